@@ -1,0 +1,56 @@
+//! Makes a room and plays all of its seats over one stream, each with its own agent.
+//!
+//! `cargo run -p chefshat-client --example many_seats -- [SERVER]`
+
+use chefshat_client::{Action, Agent, Client, RandomAgent, legal_actions, v1};
+
+/// Plays the first legal action: of the rarest face that goes, as few cards as possible.
+struct First;
+
+impl Agent for First {
+    fn decide(&mut self, request: &v1::DecisionRequest) -> Action {
+        legal_actions(request)
+            .next()
+            .expect("some action is always legal")
+    }
+}
+
+#[tokio::main]
+async fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let server = std::env::args().nth(1);
+    let client = Client::connect(server.as_deref().unwrap_or("localhost:50051")).await?;
+
+    let request = v1::CreateRoomRequest {
+        name: "many seats".to_owned(),
+        ..Default::default()
+    };
+    let made = client.create_room(request).await?;
+    let room = made.room.ok_or("the server made no room")?;
+    println!("room {}", room.room_id);
+
+    let mut seats: Vec<(String, Box<dyn Agent>)> = Vec::new();
+    for seat in &room.seats {
+        let name = format!("agent {}", seat.seat);
+        let joined = client.join_with_code(made.join_code.as_str(), name).await?;
+        let agent: Box<dyn Agent> = if seat.seat == 0 {
+            Box::new(First)
+        } else {
+            Box::new(RandomAgent::new(u64::from(seat.seat)))
+        };
+        seats.push((joined.ticket, agent));
+    }
+    for outcome in client.play_many(seats).await {
+        let outcome = outcome?;
+        let (seat, answers) = (outcome.seat, outcome.answers);
+        match outcome.standing() {
+            Some(line) => {
+                println!(
+                    "seat {seat}: place {}, {} points, {answers} decisions",
+                    line.place, line.points
+                );
+            }
+            None => println!("seat {seat}: no result"),
+        }
+    }
+    Ok(())
+}

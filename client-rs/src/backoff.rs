@@ -1,0 +1,132 @@
+//! How long to wait before connecting again, and when to give up. Only arithmetic: whoever waits lives in `run` and `spectate`.
+
+use std::time::Duration;
+
+use rand::{Rng, RngExt as _};
+use tokio::time::Instant;
+
+/// Standard wait before the first attempt to connect again.
+pub const FIRST_DELAY: Duration = Duration::from_millis(100);
+/// Standard longest wait between two attempts.
+pub const MAX_DELAY: Duration = Duration::from_secs(5);
+/// Standard time without a connection after which the seats are given up.
+pub const GIVE_UP_AFTER: Duration = Duration::from_secs(60);
+
+/// How a lost connection is made anew: waits that double from `first` to `max`, each shortened at random by up to a half so that many
+/// clients do not come back at the same instant.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Backoff {
+    /// Wait before the first attempt.
+    pub first: Duration,
+    /// Longest wait between two attempts. A connection that has held this long ends the outage before it.
+    pub max: Duration,
+    /// Length of an outage after which nothing is tried any more; zero never connects again.
+    pub give_up_after: Duration,
+}
+
+impl Default for Backoff {
+    fn default() -> Self {
+        Self {
+            first: FIRST_DELAY,
+            max: MAX_DELAY,
+            give_up_after: GIVE_UP_AFTER,
+        }
+    }
+}
+
+impl Backoff {
+    /// The wait before attempt number `attempt`, from 0.
+    fn delay(&self, attempt: u32, rng: &mut impl Rng) -> Duration {
+        let factor = 2u32.saturating_pow(attempt);
+        let full = self.first.saturating_mul(factor).min(self.max);
+        full.mul_f64(rng.random_range(0.5..=1.0))
+    }
+}
+
+/// An outage under way, or none.
+#[derive(Debug, Default)]
+pub(crate) struct Outage {
+    since: Option<Instant>,
+    attempts: u32,
+}
+
+impl Outage {
+    /// The connection is proven to work.
+    pub(crate) fn over(&mut self) {
+        *self = Self::default();
+    }
+
+    /// The connection failed at `now`: how long to wait before the next attempt, or the length of the outage if it is time to give up.
+    pub(crate) fn failed(&mut self, backoff: &Backoff, now: Instant) -> Result<Duration, Duration> {
+        let lasted = now.duration_since(*self.since.get_or_insert(now));
+        let delay = backoff.delay(self.attempts, &mut rand::rng());
+        self.attempts = self.attempts.saturating_add(1);
+        if lasted + delay > backoff.give_up_after {
+            return Err(lasted);
+        }
+        Ok(delay)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn waits_double_up_to_the_longest() {
+        let backoff = Backoff::default();
+        let mut rng = rand::rng();
+        let table = [
+            (0, 100),
+            (1, 200),
+            (4, 1600),
+            (5, 3200),
+            (6, 5000),
+            (40, 5000),
+        ];
+        for (attempt, full_ms) in table {
+            for _ in 0..100 {
+                let delay = backoff.delay(attempt, &mut rng);
+                let full = Duration::from_millis(full_ms);
+                assert!(
+                    delay >= full / 2 && delay <= full,
+                    "attempt {attempt}: {delay:?}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn an_outage_ends_in_giving_up_and_begins_anew_after_a_connection() {
+        let backoff = Backoff::default();
+        let start = Instant::now();
+        let mut now = start;
+        let mut outage = Outage::default();
+        let mut attempts = 0;
+        let lasted = loop {
+            match outage.failed(&backoff, now) {
+                Ok(delay) => now += delay,
+                Err(lasted) => break lasted,
+            }
+            attempts += 1;
+        };
+        assert_eq!(lasted, now - start);
+        assert!(lasted <= backoff.give_up_after && lasted >= backoff.give_up_after - backoff.max);
+        assert!(attempts > 10);
+
+        outage.over();
+        let delay = outage
+            .failed(&backoff, now)
+            .expect("a new outage has its whole time");
+        assert!(delay <= backoff.first);
+    }
+
+    #[test]
+    fn zero_time_never_tries_again() {
+        let backoff = Backoff {
+            give_up_after: Duration::ZERO,
+            ..Backoff::default()
+        };
+        assert!(Outage::default().failed(&backoff, Instant::now()).is_err());
+    }
+}

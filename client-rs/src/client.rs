@@ -1,0 +1,264 @@
+//! The connection to a server and the calls one makes on it. Nothing is kept here but the connection: a `Client` is cheap to clone, and
+//! everything it starts may run at the same time.
+
+use std::time::Duration;
+
+use tonic::transport::{Channel, Endpoint};
+
+use crate::session::Session;
+use crate::v1::act_request::Command;
+use crate::v1::play_service_client::PlayServiceClient;
+use crate::v1::record_service_client::RecordServiceClient;
+use crate::v1::room_service_client::RoomServiceClient;
+use crate::v1::server_service_client::ServerServiceClient;
+use crate::{Agent, Error, Outcome, PlayError, PlayOptions, Spectator, run, v1};
+
+/// Time for a connection to be made.
+const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
+/// A connection on which nothing comes for this long is probed.
+const KEEPALIVE_INTERVAL: Duration = Duration::from_secs(20);
+/// A probe not answered for this long ends the connection.
+const KEEPALIVE_TIMEOUT: Duration = Duration::from_secs(10);
+/// Bytes the server may send on a stream before the client has read them: room for a message to each of some hundred seats.
+const STREAM_WINDOW_BYTES: u32 = 1 << 20;
+/// The same for all streams of the connection together.
+const CONNECTION_WINDOW_BYTES: u32 = 4 << 20;
+/// The largest message taken from a server: the whole history of hundreds of seats, should it come as one.
+pub(crate) const MAX_RESPONSE_BYTES: usize = 64 << 20;
+
+/// A connection to a server, made again by itself when it is lost.
+#[derive(Clone, Debug)]
+pub struct Client {
+    channel: Channel,
+}
+
+impl Client {
+    /// Connects to a server at `http://host:port`, or `host:port`.
+    ///
+    /// # Errors
+    /// `ADDRESS_REFUSED` if that is no address, `CONNECT_FAILED` if nobody answers there within five seconds.
+    pub async fn connect(url: impl AsRef<str>) -> Result<Self, Error> {
+        let url = url.as_ref();
+        let address = if url.contains("://") {
+            url.to_owned()
+        } else {
+            format!("http://{url}")
+        };
+        let channel = Endpoint::from_shared(address)
+            .map_err(|cause| Error::address(url, &cause))?
+            .connect_timeout(CONNECT_TIMEOUT)
+            .tcp_nodelay(true)
+            .http2_keep_alive_interval(KEEPALIVE_INTERVAL)
+            .keep_alive_timeout(KEEPALIVE_TIMEOUT)
+            .keep_alive_while_idle(true)
+            .initial_stream_window_size(STREAM_WINDOW_BYTES)
+            .initial_connection_window_size(CONNECTION_WINDOW_BYTES)
+            .connect()
+            .await
+            .map_err(|cause| Error::connect(url, &cause))?;
+        Ok(Self::from_channel(channel))
+    }
+
+    /// Takes a channel made otherwise: with TLS, over a Unix socket, on a simulated network.
+    pub fn from_channel(channel: Channel) -> Self {
+        Self { channel }
+    }
+
+    /// The channel, for calls of the protocol that have no method here.
+    pub fn channel(&self) -> Channel {
+        self.channel.clone()
+    }
+
+    /// What the server is and can do.
+    ///
+    /// # Errors
+    /// A failed connection.
+    pub async fn server_info(&self) -> Result<v1::GetServerInfoResponse, Error> {
+        let mut service = ServerServiceClient::new(self.channel());
+        let response = service.get_server_info(v1::GetServerInfoRequest {}).await?;
+        Ok(response.into_inner())
+    }
+
+    /// The texts of all actions for a number of faces, 4..=15; 0 means the standard 11.
+    ///
+    /// # Errors
+    /// `FACES_OUT_OF_RANGE`.
+    pub async fn action_table(&self, faces: u32) -> Result<v1::GetActionTableResponse, Error> {
+        let mut service = ServerServiceClient::new(self.channel());
+        let request = v1::GetActionTableRequest { faces };
+        Ok(service.get_action_table(request).await?.into_inner())
+    }
+
+    /// Makes a room. The response holds the join code for its participants and the token that closes it.
+    ///
+    /// # Errors
+    /// `RULE_SET_REFUSED`, `POLICY_REFUSED`, `SEATS_REFUSED`, `SEED_REFUSED` or `NAME_REFUSED`, with the field at fault in the metadata;
+    /// `TOO_MANY_ROOMS`; `SHUTTING_DOWN`.
+    pub async fn create_room(
+        &self,
+        request: v1::CreateRoomRequest,
+    ) -> Result<v1::CreateRoomResponse, Error> {
+        let mut service = RoomServiceClient::new(self.channel());
+        Ok(service.create_room(request).await?.into_inner())
+    }
+
+    /// One room.
+    ///
+    /// # Errors
+    /// `ROOM_UNKNOWN`.
+    pub async fn get_room(&self, room_id: impl Into<String>) -> Result<v1::Room, Error> {
+        let mut service = RoomServiceClient::new(self.channel());
+        let request = v1::GetRoomRequest {
+            room_id: room_id.into(),
+        };
+        let response = service.get_room(request).await?.into_inner();
+        response.room.ok_or_else(|| Error::incomplete("room"))
+    }
+
+    /// A page of the server's rooms.
+    ///
+    /// # Errors
+    /// A failed connection, or a page token that the server does not know.
+    pub async fn list_rooms(
+        &self,
+        request: v1::ListRoomsRequest,
+    ) -> Result<v1::ListRoomsResponse, Error> {
+        let mut service = RoomServiceClient::new(self.channel());
+        Ok(service.list_rooms(request).await?.into_inner())
+    }
+
+    /// Takes a seat. The response holds the ticket to play on it.
+    ///
+    /// # Errors
+    /// `JOIN_CODE_WRONG`, `ROOM_FULL`, `SEAT_TAKEN`, `KIND_NOT_ADMITTED`, `GAME_STARTED`, `ROOM_UNKNOWN`.
+    pub async fn join(&self, request: v1::JoinRoomRequest) -> Result<v1::JoinRoomResponse, Error> {
+        let mut service = RoomServiceClient::new(self.channel());
+        Ok(service.join_room(request).await?.into_inner())
+    }
+
+    /// Takes the first free seat of the room with this join code, as an agent.
+    ///
+    /// # Errors
+    /// As [`Client::join`].
+    pub async fn join_with_code(
+        &self,
+        join_code: impl Into<String>,
+        name: impl Into<String>,
+    ) -> Result<v1::JoinRoomResponse, Error> {
+        let (join_code, name) = (join_code.into(), name.into());
+        self.join(v1::JoinRoomRequest {
+            join_code,
+            name,
+            ..Default::default()
+        })
+        .await
+    }
+
+    /// Closes a room; a running game is aborted.
+    ///
+    /// # Errors
+    /// `OWNER_TOKEN_WRONG`, `ROOM_UNKNOWN`.
+    pub async fn close_room(
+        &self,
+        room_id: impl Into<String>,
+        owner_token: impl Into<String>,
+    ) -> Result<v1::Room, Error> {
+        let mut service = RoomServiceClient::new(self.channel());
+        let request = v1::CloseRoomRequest {
+            room_id: room_id.into(),
+            owner_token: owner_token.into(),
+        };
+        let response = service.close_room(request).await?.into_inner();
+        response.room.ok_or_else(|| Error::incomplete("room"))
+    }
+
+    /// The record of a game that has ended, line by line.
+    ///
+    /// # Errors
+    /// `GAME_UNKNOWN`, `GAME_RUNNING`.
+    pub async fn record(&self, game_id: impl Into<String>) -> Result<Vec<v1::RecordLine>, Error> {
+        let mut service =
+            RecordServiceClient::new(self.channel()).max_decoding_message_size(MAX_RESPONSE_BYTES);
+        let request = v1::GetRecordRequest {
+            game_id: game_id.into(),
+        };
+        let mut stream = service.get_record(request).await?.into_inner();
+        let mut lines = Vec::new();
+        while let Some(part) = stream.message().await? {
+            lines.extend(part.lines);
+        }
+        Ok(lines)
+    }
+
+    /// Has a seat express something, also while it is being played.
+    ///
+    /// # Errors
+    /// `TICKET_UNKNOWN`, `EXPRESSION_REFUSED`, `GAME_OVER`.
+    pub async fn express(
+        &self,
+        ticket: impl Into<String>,
+        expression: v1::Expression,
+    ) -> Result<(), Error> {
+        let mut service = PlayServiceClient::new(self.channel());
+        let request = v1::ActRequest {
+            ticket: ticket.into(),
+            command: Some(Command::Express(expression)),
+        };
+        service.act(request).await?;
+        Ok(())
+    }
+
+    /// Watches a room, from an event number on; 0 and 1 are its beginning. The connection is made with the first event asked for.
+    pub fn spectate(&self, room_id: impl Into<String>, from_sequence: u64) -> Spectator {
+        Spectator::new(self.channel(), room_id.into(), from_sequence)
+    }
+
+    /// Plays a seat to the end of its game. Dropping the future leaves the seat.
+    ///
+    /// # Errors
+    /// See [`PlayError`]; lost connections are made again with the standard [`Backoff`](crate::Backoff).
+    pub async fn play(
+        &self,
+        ticket: impl Into<String>,
+        agent: impl Agent,
+    ) -> Result<Outcome, PlayError> {
+        let options = PlayOptions::default();
+        self.play_with(ticket, agent, &options).await
+    }
+
+    /// The same with options.
+    ///
+    /// # Errors
+    /// See [`PlayError`].
+    pub async fn play_with(
+        &self,
+        ticket: impl Into<String>,
+        agent: impl Agent,
+        options: &PlayOptions,
+    ) -> Result<Outcome, PlayError> {
+        let outcomes = self.play_many_with([(ticket.into(), agent)], options).await;
+        let outcome = outcomes.into_iter().next();
+        outcome.expect("there is an outcome for each seat")
+    }
+
+    /// Plays any number of seats, in any number of games, over one stream. The outcomes come when all games are over, in the order of the
+    /// seats. For agents of different types give `Box<dyn Agent>`.
+    pub async fn play_many<A: Agent>(
+        &self,
+        seats: impl IntoIterator<Item = (String, A)>,
+    ) -> Vec<Result<Outcome, PlayError>> {
+        let options = PlayOptions::default();
+        self.play_many_with(seats, &options).await
+    }
+
+    /// The same with options.
+    pub async fn play_many_with<A: Agent>(
+        &self,
+        seats: impl IntoIterator<Item = (String, A)>,
+        options: &PlayOptions,
+    ) -> Vec<Result<Outcome, PlayError>> {
+        let mut session = Session::new(seats, options);
+        run::run(self.channel(), &mut session, &options.backoff).await;
+        session.into_outcomes()
+    }
+}

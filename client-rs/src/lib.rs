@@ -1,0 +1,29 @@
+//! The parts, each in a module of its own: what an agent is ([`Agent`]), how it is connected ([`Client`]), what it gets out of a game
+//! ([`Outcome`], [`PlayError`]), how one watches ([`Spectator`]). The messages are those of the protocol, re-exported as [`v1`].
+//! No rules of the game live here: the server says what is legal.
+#![doc = ""]
+#![doc = include_str!("../README.md")]
+
+mod agent;
+mod backoff;
+mod client;
+mod error;
+mod mask;
+mod options;
+mod outcome;
+mod random;
+mod run;
+mod seat;
+mod session;
+mod spectate;
+
+pub use agent::{Action, Agent};
+pub use backoff::{Backoff, FIRST_DELAY, GIVE_UP_AFTER, MAX_DELAY};
+pub use chefshat_proto::v1;
+pub use client::Client;
+pub use error::{Error, PlayError};
+pub use mask::{is_legal, legal_actions, legal_count, nth_legal};
+pub use options::{ENTROPY_BYTES, Entropy, PlayOptions};
+pub use outcome::{Ending, Outcome};
+pub use random::RandomAgent;
+pub use spectate::Spectator;

@@ -1,0 +1,80 @@
+//! Reading the mask of legal actions: bit i%8 of byte i/8 is action i. An empty mask (the seat asked for none) has no legal actions
+//! here; the server still knows them.
+
+use crate::{Action, v1};
+
+/// The legal actions of a decision, ascending.
+pub fn legal_actions(request: &v1::DecisionRequest) -> impl Iterator<Item = Action> + '_ {
+    (0u32..)
+        .zip(&request.action_mask)
+        .flat_map(|(index, &byte)| {
+            let mut rest = byte;
+            std::iter::from_fn(move || {
+                let bit = (rest != 0).then(|| rest.trailing_zeros())?;
+                rest &= rest - 1;
+                Some(Action(8 * index + bit))
+            })
+        })
+}
+
+/// The number of legal actions of a decision.
+pub fn legal_count(request: &v1::DecisionRequest) -> usize {
+    let ones = |byte: &u8| byte.count_ones() as usize;
+    request.action_mask.iter().map(ones).sum()
+}
+
+/// The legal action with `n` legal ones below it; `None` if there are not that many.
+pub fn nth_legal(request: &v1::DecisionRequest, n: usize) -> Option<Action> {
+    let mut left = n;
+    for (index, &byte) in (0u32..).zip(&request.action_mask) {
+        let ones = byte.count_ones() as usize;
+        if left < ones {
+            let mut rest = byte;
+            for _ in 0..left {
+                rest &= rest - 1;
+            }
+            return Some(Action(8 * index + rest.trailing_zeros()));
+        }
+        left -= ones;
+    }
+    None
+}
+
+/// Whether an action is legal in a decision.
+pub fn is_legal(request: &v1::DecisionRequest, action: Action) -> bool {
+    let byte = usize::try_from(action.0 / 8)
+        .ok()
+        .and_then(|index| request.action_mask.get(index));
+    byte.is_some_and(|byte| byte >> (action.0 % 8) & 1 == 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn masks_read_as_listed() {
+        let table: [(&[u8], &[u32]); 6] = [
+            (&[], &[]),
+            (&[0, 0], &[]),
+            (&[0b0000_0001], &[0]),
+            (&[0b1000_0000, 0b0000_0001], &[7, 8]),
+            (&[0, 0b1010_0000, 0, 0b0000_0110], &[13, 15, 25, 26]),
+            (&[0xff], &[0, 1, 2, 3, 4, 5, 6, 7]),
+        ];
+        for (mask, expected) in table {
+            let request = v1::DecisionRequest {
+                action_mask: mask.to_vec(),
+                ..Default::default()
+            };
+            let expected: Vec<Action> = expected.iter().copied().map(Action).collect();
+            assert_eq!(legal_actions(&request).collect::<Vec<_>>(), expected);
+            assert_eq!(legal_count(&request), expected.len());
+            let nth: Vec<Action> = (0..).map_while(|n| nth_legal(&request, n)).collect();
+            assert_eq!(nth, expected);
+            for action in (0..40).map(Action).chain([Action(u32::MAX)]) {
+                assert_eq!(is_legal(&request, action), expected.contains(&action));
+            }
+        }
+    }
+}

@@ -1,0 +1,107 @@
+//! The simplest agent: any legal action, all equally likely.
+
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+
+use crate::{Action, Agent, legal_count, nth_legal, v1};
+
+/// Actions of a turn in the standard numbering, until the start of the game names another.
+const STANDARD_TURN_ACTIONS: u32 = 200;
+/// All actions in the standard numbering, until the start of the game names another.
+const STANDARD_ACTIONS: u32 = 214;
+
+/// Plays uniformly at random among the legal actions; without a mask among all actions of the decision's kind, legal or not. Its choices
+/// are a function of its seed and of what it is asked.
+#[derive(Debug, Clone)]
+pub struct RandomAgent {
+    rng: ChaCha8Rng,
+    turn_actions: u32,
+    actions: u32,
+}
+
+impl RandomAgent {
+    /// An agent with this seed.
+    pub fn new(seed: u64) -> Self {
+        Self {
+            rng: ChaCha8Rng::seed_from_u64(seed),
+            turn_actions: STANDARD_TURN_ACTIONS,
+            actions: STANDARD_ACTIONS,
+        }
+    }
+
+    /// A number below `n`, by multiplication: of a bias nobody can measure at these sizes, and the same in every version.
+    fn below(&mut self, n: u32) -> u32 {
+        let product = u64::from(self.rng.next_u32()) * u64::from(n);
+        u32::try_from(product >> 32).expect("the upper half of a product of two u32 is a u32")
+    }
+}
+
+impl Agent for RandomAgent {
+    fn decide(&mut self, request: &v1::DecisionRequest) -> Action {
+        let legal = u32::try_from(legal_count(request)).unwrap_or(u32::MAX);
+        if legal == 0 {
+            return if request.kind() == v1::DecisionKind::Turn {
+                Action(self.below(self.turn_actions))
+            } else {
+                let others = self.actions.saturating_sub(self.turn_actions);
+                Action(self.turn_actions.saturating_add(self.below(others)))
+            };
+        }
+        let n = self.below(legal);
+        nth_legal(request, n as usize).expect("n is below the number of legal actions")
+    }
+
+    fn on_event(&mut self, event: &v1::GameEvent) {
+        if let Some(v1::game_event::Kind::GameStarted(start)) = &event.kind
+            && let Some(space) = &start.action_space
+        {
+            self.turn_actions = space.turn_actions;
+            self.actions = space.size;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn request(mask: &[u8], kind: v1::DecisionKind) -> v1::DecisionRequest {
+        v1::DecisionRequest {
+            action_mask: mask.to_vec(),
+            kind: kind.into(),
+            ..Default::default()
+        }
+    }
+
+    #[test]
+    fn reaches_every_legal_action_and_no_other() {
+        let request = request(&[0b0010_0101, 0b1000_0000], v1::DecisionKind::Turn);
+        let mut agent = RandomAgent::new(1);
+        let mut seen: Vec<u32> = (0..1000).map(|_| agent.decide(&request).0).collect();
+        seen.sort_unstable();
+        seen.dedup();
+        assert_eq!(seen, [0, 2, 5, 15]);
+    }
+
+    #[test]
+    fn same_seed_same_choices() {
+        let request = request(&[0xff; 27], v1::DecisionKind::Turn);
+        let play = |seed| -> Vec<Action> {
+            let mut agent = RandomAgent::new(seed);
+            (0..50).map(|_| agent.decide(&request)).collect()
+        };
+        assert_eq!(play(7), play(7));
+        assert_ne!(play(7), play(8));
+    }
+
+    #[test]
+    fn without_a_mask_stays_in_its_kind_of_decision() {
+        let mut agent = RandomAgent::new(3);
+        for _ in 0..1000 {
+            let turn = agent.decide(&request(&[], v1::DecisionKind::Turn));
+            assert!(turn.0 < 200);
+            let give = agent.decide(&request(&[], v1::DecisionKind::Exchange));
+            assert!((200..214).contains(&give.0));
+        }
+    }
+}

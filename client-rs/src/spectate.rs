@@ -1,0 +1,137 @@
+//! Watching a room: its public events, each once and in order, across lost connections.
+
+use std::collections::VecDeque;
+
+use futures::Stream;
+use tokio::time::{Instant, sleep};
+use tonic::transport::Channel;
+use tonic::{Status, Streaming};
+
+use crate::backoff::{Backoff, Outage};
+use crate::client::MAX_RESPONSE_BYTES;
+use crate::error::{Error, may_retry};
+use crate::v1::{self, spectator_service_client::SpectatorServiceClient};
+
+/// A spectator of one room. Made by [`Client::spectate`](crate::Client::spectate).
+#[derive(Debug)]
+pub struct Spectator {
+    client: SpectatorServiceClient<Channel>,
+    room_id: String,
+    next_event: u64,
+    backoff: Backoff,
+    outage: Outage,
+    stream: Option<(Streaming<v1::SpectatorServiceWatchResponse>, Instant)>,
+    ready: VecDeque<v1::GameEvent>,
+    room: Option<v1::Room>,
+    ended: bool,
+}
+
+impl Spectator {
+    pub(crate) fn new(channel: Channel, room_id: String, from_sequence: u64) -> Self {
+        Self {
+            client: SpectatorServiceClient::new(channel)
+                .max_decoding_message_size(MAX_RESPONSE_BYTES),
+            room_id,
+            next_event: from_sequence,
+            backoff: Backoff::default(),
+            outage: Outage::default(),
+            stream: None,
+            ready: VecDeque::new(),
+            room: None,
+            ended: false,
+        }
+    }
+
+    /// With this backoff instead of the standard one.
+    #[must_use]
+    pub fn with_backoff(mut self, backoff: Backoff) -> Self {
+        self.backoff = backoff;
+        self
+    }
+
+    /// The room as it stood when the watching last began; `None` before the first event.
+    pub fn room(&self) -> Option<&v1::Room> {
+        self.room.as_ref()
+    }
+
+    /// Number of the next event to come: where to go on in another process.
+    pub fn next_sequence(&self) -> u64 {
+        let first = self.ready.front().map(|event| event.sequence);
+        first.unwrap_or(self.next_event).max(1)
+    }
+
+    /// The next event, or `None` when the game is over. May be dropped while it waits: nothing is lost.
+    ///
+    /// # Errors
+    /// What the server refuses (`ROOM_UNKNOWN`, `SPECTATORS_NOT_ADMITTED`), or the last failure when the connection cannot be made
+    /// again in time. After an error there is nothing more.
+    pub async fn next(&mut self) -> Result<Option<v1::GameEvent>, Error> {
+        loop {
+            if let Some(event) = self.ready.pop_front() {
+                return Ok(Some(event));
+            }
+            if self.ended {
+                return Ok(None);
+            }
+            match self.receive().await {
+                Ok(Some(response)) => self.take(response),
+                Ok(None) => self.ended = true,
+                Err(status) => self.lost(status).await?,
+            }
+        }
+    }
+
+    /// The same as a [`Stream`].
+    pub fn into_stream(self) -> impl Stream<Item = Result<v1::GameEvent, Error>> + Send {
+        futures::stream::try_unfold(self, |mut spectator| async {
+            let event = spectator.next().await?;
+            Ok(event.map(|event| (event, spectator)))
+        })
+    }
+
+    async fn receive(&mut self) -> Result<Option<v1::SpectatorServiceWatchResponse>, Status> {
+        if self.stream.is_none() {
+            let request = v1::SpectatorServiceWatchRequest {
+                room_id: self.room_id.clone(),
+                from_sequence: self.next_event,
+                snapshot: false,
+            };
+            let stream = self.client.watch(request).await?.into_inner();
+            self.stream = Some((stream, Instant::now()));
+        }
+        match &mut self.stream {
+            Some((stream, _)) => stream.message().await,
+            None => Ok(None),
+        }
+    }
+
+    fn take(&mut self, response: v1::SpectatorServiceWatchResponse) {
+        if response.room.is_some() {
+            self.room = response.room;
+        }
+        for event in response.events {
+            if event.sequence >= self.next_event {
+                self.next_event = event.sequence.saturating_add(1);
+                self.outage.over();
+                self.ready.push_back(event);
+            }
+        }
+    }
+
+    async fn lost(&mut self, status: Status) -> Result<(), Error> {
+        let opened = self.stream.take().map(|(_, opened)| opened);
+        if opened.is_some_and(|opened| opened.elapsed() >= self.backoff.max) {
+            self.outage.over();
+        }
+        let retry = may_retry(status.code())
+            .then(|| self.outage.failed(&self.backoff, Instant::now()).ok())
+            .flatten();
+        let Some(delay) = retry else {
+            self.ended = true;
+            return Err(status.into());
+        };
+        tracing::info!(?delay, "connection lost: {status}");
+        sleep(delay).await;
+        Ok(())
+    }
+}

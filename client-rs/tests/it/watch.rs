@@ -1,0 +1,58 @@
+//! A spectator whose stream breaks.
+
+use std::time::Duration;
+
+use chefshat_client::{Backoff, v1};
+use futures::TryStreamExt as _;
+use tonic::{Code, Status};
+
+use crate::fake::{Fake, event};
+
+fn part(
+    numbers: impl IntoIterator<Item = u64>,
+) -> Result<v1::SpectatorServiceWatchResponse, Status> {
+    Ok(v1::SpectatorServiceWatchResponse {
+        events: numbers.into_iter().map(event).collect(),
+        ..Default::default()
+    })
+}
+
+fn quick() -> Backoff {
+    Backoff {
+        first: Duration::from_millis(1),
+        max: Duration::from_millis(10),
+        ..Backoff::default()
+    }
+}
+
+#[tokio::test]
+async fn events_come_once_and_in_order_across_lost_streams() {
+    let fake = Fake::default();
+    fake.watch(vec![
+        part(1..=2),
+        part([]),
+        Err(Status::resource_exhausted("too slow")),
+    ]);
+    fake.watch(vec![Err(Status::unavailable("not now"))]);
+    fake.watch(vec![part(2..=4), part([5])]);
+    let client = fake.start().await;
+    let spectator = client.spectate("room", 0).with_backoff(quick());
+    let events: Vec<_> = spectator.into_stream().try_collect().await.unwrap();
+    let numbers: Vec<_> = events.iter().map(|event| event.sequence).collect();
+    assert_eq!(numbers, [1, 2, 3, 4, 5]);
+    assert_eq!(fake.watched_from(), [0, 3, 3]);
+    assert!(fake.is_done());
+}
+
+#[tokio::test]
+async fn a_refusal_ends_the_watching() {
+    let fake = Fake::default();
+    fake.watch(vec![Err(Status::not_found("no such room"))]);
+    fake.watch(vec![part([1])]);
+    let client = fake.start().await;
+    let mut spectator = client.spectate("room", 5).with_backoff(quick());
+    assert_eq!(spectator.next_sequence(), 5);
+    assert_eq!(spectator.next().await.unwrap_err().code(), Code::NotFound);
+    assert_eq!(spectator.next().await.unwrap(), None);
+    assert!(!fake.is_done());
+}

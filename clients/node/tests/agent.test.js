@@ -1,0 +1,160 @@
+// The agent against a server made of a few lines, which says exactly what each test needs: one game as a script, with its lost
+// connections and refusals. Nothing here knows the rules; the game against the real server is in server.test.js.
+import assert from "node:assert/strict";
+import { spawn } from "node:child_process";
+import { once } from "node:events";
+import { fileURLToPath } from "node:url";
+import { after, test } from "node:test";
+import grpc from "@grpc/grpc-js";
+import { legalActions, play, protocol } from "../agent.js";
+
+const AGENT = fileURLToPath(new URL("../agent.js", import.meta.url));
+const STANDINGS = [{ seat: 2, points: 15, place: 1 }, { seat: 0, points: 9, place: 2 }];
+const servers = [];
+after(() => servers.forEach((server) => server.forceShutdown()));
+
+/** A server whose n-th connection is met by the n-th of `connections`, each a function of the stream and its first message. */
+async function serve(...connections) {
+  const joins = [];
+  const server = new grpc.Server();
+  server.addService(protocol.RoomService.service, {
+    JoinRoom: ({ request }, done) => {
+      joins.push(request);
+      if (request.join_code === "TABLE") done(null, { seat: 2, ticket: "a ticket" });
+      else done({ code: grpc.status.PERMISSION_DENIED, details: "no room has this join code" });
+    },
+  });
+  server.addService(protocol.PlayService.service, {
+    Play: async (stream) => {
+      const messages = stream[Symbol.asyncIterator]();
+      const read = async () => (await messages.next()).value?.commands;
+      await connections.shift()(stream, read);
+    },
+  });
+  servers.push(server);
+  const port = await new Promise((resolve, reject) => {
+    const bound = (error, number) => (error ? reject(error) : resolve(number));
+    server.bindAsync("127.0.0.1:0", grpc.ServerCredentials.createInsecure(), bound);
+  });
+  return { address: `127.0.0.1:${port}`, joins, left: connections };
+}
+
+const ask = (decision_id, ...bytes) => ({ handle: 4, decision: { decision_id, action_mask: Buffer.from(bytes) } });
+const events = (...list) => ({ handle: 4, events: { events: list } });
+const ended = (sequence) => ({ sequence, game_ended: { standings: STANDINGS } });
+const detached = (reason) => ({ handle: 4, detached: { reason: `DETACH_REASON_${reason}` } });
+
+for (const [bytes, actions] of [
+  [[], []],
+  [[0b0000_0001], [0]],
+  [[0b1000_0000, 0, 0b0000_0110], [7, 17, 18]],
+  [[0xff], [0, 1, 2, 3, 4, 5, 6, 7]],
+]) {
+  test(`the mask ${JSON.stringify(bytes)} allows ${JSON.stringify(actions)}`, () => {
+    assert.deepEqual(legalActions(Buffer.from(bytes)), actions);
+  });
+}
+
+test("a game: attach, answer with a set bit, tell the standings", async () => {
+  const answers = [];
+  const server = await serve(async (stream, read) => {
+    const [{ attach }] = await read();
+    assert.equal(attach.ticket, "a ticket");
+    assert.equal(attach.from_sequence, 0);
+    stream.write({ updates: [{ handle: 4, attached: { seat: 2, next_sequence: 1 } }] });
+    for (let id = 1; id <= 20; id += 1) {
+      stream.write({ updates: [events({ sequence: id }), ask(id, 0, 0b0010_0100)] });
+      const [{ handle, answer }] = await read();
+      assert.equal(handle, 4);
+      answers.push([answer.decision_id, answer.action]);
+    }
+    stream.write({ updates: [events(ended(21)), detached("GAME_OVER")] });
+  });
+  const result = await play({ address: server.address, code: "TABLE", name: "Ada" });
+  assert.deepEqual(result, { seat: 2, standings: STANDINGS });
+  assert.deepEqual(answers.map(([id]) => id), Array.from({ length: 20 }, (_, i) => i + 1));
+  for (const [, action] of answers) assert.ok([10, 13].includes(action), `action ${action} is not in the mask`);
+  assert.equal(server.joins.length, 1);
+  assert.deepEqual([server.joins[0].name, server.joins[0].kind], ["Ada", "PARTICIPANT_KIND_AGENT"]);
+});
+
+test("lost connections are made again and resume after the last event seen", async () => {
+  const from = [];
+  const attach = async (read) => from.push((await read())[0].attach.from_sequence);
+  const server = await serve(
+    async (stream, read) => {
+      await attach(read);
+      stream.write({ updates: [events({ sequence: 1 }, { sequence: 2 }), ask(1, 1)] });
+      await read();
+      stream.emit("error", { code: grpc.status.UNAVAILABLE, details: "cut" });
+    },
+    async (stream, read) => {
+      await attach(read);
+      stream.end();
+    },
+    async (stream, read) => {
+      await attach(read);
+      stream.write({ updates: [events({ sequence: 3 }, ended(4)), detached("GAME_OVER")] });
+    },
+  );
+  const { standings } = await play({ address: server.address, code: "TABLE", name: "Ada" });
+  assert.deepEqual(standings, STANDINGS);
+  assert.deepEqual(from, [0, 3, 3]);
+  assert.equal(server.left.length, 0);
+});
+
+for (const [what, updates, message] of [
+  ["a refusal", [{ refused: { reason: "TICKET_UNKNOWN", message: "join again" } }], /refused: join again \(TICKET_UNKNOWN\)/],
+  ["a newer connection", [detached("SUPERSEDED")], /the seat is lost \(DETACH_REASON_SUPERSEDED\)/],
+  [
+    "an aborted game",
+    [events({ sequence: 1, game_aborted: { reason: "ABORT_REASON_SHUTDOWN" } }), detached("GAME_OVER")],
+    /no result \(ABORT_REASON_SHUTDOWN\)/,
+  ],
+]) {
+  test(`${what} is an error, and no reason to connect again`, async () => {
+    const server = await serve(async (stream, read) => {
+      await read();
+      stream.write({ updates });
+    });
+    await assert.rejects(play({ address: server.address, code: "TABLE", name: "Ada" }), message);
+    assert.equal(server.left.length, 0);
+  });
+}
+
+/** Runs the agent as a process of its own. */
+async function run(args, env = {}) {
+  const agent = spawn(process.execPath, [AGENT, ...args], { env: { ...process.env, ...env } });
+  let [out, err] = ["", ""];
+  agent.stdout.on("data", (part) => { out += part; });
+  agent.stderr.on("data", (part) => { err += part; });
+  const [status] = await once(agent, "close");
+  return { status, out, err };
+}
+
+test("the process prints the standings as one line of JSON and exits with 0", async () => {
+  const server = await serve(async (stream, read) => {
+    await read();
+    stream.write({ updates: [events(ended(1)), detached("GAME_OVER")] });
+  });
+  const { status, out, err } = await run(["--address", server.address], { CHEFSHAT_CODE: "TABLE" });
+  assert.equal(err, "");
+  assert.equal(status, 0);
+  assert.match(out, /^[^\n]+\n$/);
+  assert.deepEqual(JSON.parse(out), { seat: 2, standings: STANDINGS });
+});
+
+test("the process says what is wrong and exits with 1", async () => {
+  const { address } = await serve();
+  const wrongCode = await run(["--address", address, "--code", "WRONG"]);
+  assert.deepEqual(wrongCode, { status: 1, out: "", err: "agent: no room has this join code\n" });
+
+  servers.pop().forceShutdown();
+  const nobodyThere = await run(["--address", address, "--code", "TABLE"]);
+  assert.equal(nobodyThere.status, 1);
+  assert.match(nobodyThere.err, /^agent: .*ECONNREFUSED/);
+
+  const misspelt = await run(["--adress", address]);
+  assert.equal(misspelt.status, 1);
+  assert.match(misspelt.err, /^agent: .*--adress/);
+});

@@ -1,0 +1,18 @@
+//! The `chefshat.v1` protocol: messages, service traits and clients, generated from the `.proto` files beside this crate, with the
+//! canonical JSON form of every message (serde). The documentation of each item is the comment in its `.proto` file.
+
+/// Everything of package `chefshat.v1`.
+#[allow(
+    missing_docs,
+    unreachable_pub,
+    clippy::all,
+    clippy::unwrap_used,
+    reason = "generated code"
+)]
+pub mod v1 {
+    tonic::include_proto!("chefshat.v1");
+    include!(concat!(env!("OUT_DIR"), "/chefshat.v1.serde.rs"));
+}
+
+/// The encoded `FileDescriptorSet` of the protocol, as the reflection service serves it.
+pub const DESCRIPTORS: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/descriptors.bin"));

@@ -1,0 +1,109 @@
+//! The built-in agents. Each is a function of what its seat may know and of its own generator, and of nothing else.
+
+use chefshat_engine::{Action, ActionSpace, DecisionKind, Mask, Move, Observation, Role};
+use rand::{Rng as _, RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+
+/// Which built-in agent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum AgentKind {
+    /// Uniform over the legal actions.
+    Random,
+    /// At a turn uniform over all T actions of a turn, valid or not (the paper's random agent); elsewhere as `Random`.
+    RandomUnmasked,
+    /// Sheds as many of its least rare cards as it can, keeps jokers, gives away its worst.
+    Greedy,
+}
+
+impl AgentKind {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Random, Self::RandomUnmasked, Self::Greedy];
+
+    /// The name by which people and messages call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Random => "random",
+            Self::RandomUnmasked => "random_unmasked",
+            Self::Greedy => "greedy",
+        }
+    }
+
+    /// The agent of a name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.name() == name)
+    }
+}
+
+/// A built-in agent with its generator.
+#[derive(Debug, Clone)]
+pub struct BuiltInAgent {
+    kind: AgentKind,
+    generator: ChaCha8Rng,
+}
+
+impl BuiltInAgent {
+    /// An agent whose choices follow from `seed` alone.
+    pub fn new(kind: AgentKind, seed: [u8; 32]) -> Self {
+        Self {
+            kind,
+            generator: ChaCha8Rng::from_seed(seed),
+        }
+    }
+
+    /// Which agent it is.
+    pub fn kind(&self) -> AgentKind {
+        self.kind
+    }
+
+    /// Decides. The action is one of `legal`, except that `random_unmasked` may answer a turn with any of its T actions.
+    ///
+    /// # Panics
+    /// When `legal` is empty: there is no decision to take.
+    pub fn decide(&mut self, observation: &Observation, legal: &Mask) -> Action {
+        let space = ActionSpace::new(observation.faces).expect("an observation has 4 to 15 faces");
+        let turn = observation.kind == Some(DecisionKind::Turn);
+        match self.kind {
+            AgentKind::RandomUnmasked if turn => {
+                Action::new(self.generator.random_range(0..space.turn_actions()))
+            }
+            AgentKind::Random | AgentKind::RandomUnmasked => self.uniform(legal),
+            AgentKind::Greedy => greedy(observation, legal, space),
+        }
+    }
+
+    fn uniform(&mut self, legal: &Mask) -> Action {
+        let count = u32::try_from(legal.len()).expect("a mask has below 400 actions");
+        assert!(count > 0, "a decision has a legal action");
+        // The bias of a multiplication with 32 random bits is below 400 / 2^32.
+        let index = (u64::from(self.generator.next_u32()) * u64::from(count)) >> 32;
+        legal
+            .nth(usize::try_from(index).expect("an index below the count"))
+            .expect("the index is below the number of actions")
+    }
+}
+
+/// Prefers, in this order: no jokers, the least rare face, many cards; a pass only when nothing can be played. Gives its least rare
+/// card. Declares where an exchange would cost it cards.
+fn greedy(observation: &Observation, legal: &Mask, space: ActionSpace) -> Action {
+    let role = observation
+        .seat
+        .and_then(|seat| observation.roles[seat]);
+    legal
+        .iter()
+        .max_by_key(|action| match space.decode(*action) {
+            Some(Move::Play {
+                face,
+                quantity,
+                jokers,
+            }) => (3, -i16::from(jokers), i16::from(face.get()), i16::from(quantity)),
+            Some(Move::LoneJoker) => (3, -1, -1, 0),
+            Some(Move::Give(face)) => (3, 0, i16::from(face.get()), 0),
+            Some(Move::GiveJoker) => (2, 0, 0, 0),
+            Some(Move::Declare) if matches!(role, Some(Role::Waiter | Role::Dishwasher)) => {
+                (3, 0, 0, 0)
+            }
+            Some(Move::Decline) => (2, 0, 0, 0),
+            Some(Move::Pass | Move::Declare) | None => (1, 0, 0, 0),
+        })
+        .expect("a decision has a legal action")
+}

@@ -1,0 +1,261 @@
+//! Cards as the engine counts them: a multiset packed in one number. The order in which cards were dealt is not kept here (see
+//! [`crate::Deal`]).
+
+use std::fmt;
+
+use crate::{Face, MAX_FACES};
+
+/// Bits of one count.
+const BITS: u32 = 4;
+const JOKER_SHIFT: u32 = 60;
+const JOKER_ONE: u64 = 1 << JOKER_SHIFT;
+const GOLDEN: u64 = 1 << 62;
+const FACE_BITS: u64 = JOKER_ONE - 1;
+const LOW_NIBBLES: u64 = 0x0F0F_0F0F_0F0F_0F0F;
+const BYTE_ONES: u64 = 0x0101_0101_0101_0101;
+
+/// A multiset of cards: how many of each face, how many jokers, and whether one of the cards of the top face is the Golden one.
+///
+/// Four bits for each face from face 1 in the lowest, jokers in bits 60 and 61, the Golden card's flag in bit 62. The Golden card counts
+/// among the cards of its face.
+#[derive(Copy, Clone, Eq, PartialEq, Default, Hash)]
+pub struct Cards(u64);
+
+impl Cards {
+    /// No cards.
+    pub const EMPTY: Cards = Cards(0);
+
+    /// The cards with these counts (faces 1..=F ascending, then jokers: F+1 numbers), one of face F the Golden card if `golden`. `None` if a
+    /// count is larger than any deck has, the number of counts is wrong or there is no card of face F to be golden.
+    pub fn from_counts(faces: u8, counts: &[u8], golden: bool) -> Option<Cards> {
+        if faces == 0 || faces > MAX_FACES || counts.len() != usize::from(faces) + 1 {
+            return None;
+        }
+        let mut cards = Cards::EMPTY;
+        for (number, &count) in (1..=faces).zip(counts) {
+            if count > number {
+                return None;
+            }
+            cards.add_face(Face::of(number), count);
+        }
+        let jokers = counts[usize::from(faces)];
+        if jokers > crate::MAX_JOKERS || (golden && counts[usize::from(faces) - 1] == 0) {
+            return None;
+        }
+        cards.add_jokers(jokers);
+        if golden {
+            cards.0 |= GOLDEN;
+        }
+        Some(cards)
+    }
+
+    /// The whole deck of so many faces and jokers.
+    pub(crate) fn deck(faces: u8, jokers: u8) -> Cards {
+        let mut cards = Cards(GOLDEN);
+        (1..=faces).for_each(|number| cards.add_face(Face::of(number), number));
+        cards.add_jokers(jokers);
+        cards
+    }
+
+    /// How many cards of a face, the Golden one included.
+    pub const fn count(self, face: Face) -> u8 {
+        self.count_of(face.get())
+    }
+
+    /// How many cards of the face with this number, 1..=15.
+    pub(crate) const fn count_of(self, number: u8) -> u8 {
+        ((self.0 >> (BITS * (number as u32 - 1))) & 0xF) as u8
+    }
+
+    /// How many jokers.
+    pub const fn jokers(self) -> u8 {
+        ((self.0 >> JOKER_SHIFT) & 0x3) as u8
+    }
+
+    /// Whether the Golden card is among them.
+    pub const fn has_golden(self) -> bool {
+        self.0 & GOLDEN != 0
+    }
+
+    /// How many cards in all.
+    pub const fn len(self) -> u8 {
+        self.faces_len() + self.jokers()
+    }
+
+    /// How many ingredient cards, that is, cards that are no jokers.
+    pub const fn faces_len(self) -> u8 {
+        let faces = self.0 & FACE_BITS;
+        let pairs = (faces & LOW_NIBBLES) + ((faces >> BITS) & LOW_NIBBLES);
+        (pairs.wrapping_mul(BYTE_ONES) >> 56) as u8
+    }
+
+    /// Whether there are no cards.
+    pub const fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    /// The rarest face (the lowest number) among the cards, or `None` if there are none but jokers.
+    pub fn rarest(self) -> Option<Face> {
+        let faces = self.0 & FACE_BITS;
+        (faces != 0).then(|| Face::of((faces.trailing_zeros() / BITS) as u8 + 1))
+    }
+
+    /// The highest face among the cards, or `None` if there are none but jokers.
+    pub fn highest(self) -> Option<Face> {
+        let faces = self.0 & FACE_BITS;
+        (faces != 0).then(|| Face::of(((63 - faces.leading_zeros()) / BITS) as u8 + 1))
+    }
+
+    /// The counts of a deck with this many faces: faces 1..=F ascending, then jokers, F+1 numbers.
+    pub fn counts(self, faces: u8) -> impl ExactSizeIterator<Item = u8> {
+        (0..faces + 1).map(move |index| if index == faces { self.jokers() } else { self.count_of(index + 1) })
+    }
+
+    /// The cards ascending: faces by their number, then F+1 for each joker.
+    pub fn ascending(self, faces: u8) -> impl Iterator<Item = u8> {
+        self.counts(faces).zip(1u8..).flat_map(|(count, number)| std::iter::repeat_n(number, usize::from(count)))
+    }
+
+    /// These and other cards together. `None` if a count would be larger than any deck has or there would be two Golden cards.
+    pub fn union(self, other: Cards) -> Option<Cards> {
+        let mut sum = self;
+        for number in 1..=MAX_FACES {
+            if self.count_of(number) + other.count_of(number) > number {
+                return None;
+            }
+        }
+        if self.jokers() + other.jokers() > crate::MAX_JOKERS || (self.has_golden() && other.has_golden()) {
+            return None;
+        }
+        sum.add(other);
+        Some(sum)
+    }
+
+    /// Whether all of `other` is among these cards, the Golden one not considered.
+    pub fn contains(self, other: Cards) -> bool {
+        self.jokers() >= other.jokers() && (1..=MAX_FACES).all(|number| self.count_of(number) >= other.count_of(number))
+    }
+
+    /// These cards without `n` of a face; the Golden card goes last of its face. `None` if there are not so many.
+    pub fn without_face(self, face: Face, n: u8) -> Option<Cards> {
+        let mut left = self;
+        (self.count(face) >= n).then(|| {
+            left.take_face(face, n);
+            left
+        })
+    }
+
+    /// These cards without `n` jokers. `None` if there are not so many.
+    pub fn without_jokers(self, n: u8) -> Option<Cards> {
+        (self.jokers() >= n).then(|| Cards(self.0 - u64::from(n) * JOKER_ONE))
+    }
+
+    pub(crate) fn add_face(&mut self, face: Face, n: u8) {
+        self.0 += u64::from(n) << (BITS * u32::from(face.get() - 1));
+    }
+
+    pub(crate) fn add_jokers(&mut self, n: u8) {
+        self.0 += u64::from(n) * JOKER_ONE;
+    }
+
+    /// Adds cards that are known to fit: all are of one deck.
+    pub(crate) fn add(&mut self, other: Cards) {
+        debug_assert!(!(self.has_golden() && other.has_golden()));
+        self.0 += other.0;
+    }
+
+    /// Takes cards that are known to be among these, without regard to the Golden flag, which stays as it is.
+    pub(crate) fn remove_counts(&mut self, face: u8, n: u8, jokers: u8) {
+        let counts = (u64::from(n) << (BITS * u32::from(face - 1))) + u64::from(jokers) * JOKER_ONE;
+        self.0 -= counts;
+    }
+
+    /// Adds counts to cards that have no Golden flag.
+    pub(crate) fn add_counts(&mut self, face: u8, n: u8, jokers: u8) {
+        self.0 += (u64::from(n) << (BITS * u32::from(face - 1))) + u64::from(jokers) * JOKER_ONE;
+    }
+
+    pub(crate) fn set_golden(&mut self, golden: bool) {
+        self.0 = if golden { self.0 | GOLDEN } else { self.0 & !GOLDEN };
+    }
+
+    /// Takes `n` cards of a face that are known to be there and returns them; the Golden card goes last of its face.
+    pub(crate) fn take_face(&mut self, face: Face, n: u8) -> Cards {
+        let mut taken = Cards::EMPTY;
+        // The Golden card is of the top face of the deck, so it lies among the highest cards of any hand that holds it.
+        let golden_goes = self.has_golden() && self.highest() == Some(face) && self.count(face) == n;
+        self.remove_counts(face.get(), n, 0);
+        taken.add_face(face, n);
+        if golden_goes {
+            self.set_golden(false);
+            taken.set_golden(true);
+        }
+        taken
+    }
+
+    /// Takes a joker that is known to be there and returns it.
+    pub(crate) fn take_joker(&mut self) -> Cards {
+        self.0 -= JOKER_ONE;
+        Cards(JOKER_ONE)
+    }
+
+    /// Takes the `n` rarest ingredient cards, or all if there are fewer, and returns them.
+    pub(crate) fn take_rarest(&mut self, n: u8) -> Cards {
+        let mut taken = Cards::EMPTY;
+        for _ in 0..n {
+            if let Some(face) = self.rarest() {
+                taken.add(self.take_face(face, 1));
+            }
+        }
+        taken
+    }
+
+    /// The cards whose bits are in a set of bits of faces; no jokers, and the Golden card is not told apart.
+    pub(crate) const fn among_faces(self, bits: u64) -> Cards {
+        Cards(self.0 & bits & FACE_BITS)
+    }
+
+    /// Whether any face has at least `need` cards (`need` >= 1). Only for cards without jokers.
+    pub(crate) const fn has_face_with_at_least(self, need: u8) -> bool {
+        if need > MAX_FACES {
+            return false;
+        }
+        // Adding 16 - need to a count carries into the bit above its four exactly if the count is at least `need`.
+        let carry = (16 - need as u64) * BYTE_ONES;
+        let (even, odd) = (self.0 & LOW_NIBBLES, self.0 >> BITS & LOW_NIBBLES);
+        ((even + carry) | (odd + carry)) & (BYTE_ONES << BITS) != 0
+    }
+}
+
+/// The card of a face, a joker or the Golden card as one addition to a packed number.
+pub(crate) const fn packed_face(number: u8) -> u64 {
+    1 << (BITS * (number as u32 - 1))
+}
+
+pub(crate) const PACKED_JOKER: u64 = JOKER_ONE;
+pub(crate) const PACKED_GOLDEN_FLAG: u64 = GOLDEN;
+
+impl Cards {
+    /// Cards from a sum of packed ones that are all of one deck.
+    pub(crate) const fn from_packed(sum: u64) -> Cards {
+        Cards(sum)
+    }
+}
+
+impl fmt::Debug for Cards {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut list = f.debug_list();
+        for number in 1..=MAX_FACES {
+            (0..self.count_of(number)).for_each(|_| {
+                list.entry(&number);
+            });
+        }
+        (0..self.jokers()).for_each(|_| {
+            list.entry(&format_args!("J"));
+        });
+        if self.has_golden() {
+            list.entry(&format_args!("Golden"));
+        }
+        list.finish()
+    }
+}

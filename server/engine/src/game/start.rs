@@ -1,0 +1,152 @@
+//! How a Shift begins: deal, roles, special action, exchange, first turn.
+
+use super::table::Table;
+use super::{Game, Stage};
+use crate::deal::opening_leader;
+use crate::{BySeat, Cards, Event, Move, Role, Seat, SeatOrder, SpecialAction};
+
+/// Cards that the Dishwasher gives to the Chef, and the Chef to the Dishwasher.
+const CHEF_GIFTS: u8 = 2;
+/// Cards that the Waiter gives to the Sous-Chef, and the Sous-Chef to the Waiter.
+const SOUS_CHEF_GIFTS: u8 = 1;
+/// With fewer players there is neither Sous-Chef nor Waiter.
+const SOUS_CHEF_PLAYERS: usize = 4;
+
+impl Game {
+    /// Starts a Shift with these hands. `ranking` is the order of the last Shift, empty in the first.
+    pub(super) fn start_shift(
+        &mut self,
+        shift: u32,
+        hands: BySeat<Cards>,
+        drawn: Option<Seat>,
+        ranking: SeatOrder,
+        on_event: &mut impl FnMut(Event),
+    ) {
+        let players = self.rules.players();
+        self.shift = shift;
+        self.hands = hands;
+        self.cards_left = hands.map(Cards::len);
+        self.drawn = drawn;
+        self.ranking = ranking;
+        self.roles = BySeat::filled(players, None);
+        self.played = Cards::EMPTY;
+        self.gave = BySeat::filled(players, Cards::EMPTY);
+        self.received = BySeat::filled(players, Cards::EMPTY);
+        self.special = None;
+        self.table = Table::new(players);
+        on_event(Event::ShiftStarted { shift, hands: hands.map(Some) });
+        if ranking.is_empty() {
+            return self.open_first_turn();
+        }
+        self.assign_roles(on_event);
+        let dealt_two_jokers = hands.seats().find(|&seat| hands[seat].jokers() == 2);
+        match dealt_two_jokers.filter(|_| self.rules.special_actions()) {
+            Some(seat) => self.stage = Stage::Special(seat),
+            None => self.start_exchange(on_event),
+        }
+    }
+
+    fn assign_roles(&mut self, on_event: &mut impl FnMut(Event)) {
+        self.roles = Role::by_seat(&self.ranking);
+        on_event(Event::RolesAssigned { roles: self.roles });
+    }
+
+    pub(super) fn declare(&mut self, seat: Seat, on_event: &mut impl FnMut(Event)) {
+        let special = match self.roles[seat] {
+            Some(Role::Dishwasher) => SpecialAction::FoodFight,
+            _ => SpecialAction::DinnerIsServed,
+        };
+        self.special = Some(special);
+        on_event(Event::SpecialActionDeclared { seat, special });
+        match special {
+            SpecialAction::FoodFight => {
+                self.ranking.reverse();
+                self.assign_roles(on_event);
+                self.start_exchange(on_event);
+            }
+            SpecialAction::DinnerIsServed => self.open_first_turn(),
+        }
+    }
+
+    /// Asks for the first gift. A giver without a choice is short if its hand holds too few ingredient cards; its partner then gives as
+    /// many as it receives.
+    pub(super) fn start_exchange(&mut self, on_event: &mut impl FnMut(Event)) {
+        if !self.rules.exchange() {
+            return self.open_first_turn();
+        }
+        let chef_left = CHEF_GIFTS.min(self.hands[self.ranked_from_last(0)].faces_len());
+        let sous_chef_left = if self.rules.players() < SOUS_CHEF_PLAYERS {
+            0
+        } else {
+            SOUS_CHEF_GIFTS.min(self.hands[self.ranked_from_last(1)].faces_len())
+        };
+        self.ask_for_gift(chef_left, sous_chef_left, on_event);
+    }
+
+    fn ask_for_gift(&mut self, chef_left: u8, sous_chef_left: u8, on_event: &mut impl FnMut(Event)) {
+        let rank = match (chef_left, sous_chef_left) {
+            (0, 0) => return self.complete_exchange(on_event),
+            (0, _) => 1,
+            _ => 0,
+        };
+        let giver = self.ranking.as_slice()[rank];
+        self.stage = Stage::Exchange { giver, chef_left, sous_chef_left };
+    }
+
+    /// Takes a gift that has been found legal out of the giver's hand.
+    pub(super) fn give(
+        &mut self,
+        giver: Seat,
+        gift: Move,
+        chef_left: u8,
+        sous_chef_left: u8,
+        on_event: &mut impl FnMut(Event),
+    ) {
+        let hand = &mut self.hands[giver];
+        let card = match gift {
+            Move::Give(face) => hand.take_face(face, 1),
+            _ => hand.take_joker(),
+        };
+        self.gave[giver].add(card);
+        self.cards_left[giver] -= 1;
+        if chef_left > 0 {
+            self.ask_for_gift(chef_left - 1, sous_chef_left, on_event);
+        } else {
+            self.ask_for_gift(0, sous_chef_left - 1, on_event);
+        }
+    }
+
+    /// Hands over all gifts at once: nobody has seen what it receives before.
+    fn complete_exchange(&mut self, on_event: &mut impl FnMut(Event)) {
+        let pairs = if self.rules.players() < SOUS_CHEF_PLAYERS { 1 } else { 2 };
+        for rank in 0..pairs {
+            let (chooser, forced) = (self.ranking.as_slice()[rank], self.ranked_from_last(rank));
+            let limit = if rank == 0 { CHEF_GIFTS } else { SOUS_CHEF_GIFTS };
+            self.gave[forced] = self.hands[forced].take_rarest(limit);
+            self.hand_over(forced, chooser, on_event);
+            self.hand_over(chooser, forced, on_event);
+        }
+        self.cards_left = self.hands.map(Cards::len);
+        self.open_first_turn();
+    }
+
+    fn hand_over(&mut self, giver: Seat, receiver: Seat, on_event: &mut impl FnMut(Event)) {
+        let cards = self.gave[giver];
+        if !cards.is_empty() {
+            self.hands[receiver].add(cards);
+            self.received[receiver] = cards;
+            on_event(Event::CardsExchanged { giver, receiver, count: cards.len(), cards: Some(cards) });
+        }
+    }
+
+    /// The seat so far from the Dishwasher upwards.
+    fn ranked_from_last(&self, rank: usize) -> Seat {
+        self.ranking.as_slice()[self.ranking.len() - 1 - rank]
+    }
+
+    fn open_first_turn(&mut self) {
+        let starter = opening_leader(&self.rules, &self.hands, self.drawn);
+        self.table.open(starter);
+        self.stage = Stage::Turn(starter);
+    }
+}

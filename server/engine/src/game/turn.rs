@@ -1,0 +1,91 @@
+//! Taking a turn that has been found legal: the cards move, and the turn goes on, to the next pizza or to the Shift's end.
+
+use super::table::bit;
+use super::{Game, Stage};
+use crate::observation::Board;
+use crate::{Action, Event, Face, Opening, PassScope, Seat};
+
+impl Game {
+    pub(super) fn play_face(
+        &mut self,
+        seat: Seat,
+        action: Action,
+        face: Face,
+        quantity: u8,
+        jokers: u8,
+        on_event: &mut impl FnMut(Event),
+    ) {
+        let number = face.get();
+        let hand = &mut self.hands[seat];
+        hand.remove_counts(number, quantity, jokers);
+        if hand.has_golden() && number == self.rules.faces() {
+            // The opening plays the Golden card first of all, any later turn last.
+            let opens = self.table.is_first_turn() && self.rules.opening() == Opening::Golden;
+            if opens || hand.count(face) == 0 {
+                hand.set_golden(false);
+            }
+        }
+        self.played.add_counts(number, quantity, jokers);
+        let size = quantity + jokers;
+        self.table.board = Board { face: number, size, jokers };
+        self.cards_left[seat] -= size;
+        let cards_left = self.cards_left[seat];
+        on_event(Event::Played { seat, action, face: number, quantity, jokers, cards_left });
+        self.after_play(seat, cards_left, on_event);
+    }
+
+    pub(super) fn play_lone_joker(&mut self, seat: Seat, action: Action, on_event: &mut impl FnMut(Event)) {
+        let joker = self.hands[seat].take_joker();
+        self.played.add(joker);
+        let face = self.rules.faces() + 1;
+        self.table.board = Board { face, size: 1, jokers: 1 };
+        self.cards_left[seat] -= 1;
+        let cards_left = self.cards_left[seat];
+        on_event(Event::Played { seat, action, face, quantity: 0, jokers: 1, cards_left });
+        self.after_play(seat, cards_left, on_event);
+    }
+
+    pub(super) fn pass(&mut self, seat: Seat, on_event: &mut impl FnMut(Event)) {
+        self.table.passed |= bit(seat);
+        on_event(Event::Passed { seat, cards_left: self.cards_left[seat] });
+        self.end_turn(seat, on_event);
+    }
+
+    #[inline]
+    fn after_play(&mut self, seat: Seat, cards_left: u8, on_event: &mut impl FnMut(Event)) {
+        let table = &mut self.table;
+        table.idle = 0;
+        table.last_to_play = Some(seat);
+        if self.rules.pass_scope() == PassScope::Turn {
+            table.passed = 0;
+        }
+        if cards_left == 0 {
+            let place = table.finish(seat);
+            on_event(Event::SeatFinished { seat, place });
+        }
+        self.end_turn(seat, on_event);
+    }
+
+    /// The turn goes left, to the next pizza, or to the Shift's end.
+    #[inline]
+    fn end_turn(&mut self, seat: Seat, on_event: &mut impl FnMut(Event)) {
+        let table = &mut self.table;
+        table.turns += 1;
+        if table.holding & (table.holding - 1) == 0 {
+            return self.end_shift(false, on_event);
+        }
+        if table.turns >= self.rules.max_turns() {
+            self.adjudicate(seat);
+            return self.end_shift(true, on_event);
+        }
+        let next = if table.others_in_pizza() == 0 {
+            let (pizza, last_to_play) = (table.pizza, table.last_to_play);
+            let next_leader = table.next_pizza();
+            on_event(Event::PizzaDone { pizza, last_to_play, next_leader });
+            table.move_turn(seat, table.distance_left(seat, bit(next_leader)))
+        } else {
+            table.move_turn(seat, table.distance_left(seat, table.holding & !table.passed))
+        };
+        self.stage = Stage::Turn(next);
+    }
+}

@@ -1,0 +1,44 @@
+//! Filling in what a seat may know. Nothing that is not written here reaches an agent's observation.
+
+use super::table::bit;
+use super::{Game, Stage};
+use crate::{BySeat, Cards, Observation, Viewer};
+
+impl Game {
+    /// What a viewer may know now. A spectator, and one who sees everything in the events, gets no hand.
+    ///
+    /// # Panics
+    /// If the game has no such seat.
+    #[inline]
+    pub fn observe(&self, viewer: Viewer) -> Observation {
+        let seat = match viewer {
+            Viewer::Seat(seat) => Some(seat),
+            Viewer::Spectator | Viewer::Everything => None,
+        };
+        let own = |cards: &BySeat<Cards>| seat.map_or(Cards::EMPTY, |seat| cards.as_slice()[seat.index()]);
+        let table = &self.table;
+        Observation {
+            seat,
+            kind: self.decision().filter(|decision| Some(decision.seat) == seat).map(|decision| decision.kind),
+            faces: self.rules.faces(),
+            hand_size: self.rules.hand_size(),
+            shift: self.shift,
+            pizza: table.pizza,
+            hand: own(&self.hands),
+            board: table.board,
+            cards_left: self.cards_left,
+            passed: BySeat::from_fn(self.rules.players(), |seat| table.passed & bit(seat) != 0),
+            places: table.places,
+            roles: self.roles,
+            points: self.scores,
+            played: self.played,
+            gave: own(&self.gave),
+            received: own(&self.received),
+        }
+    }
+
+    /// Whether the open decision is a turn, so that hidden cards can be exchanged for others.
+    pub(super) fn is_turn(&self) -> bool {
+        matches!(self.stage, Stage::Turn(_))
+    }
+}

@@ -1,0 +1,83 @@
+//! The small numbers of the game, each a type of its own: seats, faces and actions. What an action means is said by
+//! [`crate::ActionSpace`], not here.
+
+use std::fmt;
+
+use crate::{MAX_FACES, MAX_SEATS};
+
+/// A place at the table, numbered from 0. The seat to the left of seat s is s+1, that of the last is seat 0.
+#[derive(Copy, Clone, Eq, PartialEq, Ord, PartialOrd, Hash, Debug, Default)]
+pub struct Seat(u8);
+
+impl Seat {
+    /// The seat with this number.
+    ///
+    /// # Panics
+    /// If `index` is not below [`MAX_SEATS`]; check numbers that come from outside against the number of players first.
+    pub const fn new(index: usize) -> Seat {
+        assert!(index < MAX_SEATS, "a seat's number is below MAX_SEATS");
+        Seat(index as u8)
+    }
+
+    /// The seat's number, from 0.
+    pub const fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+impl fmt::Display for Seat {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+/// The face of a card, 1..=[`MAX_FACES`]. A lower face is rarer: face f is in the deck f times.
+#[derive(Copy, Clone, Eq, PartialEq, Ord, PartialOrd, Hash, Debug)]
+pub struct Face(u8);
+
+impl Face {
+    /// The face with this number, or `None` if there is no such face in any deck.
+    pub const fn new(number: u8) -> Option<Face> {
+        if number >= 1 && number <= MAX_FACES { Some(Face(number)) } else { None }
+    }
+
+    /// The face's number, 1..=[`MAX_FACES`].
+    pub const fn get(self) -> u8 {
+        self.0
+    }
+
+    /// A face whose number is known to be in range.
+    pub(crate) const fn of(number: u8) -> Face {
+        debug_assert!(number >= 1 && number <= MAX_FACES);
+        Face(number)
+    }
+}
+
+impl fmt::Display for Face {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+/// The number of a decision a player takes, as an agent sends it: just an index, which may be out of range of an
+/// [`crate::ActionSpace`].
+#[derive(Copy, Clone, Eq, PartialEq, Ord, PartialOrd, Hash, Debug)]
+pub struct Action(u16);
+
+impl Action {
+    /// The action with this index.
+    pub const fn new(index: u16) -> Action {
+        Action(index)
+    }
+
+    /// The index.
+    pub const fn index(self) -> u16 {
+        self.0
+    }
+}
+
+impl fmt::Display for Action {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}

@@ -1,0 +1,62 @@
+//! The rule engine of Chef's Hat: pure values, nothing else.
+//!
+//! A validated [`RuleSet`] and a [`Seed`] make a [`Game`]. A game says whose decision is open ([`Game::decision`]) and what is
+//! legal ([`Game::legal_actions`]), takes an [`Action`] ([`Game::apply`]), tells what happened as [`Event`]s and gives any
+//! seat its [`Observation`]. What a viewer may see of an event is decided in [`Event::seen_by`] alone.
+//!
+//! What deliberately does not live here: files, sockets, clocks, serialisation, threads, global randomness, agents. A game is a
+//! function of its rule set, its seed and the decisions taken, on every machine.
+//!
+//! ```
+//! use chefshat_engine::{Game, RuleSetSpec, Seed};
+//!
+//! let rules = RuleSetSpec::default().validate()?;
+//! let mut game = Game::new(rules, Seed([7; 32]), |_| {});
+//! while let Some(decision) = game.decision() {
+//!     let action = game.legal_actions().nth(0).expect("an open decision has a legal action");
+//!     game.apply(action, |event| println!("{:?} {event:?}", decision.seat))?;
+//! }
+//! println!("seat {} wins", game.standings().expect("the game has ended").winner());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod actions;
+mod by_seat;
+mod cards;
+mod deal;
+mod event;
+mod game;
+mod ids;
+mod mask;
+mod metrics;
+mod observation;
+mod order;
+mod patterns;
+mod presets;
+mod rewards;
+mod roles;
+mod rules;
+
+pub use actions::{ActionSpace, Move};
+pub use by_seat::BySeat;
+pub use cards::Cards;
+pub use deal::{Card, Deal, Seed};
+pub use event::{Event, Viewer};
+pub use game::{ActionError, Decision, DecisionKind, Game, Refusal, Script, ScriptError};
+pub use ids::{Action, Face, Seat};
+pub use mask::Mask;
+pub use metrics::{MetricsRecorder, SeatMetrics, ShiftMetrics};
+pub use observation::{Board, Observation};
+pub use order::{SeatOrder, Standings};
+pub use rewards::RewardScheme;
+pub use roles::{Role, SpecialAction};
+pub use rules::{Opening, PassScope, RuleSet, RuleSetError, RuleSetSpec, Stop};
+
+/// Version of the rules this crate plays by. A record names the version it was played by.
+pub const RULES_VERSION: u32 = 1;
+/// The most seats a game can have.
+pub const MAX_SEATS: usize = 6;
+/// The most faces a deck can have.
+pub const MAX_FACES: u8 = 15;
+/// The most jokers a deck can have.
+pub const MAX_JOKERS: u8 = 2;

@@ -1,0 +1,144 @@
+//! What the paper and this project count in each Shift, gathered from events. How games are averaged and printed is not decided here.
+
+use crate::{BySeat, Event, RewardScheme, RuleSet, Seat, SeatOrder, SpecialAction};
+
+/// What one seat did in one Shift.
+#[derive(Copy, Clone, PartialEq, Debug, Default)]
+pub struct SeatMetrics {
+    /// Its place, from 1.
+    pub place: u8,
+    /// Its points in the Shift.
+    pub points: u32,
+    /// Valid actions at turns: plays and passes.
+    pub valid: u32,
+    /// Wrong actions: invalid attempts at turns.
+    pub wrong: u32,
+    /// Passes.
+    pub passes: u32,
+    /// Plays.
+    pub plays: u32,
+    /// Sum of its rewards, what the end of the Shift brought included; 0 without a scheme.
+    pub reward_sum: f64,
+    /// Number of rewarded decisions: valid and wrong actions; 0 without a scheme.
+    pub reward_count: u32,
+    /// Performance score: the running mean over the Shifts so far of 10 * points / pizzas.
+    pub performance: f64,
+}
+
+impl SeatMetrics {
+    /// Mean reward of a rewarded decision, or `None` if there was none.
+    pub fn mean_reward(&self) -> Option<f64> {
+        (self.reward_count > 0).then(|| self.reward_sum / f64::from(self.reward_count))
+    }
+}
+
+/// What is counted in one Shift.
+#[derive(Copy, Clone, PartialEq, Debug)]
+pub struct ShiftMetrics {
+    /// Number of the Shift, from 1.
+    pub shift: u32,
+    /// Seats by place.
+    pub order: SeatOrder,
+    /// Pizzas, the one in progress at the end included.
+    pub pizzas: u32,
+    /// Laps, the one in progress at the end included.
+    pub laps: u32,
+    /// Turns: plays and passes.
+    pub turns: u32,
+    /// Seat that took the first turn.
+    pub starter: Seat,
+    /// Whether the starter took the first place.
+    pub starter_won: bool,
+    /// The special action declared, if any.
+    pub special: Option<SpecialAction>,
+    /// Whether the Shift reached its limit of turns.
+    pub adjudicated: bool,
+    /// What each seat did.
+    pub seats: BySeat<SeatMetrics>,
+}
+
+/// Gathers metrics from a game's events and from the wrong actions that are no events.
+#[derive(Copy, Clone, Debug)]
+pub struct MetricsRecorder {
+    rules: RuleSet,
+    scheme: Option<RewardScheme>,
+    seats: BySeat<SeatMetrics>,
+    finished: u8,
+    shifts: u32,
+    performance_sum: BySeat<f64>,
+}
+
+impl MetricsRecorder {
+    /// A recorder for one game, to be fed from its start; rewards are summed if there is a scheme.
+    pub fn new(rules: RuleSet, scheme: Option<RewardScheme>) -> MetricsRecorder {
+        let players = rules.players();
+        MetricsRecorder {
+            rules,
+            scheme,
+            seats: BySeat::filled(players, SeatMetrics::default()),
+            finished: 0,
+            shifts: 0,
+            performance_sum: BySeat::filled(players, 0.0),
+        }
+    }
+
+    /// Counts an invalid attempt of a seat at a turn (attempts at other decisions are neither counted nor rewarded).
+    pub fn wrong(&mut self, seat: Seat) {
+        self.seats[seat].wrong += 1;
+        if let Some(scheme) = self.scheme {
+            self.reward(seat, scheme.invalid(), 1);
+        }
+    }
+
+    /// Counts an event; gives the metrics of the Shift when it ends. It does not matter as seen by whom.
+    pub fn on_event(&mut self, event: &Event) -> Option<ShiftMetrics> {
+        match *event {
+            Event::Played { seat, cards_left, .. } => {
+                self.seats[seat].plays += 1;
+                self.finished += u8::from(cards_left == 0);
+                self.valid(seat, cards_left, (cards_left == 0).then_some(self.finished));
+                None
+            }
+            Event::Passed { seat, cards_left } => {
+                self.seats[seat].passes += 1;
+                self.valid(seat, cards_left, None);
+                None
+            }
+            Event::ShiftEnded { shift, order, points, starter, pizzas, laps, turns, special, adjudicated, finished, .. } => {
+                self.end_shift(&order, &points, finished, pizzas);
+                let seats = self.seats;
+                self.seats = BySeat::filled(seats.len(), SeatMetrics::default());
+                self.finished = 0;
+                let starter_won = order.as_slice().first() == Some(&starter);
+                Some(ShiftMetrics { shift, order, pizzas, laps, turns, starter, starter_won, special, adjudicated, seats })
+            }
+            _ => None,
+        }
+    }
+
+    fn valid(&mut self, seat: Seat, cards_left: u8, place: Option<u8>) {
+        self.seats[seat].valid += 1;
+        if let Some(scheme) = self.scheme {
+            self.reward(seat, scheme.turn(&self.rules, cards_left, place), 1);
+        }
+    }
+
+    fn end_shift(&mut self, order: &SeatOrder, points: &BySeat<u32>, finished: u8, pizzas: u32) {
+        self.shifts += 1;
+        for (&seat, place) in order.as_slice().iter().zip(1u8..) {
+            if let Some(reward) = self.scheme.and_then(|scheme| scheme.shift_end(place, points[seat], place <= finished)) {
+                self.reward(seat, reward, 0);
+            }
+            self.performance_sum[seat] += 10.0 * f64::from(points[seat]) / f64::from(pizzas);
+            let metrics = &mut self.seats[seat];
+            metrics.place = place;
+            metrics.points = points[seat];
+            metrics.performance = self.performance_sum[seat] / f64::from(self.shifts);
+        }
+    }
+
+    fn reward(&mut self, seat: Seat, reward: f32, count: u32) {
+        self.seats[seat].reward_sum += f64::from(reward);
+        self.seats[seat].reward_count += count;
+    }
+}

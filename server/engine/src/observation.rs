@@ -1,0 +1,101 @@
+//! What a seat may know of a game, as one value, and the paper's classic vector of it. How a game fills it in is in `game::view`;
+//! the mask of legal actions is not part of it ([`crate::Game::legal_actions`]).
+
+use crate::{ActionSpace, BySeat, Cards, DecisionKind, Mask, Role, Seat};
+
+/// What lies on the board.
+#[derive(Copy, Clone, Eq, PartialEq, Debug, Default)]
+pub struct Board {
+    /// The face, F+1 for a joker alone, 0 if the board is empty.
+    pub face: u8,
+    /// Number of cards, jokers included.
+    pub size: u8,
+    /// Number of jokers among them.
+    pub jokers: u8,
+}
+
+/// Everything that a seat may know at one moment. For a spectator hand, gave and received are empty.
+#[derive(Copy, Clone, Eq, PartialEq, Debug)]
+pub struct Observation {
+    /// Whose observation it is; `None` for a spectator.
+    pub seat: Option<Seat>,
+    /// The kind of decision that is open for this seat, if one is.
+    pub kind: Option<DecisionKind>,
+    /// Number of faces F of the deck.
+    pub faces: u8,
+    /// Cards dealt to a hand, H.
+    pub hand_size: u8,
+    /// Number of the Shift, from 1.
+    pub shift: u32,
+    /// Number of the pizza in its Shift, from 1; 0 before the Shift's first turn is open.
+    pub pizza: u32,
+    /// The seat's own hand.
+    pub hand: Cards,
+    /// The board.
+    pub board: Board,
+    /// Number of cards in each hand. A card given in the exchange leaves its giver's hand at once.
+    pub cards_left: BySeat<u8>,
+    /// Which seats have passed since the pizza began; with [`crate::PassScope::Turn`] since the last play.
+    pub passed: BySeat<bool>,
+    /// Place of each seat that has finished the Shift, from 1; 0 for the others.
+    pub places: BySeat<u8>,
+    /// The role of each seat; none in the first Shift.
+    pub roles: BySeat<Option<Role>>,
+    /// Points of each seat in the game so far.
+    pub points: BySeat<u64>,
+    /// Cards played so far in this Shift, by face: the Golden card is not told apart.
+    pub played: Cards,
+    /// What the seat gave in this Shift's exchange so far.
+    pub gave: Cards,
+    /// What the seat received in this Shift's exchange.
+    pub received: Cards,
+}
+
+impl Observation {
+    /// Length of the classic vector: F + H + T, the paper's 228 for the standard deck.
+    pub fn classic_len(&self) -> usize {
+        usize::from(self.faces) + usize::from(self.hand_size) + usize::from(ActionSpace::of(self.faces).turn_actions())
+    }
+
+    /// The paper's vector of numbers in 0..=1: board (F slots, the play's cards ascending, jokers as F+1, cut off; an empty board is F+2 in
+    /// slot 0), hand (H slots, ascending, zeros first), both divided by F+2; then the mask of a turn's actions as 0 and 1.
+    pub fn classic_vector(&self, mask: &Mask) -> Vec<f32> {
+        let mut vector = vec![0.0; self.classic_len()];
+        self.write_classic_vector(mask, &mut vector);
+        vector
+    }
+
+    /// Writes the classic vector to a caller's buffer.
+    ///
+    /// # Panics
+    /// If `out` is not [`Observation::classic_len`] numbers long.
+    pub fn write_classic_vector(&self, mask: &Mask, out: &mut [f32]) {
+        assert_eq!(out.len(), self.classic_len(), "the buffer has the length of the classic vector");
+        let scale = f32::from(self.faces + 2);
+        let (board, rest) = out.split_at_mut(usize::from(self.faces));
+        let (hand, actions) = rest.split_at_mut(usize::from(self.hand_size));
+
+        board.fill(0.0);
+        if self.board.face == 0 {
+            board[0] = 1.0;
+        }
+        let quantity = self.board.size - self.board.jokers;
+        for (slot, index) in board.iter_mut().zip(0..self.board.size) {
+            let card = if index < quantity { self.board.face } else { self.faces + 1 };
+            *slot = f32::from(card) / scale;
+        }
+
+        // A hand never holds more cards than were dealt: the exchange gives back as many as it takes.
+        let zeros = hand.len().saturating_sub(usize::from(self.hand.len()));
+        hand[..zeros].fill(0.0);
+        for (slot, card) in hand[zeros..].iter_mut().zip(self.hand.ascending(self.faces)) {
+            *slot = f32::from(card) / scale;
+        }
+
+        for (chunk, &word) in actions.chunks_mut(64).zip(mask.words()) {
+            for (bit, slot) in chunk.iter_mut().enumerate() {
+                *slot = f32::from((word >> bit & 1) as u8);
+            }
+        }
+    }
+}

@@ -1,0 +1,157 @@
+//! Tables computed at compile time: what each play's index means, and which plays a count of cards allows. The numbering they follow
+//! is described in `actions`.
+
+use crate::mask::WORDS;
+use crate::{Cards, MAX_FACES, Mask};
+
+/// Number of plays of cards with a face in the largest deck.
+pub(crate) const MAX_PLAYS: usize = play_offset(MAX_FACES + 1) as usize;
+/// The largest play: fifteen cards and two jokers.
+const MAX_SIZE: usize = 17;
+
+/// Index of the first play of a face: 3f(f-1)/2.
+pub(crate) const fn play_offset(face: u8) -> u16 {
+    3 * (face as u16) * (face as u16 - 1) / 2
+}
+
+/// Face, quantity and jokers of each play.
+pub(crate) static PLAYS: [[u8; 3]; MAX_PLAYS] = {
+    let mut table = [[0; 3]; MAX_PLAYS];
+    let (mut face, mut index) = (1, 0);
+    while face <= MAX_FACES {
+        let mut quantity = 1;
+        while quantity <= face {
+            let mut jokers = 0;
+            while jokers <= 2 {
+                table[index] = [face, quantity, jokers];
+                index += 1;
+                jokers += 1;
+            }
+            quantity += 1;
+        }
+        face += 1;
+    }
+    table
+};
+
+/// The plays of one face that a hand allows: bit i for the i-th play of the face, their number above [`PATTERN_BITS`] bits.
+#[derive(Copy, Clone)]
+pub(crate) struct Pattern(u64);
+
+/// A face has at most 3 * 15 plays.
+const PATTERN_BITS: u32 = 48;
+
+impl Pattern {
+    pub(crate) const fn bits(self) -> u64 {
+        self.0 & ((1 << PATTERN_BITS) - 1)
+    }
+
+    pub(crate) const fn len(self) -> u16 {
+        (self.0 >> PATTERN_BITS) as u16
+    }
+}
+
+/// The patterns for one number of jokers held and one least size of the play, by the number of cards held of a face.
+pub(crate) type Patterns = [Pattern; 16];
+
+/// By jokers held (0..=2) and least size of the play (0..=17).
+pub(crate) static PATTERNS: [[Patterns; MAX_SIZE + 1]; 3] = {
+    let mut table = [[[Pattern(0); 16]; MAX_SIZE + 1]; 3];
+    let mut held = 0;
+    while held <= 2 {
+        let mut size = 0;
+        while size <= MAX_SIZE {
+            let mut count = 0;
+            while count < 16 {
+                table[held][size][count] = pattern(held, size, count);
+                count += 1;
+            }
+            size += 1;
+        }
+        held += 1;
+    }
+    table
+};
+
+const fn pattern(held: usize, size: usize, count: usize) -> Pattern {
+    let mut bits = 0u64;
+    let mut quantity = 1;
+    while quantity <= count {
+        let mut jokers = 0;
+        while jokers <= held {
+            if quantity + jokers >= size {
+                bits |= 1 << (3 * (quantity - 1) + jokers);
+            }
+            jokers += 1;
+        }
+        quantity += 1;
+    }
+    Pattern(bits | (bits.count_ones() as u64) << PATTERN_BITS)
+}
+
+/// The legal actions of a turn: the plays that the patterns allow with these cards of faces, a joker alone and passing if allowed.
+#[inline]
+pub(crate) fn turn_mask(faces: u8, patterns: &Patterns, cards: Cards, lone_joker: bool, pass: bool) -> Mask {
+    // One function for each number of faces: every place in the mask is a constant then, and the words stay in registers.
+    match faces {
+        4 => filled_mask::<4>(patterns, cards, lone_joker, pass),
+        5 => filled_mask::<5>(patterns, cards, lone_joker, pass),
+        6 => filled_mask::<6>(patterns, cards, lone_joker, pass),
+        7 => filled_mask::<7>(patterns, cards, lone_joker, pass),
+        8 => filled_mask::<8>(patterns, cards, lone_joker, pass),
+        9 => filled_mask::<9>(patterns, cards, lone_joker, pass),
+        10 => filled_mask::<10>(patterns, cards, lone_joker, pass),
+        11 => filled_mask::<11>(patterns, cards, lone_joker, pass),
+        12 => filled_mask::<12>(patterns, cards, lone_joker, pass),
+        13 => filled_mask::<13>(patterns, cards, lone_joker, pass),
+        14 => filled_mask::<14>(patterns, cards, lone_joker, pass),
+        _ => filled_mask::<15>(patterns, cards, lone_joker, pass),
+    }
+}
+
+fn filled_mask<const F: u8>(patterns: &Patterns, cards: Cards, lone_joker: bool, pass: bool) -> Mask {
+    let mut set = Filling { words: [0; WORDS], len: 0 };
+    // Often nothing but passing is left: then no table is looked up.
+    if !cards.is_empty() {
+        macro_rules! insert_faces {
+            ($($number:literal)*) => { $(if $number <= F { set.insert_face::<$number>(patterns, cards); })* };
+        }
+        insert_faces!(1 2 3 4 5 6 7 8 9 10 11 12 13 14 15);
+    }
+    set.insert(play_offset(F + 1), lone_joker);
+    set.insert(play_offset(F + 1) + 1, pass);
+    Mask::from_words(set.words, set.len)
+}
+
+/// A mask being filled.
+struct Filling {
+    words: [u64; WORDS],
+    len: u16,
+}
+
+impl Filling {
+    #[inline(always)]
+    fn insert_face<const NUMBER: u8>(&mut self, patterns: &Patterns, cards: Cards) {
+        let pattern = patterns[usize::from(cards.count_of(NUMBER))];
+        let (index, shift) = const { place(play_offset(NUMBER)) };
+        self.words[index] |= pattern.bits() << shift;
+        // Three bits for each card the deck has of the face: those beyond the word go into the next one.
+        if shift + 3 * u32::from(NUMBER) > 64 {
+            self.words[index + 1] |= pattern.bits() >> (64 - shift);
+        }
+        // Never more than there are plays, so that it cannot overflow.
+        self.len = self.len.wrapping_add(pattern.len());
+    }
+
+    #[inline(always)]
+    fn insert(&mut self, action: u16, legal: bool) {
+        let (index, shift) = place(action);
+        self.words[index] |= u64::from(legal) << shift;
+        self.len = self.len.wrapping_add(u16::from(legal));
+    }
+}
+
+/// Word and bit of an action in a mask.
+const fn place(index: u16) -> (usize, u32) {
+    (index as usize / 64, index as u32 % 64)
+}

@@ -1,0 +1,139 @@
+//! Events of the engine as events of the protocol. What a viewer may see was decided before, by `Event::seen_by`: here everything that
+//! is present is written, and nothing else.
+
+use chefshat_engine::{ActionSpace, BySeat, Cards, Event, Role, Seat, SpecialAction};
+use chefshat_proto::v1::{self, game_event::Kind};
+
+/// How the decision behind an event came about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct By {
+    /// Who or what decided.
+    pub source: v1::DecisionSource,
+    /// Measured decision time, microseconds; 0 for built-in agents.
+    pub decision_time_us: u64,
+}
+
+/// The protocol's form of an event. `None` for the end of the game, which the room tells itself (it adds what it reveals).
+pub fn event_kind(event: &Event, space: ActionSpace, by: By) -> Option<Kind> {
+    let faces = space.faces();
+    Some(match *event {
+        Event::ShiftStarted { shift, ref hands } => Kind::ShiftStarted(v1::ShiftStarted {
+            shift,
+            hands: hands
+                .iter()
+                .filter_map(|(seat, hand)| hand.map(|hand| seat_cards(seat, hand, faces)))
+                .collect(),
+        }),
+        Event::RolesAssigned { ref roles } => Kind::RolesAssigned(v1::RolesAssigned {
+            roles: roles_to_proto(roles),
+        }),
+        Event::SpecialActionDeclared { seat, special } => {
+            Kind::SpecialActionDeclared(v1::SpecialActionDeclared {
+                seat: number(seat),
+                action: special_to_proto(special).into(),
+                source: by.source.into(),
+                decision_time_us: by.decision_time_us,
+            })
+        }
+        Event::CardsExchanged {
+            giver,
+            receiver,
+            count,
+            cards,
+        } => Kind::CardsExchanged(v1::CardsExchanged {
+            giver: number(giver),
+            receiver: number(receiver),
+            count: count.into(),
+            cards: cards.map_or_else(Vec::new, |cards| ascending(cards, faces)),
+        }),
+        Event::Played {
+            seat,
+            action,
+            face,
+            quantity,
+            jokers,
+            cards_left,
+        } => Kind::Play(v1::Play {
+            seat: number(seat),
+            action: action.index().into(),
+            face: face.into(),
+            quantity: quantity.into(),
+            jokers: jokers.into(),
+            cards_left: cards_left.into(),
+            source: by.source.into(),
+            decision_time_us: by.decision_time_us,
+        }),
+        Event::Passed { seat, .. } => Kind::Pass(v1::Pass {
+            seat: number(seat),
+            source: by.source.into(),
+            decision_time_us: by.decision_time_us,
+        }),
+        Event::SeatFinished { seat, place } => Kind::SeatFinished(v1::SeatFinished {
+            seat: number(seat),
+            place: place.into(),
+        }),
+        Event::PizzaDone {
+            pizza,
+            last_to_play,
+            next_leader,
+        } => Kind::PizzaDone(v1::PizzaDone {
+            pizza,
+            last_to_play: last_to_play.map(number),
+            next_leader: number(next_leader),
+        }),
+        Event::ShiftEnded {
+            shift,
+            ref order,
+            ref points,
+            ref scores,
+            starter,
+            pizzas,
+            laps,
+            turns,
+            adjudicated,
+            ..
+        } => Kind::ShiftEnded(v1::ShiftEnded {
+            shift,
+            order: order.as_slice().iter().copied().map(number).collect(),
+            points: points.values().copied().collect(),
+            scores: scores.values().copied().collect(),
+            starter: number(starter),
+            pizzas,
+            laps,
+            turns,
+            adjudicated,
+        }),
+        Event::GameEnded { .. } => return None,
+    })
+}
+
+/// One seat's cards as a message.
+pub fn seat_cards(seat: Seat, cards: Cards, faces: u8) -> v1::SeatCards {
+    v1::SeatCards {
+        seat: number(seat),
+        cards: ascending(cards, faces),
+        golden: cards.has_golden(),
+    }
+}
+
+fn roles_to_proto(roles: &BySeat<Option<Role>>) -> Vec<i32> {
+    roles
+        .values()
+        .map(|role| role.map_or(0, |role| role as i32))
+        .collect()
+}
+
+fn special_to_proto(special: SpecialAction) -> v1::SpecialAction {
+    match special {
+        SpecialAction::FoodFight => v1::SpecialAction::FoodFight,
+        SpecialAction::DinnerIsServed => v1::SpecialAction::DinnerIsServed,
+    }
+}
+
+fn ascending(cards: Cards, faces: u8) -> Vec<u32> {
+    cards.ascending(faces).map(u32::from).collect()
+}
+
+fn number(seat: Seat) -> u32 {
+    u32::try_from(seat.index()).expect("a seat is below six")
+}

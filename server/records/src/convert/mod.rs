@@ -1,0 +1,8 @@
+//! Between the engine's values and the protocol's messages. The two crates know nothing of each other; this folder knows both, and
+//! nothing of rooms or files.
+
+mod events;
+mod rules;
+
+pub use events::{By, event_kind, seat_cards};
+pub use rules::{FieldProblem, action_space, role_from_number, rules_from_proto, rules_to_proto};

@@ -1,0 +1,153 @@
+//! Rule sets, roles and the numbering of actions, in both directions.
+
+use chefshat_engine::{ActionSpace, Opening, PassScope, Role, RuleSet, RuleSetSpec, Stop};
+use chefshat_proto::v1;
+
+/// A field of a request that cannot be accepted, and why.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{field}: {message}")]
+pub struct FieldProblem {
+    /// Name of the field, as in the `.proto`.
+    pub field: &'static str,
+    /// What is wrong and what to do.
+    pub message: String,
+}
+
+impl FieldProblem {
+    /// A problem with one field.
+    pub fn new(field: &'static str, message: impl Into<String>) -> Self {
+        Self {
+            field,
+            message: message.into(),
+        }
+    }
+}
+
+/// The rule set a message asks for: its preset with every field that is set in place of the preset's.
+///
+/// # Errors
+/// The first field that makes no sense.
+pub fn rules_from_proto(message: &v1::RuleSet) -> Result<RuleSet, FieldProblem> {
+    let preset = if message.preset.is_empty() {
+        "paper"
+    } else {
+        message.preset.as_str()
+    };
+    let mut spec = RuleSetSpec::preset(preset).ok_or_else(|| {
+        FieldProblem::new(
+            "preset",
+            format!(
+                "there is no preset {preset:?}; use one of {}",
+                RuleSetSpec::PRESETS.join(", ")
+            ),
+        )
+    })?;
+    if let Some(players) = message.players {
+        spec.players = small("players", players)?;
+    }
+    if let Some(faces) = message.faces {
+        spec.faces = small("faces", faces)?;
+    }
+    if let Some(jokers) = message.jokers {
+        spec.jokers = small("jokers", jokers)?;
+    }
+    match message.stop {
+        Some(v1::rule_set::Stop::TargetPoints(points)) => spec.stop = Stop::Points(points),
+        Some(v1::rule_set::Stop::TargetShifts(shifts)) => spec.stop = Stop::Shifts(shifts),
+        None => {}
+    }
+    if !message.points.is_empty() {
+        spec.points = message.points.clone();
+    }
+    if let Some(exchange) = message.exchange {
+        spec.exchange = exchange;
+    }
+    if let Some(special_actions) = message.special_actions {
+        spec.special_actions = special_actions;
+    }
+    match v1::Opening::try_from(message.opening) {
+        Ok(v1::Opening::Unspecified) => {}
+        Ok(v1::Opening::Golden) => spec.opening = Opening::Golden,
+        Ok(v1::Opening::AnyTopFace) => spec.opening = Opening::AnyTopFace,
+        Err(_) => return Err(unknown_value("opening", message.opening)),
+    }
+    if let Some(opening_pass) = message.opening_pass {
+        spec.opening_pass = opening_pass;
+    }
+    match v1::PassScope::try_from(message.pass_scope) {
+        Ok(v1::PassScope::Unspecified) => {}
+        Ok(v1::PassScope::Pizza) => spec.pass_scope = PassScope::Pizza,
+        Ok(v1::PassScope::Turn) => spec.pass_scope = PassScope::Turn,
+        Err(_) => return Err(unknown_value("pass_scope", message.pass_scope)),
+    }
+    if let Some(max_idle_pizzas) = message.max_idle_pizzas {
+        spec.max_idle_pizzas = max_idle_pizzas;
+    }
+    if let Some(max_turns) = message.max_turns {
+        spec.max_turns = max_turns;
+    }
+    spec.validate()
+        .map_err(|error| FieldProblem::new(error.field(), error.to_string()))
+}
+
+/// A rule set with every field set. The preset is left empty: the fields say it all.
+pub fn rules_to_proto(rules: &RuleSet) -> v1::RuleSet {
+    let spec = rules.spec();
+    v1::RuleSet {
+        preset: String::new(),
+        players: Some(spec.players.into()),
+        faces: Some(spec.faces.into()),
+        jokers: Some(spec.jokers.into()),
+        stop: Some(match spec.stop {
+            Stop::Points(points) => v1::rule_set::Stop::TargetPoints(points),
+            Stop::Shifts(shifts) => v1::rule_set::Stop::TargetShifts(shifts),
+        }),
+        points: spec.points,
+        exchange: Some(spec.exchange),
+        special_actions: Some(spec.special_actions),
+        opening: match spec.opening {
+            Opening::Golden => v1::Opening::Golden,
+            Opening::AnyTopFace => v1::Opening::AnyTopFace,
+        }
+        .into(),
+        opening_pass: Some(spec.opening_pass),
+        pass_scope: match spec.pass_scope {
+            PassScope::Pizza => v1::PassScope::Pizza,
+            PassScope::Turn => v1::PassScope::Turn,
+        }
+        .into(),
+        max_idle_pizzas: Some(spec.max_idle_pizzas),
+        max_turns: Some(spec.max_turns),
+    }
+}
+
+/// The numbering of actions as a message.
+pub fn action_space(space: &ActionSpace) -> v1::ActionSpace {
+    v1::ActionSpace {
+        id: space.id(),
+        size: space.size().into(),
+        turn_actions: space.turn_actions().into(),
+    }
+}
+
+/// The role with a number of `chefshat.v1.Role`; `None` for 0 and for numbers that name no role.
+pub fn role_from_number(number: u8) -> Option<Role> {
+    [
+        Role::Chef,
+        Role::SousChef,
+        Role::Cook,
+        Role::Waiter,
+        Role::Dishwasher,
+    ]
+    .into_iter()
+    .find(|role| *role as u8 == number)
+}
+
+fn small(field: &'static str, value: u32) -> Result<u8, FieldProblem> {
+    u8::try_from(value)
+        .map_err(|_| FieldProblem::new(field, format!("{value} is far out of range")))
+}
+
+fn unknown_value(field: &'static str, value: i32) -> FieldProblem {
+    FieldProblem::new(field, format!("{value} is not a value of this enum"))
+}

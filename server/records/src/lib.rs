@@ -1,0 +1,7 @@
+//! A finished game as a file: its form (JSON Lines of `chefshat.v1.RecordLine`), writing, reading and replaying it, and the translation
+//! between the engine's values and the protocol's messages that all of this rests on. Hosting games lives in the server.
+
+pub mod convert;
+pub mod jsonl;
+pub mod replay;
+pub mod seeds;

@@ -1,0 +1,69 @@
+//! The command line of `chefshat`: what it understands, and one module for each command. What the commands do is elsewhere.
+
+mod serve;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use tracing_subscriber::EnvFilter;
+
+/// Why a command failed, in words for the person who ran it.
+pub type CommandError = Box<dyn std::error::Error + Send + Sync>;
+
+/// Chef's Hat: a game server for agents, robots and people.
+#[derive(Debug, Parser)]
+#[command(name = "chefshat", version, propagate_version = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+    /// What is logged to standard error, for instance `debug` or `chefshat_server=debug`.
+    #[arg(long, env = "CHEFSHAT_LOG", default_value = "warn", global = true)]
+    log: String,
+    /// Log lines as JSON.
+    #[arg(long, env = "CHEFSHAT_LOG_JSON", global = true)]
+    log_json: bool,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Host rooms.
+    Serve(serve::Serve),
+}
+
+/// Runs what the command line asks for.
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let result = start_logging(&cli).and_then(|()| match cli.command {
+        Command::Serve(command) => in_runtime(command.run()),
+    });
+    match result {
+        Ok(code) => code,
+        Err(error) => {
+            anstream::eprintln!("chefshat: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn in_runtime(
+    command: impl Future<Output = Result<ExitCode, CommandError>>,
+) -> Result<ExitCode, CommandError> {
+    tokio::runtime::Builder::new_multi_thread()
+        .enable_all()
+        .build()?
+        .block_on(command)
+}
+
+fn start_logging(cli: &Cli) -> Result<(), CommandError> {
+    let filter = EnvFilter::try_new(&cli.log)
+        .map_err(|error| format!("--log {:?}: {error}; write for instance info", cli.log))?;
+    let logs = tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr);
+    if cli.log_json {
+        logs.json().init();
+    } else {
+        logs.init();
+    }
+    Ok(())
+}

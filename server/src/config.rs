@@ -1,0 +1,56 @@
+//! What a server is configured with, and every limit it keeps.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// Largest message a client may send, bytes.
+pub const MAX_MESSAGE_BYTES: usize = 64 * 1024;
+/// Most streams of one connection.
+pub const MAX_STREAMS_PER_CONNECTION: u32 = 1_024;
+/// Most seats attached to one stream.
+pub const MAX_SEATS_PER_STREAM: usize = 4_096;
+/// Most seats named in one Watch.
+pub const MAX_SEATS_PER_WATCH: usize = 64;
+/// Most commands in one message.
+pub const MAX_COMMANDS_PER_MESSAGE: usize = 1_024;
+/// Messages that wait for one room.
+pub const ROOM_MAILBOX: usize = 256;
+/// Longest name of a room or participant, characters.
+pub const MAX_NAME_CHARS: usize = 64;
+/// Most Shifts of a hosted game, and most points it may be played to.
+pub const MAX_HOSTED_SHIFTS: u32 = 10_000;
+/// How often an idle Watch stream says that it is alive.
+pub const HEARTBEAT: Duration = Duration::from_secs(15);
+
+/// What may be set for a server.
+#[derive(Debug, Clone)]
+pub struct ServerConfig {
+    /// Where records of finished games are written; `None`: nowhere.
+    pub data_dir: Option<PathBuf>,
+    /// Most rooms at a time, ended ones that are still shown included.
+    pub max_rooms: usize,
+    /// Most connections at a time.
+    pub max_connections: usize,
+    /// How long an ended room is still shown.
+    pub retention: Duration,
+    /// How long running games may go on after a shutdown was asked for.
+    pub grace: Duration,
+    /// How long a new connection may stay silent before it is dropped.
+    pub first_byte_timeout: Duration,
+    /// Web origins that may call the server from a browser; `*` is all.
+    pub allowed_origins: Vec<String>,
+}
+
+impl Default for ServerConfig {
+    fn default() -> Self {
+        Self {
+            data_dir: None,
+            max_rooms: 10_000,
+            max_connections: 10_000,
+            retention: Duration::from_secs(600),
+            grace: Duration::from_secs(30),
+            first_byte_timeout: Duration::from_secs(10),
+            allowed_origins: Vec::new(),
+        }
+    }
+}

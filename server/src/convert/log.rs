@@ -1,0 +1,250 @@
+//! The log of a room as events of the protocol, as a viewer may see them. What of the engine's events a viewer may see is decided by
+//! `Event::seen_by`; rewards are withheld here, because only rooms have them.
+
+use chefshat_engine::{Event, Seat, Viewer};
+use chefshat_proto::v1::{self, game_event::Kind};
+use chefshat_records::convert::{By, action_space, event_kind, rules_to_proto};
+use chefshat_records::seeds::SeedPlan;
+use prost::Message as _;
+
+use super::decision::source_to_proto;
+use super::policy::policy_to_proto;
+use super::room::{kind_to_proto, participants};
+use crate::room::core::Core;
+use crate::room::log::{ByWhom, Happening, LogEntry};
+use crate::store::journal::AbortReason;
+
+/// The event at a position of the log (from 0), as `viewer` may see it; `None` beyond the end.
+pub fn view(core: &Core, position: usize, viewer: Viewer) -> Option<v1::GameEvent> {
+    let entry = core.log().get(position)?;
+    Some(v1::GameEvent {
+        sequence: u64::try_from(position).expect("a log fits memory") + 1,
+        elapsed_ms: entry.at_ms.into(),
+        rewards: rewards(entry, viewer),
+        kind: Some(kind(core, &entry.happening, viewer)),
+    })
+}
+
+fn kind(core: &Core, happening: &Happening, viewer: Viewer) -> Kind {
+    let space = core.header().rules.actions();
+    let engine_event = |event: Event, by: &ByWhom| {
+        event_kind(&event.seen_by(viewer), space, by_to_proto(by))
+            .expect("a room tells the end of its game itself")
+    };
+    match happening {
+        Happening::Seated(seat, participant) => Kind::Seated(v1::Seated {
+            seat: number(*seat),
+            name: participant.name.clone(),
+            kind: kind_to_proto(Some(participant.kind)),
+            built_in_agent: String::new(),
+        }),
+        Happening::Vacated(seat) => Kind::Vacated(v1::Vacated {
+            seat: number(*seat),
+        }),
+        Happening::Disconnected(seat) => Kind::Disconnected(v1::Disconnected {
+            seat: number(*seat),
+        }),
+        Happening::Returned(seat) => Kind::Returned(v1::Returned {
+            seat: number(*seat),
+        }),
+        Happening::Substituted(seat) => Kind::Substituted(v1::Substituted {
+            seat: number(*seat),
+            agent: core.header().policy.substitute.name().into(),
+        }),
+        Happening::GameStarted => Kind::GameStarted(game_started(core)),
+        Happening::Game(game) => engine_event(game.event, &game.by),
+        Happening::Played {
+            seat,
+            action,
+            cards_left,
+            by,
+        } => {
+            let (face, quantity, jokers) = played(core, *action);
+            engine_event(
+                Event::Played {
+                    seat: *seat,
+                    action: *action,
+                    face,
+                    quantity,
+                    jokers,
+                    cards_left: *cards_left,
+                },
+                by,
+            )
+        }
+        Happening::Passed {
+            seat,
+            cards_left,
+            by,
+        } => engine_event(
+            Event::Passed {
+                seat: *seat,
+                cards_left: *cards_left,
+            },
+            by,
+        ),
+        Happening::PizzaDone {
+            pizza,
+            last_to_play,
+            next_leader,
+        } => engine_event(
+            Event::PizzaDone {
+                pizza: *pizza,
+                last_to_play: *last_to_play,
+                next_leader: *next_leader,
+            },
+            &UNDECIDED,
+        ),
+        Happening::SeatFinished { seat, place } => engine_event(
+            Event::SeatFinished {
+                seat: *seat,
+                place: *place,
+            },
+            &UNDECIDED,
+        ),
+        Happening::GameEnded => Kind::GameEnded(v1::GameEnded {
+            standings: standings(core),
+            reveal: reveal(core),
+        }),
+        Happening::GameAborted(reason) => Kind::GameAborted(v1::GameAborted {
+            reason: match reason {
+                AbortReason::Closed => v1::AbortReason::Closed,
+                AbortReason::Shutdown => v1::AbortReason::Shutdown,
+                AbortReason::ParticipantsLost => v1::AbortReason::ParticipantsLost,
+                AbortReason::NeverStarted => v1::AbortReason::NeverStarted,
+                AbortReason::TooLong => v1::AbortReason::TooLong,
+            }
+            .into(),
+            reveal: reveal(core),
+        }),
+        Happening::Expressed(seat, expression) => Kind::ExpressionShown(v1::ExpressionShown {
+            seat: number(*seat),
+            expression: v1::Expression::decode(expression.as_ref()).ok(),
+        }),
+    }
+}
+
+/// For events that no decision stands behind alone.
+const UNDECIDED: ByWhom = ByWhom {
+    source: crate::store::journal::Source::Agent,
+    time_us: 0,
+    reward: None,
+};
+
+/// The start of a game, as the rooms of the server stand now.
+pub fn game_started(core: &Core) -> v1::GameStarted {
+    let header = core.header();
+    v1::GameStarted {
+        game_id: header.game_id.to_string(),
+        rules: Some(rules_to_proto(&header.rules)),
+        rules_version: chefshat_engine::RULES_VERSION,
+        policy: Some(policy_to_proto(&header.policy)),
+        seats: participants(core)
+            .into_iter()
+            .map(|seat| v1::Participant {
+                // The same for everybody who reads the log, whenever: what changes later has events of its own.
+                connected: true,
+                substituted: false,
+                ..seat
+            })
+            .collect(),
+        action_space: Some(action_space(&header.rules.actions())),
+        hand_size: header.rules.hand_size().into(),
+        seed_commitment: header
+            .seed
+            .commitment(&header.game_id.0)
+            .map_or_else(Vec::new, |hash| hash.to_vec()),
+    }
+}
+
+fn standings(core: &Core) -> Vec<v1::Standing> {
+    let Some(game) = core.game() else {
+        return Vec::new();
+    };
+    let Some(standings) = game.standings() else {
+        return Vec::new();
+    };
+    standings
+        .as_slice()
+        .iter()
+        .zip(1..)
+        .map(|(seat, place)| v1::Standing {
+            seat: number(*seat),
+            points: game.scores()[*seat],
+            place,
+        })
+        .collect()
+}
+
+fn reveal(core: &Core) -> Option<v1::SeedReveal> {
+    let game = core.game()?;
+    let (server_seed, nonce, seat_entropy) = match core.header().seed {
+        SeedPlan::Committed { server_seed, nonce } => (
+            server_seed.to_vec(),
+            nonce.to_vec(),
+            core.entropy().to_vec(),
+        ),
+        SeedPlan::Fixed { .. } => (Vec::new(), Vec::new(), Vec::new()),
+    };
+    Some(v1::SeedReveal {
+        server_seed,
+        nonce,
+        seat_entropy,
+        game_seed: game.seed().0.to_vec(),
+    })
+}
+
+/// The rewards of an event that a viewer may see: a seat its own, the record all, spectators none.
+fn rewards(entry: &LogEntry, viewer: Viewer) -> Vec<v1::SeatReward> {
+    let visible = |seat: Seat| match viewer {
+        Viewer::Seat(own) => own == seat,
+        Viewer::Spectator => false,
+        Viewer::Everything => true,
+    };
+    let one = |seat: Seat, value: f32| v1::SeatReward {
+        seat: number(seat),
+        value,
+    };
+    match &entry.happening {
+        Happening::Played { seat, by, .. } | Happening::Passed { seat, by, .. }
+            if visible(*seat) =>
+        {
+            by.reward
+                .map(|value| one(*seat, value))
+                .into_iter()
+                .collect()
+        }
+        Happening::Game(game) => game
+            .rewards
+            .iter()
+            .filter(|(seat, _)| visible(*seat))
+            .map(|(seat, value)| one(*seat, *value))
+            .collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// Face, quantity and jokers of a play, from its action.
+fn played(core: &Core, action: chefshat_engine::Action) -> (u8, u8, u8) {
+    use chefshat_engine::Move;
+    let rules = &core.header().rules;
+    match rules.actions().decode(action) {
+        Some(Move::Play {
+            face,
+            quantity,
+            jokers,
+        }) => (face.get(), quantity, jokers),
+        _ => (rules.faces() + 1, 0, 1),
+    }
+}
+
+fn by_to_proto(by: &ByWhom) -> By {
+    By {
+        source: source_to_proto(by.source),
+        decision_time_us: by.time_us,
+    }
+}
+
+fn number(seat: Seat) -> u32 {
+    u32::try_from(seat.index()).expect("a seat is below six")
+}

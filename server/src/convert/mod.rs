@@ -1,0 +1,17 @@
+//! Between what rooms hold and what the protocol says. Rule sets and the engine's events are translated in `chefshat-records`, which
+//! records share; here is what only a server has: policies, seats, decisions, the log.
+
+mod decision;
+mod log;
+mod policy;
+mod record;
+mod room;
+
+pub use decision::{
+    annotations_from_proto, answer_result, decision_request, expression_from_proto,
+    observation_from_proto, observation_to_proto,
+};
+pub use log::{game_started, view};
+pub use policy::{policy_from_proto, policy_to_proto};
+pub use record::record_lines;
+pub use room::{describe, fills_from_proto, kind_from_proto, participants};

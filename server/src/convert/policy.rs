@@ -1,0 +1,153 @@
+//! A room's policy as a message, and back with its ranges checked.
+
+use std::ops::RangeInclusive;
+use std::time::Duration;
+
+use chefshat_arena::AgentKind;
+use chefshat_engine::RewardScheme;
+use chefshat_proto::v1;
+use chefshat_records::convert::FieldProblem;
+
+use crate::room::policy::{AbortPolicy, Policy};
+
+/// A day, the longest time a policy may name, milliseconds.
+const DAY_MS: u32 = 86_400_000;
+
+/// The policy a message asks for: the standard one with every field that is set in place of the standard's.
+///
+/// # Errors
+/// The first field out of its range.
+pub fn policy_from_proto(message: &v1::RoomPolicy) -> Result<Policy, FieldProblem> {
+    let standard = Policy::default();
+    let spectator_delay = in_range(
+        "spectator_delay_decisions",
+        message.spectator_delay_decisions,
+        0..=10_000,
+    )?
+    .unwrap_or(0);
+    let policy = Policy {
+        decision_time: millis("decision_time_ms", message.decision_time_ms, 10..=DAY_MS)?
+            .unwrap_or(standard.decision_time),
+        bank: millis("bank_ms", message.bank_ms, 0..=DAY_MS)?.unwrap_or(standard.bank),
+        max_invalid_attempts: match in_range(
+            "max_invalid_attempts",
+            message.max_invalid_attempts,
+            0..=1000,
+        )? {
+            None => standard.max_invalid_attempts,
+            Some(0) => None,
+            Some(limit) => Some(limit),
+        },
+        max_timeouts: in_range("max_timeouts", message.max_timeouts, 1..=1000)?
+            .unwrap_or(standard.max_timeouts),
+        substitute: agent("substitute", &message.substitute)?.unwrap_or(standard.substitute),
+        abort: match v1::AbortPolicy::try_from(message.abort) {
+            Ok(v1::AbortPolicy::Unspecified | v1::AbortPolicy::AllLost) => AbortPolicy::AllLost,
+            Ok(v1::AbortPolicy::AnyLost) => AbortPolicy::AnyLost,
+            Ok(v1::AbortPolicy::Never) => AbortPolicy::Never,
+            Err(_) => return Err(unknown("abort", message.abort)),
+        },
+        reward_scheme: match v1::RewardScheme::try_from(message.reward_scheme) {
+            Ok(v1::RewardScheme::Unspecified) => None,
+            Ok(v1::RewardScheme::Validity) => Some(RewardScheme::Validity),
+            Ok(v1::RewardScheme::Paper) => Some(RewardScheme::Paper),
+            Ok(v1::RewardScheme::PaperIntended) => Some(RewardScheme::PaperIntended),
+            Ok(v1::RewardScheme::Winning) => Some(RewardScheme::Winning),
+            Ok(v1::RewardScheme::Points) => Some(RewardScheme::Points),
+            Err(_) => return Err(unknown("reward_scheme", message.reward_scheme)),
+        },
+        pace: millis("pace_ms", message.pace_ms, 0..=60_000)?.unwrap_or(standard.pace),
+        waiting_time: millis("waiting_time_ms", message.waiting_time_ms, 1_000..=DAY_MS)?
+            .unwrap_or(standard.waiting_time),
+        spectators: message.spectators.unwrap_or(standard.spectators),
+        spectator_delay_decisions: usize::try_from(spectator_delay).unwrap_or(usize::MAX),
+        spectators_see_hands: message
+            .spectators_see_hands
+            .unwrap_or(standard.spectators_see_hands),
+    };
+    if policy.spectators_see_hands && policy.spectator_delay_decisions == 0 {
+        return Err(FieldProblem::new(
+            "spectators_see_hands",
+            "spectators may see hands only with a spectator_delay_decisions of 1 or more",
+        ));
+    }
+    Ok(policy)
+}
+
+/// A policy with every field set.
+pub fn policy_to_proto(policy: &Policy) -> v1::RoomPolicy {
+    v1::RoomPolicy {
+        decision_time_ms: Some(to_millis(policy.decision_time)),
+        bank_ms: Some(to_millis(policy.bank)),
+        max_invalid_attempts: Some(policy.max_invalid_attempts.unwrap_or(0)),
+        max_timeouts: Some(policy.max_timeouts),
+        substitute: policy.substitute.name().into(),
+        abort: match policy.abort {
+            AbortPolicy::AllLost => v1::AbortPolicy::AllLost,
+            AbortPolicy::AnyLost => v1::AbortPolicy::AnyLost,
+            AbortPolicy::Never => v1::AbortPolicy::Never,
+        }
+        .into(),
+        reward_scheme: match policy.reward_scheme {
+            None => v1::RewardScheme::Unspecified,
+            Some(RewardScheme::Validity) => v1::RewardScheme::Validity,
+            Some(RewardScheme::Paper) => v1::RewardScheme::Paper,
+            Some(RewardScheme::PaperIntended) => v1::RewardScheme::PaperIntended,
+            Some(RewardScheme::Winning) => v1::RewardScheme::Winning,
+            Some(RewardScheme::Points) => v1::RewardScheme::Points,
+        }
+        .into(),
+        pace_ms: Some(to_millis(policy.pace)),
+        waiting_time_ms: Some(to_millis(policy.waiting_time)),
+        spectators: Some(policy.spectators),
+        spectator_delay_decisions: Some(
+            u32::try_from(policy.spectator_delay_decisions).unwrap_or(u32::MAX),
+        ),
+        spectators_see_hands: Some(policy.spectators_see_hands),
+    }
+}
+
+/// The built-in agent of a name; `None` for the empty name.
+pub(super) fn agent(field: &'static str, name: &str) -> Result<Option<AgentKind>, FieldProblem> {
+    if name.is_empty() {
+        return Ok(None);
+    }
+    AgentKind::from_name(name).map(Some).ok_or_else(|| {
+        let known = AgentKind::ALL.map(AgentKind::name).join(", ");
+        FieldProblem::new(
+            field,
+            format!("there is no built-in agent {name:?}; use one of {known}"),
+        )
+    })
+}
+
+/// Whole milliseconds, as messages count time.
+pub(super) fn to_millis(time: Duration) -> u32 {
+    u32::try_from(time.as_millis()).unwrap_or(u32::MAX)
+}
+
+fn millis(
+    field: &'static str,
+    value: Option<u32>,
+    range: RangeInclusive<u32>,
+) -> Result<Option<Duration>, FieldProblem> {
+    Ok(in_range(field, value, range)?.map(|ms| Duration::from_millis(ms.into())))
+}
+
+fn in_range(
+    field: &'static str,
+    value: Option<u32>,
+    range: RangeInclusive<u32>,
+) -> Result<Option<u32>, FieldProblem> {
+    match value {
+        Some(value) if !range.contains(&value) => Err(FieldProblem::new(
+            field,
+            format!("{value} is not in {}..={}", range.start(), range.end()),
+        )),
+        value => Ok(value),
+    }
+}
+
+fn unknown(field: &'static str, value: i32) -> FieldProblem {
+    FieldProblem::new(field, format!("{value} is not a value of this enum"))
+}

@@ -1,0 +1,135 @@
+//! The record of a finished game: its journal folded again, with every decision and event in the order in which they happened.
+
+use std::sync::Arc;
+
+use chefshat_engine::{Action, Seat, Viewer};
+use chefshat_proto::v1::{self, record_line::Line};
+use chefshat_records::convert::{action_space, rules_to_proto};
+use chefshat_records::jsonl::FORMAT_VERSION;
+use prost::Message as _;
+
+use super::decision::{kind_to_proto, mask_bytes, source_to_proto};
+use super::log::view;
+use super::policy::policy_to_proto;
+use super::room::{participants, state_to_proto};
+use crate::room::core::Core;
+use crate::store::journal::{Change, Decided, Entry, GameHeader};
+
+/// Every line of the record of a game, from its header and its journal.
+pub fn record_lines(header: &Arc<GameHeader>, journal: &[Entry]) -> Vec<v1::RecordLine> {
+    let mut core = Core::new(Arc::clone(header));
+    let mut body = Vec::with_capacity(journal.len() * 2);
+    let mut attempts: Vec<Action> = Vec::new();
+    let mut decisions = 0;
+    for entry in journal {
+        match &entry.change {
+            Change::Attempted { action, .. } => attempts.push(*action),
+            Change::Decided(decided) => {
+                decisions += 1;
+                let record = decision(&core, entry, decided, &std::mem::take(&mut attempts));
+                body.push(Line::Decision(record));
+            }
+            Change::Expressed {
+                seat,
+                record_only: true,
+                expression,
+            } => body.push(Line::PrivateExpression(v1::PrivateExpression {
+                seat: number(*seat),
+                elapsed_ms: elapsed_ms(entry),
+                expression: v1::Expression::decode(expression.as_ref()).ok(),
+            })),
+            _ => {}
+        }
+        let before = core.log().len();
+        core.refold(entry);
+        body.extend(
+            (before..core.log().len())
+                .filter_map(|position| view(&core, position, Viewer::Everything))
+                .map(Line::Event),
+        );
+    }
+    let footer = Line::Footer(v1::RecordFooter {
+        state: state_to_proto(core.state()).into(),
+        events: u64::try_from(core.log().len()).unwrap_or(u64::MAX),
+        decisions,
+    });
+    std::iter::once(Line::Header(record_header(&core)))
+        .chain(body)
+        .chain(std::iter::once(footer))
+        .map(|line| v1::RecordLine { line: Some(line) })
+        .collect()
+}
+
+fn record_header(core: &Core) -> v1::RecordHeader {
+    let header = core.header();
+    let commitment = header.seed.commitment(&header.game_id.0);
+    v1::RecordHeader {
+        format_version: FORMAT_VERSION,
+        game_id: header.game_id.to_string(),
+        room_id: header.room_id.to_string(),
+        room_name: header.name.clone(),
+        origin: match commitment {
+            Some(_) => v1::GameOrigin::Dealt,
+            None => v1::GameOrigin::FixedSeed,
+        }
+        .into(),
+        rules: Some(rules_to_proto(&header.rules)),
+        rules_version: chefshat_engine::RULES_VERSION,
+        policy: Some(policy_to_proto(&header.policy)),
+        seats: participants(core),
+        seed_commitment: commitment.map_or_else(Vec::new, |hash| hash.to_vec()),
+        created_at_ms: header.created_at_ms,
+        server_version: env!("CARGO_PKG_VERSION").into(),
+        action_space: Some(action_space(&header.rules.actions())),
+    }
+}
+
+/// A decision, as the game stood before it.
+fn decision(
+    core: &Core,
+    entry: &Entry,
+    decided: &Decided,
+    attempts: &[Action],
+) -> v1::DecisionRecord {
+    let rules = &core.header().rules;
+    let open = core.open();
+    let invalid_reward = core
+        .header()
+        .policy
+        .reward_scheme
+        .filter(|_| core.open_is_turn() && !attempts.is_empty())
+        .map(|scheme| attempts.iter().map(|_| scheme.invalid()).sum());
+    v1::DecisionRecord {
+        seat: number(decided.seat),
+        decision_id: open.map_or(0, |open| open.id),
+        kind: open
+            .map_or(v1::DecisionKind::Unspecified, |open| {
+                kind_to_proto(open.decision.kind)
+            })
+            .into(),
+        action: decided.action.index().into(),
+        text: rules.actions().text(decided.action).unwrap_or_default(),
+        source: source_to_proto(decided.source).into(),
+        decision_time_us: decided.time_us,
+        bank_left_ms: decided.bank_left_ms,
+        invalid_attempts: attempts
+            .iter()
+            .map(|action| action.index().into())
+            .collect(),
+        annotations: decided
+            .annotations
+            .as_ref()
+            .and_then(|bytes| v1::Annotations::decode(bytes.as_ref()).ok()),
+        action_mask: mask_bytes(&core.legal_actions(), rules),
+        invalid_reward,
+        elapsed_ms: elapsed_ms(entry),
+    }
+}
+
+fn elapsed_ms(entry: &Entry) -> u64 {
+    u64::try_from(entry.at.as_millis()).unwrap_or(u64::MAX)
+}
+
+fn number(seat: Seat) -> u32 {
+    u32::try_from(seat.index()).expect("a seat is below six")
+}

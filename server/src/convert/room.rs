@@ -1,0 +1,133 @@
+//! A room and its seats as messages.
+
+use chefshat_engine::RuleSet;
+use chefshat_proto::v1::{self, seat_config::FilledBy};
+use chefshat_records::convert::{FieldProblem, rules_to_proto};
+
+use super::policy::{agent, policy_to_proto};
+use crate::room::core::{Core, State};
+use crate::store::journal::{Fill, ParticipantKind};
+
+/// What fills the seats of a new room; none given means that all are open.
+///
+/// # Errors
+/// A number of seats other than the rule set's, or a seat that makes no sense.
+pub fn fills_from_proto(
+    seats: &[v1::SeatConfig],
+    rules: &RuleSet,
+) -> Result<Vec<Fill>, FieldProblem> {
+    let players = usize::from(rules.players());
+    if seats.is_empty() {
+        return Ok(vec![Fill::Open { reserved_for: None }; players]);
+    }
+    if seats.len() != players {
+        return Err(FieldProblem::new(
+            "seats",
+            format!(
+                "{} seats are described, but the rule set has {players} players; describe all or none",
+                seats.len()
+            ),
+        ));
+    }
+    seats
+        .iter()
+        .map(|seat| match &seat.filled_by {
+            None => Ok(Fill::Open { reserved_for: None }),
+            Some(FilledBy::ReservedFor(kind)) => Ok(Fill::Open {
+                reserved_for: kind_from_proto("seats", *kind)?,
+            }),
+            Some(FilledBy::BuiltInAgent(name)) => agent("seats", name)?
+                .map(Fill::BuiltIn)
+                .ok_or_else(|| FieldProblem::new("seats", "a built-in agent has no name")),
+        })
+        .collect()
+}
+
+/// The kind of a participant; `None` when unspecified.
+///
+/// # Errors
+/// A number that names no kind.
+pub fn kind_from_proto(
+    field: &'static str,
+    kind: i32,
+) -> Result<Option<ParticipantKind>, FieldProblem> {
+    match v1::ParticipantKind::try_from(kind) {
+        Ok(v1::ParticipantKind::Unspecified) => Ok(None),
+        Ok(v1::ParticipantKind::Agent) => Ok(Some(ParticipantKind::Agent)),
+        Ok(v1::ParticipantKind::Human) => Ok(Some(ParticipantKind::Human)),
+        Ok(v1::ParticipantKind::Robot) => Ok(Some(ParticipantKind::Robot)),
+        Err(_) => Err(FieldProblem::new(
+            field,
+            format!("{kind} is not a kind of participant"),
+        )),
+    }
+}
+
+/// The message's name for a kind.
+pub(super) fn kind_to_proto(kind: Option<ParticipantKind>) -> i32 {
+    match kind {
+        None => v1::ParticipantKind::Unspecified,
+        Some(ParticipantKind::Agent) => v1::ParticipantKind::Agent,
+        Some(ParticipantKind::Human) => v1::ParticipantKind::Human,
+        Some(ParticipantKind::Robot) => v1::ParticipantKind::Robot,
+    }
+    .into()
+}
+
+/// A room as everybody sees it.
+pub fn describe(core: &Core) -> v1::Room {
+    let header = core.header();
+    let commitment = header.seed.commitment(&header.game_id.0);
+    v1::Room {
+        room_id: header.room_id.to_string(),
+        game_id: header.game_id.to_string(),
+        name: header.name.clone(),
+        state: state_to_proto(core.state()).into(),
+        rules: Some(rules_to_proto(&header.rules)),
+        policy: Some(policy_to_proto(&header.policy)),
+        seats: participants(core),
+        seed_commitment: commitment.map_or_else(Vec::new, |hash| hash.to_vec()),
+        seed_fixed: commitment.is_none(),
+        created_at_ms: header.created_at_ms,
+    }
+}
+
+/// The message's name for where a room stands.
+pub(super) fn state_to_proto(state: State) -> v1::RoomState {
+    match state {
+        State::Waiting => v1::RoomState::Waiting,
+        State::Playing => v1::RoomState::Playing,
+        State::Finished => v1::RoomState::Finished,
+        State::Aborted(_) => v1::RoomState::Aborted,
+    }
+}
+
+/// The seats of a room.
+pub fn participants(core: &Core) -> Vec<v1::Participant> {
+    core.all_seats()
+        .map(|seat| {
+            let standing = core.standing(seat);
+            let (reserved_for, built_in) = match standing.fill {
+                Fill::Open { reserved_for } => (reserved_for, None),
+                Fill::BuiltIn(kind) => (None, Some(kind.name())),
+            };
+            let participant = standing.participant;
+            v1::Participant {
+                seat: u32::try_from(seat.index()).expect("a seat is below six"),
+                name: participant.map_or_else(
+                    || built_in.unwrap_or_default().to_owned(),
+                    |participant| participant.name.clone(),
+                ),
+                kind: kind_to_proto(
+                    participant
+                        .map(|participant| participant.kind)
+                        .or(built_in.map(|_| ParticipantKind::Agent)),
+                ),
+                reserved_for: kind_to_proto(reserved_for),
+                built_in_agent: built_in.unwrap_or_default().to_owned(),
+                connected: standing.connected,
+                substituted: standing.substituted,
+            }
+        })
+        .collect()
+}

@@ -1,0 +1,107 @@
+//! `ServerService`: what the server is and can do.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use chefshat_arena::AgentKind;
+use chefshat_engine::{Action, ActionSpace, RULES_VERSION, RuleSetSpec};
+use chefshat_proto::v1::{self, server_service_server::ServerService};
+use chefshat_records::convert::{FieldProblem, action_space, rules_to_proto};
+use tonic::{Request, Response, Status};
+
+use super::status::field;
+use crate::config::{
+    MAX_HOSTED_SHIFTS, MAX_MESSAGE_BYTES, MAX_SEATS_PER_STREAM, MAX_SEATS_PER_WATCH,
+    MAX_STREAMS_PER_CONNECTION, ServerConfig,
+};
+use crate::room::MAX_SPECTATORS;
+use crate::rooms::Rooms;
+
+/// Faces of the standard game.
+const STANDARD_FACES: u32 = 11;
+
+/// The service.
+#[derive(Debug, Clone)]
+pub struct Info {
+    rooms: Arc<Rooms>,
+    limits: HashMap<String, u64>,
+}
+
+impl Info {
+    /// The service for these rooms.
+    pub fn new(rooms: Arc<Rooms>, config: &ServerConfig) -> Self {
+        let limits = [
+            ("max_rooms", config.max_rooms),
+            ("max_connections", config.max_connections),
+            ("max_message_bytes", MAX_MESSAGE_BYTES),
+            ("max_seats_per_stream", MAX_SEATS_PER_STREAM),
+            ("max_seats_per_watch", MAX_SEATS_PER_WATCH),
+            ("max_spectators_per_room", MAX_SPECTATORS),
+            (
+                "max_streams_per_connection",
+                usize::try_from(MAX_STREAMS_PER_CONNECTION).unwrap_or(usize::MAX),
+            ),
+            (
+                "max_shifts",
+                usize::try_from(MAX_HOSTED_SHIFTS).unwrap_or(usize::MAX),
+            ),
+        ]
+        .into_iter()
+        .map(|(name, limit)| (name.to_owned(), u64::try_from(limit).unwrap_or(u64::MAX)))
+        .collect();
+        Self { rooms, limits }
+    }
+}
+
+#[tonic::async_trait]
+impl ServerService for Info {
+    async fn get_server_info(
+        &self,
+        _request: Request<v1::GetServerInfoRequest>,
+    ) -> Result<Response<v1::GetServerInfoResponse>, Status> {
+        let presets = RuleSetSpec::PRESETS
+            .iter()
+            .map(|name| {
+                let rules = RuleSetSpec::preset(name)
+                    .and_then(|spec| spec.validate().ok())
+                    .expect("every preset is a valid rule set");
+                v1::RuleSet {
+                    preset: (*name).to_owned(),
+                    ..rules_to_proto(&rules)
+                }
+            })
+            .collect();
+        Ok(Response::new(v1::GetServerInfoResponse {
+            server_version: env!("CARGO_PKG_VERSION").into(),
+            rules_version: RULES_VERSION,
+            presets,
+            built_in_agents: AgentKind::ALL.map(|kind| kind.name().to_owned()).to_vec(),
+            limits: self.limits.clone(),
+            open_rooms: u32::try_from(self.rooms.open_count()).unwrap_or(u32::MAX),
+            shutting_down: self.rooms.is_shutting_down(),
+        }))
+    }
+
+    async fn get_action_table(
+        &self,
+        request: Request<v1::GetActionTableRequest>,
+    ) -> Result<Response<v1::GetActionTableResponse>, Status> {
+        let faces = match request.into_inner().faces {
+            0 => STANDARD_FACES,
+            faces => faces,
+        };
+        let space = u8::try_from(faces)
+            .ok()
+            .and_then(ActionSpace::new)
+            .ok_or_else(|| {
+                let problem = FieldProblem::new("faces", format!("{faces} is not in 4..=15"));
+                field("FACES_OUT_OF_RANGE", &problem)
+            })?;
+        Ok(Response::new(v1::GetActionTableResponse {
+            action_space: Some(action_space(&space)),
+            texts: (0..space.size())
+                .filter_map(|index| space.text(Action::new(index)))
+                .collect(),
+        }))
+    }
+}

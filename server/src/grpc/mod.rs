@@ -1,0 +1,14 @@
+//! The gRPC services: they translate and forward. No handler owns state, so that one dropped half-way loses nothing.
+
+mod info;
+mod play;
+mod records;
+mod room_service;
+mod spectate;
+pub mod status;
+
+pub use info::Info;
+pub use play::Play;
+pub use records::Records;
+pub use room_service::RoomCalls;
+pub use spectate::Spectate;

@@ -1,0 +1,343 @@
+//! `PlayService`: streams of seats, and single commands without a stream. A stream's requests are read by a task of their own; its
+//! responses come from its outbox, which rooms fill.
+
+use std::pin::Pin;
+use std::sync::Arc;
+
+use chefshat_proto::v1::{
+    self, SeatUpdate, act_request, play_service_server::PlayService, seat_command::Command,
+    seat_update::Update,
+};
+use chefshat_records::convert::FieldProblem;
+use chefshat_records::seeds::MAX_ENTROPY;
+use futures::{Stream, StreamExt as _};
+use tokio::time::Instant;
+use tokio_util::sync::CancellationToken;
+use tonic::{Code, Request, Response, Status, Streaming};
+
+use super::status::{Refusal, field, status, ticket_unknown};
+use crate::config::{
+    HEARTBEAT, MAX_COMMANDS_PER_MESSAGE, MAX_SEATS_PER_STREAM, MAX_SEATS_PER_WATCH,
+};
+use crate::convert;
+use crate::ids::Token;
+use crate::outbox::{Outbox, OutboxStream};
+use crate::room::core::ConnectionId;
+use crate::room::delivery::Wishes;
+use crate::room::{AttachRequest, Handle, SeatAction};
+use crate::rooms::Rooms;
+
+/// The service.
+#[derive(Debug, Clone)]
+pub struct Play {
+    rooms: Arc<Rooms>,
+    /// Cancelled when all streams are to end.
+    closing: CancellationToken,
+}
+
+impl Play {
+    /// The service for these rooms; `closing` ends its streams.
+    pub fn new(rooms: Arc<Rooms>, closing: CancellationToken) -> Self {
+        Self { rooms, closing }
+    }
+}
+
+#[tonic::async_trait]
+impl PlayService for Play {
+    type PlayStream = Pin<Box<dyn Stream<Item = Result<v1::PlayResponse, Status>> + Send>>;
+    type WatchStream =
+        Pin<Box<dyn Stream<Item = Result<v1::PlayServiceWatchResponse, Status>> + Send>>;
+
+    async fn play(
+        &self,
+        request: Request<Streaming<v1::PlayRequest>>,
+    ) -> Result<Response<Self::PlayStream>, Status> {
+        let (outbox, updates) = Outbox::new();
+        let reader = Reader::new(Arc::clone(&self.rooms), outbox, true);
+        tokio::spawn(reader.read(request.into_inner(), self.closing.clone()));
+        Ok(Response::new(Box::pin(updates.map(|updates| {
+            updates.map(|updates| v1::PlayResponse { updates })
+        }))))
+    }
+
+    async fn watch(
+        &self,
+        request: Request<v1::PlayServiceWatchRequest>,
+    ) -> Result<Response<Self::WatchStream>, Status> {
+        let seats = request.into_inner().seats;
+        if !(1..=MAX_SEATS_PER_WATCH).contains(&seats.len()) {
+            return Err(field(
+                "SEATS_REFUSED",
+                &FieldProblem::new("seats", format!("name 1 to {MAX_SEATS_PER_WATCH} seats")),
+            ));
+        }
+        let (outbox, updates) = Outbox::new();
+        let mut reader = Reader::new(Arc::clone(&self.rooms), Arc::clone(&outbox), false);
+        let closing = self.closing.clone();
+        tokio::spawn(async move {
+            for attach in seats {
+                reader.attach(attach).await;
+            }
+            // The seats stay attached until the client goes or the server closes.
+            tokio::select! {
+                () = outbox.abandoned() => {}
+                () = closing.cancelled() => outbox.end(Ok(())),
+            }
+            reader.leave_all().await;
+        });
+        Ok(Response::new(Box::pin(with_heartbeats(updates))))
+    }
+
+    async fn act(
+        &self,
+        request: Request<v1::ActRequest>,
+    ) -> Result<Response<v1::ActResponse>, Status> {
+        let arrived = Instant::now();
+        let request = request.into_inner();
+        let token = Token::parse(&request.ticket).ok_or_else(ticket_unknown)?;
+        let room = self.rooms.get(token.room).ok_or_else(ticket_unknown)?;
+        let action = match request.command {
+            Some(act_request::Command::Answer(answer)) => answer_action(answer),
+            Some(act_request::Command::Express(expression)) => express_action(&expression)
+                .map_err(|problem| field("EXPRESSION_REFUSED", &problem))?,
+            Some(act_request::Command::Resume(_)) => SeatAction::Resume,
+            None => {
+                return Err(field(
+                    "COMMAND_MISSING",
+                    &FieldProblem::new("command", "say what the seat does"),
+                ));
+            }
+        };
+        let result = room
+            .act(token.secret, action, arrived)
+            .await
+            .map_err(Refusal::from)?
+            .ok_or_else(ticket_unknown)?
+            .map_err(Refusal::from)?;
+        Ok(Response::new(v1::ActResponse { result }))
+    }
+}
+
+/// Updates as Watch sends them, with heartbeats when nothing happens.
+fn with_heartbeats(
+    updates: OutboxStream<SeatUpdate>,
+) -> impl Stream<Item = Result<v1::PlayServiceWatchResponse, Status>> {
+    tokio_stream::StreamExt::timeout_repeating(updates, tokio::time::interval(HEARTBEAT))
+        .map(|message| message.unwrap_or_else(|_| Ok(Vec::new())))
+        .map(|updates| updates.map(|updates| v1::PlayServiceWatchResponse { updates }))
+}
+
+/// A seat that is attached to a stream.
+struct BoundSeat {
+    room: Handle,
+    seat: chefshat_engine::Seat,
+    connection: ConnectionId,
+}
+
+/// Reads the requests of one stream.
+struct Reader {
+    rooms: Arc<Rooms>,
+    outbox: Arc<Outbox<SeatUpdate>>,
+    /// Index = handle; `None` where an attachment was refused or has been left.
+    seats: Vec<Option<BoundSeat>>,
+    /// What unspecified delivery means: on Play with decisions, on Watch at once.
+    with_decisions: bool,
+}
+
+impl Reader {
+    fn new(rooms: Arc<Rooms>, outbox: Arc<Outbox<SeatUpdate>>, with_decisions: bool) -> Self {
+        Self {
+            rooms,
+            outbox,
+            seats: Vec::new(),
+            with_decisions,
+        }
+    }
+
+    async fn read(mut self, mut requests: Streaming<v1::PlayRequest>, closing: CancellationToken) {
+        let end = loop {
+            let message = tokio::select! {
+                message = requests.message() => message,
+                () = closing.cancelled() => break Ok(()),
+                () = self.outbox.abandoned() => break Ok(()),
+            };
+            let arrived = Instant::now();
+            match message {
+                Ok(Some(request)) if request.commands.len() > MAX_COMMANDS_PER_MESSAGE => {
+                    break Err(status(
+                        Code::InvalidArgument,
+                        "TOO_MANY_COMMANDS",
+                        format!("a message holds at most {MAX_COMMANDS_PER_MESSAGE} commands"),
+                        [("field", "commands")],
+                    ));
+                }
+                Ok(Some(request)) => {
+                    for command in request.commands {
+                        self.obey(command, arrived).await;
+                    }
+                }
+                Ok(None) => break Ok(()),
+                Err(status) => break Err(status),
+            }
+        };
+        self.leave_all().await;
+        self.outbox.end(end);
+    }
+
+    async fn obey(&mut self, command: v1::SeatCommand, arrived: Instant) {
+        let handle = command.handle;
+        let action = match command.command {
+            Some(Command::Attach(attach)) => return self.attach(attach).await,
+            Some(Command::Detach(_)) => return self.detach(handle).await,
+            Some(Command::Answer(answer)) => answer_action(answer),
+            Some(Command::Express(expression)) => match express_action(&expression) {
+                Ok(action) => action,
+                Err(problem) => {
+                    return self.refuse_field(handle, 0, "EXPRESSION_REFUSED", &problem);
+                }
+            },
+            Some(Command::Resume(_)) => SeatAction::Resume,
+            None => {
+                let problem = FieldProblem::new("command", "say what the seat does");
+                return self.refuse_field(handle, 0, "COMMAND_MISSING", &problem);
+            }
+        };
+        let Some(bound) = self.bound(handle) else {
+            let problem = FieldProblem::new(
+                "handle",
+                "no seat of this stream has this handle; attach first",
+            );
+            return self.refuse_field(handle, 0, "HANDLE_UNKNOWN", &problem);
+        };
+        let (room, seat, connection) = (bound.room.clone(), bound.seat, bound.connection);
+        if room
+            .perform(seat, connection, action, arrived)
+            .await
+            .is_err()
+        {
+            self.refuse(handle, 0, &super::status::room_unknown());
+        }
+    }
+
+    async fn attach(&mut self, attach: v1::Attach) {
+        let handle = u32::try_from(self.seats.len()).unwrap_or(u32::MAX);
+        let request_id = attach.request_id;
+        if self.seats.len() >= MAX_SEATS_PER_STREAM {
+            let refusal = status(
+                Code::ResourceExhausted,
+                "TOO_MANY_SEATS",
+                format!("a stream takes at most {MAX_SEATS_PER_STREAM} attachments; open another"),
+                [("max_seats_per_stream", &MAX_SEATS_PER_STREAM.to_string())],
+            );
+            return self.refuse(handle, request_id, &refusal);
+        }
+        self.seats.push(None);
+        if attach.entropy.len() > MAX_ENTROPY {
+            let problem = FieldProblem::new("entropy", format!("at most {MAX_ENTROPY} bytes"));
+            return self.refuse_field(handle, request_id, "ENTROPY_REFUSED", &problem);
+        }
+        let bound = self.bind(attach, handle).await;
+        match bound {
+            Some(bound) => {
+                if let Some(place) = self.seats.last_mut() {
+                    *place = Some(bound);
+                }
+            }
+            None => self.refuse(handle, request_id, &ticket_unknown()),
+        }
+    }
+
+    async fn bind(&self, attach: v1::Attach, handle: u32) -> Option<BoundSeat> {
+        let token = Token::parse(&attach.ticket)?;
+        let room = self.rooms.get(token.room)?;
+        let at_once = match attach.delivery() {
+            v1::EventDelivery::Unspecified => !self.with_decisions,
+            v1::EventDelivery::WithDecisions => false,
+            v1::EventDelivery::AtOnce => true,
+        };
+        let from = attach.from_sequence.saturating_sub(1);
+        let request = AttachRequest {
+            secret: token.secret,
+            request_id: attach.request_id,
+            outbox: Arc::clone(&self.outbox),
+            handle,
+            wishes: Wishes {
+                at_once,
+                no_mask: attach.no_mask,
+                snapshot: attach.snapshot,
+                from: usize::try_from(from).unwrap_or(usize::MAX),
+            },
+            entropy: attach.entropy,
+        };
+        let (seat, connection) = room.attach(request).await.ok()??;
+        Some(BoundSeat {
+            room,
+            seat,
+            connection,
+        })
+    }
+
+    async fn detach(&mut self, handle: u32) {
+        let place = usize::try_from(handle)
+            .ok()
+            .and_then(|index| self.seats.get_mut(index));
+        if let Some(bound) = place.and_then(Option::take) {
+            bound
+                .room
+                .lost(
+                    bound.seat,
+                    bound.connection,
+                    Some(v1::DetachReason::Requested),
+                )
+                .await;
+        }
+    }
+
+    async fn leave_all(&mut self) {
+        for bound in self.seats.drain(..).flatten() {
+            bound.room.lost(bound.seat, bound.connection, None).await;
+        }
+    }
+
+    fn bound(&self, handle: u32) -> Option<&BoundSeat> {
+        self.seats.get(usize::try_from(handle).ok()?)?.as_ref()
+    }
+
+    fn refuse_field(&self, handle: u32, request_id: u32, reason: &str, problem: &FieldProblem) {
+        self.refuse(handle, request_id, &field(reason, problem));
+    }
+
+    fn refuse(&self, handle: u32, request_id: u32, refusal: &Status) {
+        use tonic_types::StatusExt as _;
+        let (reason, metadata) = refusal
+            .get_details_error_info()
+            .map(|info| (info.reason, info.metadata))
+            .unwrap_or_default();
+        let mut updates = vec![SeatUpdate {
+            handle,
+            update: Some(Update::Refused(v1::Refused {
+                request_id,
+                reason,
+                message: refusal.message().to_owned(),
+                metadata,
+            })),
+        }];
+        // A client that does not read its refusals does not get more of them.
+        self.outbox.push(&mut updates, None, None);
+    }
+}
+
+fn answer_action(answer: v1::Answer) -> SeatAction {
+    SeatAction::Answer {
+        decision_id: answer.decision_id,
+        action: answer.action,
+        annotations: convert::annotations_from_proto(answer.annotations),
+    }
+}
+
+fn express_action(expression: &v1::Expression) -> Result<SeatAction, FieldProblem> {
+    Ok(SeatAction::Express {
+        record_only: expression.record_only,
+        expression: convert::expression_from_proto(expression)?,
+    })
+}

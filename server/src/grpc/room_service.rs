@@ -1,0 +1,246 @@
+//! `RoomService`: making, finding, joining and closing rooms.
+
+use std::sync::Arc;
+
+use chefshat_engine::Stop;
+use chefshat_proto::v1::{self, room_service_server::RoomService};
+use chefshat_records::convert::{FieldProblem, rules_from_proto};
+use tonic::{Code, Request, Response, Status};
+
+use super::status::{self, Refusal, field, room_unknown};
+use crate::config::{MAX_HOSTED_SHIFTS, MAX_NAME_CHARS};
+use crate::convert;
+use crate::ids::{Id, Token};
+use crate::room::{Handle, JoinRequest};
+use crate::rooms::{NewRoom, Rooms};
+use crate::store::journal::ParticipantKind;
+
+const STANDARD_PAGE: u32 = 50;
+const MAX_PAGE: u32 = 100;
+
+/// The service.
+#[derive(Debug, Clone)]
+pub struct RoomCalls {
+    rooms: Arc<Rooms>,
+}
+
+impl RoomCalls {
+    /// The service for these rooms.
+    pub fn new(rooms: Arc<Rooms>) -> Self {
+        Self { rooms }
+    }
+
+    fn find(&self, room_id: &str) -> Result<Handle, Status> {
+        find(&self.rooms, room_id)
+    }
+}
+
+/// The room of an id as it stands in a message.
+pub(super) fn find(rooms: &Rooms, room_id: &str) -> Result<Handle, Status> {
+    Id::parse(room_id)
+        .and_then(|id| rooms.get(id))
+        .ok_or_else(room_unknown)
+}
+
+#[tonic::async_trait]
+impl RoomService for RoomCalls {
+    async fn create_room(
+        &self,
+        request: Request<v1::CreateRoomRequest>,
+    ) -> Result<Response<v1::CreateRoomResponse>, Status> {
+        let new = new_room(request.into_inner())?;
+        let created = self.rooms.create(new).await.map_err(Refusal::from)?;
+        let room = created.handle.describe().await.map_err(Refusal::from)?;
+        Ok(Response::new(v1::CreateRoomResponse {
+            room: Some(room),
+            join_code: created.join_code,
+            owner_token: created.owner.word(),
+        }))
+    }
+
+    async fn get_room(
+        &self,
+        request: Request<v1::GetRoomRequest>,
+    ) -> Result<Response<v1::GetRoomResponse>, Status> {
+        let handle = self.find(&request.into_inner().room_id)?;
+        let room = handle.describe().await.map_err(Refusal::from)?;
+        Ok(Response::new(v1::GetRoomResponse { room: Some(room) }))
+    }
+
+    async fn list_rooms(
+        &self,
+        request: Request<v1::ListRoomsRequest>,
+    ) -> Result<Response<v1::ListRoomsResponse>, Status> {
+        let request = request.into_inner();
+        let page_size = match request.page_size {
+            0 => STANDARD_PAGE,
+            size => size.min(MAX_PAGE),
+        };
+        let mut after = match request.page_token.as_str() {
+            "" => None,
+            token => Some(token.parse().map_err(|_| {
+                field(
+                    "PAGE_TOKEN_REFUSED",
+                    &FieldProblem::new("page_token", "not a token of this server"),
+                )
+            })?),
+        };
+        let mut response = v1::ListRoomsResponse::default();
+        // Each round looks at a page of rooms; those in other states are passed over.
+        loop {
+            let page = self.rooms.list(after, to_usize(MAX_PAGE));
+            let last_page = page.len() < to_usize(MAX_PAGE);
+            for (number, handle) in page {
+                if response.rooms.len() == to_usize(page_size) {
+                    response.next_page_token =
+                        after.map_or_else(String::new, |after: u64| after.to_string());
+                    return Ok(Response::new(response));
+                }
+                after = Some(number);
+                // A room that has just gone is no longer listed.
+                if let Ok(room) = handle.describe().await
+                    && (request.state == 0 || request.state == room.state)
+                {
+                    response.rooms.push(room);
+                }
+            }
+            if last_page {
+                return Ok(Response::new(response));
+            }
+        }
+    }
+
+    async fn join_room(
+        &self,
+        request: Request<v1::JoinRoomRequest>,
+    ) -> Result<Response<v1::JoinRoomResponse>, Status> {
+        let request = request.into_inner();
+        if self.rooms.is_shutting_down() {
+            return Err(status::shutting_down());
+        }
+        let handle = if request.room_id.is_empty() {
+            self.rooms
+                .by_code(&request.join_code)
+                .ok_or_else(join_code_wrong)?
+        } else {
+            let handle = self.find(&request.room_id)?;
+            if !self.rooms.code_is(handle.id(), &request.join_code) {
+                return Err(join_code_wrong());
+            }
+            handle
+        };
+        let kind = convert::kind_from_proto("kind", request.kind)
+            .map_err(|problem| field("KIND_REFUSED", &problem))?
+            .unwrap_or(ParticipantKind::Agent);
+        let name = request.name.trim().to_owned();
+        check_name(&name, 1).map_err(|problem| field("NAME_REFUSED", &problem))?;
+        let joined = handle
+            .join(JoinRequest {
+                name,
+                kind,
+                seat: request.seat,
+            })
+            .await
+            .map_err(Refusal::from)?
+            .map_err(Refusal::from)?;
+        Ok(Response::new(v1::JoinRoomResponse {
+            room: Some(joined.room),
+            seat: u32::try_from(joined.seat.index()).expect("a seat is below six"),
+            ticket: joined.ticket.word(),
+        }))
+    }
+
+    async fn close_room(
+        &self,
+        request: Request<v1::CloseRoomRequest>,
+    ) -> Result<Response<v1::CloseRoomResponse>, Status> {
+        let request = request.into_inner();
+        let handle = self.find(&request.room_id)?;
+        let wrong = || {
+            status::status(
+                Code::PermissionDenied,
+                "OWNER_TOKEN_WRONG",
+                "this is not the owner token that CreateRoom gave for this room",
+                [("field", "owner_token")],
+            )
+        };
+        let token = Token::parse(&request.owner_token)
+            .filter(|token| token.room == handle.id())
+            .ok_or_else(wrong)?;
+        let room = handle
+            .close(token.secret)
+            .await
+            .map_err(Refusal::from)?
+            .ok_or_else(wrong)?;
+        Ok(Response::new(v1::CloseRoomResponse { room: Some(room) }))
+    }
+}
+
+fn new_room(request: v1::CreateRoomRequest) -> Result<NewRoom, Status> {
+    let name = request.name.trim().to_owned();
+    check_name(&name, 0).map_err(|problem| field("NAME_REFUSED", &problem))?;
+    let rules = rules_from_proto(&request.rules.unwrap_or_default())
+        .map_err(|problem| field("RULE_SET_REFUSED", &problem))?;
+    let (Stop::Points(length) | Stop::Shifts(length)) = rules.stop();
+    if length > MAX_HOSTED_SHIFTS {
+        return Err(status::status(
+            Code::InvalidArgument,
+            "RULE_SET_REFUSED",
+            format!(
+                "a hosted game ends after at most {MAX_HOSTED_SHIFTS} points or Shifts, not {length}"
+            ),
+            [
+                ("field", "stop"),
+                ("max_shifts", &MAX_HOSTED_SHIFTS.to_string()),
+            ],
+        ));
+    }
+    let policy = convert::policy_from_proto(&request.policy.unwrap_or_default())
+        .map_err(|problem| field("POLICY_REFUSED", &problem))?;
+    let fills = convert::fills_from_proto(&request.seats, &rules)
+        .map_err(|problem| field("SEATS_REFUSED", &problem))?;
+    let game_seed = match request.game_seed.as_slice() {
+        [] => None,
+        bytes => Some(bytes.try_into().map_err(|_| {
+            let message = format!("{} bytes; give 32, or none", bytes.len());
+            field("SEED_REFUSED", &FieldProblem::new("game_seed", message))
+        })?),
+    };
+    Ok(NewRoom {
+        name,
+        rules,
+        policy,
+        fills,
+        game_seed,
+    })
+}
+
+fn check_name(name: &str, least: usize) -> Result<(), FieldProblem> {
+    let length = name.chars().count();
+    if !(least..=MAX_NAME_CHARS).contains(&length) {
+        return Err(FieldProblem::new(
+            "name",
+            format!("{length} characters are not in {least}..={MAX_NAME_CHARS}"),
+        ));
+    }
+    if name.chars().any(char::is_control) {
+        return Err(FieldProblem::new(
+            "name",
+            "control characters cannot be shown",
+        ));
+    }
+    Ok(())
+}
+
+fn join_code_wrong() -> Status {
+    status::status(
+        Code::PermissionDenied,
+        "JOIN_CODE_WRONG",
+        "no room here has this join code; ask the room's creator for it",
+        [("field", "join_code")],
+    )
+}
+
+fn to_usize(number: u32) -> usize {
+    usize::try_from(number).unwrap_or(usize::MAX)
+}

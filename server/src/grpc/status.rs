@@ -1,0 +1,175 @@
+//! Every error a client can see, as a gRPC status with `google.rpc.ErrorInfo`: reason in UPPER_SNAKE, domain `chefshat`, metadata that
+//! names the field or limit at fault. What a client cannot act on goes to the log instead.
+
+use std::collections::HashMap;
+
+use chefshat_records::convert::FieldProblem;
+use tonic::{Code, Status};
+use tonic_types::{ErrorDetails, StatusExt as _};
+
+use crate::room::core::{ExpressError, JoinError};
+use crate::room::{RoomGone, SpectateError};
+use crate::rooms::CreateError;
+
+/// Domain of every `ErrorInfo`.
+const DOMAIN: &str = "chefshat";
+
+/// A status with its reason and what it is about.
+pub fn status<const N: usize>(
+    code: Code,
+    reason: &str,
+    message: impl Into<String>,
+    metadata: [(&str, &str); N],
+) -> Status {
+    let metadata: HashMap<String, String> = metadata
+        .into_iter()
+        .map(|(key, value)| (key.to_owned(), value.to_owned()))
+        .collect();
+    Status::with_error_details(
+        code,
+        message,
+        ErrorDetails::with_error_info(reason, DOMAIN, metadata),
+    )
+}
+
+/// A field that cannot be accepted.
+pub fn field(reason: &str, problem: &FieldProblem) -> Status {
+    status(
+        Code::InvalidArgument,
+        reason,
+        problem.to_string(),
+        [("field", problem.field)],
+    )
+}
+
+/// There is no such room.
+pub fn room_unknown() -> Status {
+    status(
+        Code::NotFound,
+        "ROOM_UNKNOWN",
+        "there is no such room here; it may have been closed",
+        [],
+    )
+}
+
+/// No seat has this ticket.
+pub fn ticket_unknown() -> Status {
+    status(
+        Code::Unauthenticated,
+        "TICKET_UNKNOWN",
+        "this ticket opens no seat here: it is mistyped, its seat was freed, or its room is gone; join again",
+        [("field", "ticket")],
+    )
+}
+
+/// The room stopped because its store failed.
+pub fn room_failed() -> Status {
+    status(
+        Code::Internal,
+        "ROOM_FAILED",
+        "the server could not keep this game and has stopped it",
+        [],
+    )
+}
+
+/// The server is shutting down.
+pub fn shutting_down() -> Status {
+    status(
+        Code::Unavailable,
+        "SHUTTING_DOWN",
+        "the server is shutting down",
+        [],
+    )
+}
+
+/// A spectator was cut off.
+pub fn spectator_too_slow() -> Status {
+    status(
+        Code::ResourceExhausted,
+        "SPECTATOR_TOO_SLOW",
+        "the stream was not read fast enough; watch again from the number after the last event seen",
+        [],
+    )
+}
+
+impl From<RoomGone> for Refusal {
+    fn from(_: RoomGone) -> Self {
+        Self(room_unknown())
+    }
+}
+
+/// A status that other errors turn into.
+#[derive(Debug)]
+pub struct Refusal(pub Status);
+
+impl From<Refusal> for Status {
+    fn from(refusal: Refusal) -> Self {
+        refusal.0
+    }
+}
+
+impl From<JoinError> for Refusal {
+    fn from(error: JoinError) -> Self {
+        let (code, reason) = match error {
+            JoinError::RoomFull => (Code::ResourceExhausted, "ROOM_FULL"),
+            JoinError::SeatTaken => (Code::FailedPrecondition, "SEAT_TAKEN"),
+            JoinError::NoSuchSeat => (Code::InvalidArgument, "NO_SUCH_SEAT"),
+            JoinError::KindNotAdmitted => (Code::FailedPrecondition, "KIND_NOT_ADMITTED"),
+            JoinError::GameStarted => (Code::FailedPrecondition, "GAME_STARTED"),
+        };
+        Self(status(code, reason, error.to_string(), []))
+    }
+}
+
+impl From<ExpressError> for Refusal {
+    fn from(error: ExpressError) -> Self {
+        let (code, reason) = match error {
+            ExpressError::GameOver => (Code::FailedPrecondition, "GAME_OVER"),
+            ExpressError::TooMany => (Code::ResourceExhausted, "EXPRESSION_REFUSED"),
+        };
+        Self(status(code, reason, error.to_string(), []))
+    }
+}
+
+impl From<CreateError> for Refusal {
+    fn from(error: CreateError) -> Self {
+        Self(match error {
+            CreateError::TooMany(limit) => status(
+                Code::ResourceExhausted,
+                "TOO_MANY_ROOMS",
+                error.to_string(),
+                [("max_rooms", &limit.to_string())],
+            ),
+            CreateError::ShuttingDown => shutting_down(),
+            CreateError::Store(error) => {
+                tracing::error!(%error, "a room was not made");
+                room_failed()
+            }
+        })
+    }
+}
+
+impl From<SpectateError> for Refusal {
+    fn from(error: SpectateError) -> Self {
+        Self(match error {
+            SpectateError::NotAdmitted => status(
+                Code::PermissionDenied,
+                "SPECTATORS_NOT_ADMITTED",
+                "this room admits no spectators",
+                [],
+            ),
+            SpectateError::Full => status(
+                Code::ResourceExhausted,
+                "TOO_MANY_SPECTATORS",
+                "this room has as many spectators as it can take",
+                [],
+            ),
+            SpectateError::SnapshotDelayed => status(
+                Code::FailedPrecondition,
+                "SNAPSHOT_DELAYED",
+                "this room shows its events with a delay; ask for events instead of a snapshot",
+                [("field", "snapshot")],
+            ),
+        })
+    }
+}

@@ -1,0 +1,239 @@
+//! Everything a room does because time has passed: deadlines and banks, default decisions, substitution, the decisions of built-in
+//! agents, seats that are not attached in time.
+
+use std::time::Duration;
+
+use chefshat_arena::BuiltInAgent;
+use chefshat_engine::{Game, Seat, Viewer};
+
+use super::{BUILT_IN_BUDGET, Core, JOIN_HOLD, MAX_HANDOVER, State};
+use crate::room::policy::AbortPolicy;
+use crate::store::journal::{AbortReason, Change, Fill, Source};
+
+impl Core {
+    /// When the room must next be told that time has passed; `None` when nothing depends on it.
+    pub fn deadline(&self) -> Option<Duration> {
+        match self.state {
+            State::Waiting => Some(
+                self.holds()
+                    .map(|(_, until)| until)
+                    .min()
+                    .map_or(self.header.policy.waiting_time, |hold| {
+                        hold.min(self.header.policy.waiting_time)
+                    }),
+            ),
+            State::Playing => {
+                let open = self.open.as_ref()?;
+                let seat = open.decision.seat;
+                Some(if self.is_automatic(seat) {
+                    open.released + self.header.policy.pace
+                } else {
+                    open.start.unwrap_or(open.released) + self.time_allowed(seat)
+                })
+            }
+            State::Finished | State::Aborted(_) => None,
+        }
+    }
+
+    /// Time has passed. `handed` is when the open decision was handed to its seat's transport, if it was.
+    pub fn tick(&mut self, now: Duration, handed: Option<Duration>) {
+        match self.state {
+            State::Waiting => self.tick_waiting(now),
+            State::Playing => self.tick_playing(now, handed),
+            State::Finished | State::Aborted(_) => {}
+        }
+    }
+
+    /// Ends the game without a result, unless it has ended.
+    pub fn abort(&mut self, now: Duration, reason: AbortReason) {
+        if !self.state.is_over() {
+            self.commit(now, Change::Aborted(reason));
+        }
+    }
+
+    /// Lets built-in agents and substitutes decide as far as they may now.
+    pub(super) fn advance(&mut self, now: Duration) {
+        for _ in 0..BUILT_IN_BUDGET {
+            if self.state == State::Playing && self.is_too_long() {
+                self.abort(now, AbortReason::TooLong);
+            }
+            let due = self.state == State::Playing
+                && self.open.as_ref().is_some_and(|open| {
+                    self.is_automatic(open.decision.seat)
+                        && open.released + self.header.policy.pace <= now
+                });
+            if !due {
+                return;
+            }
+            self.decide_automatically(now);
+        }
+    }
+
+    /// Time a seat has for a decision, its bank included.
+    fn time_allowed(&self, seat: Seat) -> Duration {
+        self.header.policy.decision_time + self.seats[seat.index()].bank_left
+    }
+
+    /// What is left of a seat's bank after a decision that took `time`.
+    pub(super) fn bank_after(&self, seat: Seat, time: Duration) -> Duration {
+        let beyond = time.saturating_sub(self.header.policy.decision_time);
+        self.seats[seat.index()].bank_left.saturating_sub(beyond)
+    }
+
+    /// Time left for the open decision: before the bank is touched, and in the bank.
+    pub fn time_left(&self, now: Duration) -> (Duration, Duration) {
+        let Some(open) = &self.open else {
+            return (Duration::ZERO, Duration::ZERO);
+        };
+        let used = now.saturating_sub(open.start.unwrap_or(now));
+        (
+            self.header.policy.decision_time.saturating_sub(used),
+            self.bank_after(open.decision.seat, used),
+        )
+    }
+
+    /// Settles when the clock of the open decision began, if it is not settled yet. It never begins again.
+    pub(super) fn settle_start(&mut self, now: Duration, handed: Option<Duration>) {
+        let Some(open) = &mut self.open else { return };
+        if open.start.is_some() {
+            return;
+        }
+        let connected = self.seats[open.decision.seat.index()].connection.is_some();
+        let latest = open.released + MAX_HANDOVER;
+        open.start = match handed {
+            Some(handed) => Some(handed.clamp(open.released, latest)),
+            None if !connected => Some(open.released),
+            None => (now >= latest).then_some(latest),
+        };
+    }
+
+    fn holds(&self) -> impl Iterator<Item = (Seat, Duration)> + '_ {
+        self.all_seats().filter_map(|seat| {
+            let state = &self.seats[seat.index()];
+            (state.participant.is_some() && !state.ever_attached)
+                .then_some((seat, state.joined_at + JOIN_HOLD))
+        })
+    }
+
+    fn tick_waiting(&mut self, now: Duration) {
+        let expired: Vec<Seat> = self
+            .holds()
+            .filter(|(_, until)| *until <= now)
+            .map(|(seat, _)| seat)
+            .collect();
+        for seat in expired {
+            self.commit(now, Change::Vacated(seat));
+        }
+        if now >= self.header.policy.waiting_time {
+            self.abort(now, AbortReason::NeverStarted);
+        }
+    }
+
+    fn tick_playing(&mut self, now: Duration, handed: Option<Duration>) {
+        self.settle_start(now, handed);
+        if let Some(open) = &self.open {
+            let seat = open.decision.seat;
+            let late = open
+                .start
+                .is_some_and(|start| start + self.time_allowed(seat) <= now);
+            if late && !self.is_automatic(seat) {
+                self.time_out(now);
+            }
+        }
+        self.advance(now);
+    }
+
+    /// Takes the default decision for a seat whose time is up, and what follows from its being late too often.
+    fn time_out(&mut self, now: Duration) {
+        let Some(open) = &self.open else { return };
+        let seat = open.decision.seat;
+        let time = now.saturating_sub(open.start.unwrap_or(open.released));
+        let source = if self.seats[seat.index()].connection.is_some() {
+            Source::Timeout
+        } else {
+            Source::Disconnected
+        };
+        self.take_default(now, seat, source, time);
+        if self.state == State::Playing
+            && self.seats[seat.index()].timeouts >= self.header.policy.max_timeouts
+        {
+            self.lose(now, seat);
+        }
+    }
+
+    /// Takes the default decision.
+    pub(super) fn take_default(
+        &mut self,
+        now: Duration,
+        seat: Seat,
+        source: Source,
+        time: Duration,
+    ) {
+        let action = self
+            .game
+            .as_deref()
+            .and_then(Game::default_action)
+            .expect("an open decision has a default");
+        let bank_left = self.bank_after(seat, time);
+        let decided = self.decided(seat, action, source, time, bank_left);
+        self.commit(now, Change::Decided(decided));
+    }
+
+    /// A seat has been late too often: a substitute plays for it, or the game is given up.
+    fn lose(&mut self, now: Duration, seat: Seat) {
+        let others_lost = self
+            .seats
+            .iter()
+            .enumerate()
+            .filter(|(index, state)| {
+                *index != seat.index() && matches!(state.fill, Fill::Open { .. })
+            })
+            .all(|(_, state)| state.substituted);
+        let abort = match self.header.policy.abort {
+            AbortPolicy::AnyLost => true,
+            AbortPolicy::AllLost => others_lost,
+            AbortPolicy::Never => false,
+        };
+        if abort {
+            self.abort(now, AbortReason::ParticipantsLost);
+            return;
+        }
+        let substitute = self.header.policy.substitute;
+        let seed = self.header.seed.agent_seed(seat.index());
+        self.seats[seat.index()]
+            .agent
+            .get_or_insert_with(|| Box::new(BuiltInAgent::new(substitute, seed)));
+        self.commit(now, Change::Substituted(seat));
+    }
+
+    fn decide_automatically(&mut self, now: Duration) {
+        let (Some(open), Some(game)) = (&self.open, self.game.as_deref()) else {
+            return;
+        };
+        let seat = open.decision.seat;
+        let attempts = open.attempts;
+        let observation = game.observe(Viewer::Seat(seat));
+        let legal = game.legal_actions();
+        let state = &mut self.seats[seat.index()];
+        let agent = state
+            .agent
+            .as_mut()
+            .expect("an automatic seat has its agent");
+        let action = agent.decide(&observation, &legal);
+        let bank_left = state.bank_left;
+        if legal.contains(action) {
+            let source = if state.substituted {
+                Source::Substitute
+            } else {
+                Source::Agent
+            };
+            let decided = self.decided(seat, action, source, Duration::ZERO, bank_left);
+            self.commit(now, Change::Decided(decided));
+        } else {
+            self.commit(now, Change::Attempted { seat, action });
+            if self.header.policy.max_invalid_attempts == Some(attempts + 1) {
+                self.take_default(now, seat, Source::Invalid, Duration::ZERO);
+            }
+        }
+    }
+}

@@ -1,0 +1,417 @@
+//! What participants do: join, attach, leave, answer, express, come back. Each input is checked against the state; what is not right is
+//! answered and changes nothing.
+
+use std::time::Duration;
+
+use chefshat_engine::{ActionError, Seat};
+
+use super::{
+    ConnectionId, Core, MAX_ANNOTATION_BYTES, MAX_ANNOTATION_BYTES_PER_GAME, MAX_CONNECTION_EVENTS,
+    MAX_EXPRESSIONS_PER_SEAT, State,
+};
+use crate::store::journal::{Change, Fill, ParticipantKind, SeatedParticipant, Source};
+
+/// How a seat stands, as everybody may know it.
+#[derive(Debug, Clone, Copy)]
+pub struct SeatStanding<'a> {
+    /// What fills it.
+    pub fill: Fill,
+    /// Who has taken it.
+    pub participant: Option<&'a SeatedParticipant>,
+    /// Whether an agent is attached.
+    pub connected: bool,
+    /// Whether a substitute plays for it.
+    pub substituted: bool,
+}
+
+/// Why a seat cannot be taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum JoinError {
+    /// All seats are taken.
+    #[error("every seat of this room is taken")]
+    RoomFull,
+    /// The seat asked for is taken.
+    #[error("this seat is taken; leave `seat` unset to take any free one")]
+    SeatTaken,
+    /// There is no such seat.
+    #[error("this room has no such seat")]
+    NoSuchSeat,
+    /// The free seats are reserved for other kinds.
+    #[error("the free seats of this room are reserved for participants of another kind")]
+    KindNotAdmitted,
+    /// The game has begun or ended.
+    #[error("the game of this room has begun; nobody can join any more")]
+    GameStarted,
+}
+
+/// Why an expression is not taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum ExpressError {
+    /// The game is over.
+    #[error("the game is over")]
+    GameOver,
+    /// The seat has expressed too much.
+    #[error("a seat may express itself at most {MAX_EXPRESSIONS_PER_SEAT} times in a game")]
+    TooMany,
+}
+
+/// An answer as it arrived.
+#[derive(Debug)]
+pub struct AnswerInput {
+    /// The seat that answers.
+    pub seat: Seat,
+    /// The decision it answers.
+    pub decision_id: u64,
+    /// The action, as it was sent.
+    pub action: u32,
+    /// Annotations, encoded.
+    pub annotations: Option<Box<[u8]>>,
+    /// When the answer was read.
+    pub arrived: Duration,
+    /// When the decision was handed to the transport, if it was.
+    pub handed: Option<Duration>,
+}
+
+/// What became of an answer.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Answered {
+    /// The verdict.
+    pub verdict: Verdict,
+    /// Measured decision time; zero where there is none.
+    pub time: Duration,
+    /// Annotations were over their limit.
+    pub annotations_dropped: bool,
+}
+
+/// Whether an answer counts.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Verdict {
+    /// The action was taken.
+    Accepted,
+    /// The action is not legal.
+    Invalid {
+        /// Why, in words.
+        detail: String,
+        /// Attempts left; `None` when unlimited.
+        attempts_left: Option<u32>,
+        /// Reward of the attempt, where the room has a scheme.
+        reward: Option<f32>,
+    },
+    /// The decision is closed.
+    Closed,
+    /// There has been no such decision.
+    Unknown,
+}
+
+impl Core {
+    /// Takes a seat.
+    ///
+    /// # Errors
+    /// Why none can be taken; the room is then as it was.
+    pub fn join(
+        &mut self,
+        now: Duration,
+        wanted: Option<u32>,
+        participant: SeatedParticipant,
+    ) -> Result<Seat, JoinError> {
+        if self.state != State::Waiting {
+            return Err(JoinError::GameStarted);
+        }
+        let seat = match wanted {
+            Some(number) => {
+                let seat = self
+                    .all_seats()
+                    .find(|seat| u32::try_from(seat.index()) == Ok(number))
+                    .ok_or(JoinError::NoSuchSeat)?;
+                if !self.is_free(seat) {
+                    return Err(JoinError::SeatTaken);
+                }
+                if !self.admits(seat, participant.kind) {
+                    return Err(JoinError::KindNotAdmitted);
+                }
+                seat
+            }
+            None => {
+                // A seat reserved for this very kind comes first, so that seats open to all stay free for others.
+                let mut free: Vec<Seat> = self.all_seats().filter(|s| self.is_free(*s)).collect();
+                if free.is_empty() {
+                    return Err(JoinError::RoomFull);
+                }
+                free.retain(|seat| self.admits(*seat, participant.kind));
+                *free
+                    .iter()
+                    .find(|seat| {
+                        matches!(
+                            self.seats[seat.index()].fill,
+                            Fill::Open {
+                                reserved_for: Some(_)
+                            }
+                        )
+                    })
+                    .or(free.first())
+                    .ok_or(JoinError::KindNotAdmitted)?
+            }
+        };
+        self.commit(
+            now,
+            Change::Seated {
+                seat,
+                participant: Box::new(participant),
+            },
+        );
+        Ok(seat)
+    }
+
+    /// Attaches a connection to a seat. Whoever was attached before has lost the seat.
+    pub fn attach(
+        &mut self,
+        now: Duration,
+        seat: Seat,
+        connection: ConnectionId,
+        entropy: Vec<u8>,
+        handed_before: Option<Duration>,
+    ) {
+        if self.awaited_from(seat).is_some() {
+            self.settle_start(now, handed_before);
+        }
+        let state = &mut self.seats[seat.index()];
+        state.connection = Some(connection);
+        state.ever_attached = true;
+        if self.state == State::Waiting {
+            state.entropy = entropy;
+        }
+        if state.away || state.substituted {
+            self.returned(now, seat);
+        }
+        self.start_if_complete(now);
+        self.advance(now);
+    }
+
+    /// A connection has gone. Does nothing if the seat has a newer one.
+    pub fn lost(
+        &mut self,
+        now: Duration,
+        seat: Seat,
+        connection: ConnectionId,
+        handed: Option<Duration>,
+    ) {
+        if self.seats[seat.index()].connection != Some(connection) {
+            return;
+        }
+        self.seats[seat.index()].connection = None;
+        if self.awaited_from(seat).is_some() {
+            self.settle_start(now, handed);
+        }
+        let state = &mut self.seats[seat.index()];
+        if !self.state.is_over() && state.connection_events < MAX_CONNECTION_EVENTS {
+            state.connection_events += 1;
+            self.commit(now, Change::Disconnected(seat));
+        }
+    }
+
+    /// The seat's agent says that it plays itself again.
+    pub fn resume(&mut self, now: Duration, seat: Seat) {
+        if self.seats[seat.index()].substituted {
+            self.returned(now, seat);
+        }
+    }
+
+    /// Somebody expresses something; `expression` is the encoded message.
+    ///
+    /// # Errors
+    /// Why it is not taken.
+    pub fn express(
+        &mut self,
+        now: Duration,
+        seat: Seat,
+        record_only: bool,
+        expression: Box<[u8]>,
+    ) -> Result<(), ExpressError> {
+        if self.state.is_over() {
+            return Err(ExpressError::GameOver);
+        }
+        if self.seats[seat.index()].expressions >= MAX_EXPRESSIONS_PER_SEAT {
+            return Err(ExpressError::TooMany);
+        }
+        self.commit(
+            now,
+            Change::Expressed {
+                seat,
+                record_only,
+                expression,
+            },
+        );
+        Ok(())
+    }
+
+    /// An answer has arrived.
+    pub fn answer(&mut self, now: Duration, input: AnswerInput) -> Answered {
+        let seat = input.seat;
+        if let Some(last) = &self.seats[seat.index()].last_answer
+            && last.decision_id == input.decision_id
+        {
+            return if last.action == input.action {
+                last.answered.clone()
+            } else {
+                Answered::closed(Verdict::Closed)
+            };
+        }
+        if input.decision_id == 0 || input.decision_id > self.seats[seat.index()].decisions {
+            return Answered::closed(Verdict::Unknown);
+        }
+        let open = match self.awaited_from(seat) {
+            Some(open) if open.id == input.decision_id => open.clone(),
+            _ => return Answered::closed(Verdict::Closed),
+        };
+        self.settle_start(now, input.handed);
+        let start = self
+            .open
+            .as_ref()
+            .and_then(|open| open.start)
+            .unwrap_or(open.released);
+        let time = input.arrived.saturating_sub(start);
+        if time >= self.header.policy.decision_time + self.seats[seat.index()].bank_left {
+            // It arrived after the deadline, before the room was told that the time was up.
+            self.tick(now, input.handed);
+            return Answered::closed(Verdict::Closed);
+        }
+        let answered = match self.refusal(input.action) {
+            Some(error) => self.invalid(now, &input, time, open.attempts + 1, &error),
+            None => self.accept(now, input, time),
+        };
+        self.advance(now);
+        answered
+    }
+
+    fn accept(&mut self, now: Duration, input: AnswerInput, time: Duration) -> Answered {
+        let seat = input.seat;
+        let taken_already = self.seats[seat.index()].annotation_bytes;
+        let (annotations, annotations_dropped) = match input.annotations {
+            Some(bytes)
+                if bytes.len() > MAX_ANNOTATION_BYTES
+                    || taken_already + bytes.len() > MAX_ANNOTATION_BYTES_PER_GAME =>
+            {
+                (None, true)
+            }
+            annotations => (annotations, false),
+        };
+        let bank_left = self.bank_after(seat, time);
+        let mut decided = self.decided(
+            seat,
+            Self::action_from(input.action),
+            Source::Agent,
+            time,
+            bank_left,
+        );
+        decided.annotations = annotations;
+        self.commit(now, Change::Decided(decided));
+        let last = self.seats[seat.index()]
+            .last_answer
+            .as_mut()
+            .expect("a decision by the agent has just been folded");
+        last.answered.annotations_dropped = annotations_dropped;
+        last.answered.clone()
+    }
+
+    fn invalid(
+        &mut self,
+        now: Duration,
+        input: &AnswerInput,
+        time: Duration,
+        attempts: u32,
+        error: &ActionError,
+    ) -> Answered {
+        let limit = self.header.policy.max_invalid_attempts;
+        let reward = self
+            .header
+            .policy
+            .reward_scheme
+            .filter(|_| self.open_is_turn())
+            .map(|scheme| scheme.invalid());
+        self.commit(
+            now,
+            Change::Attempted {
+                seat: input.seat,
+                action: Self::action_from(input.action),
+            },
+        );
+        if limit.is_some_and(|limit| attempts >= limit) {
+            self.take_default(now, input.seat, Source::Invalid, time);
+        }
+        Answered {
+            verdict: Verdict::Invalid {
+                detail: error.to_string(),
+                attempts_left: limit.map(|limit| limit.saturating_sub(attempts)),
+                reward,
+            },
+            time,
+            annotations_dropped: false,
+        }
+    }
+
+    /// Why an action cannot be taken now; `None` if it can.
+    fn refusal(&self, action: u32) -> Option<ActionError> {
+        let action = Self::action_from(action);
+        if self.legal_actions().contains(action) {
+            return None;
+        }
+        // The engine says why when it is asked to do it; the copy is thrown away.
+        self.game()
+            .and_then(|game| game.clone().apply(action, |_| {}).err())
+    }
+
+    fn returned(&mut self, now: Duration, seat: Seat) {
+        let state = &mut self.seats[seat.index()];
+        if state.connection_events >= MAX_CONNECTION_EVENTS && !state.substituted {
+            return;
+        }
+        state.connection_events += 1;
+        if !self.state.is_over() {
+            self.commit(now, Change::Returned(seat));
+        }
+    }
+
+    fn start_if_complete(&mut self, now: Duration) {
+        let complete = self.state == State::Waiting
+            && self
+                .seats
+                .iter()
+                .all(|seat| matches!(seat.fill, Fill::BuiltIn(_)) || seat.connection.is_some());
+        if complete {
+            let entropy = self
+                .seats
+                .iter_mut()
+                .map(|seat| std::mem::take(&mut seat.entropy))
+                .collect();
+            self.commit(now, Change::Started { entropy });
+        }
+    }
+
+    /// A room without open seats begins by itself.
+    pub fn begin_if_all_built_in(&mut self, now: Duration) {
+        self.start_if_complete(now);
+        self.advance(now);
+    }
+
+    fn is_free(&self, seat: Seat) -> bool {
+        let state = &self.seats[seat.index()];
+        state.participant.is_none() && matches!(state.fill, Fill::Open { .. })
+    }
+
+    fn admits(&self, seat: Seat, kind: ParticipantKind) -> bool {
+        match self.seats[seat.index()].fill {
+            Fill::Open { reserved_for } => reserved_for.is_none_or(|wanted| wanted == kind),
+            Fill::BuiltIn(_) => false,
+        }
+    }
+}
+
+impl Answered {
+    fn closed(verdict: Verdict) -> Self {
+        Self {
+            verdict,
+            time: Duration::ZERO,
+            annotations_dropped: false,
+        }
+    }
+}

@@ -1,0 +1,242 @@
+//! How what happened reaches the seats of a room. Each attached seat has a position in the room's log; what lies beyond it is sent when
+//! it is due. A stream that is full is not waited for: the position stays, and the rest follows when there is space.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use chefshat_engine::{Event, Seat, Viewer};
+use chefshat_proto::v1::{self, SeatUpdate, seat_update::Update};
+
+use super::core::{ConnectionId, Core};
+use super::log::Happening;
+use crate::convert;
+use crate::outbox::{HandStamp, OnSpace, Outbox};
+
+/// Events that gather for a seat before they are sent without a decision.
+pub const MAX_HELD_EVENTS: usize = 128;
+/// Updates held for a stream that is full; answers to commands beyond it are dropped.
+const MAX_HELD_UPDATES: usize = 256;
+/// Most events in one batch.
+const EVENTS_PER_BATCH: usize = 256;
+
+/// How a seat wants to be told.
+#[derive(Debug, Clone, Copy)]
+pub struct Wishes {
+    /// Each event as it happens, not with the next decision.
+    pub at_once: bool,
+    /// No masks in decision requests.
+    pub no_mask: bool,
+    /// Start with a snapshot instead of the events so far.
+    pub snapshot: bool,
+    /// Position in the log from which events are wanted.
+    pub from: usize,
+}
+
+/// A seat's place on a stream.
+pub struct Attachment {
+    connection: ConnectionId,
+    outbox: Arc<Outbox<SeatUpdate>>,
+    handle: u32,
+    wishes: Wishes,
+    position: usize,
+    /// Decision that has been sent, or 0.
+    sent: u64,
+    stamp: Arc<HandStamp>,
+    on_space: Arc<dyn OnSpace>,
+    /// Updates that go out with the next flush.
+    held: Vec<SeatUpdate>,
+    /// Whether a decision request is among them.
+    decision_held: bool,
+    stalled: bool,
+    done: bool,
+}
+
+impl Attachment {
+    /// Attaches a seat. Its stream is told by [`Attachment::greet`].
+    pub fn new(
+        connection: ConnectionId,
+        outbox: Arc<Outbox<SeatUpdate>>,
+        handle: u32,
+        wishes: Wishes,
+        stamp: Arc<HandStamp>,
+        on_space: Arc<dyn OnSpace>,
+    ) -> Self {
+        Self {
+            connection,
+            outbox,
+            handle,
+            wishes,
+            position: wishes.from,
+            sent: 0,
+            stamp,
+            on_space,
+            held: Vec::new(),
+            decision_held: false,
+            stalled: false,
+            done: false,
+        }
+    }
+
+    /// Which connection it is.
+    pub fn connection(&self) -> ConnectionId {
+        self.connection
+    }
+
+    /// When the decision that was sent last was handed to the transport.
+    pub fn handed(&self) -> Option<Duration> {
+        self.stamp.get()
+    }
+
+    /// Says that the seat is attached, with a snapshot if one was wished for.
+    pub fn greet(&mut self, core: &Core, seat: Seat, request_id: u32) {
+        let header = core.header();
+        let next_sequence = u64::try_from(core.log().len()).unwrap_or(u64::MAX) + 1;
+        self.hold(Update::Attached(v1::Attached {
+            request_id,
+            room_id: header.room_id.to_string(),
+            game_id: header.game_id.to_string(),
+            seat: u32::try_from(seat.index()).expect("a seat is below six"),
+            next_sequence,
+        }));
+        if self.wishes.snapshot {
+            self.position = core.log().len();
+            self.hold(Update::Snapshot(snapshot(core, Viewer::Seat(seat))));
+        }
+        self.position = self.position.min(core.log().len());
+    }
+
+    /// Tells what became of an answer: with the next flush if it was taken and the seat is told with its decisions, else now.
+    pub fn tell_result(&mut self, result: v1::AnswerResult) {
+        if self.is_deaf() {
+            return;
+        }
+        let may_wait =
+            !self.wishes.at_once && result.status() == v1::AnswerStatus::Accepted && !self.stalled;
+        self.hold(Update::Result(result));
+        if !may_wait {
+            self.push();
+        }
+    }
+
+    /// Tells that a command was refused.
+    pub fn refuse(&mut self, refused: v1::Refused) {
+        if self.is_deaf() {
+            return;
+        }
+        self.hold(Update::Refused(refused));
+        self.push();
+    }
+
+    /// Ends the attachment.
+    pub fn detach(&mut self, reason: v1::DetachReason) {
+        if !self.done {
+            self.done = true;
+            self.hold(Update::Detached(v1::Detached {
+                reason: reason.into(),
+            }));
+            self.push();
+        }
+    }
+
+    /// Sends what is due. `urgent`: something happened that the seat is told of at once in any case.
+    pub fn deliver(&mut self, core: &Core, seat: Seat, now: Duration, urgent: bool) {
+        if self.done {
+            return;
+        }
+        let decision = core
+            .awaited()
+            .filter(|open| open.decision.seat == seat && open.id != self.sent);
+        let backlog = core.log().len() - self.position;
+        let over = core.state().is_over();
+        let due = decision.is_some()
+            || urgent
+            || over
+            || self.stalled
+            || backlog >= MAX_HELD_EVENTS
+            || (self.wishes.at_once && (backlog > 0 || !self.held.is_empty()));
+        if !due {
+            return;
+        }
+        if self.stalled && !self.push() {
+            return;
+        }
+        while self.position < core.log().len() {
+            let end = (self.position + EVENTS_PER_BATCH).min(core.log().len());
+            let events = (self.position..end)
+                .filter_map(|position| convert::view(core, position, Viewer::Seat(seat)))
+                .collect();
+            self.hold(Update::Events(v1::EventBatch { events }));
+            self.position = end;
+            if end < core.log().len() && !self.push() {
+                return;
+            }
+        }
+        if let Some(open) = decision {
+            let request = convert::decision_request(core, open, now, !self.wishes.no_mask);
+            self.sent = open.id;
+            self.hold(Update::Decision(request));
+            self.stamp.clear();
+            self.decision_held = true;
+        }
+        if !self.held.is_empty() && !self.push() {
+            return;
+        }
+        if over {
+            self.detach(v1::DetachReason::GameOver);
+        }
+    }
+
+    fn hold(&mut self, update: Update) {
+        self.held.push(SeatUpdate {
+            handle: self.handle,
+            update: Some(update),
+        });
+    }
+
+    /// Moves what is held to the outbox; if that is full, it stays held, and the room hears when there is space.
+    fn push(&mut self) -> bool {
+        let stamp = self.decision_held.then_some(&self.stamp);
+        let pushed = self
+            .outbox
+            .push(&mut self.held, stamp, Some(&self.on_space));
+        self.stalled = !pushed;
+        self.decision_held &= !pushed;
+        pushed
+    }
+
+    /// Whether the client does not read and has had its share of answers held for it.
+    fn is_deaf(&self) -> bool {
+        self.stalled && self.held.len() >= MAX_HELD_UPDATES
+    }
+}
+
+impl std::fmt::Debug for Attachment {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter
+            .debug_struct("Attachment")
+            .field("connection", &self.connection)
+            .field("position", &self.position)
+            .finish_non_exhaustive()
+    }
+}
+
+/// Where the game stands, for a viewer.
+pub fn snapshot(core: &Core, viewer: Viewer) -> v1::Snapshot {
+    v1::Snapshot {
+        game_started: core.game().map(|_| convert::game_started(core)),
+        observation: core
+            .observe(viewer)
+            .map(|observation| convert::observation_to_proto(&observation)),
+        next_sequence: u64::try_from(core.log().len()).unwrap_or(u64::MAX) + 1,
+    }
+}
+
+/// Whether an event is told to a seat at once in any case: its own finishing, the end of a Shift, the end of the game.
+pub fn is_urgent(happening: &Happening, seat: Seat) -> bool {
+    match happening {
+        Happening::SeatFinished { seat: finished, .. } => *finished == seat,
+        Happening::Game(game) => matches!(game.event, Event::ShiftEnded { .. }),
+        Happening::GameEnded | Happening::GameAborted(_) => true,
+        _ => false,
+    }
+}

@@ -1,0 +1,15 @@
+//! A room: a place with seats that owns one game. `core` is the synchronous heart that decides everything; `task` is the thin shell around
+//! it that receives, keeps, and only then tells; `delivery` is how what happened reaches streams.
+
+pub mod core;
+pub mod delivery;
+pub mod log;
+pub mod policy;
+mod spectators;
+mod task;
+
+pub use spectators::{MAX_SPECTATOR_LAG, MAX_SPECTATORS};
+pub use task::{
+    Acted, AttachRequest, Handle, JoinRequest, Joined, RoomGone, RoomWatcher, SeatAction,
+    SpectateError, SpectateRequest, TaskContext, start,
+};

@@ -1,0 +1,65 @@
+//! The policy of a room, validated: times, limits and manners.
+
+use std::time::Duration;
+
+use chefshat_arena::AgentKind;
+use chefshat_engine::RewardScheme;
+
+/// When a game is given up because its participants are gone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AbortPolicy {
+    /// When every seat that is not a built-in agent's has been substituted.
+    AllLost,
+    /// When one seat would be substituted.
+    AnyLost,
+    /// Never.
+    Never,
+}
+
+/// A room's policy. Made by `convert::policy`, which checks the ranges stated in `room.proto`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Policy {
+    /// Time for a decision.
+    pub decision_time: Duration,
+    /// What each seat may use beyond that over the whole game.
+    pub bank: Duration,
+    /// Invalid attempts after which the default decision is taken; `None`: unlimited.
+    pub max_invalid_attempts: Option<u32>,
+    /// Decisions in a row lost to the clock before a seat is substituted.
+    pub max_timeouts: u32,
+    /// Who plays for a substituted seat.
+    pub substitute: AgentKind,
+    /// When the game is aborted instead.
+    pub abort: AbortPolicy,
+    /// Rewards told to seats.
+    pub reward_scheme: Option<RewardScheme>,
+    /// How long a built-in agent or substitute waits before it decides.
+    pub pace: Duration,
+    /// How long the room waits for its seats.
+    pub waiting_time: Duration,
+    /// Whether spectators may watch.
+    pub spectators: bool,
+    /// By how many decisions spectators are behind.
+    pub spectator_delay_decisions: usize,
+    /// Whether spectators see all hands.
+    pub spectators_see_hands: bool,
+}
+
+impl Default for Policy {
+    fn default() -> Self {
+        Self {
+            decision_time: Duration::from_secs(10),
+            bank: Duration::from_secs(60),
+            max_invalid_attempts: Some(10),
+            max_timeouts: 3,
+            substitute: AgentKind::Random,
+            abort: AbortPolicy::AllLost,
+            reward_scheme: None,
+            pace: Duration::ZERO,
+            waiting_time: Duration::from_secs(3600),
+            spectators: true,
+            spectator_delay_decisions: 0,
+            spectators_see_hands: false,
+        }
+    }
+}

@@ -1,0 +1,761 @@
+//! The shell around a room's core: a task that receives from a bounded mailbox, arms one deadline, and for every batch of inputs lets the
+//! core apply them, hands the changes to the store, awaits it, and only then tells anybody. Nothing is decided here.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+use chefshat_engine::Seat;
+use chefshat_proto::v1::{self, SeatUpdate, SpectatorServiceWatchResponse};
+use tokio::sync::{mpsc, oneshot};
+use tokio::time::{Instant, Sleep};
+use tokio_util::task::TaskTracker;
+use tracing::{debug, error, info};
+
+use super::core::{AnswerInput, Answered, ConnectionId, Core, ExpressError, JoinError, State};
+use super::delivery::{Attachment, Wishes, is_urgent};
+use super::spectators::{MAX_SPECTATORS, Spectator};
+use crate::config::ROOM_MAILBOX;
+use crate::convert;
+use crate::ids::{Id, Token};
+use crate::outbox::{HandStamp, OnSpace, Outbox};
+use crate::store::Store;
+use crate::store::journal::{AbortReason, GameHeader, ParticipantKind, SeatedParticipant};
+
+/// Inputs that are applied before the store is asked once for all of them.
+const INPUTS_PER_COMMIT: usize = 64;
+
+/// The room is gone: closed, ended long ago, or stopped because its store failed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the room is gone")]
+pub struct RoomGone;
+
+/// Asks for a seat.
+#[derive(Debug)]
+pub struct JoinRequest {
+    /// Name to show.
+    pub name: String,
+    /// What joins.
+    pub kind: ParticipantKind,
+    /// A certain seat.
+    pub seat: Option<u32>,
+}
+
+/// A seat that was taken.
+#[derive(Debug)]
+pub struct Joined {
+    /// The seat.
+    pub seat: Seat,
+    /// Its ticket.
+    pub ticket: Token,
+    /// The room with it.
+    pub room: v1::Room,
+}
+
+/// Asks to attach a stream to a seat.
+#[derive(Debug)]
+pub struct AttachRequest {
+    /// The ticket's secret.
+    pub secret: [u8; 32],
+    /// Chosen by the client.
+    pub request_id: u32,
+    /// The stream.
+    pub outbox: Arc<Outbox<SeatUpdate>>,
+    /// Number of the seat on the stream.
+    pub handle: u32,
+    /// How it wants to be told.
+    pub wishes: Wishes,
+    /// The seat's part of the game seed.
+    pub entropy: Vec<u8>,
+}
+
+/// Asks to watch.
+#[derive(Debug)]
+pub struct SpectateRequest {
+    /// The stream.
+    pub outbox: Arc<Outbox<SpectatorServiceWatchResponse>>,
+    /// Position in the log from which events are wanted.
+    pub from: usize,
+    /// Start with a snapshot.
+    pub snapshot: bool,
+}
+
+/// Why a room cannot be watched.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SpectateError {
+    /// The policy does not admit spectators.
+    NotAdmitted,
+    /// There are too many.
+    Full,
+    /// A snapshot of a delayed room would tell what is not to be known yet.
+    SnapshotDelayed,
+}
+
+/// What a seat does.
+#[derive(Debug)]
+pub enum SeatAction {
+    /// Answers a decision.
+    Answer {
+        /// The decision.
+        decision_id: u64,
+        /// The action.
+        action: u32,
+        /// Annotations, encoded.
+        annotations: Option<Box<[u8]>>,
+    },
+    /// Expresses something.
+    Express {
+        /// For the record only.
+        record_only: bool,
+        /// The expression, encoded.
+        expression: Box<[u8]>,
+    },
+    /// Plays itself again.
+    Resume,
+}
+
+/// What became of an action that was sent without a stream.
+pub type Acted = Result<Option<v1::AnswerResult>, ExpressError>;
+
+enum Message {
+    Join(JoinRequest, oneshot::Sender<Result<Joined, JoinError>>),
+    Attach(AttachRequest, oneshot::Sender<Option<(Seat, ConnectionId)>>),
+    Lost(Seat, ConnectionId, Option<v1::DetachReason>),
+    Do(Seat, ConnectionId, SeatAction, Instant),
+    Act(
+        [u8; 32],
+        SeatAction,
+        Instant,
+        oneshot::Sender<Option<Acted>>,
+    ),
+    Spectate(SpectateRequest, oneshot::Sender<Result<(), SpectateError>>),
+    Describe(oneshot::Sender<v1::Room>),
+    Close([u8; 32], oneshot::Sender<Option<v1::Room>>),
+    Abort(AbortReason),
+    Space,
+}
+
+/// What is told once the changes are kept.
+enum Release {
+    Join(
+        oneshot::Sender<Result<Joined, JoinError>>,
+        Result<Joined, JoinError>,
+    ),
+    Attach(
+        AttachRequest,
+        Seat,
+        ConnectionId,
+        oneshot::Sender<Option<(Seat, ConnectionId)>>,
+    ),
+    Result(Seat, ConnectionId, v1::AnswerResult),
+    Refuse(Seat, ConnectionId, v1::Refused),
+    Acted(oneshot::Sender<Option<Acted>>, Acted),
+    Closed(oneshot::Sender<Option<v1::Room>>),
+}
+
+/// How others reach a room.
+#[derive(Clone)]
+pub struct Handle {
+    id: Id,
+    mailbox: mpsc::Sender<Message>,
+}
+
+impl std::fmt::Debug for Handle {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(formatter, "Handle({})", self.id)
+    }
+}
+
+impl Handle {
+    /// Which room.
+    pub fn id(&self) -> Id {
+        self.id
+    }
+
+    /// Takes a seat.
+    ///
+    /// # Errors
+    /// The room is gone, or (inside) why no seat can be taken.
+    pub async fn join(&self, request: JoinRequest) -> Result<Result<Joined, JoinError>, RoomGone> {
+        self.ask(|reply| Message::Join(request, reply)).await
+    }
+
+    /// Attaches a stream to a seat; `None` if the ticket is not of this room.
+    ///
+    /// # Errors
+    /// The room is gone.
+    pub async fn attach(
+        &self,
+        request: AttachRequest,
+    ) -> Result<Option<(Seat, ConnectionId)>, RoomGone> {
+        self.ask(|reply| Message::Attach(request, reply)).await
+    }
+
+    /// The connection of a seat has gone, or leaves (`reason` is told to it).
+    pub async fn lost(
+        &self,
+        seat: Seat,
+        connection: ConnectionId,
+        reason: Option<v1::DetachReason>,
+    ) {
+        // A room that is gone has nobody to miss.
+        let _ = self
+            .mailbox
+            .send(Message::Lost(seat, connection, reason))
+            .await;
+    }
+
+    /// A seat does something over its stream, where it hears what became of it.
+    ///
+    /// # Errors
+    /// The room is gone.
+    pub async fn perform(
+        &self,
+        seat: Seat,
+        connection: ConnectionId,
+        action: SeatAction,
+        arrived: Instant,
+    ) -> Result<(), RoomGone> {
+        self.mailbox
+            .send(Message::Do(seat, connection, action, arrived))
+            .await
+            .map_err(|_| RoomGone)
+    }
+
+    /// A seat does something without a stream; `None` if the ticket is not of this room.
+    ///
+    /// # Errors
+    /// The room is gone.
+    pub async fn act(
+        &self,
+        secret: [u8; 32],
+        action: SeatAction,
+        arrived: Instant,
+    ) -> Result<Option<Acted>, RoomGone> {
+        self.ask(|reply| Message::Act(secret, action, arrived, reply))
+            .await
+    }
+
+    /// Watches.
+    ///
+    /// # Errors
+    /// The room is gone, or (inside) why it cannot be watched.
+    pub async fn spectate(
+        &self,
+        request: SpectateRequest,
+    ) -> Result<Result<(), SpectateError>, RoomGone> {
+        self.ask(|reply| Message::Spectate(request, reply)).await
+    }
+
+    /// The room as everybody sees it.
+    ///
+    /// # Errors
+    /// The room is gone.
+    pub async fn describe(&self) -> Result<v1::Room, RoomGone> {
+        self.ask(Message::Describe).await
+    }
+
+    /// Closes the room; `None` if the token is not its owner's.
+    ///
+    /// # Errors
+    /// The room is gone.
+    pub async fn close(&self, secret: [u8; 32]) -> Result<Option<v1::Room>, RoomGone> {
+        self.ask(|reply| Message::Close(secret, reply)).await
+    }
+
+    /// Ends the game without a result, if it has not ended.
+    pub async fn abort(&self, reason: AbortReason) {
+        // A room that is gone has nothing left to end.
+        let _ = self.mailbox.send(Message::Abort(reason)).await;
+    }
+
+    async fn ask<T>(
+        &self,
+        message: impl FnOnce(oneshot::Sender<T>) -> Message,
+    ) -> Result<T, RoomGone> {
+        let (reply, answer) = oneshot::channel();
+        self.mailbox
+            .send(message(reply))
+            .await
+            .map_err(|_| RoomGone)?;
+        answer.await.map_err(|_| RoomGone)
+    }
+}
+
+struct TellSpace(mpsc::WeakSender<Message>);
+
+impl OnSpace for TellSpace {
+    fn space(&self) {
+        if let Some(mailbox) = self.0.upgrade() {
+            // A full mailbox means that the room is about to deliver anyway.
+            let _ = mailbox.try_send(Message::Space);
+        }
+    }
+}
+
+/// What a room needs from its server.
+#[derive(Clone)]
+pub struct TaskContext {
+    /// Where games are kept.
+    pub store: Arc<dyn Store>,
+    /// Where records are written.
+    pub data_dir: Option<PathBuf>,
+    /// How long an ended room is still shown.
+    pub retention: Duration,
+    /// Numbers for connections.
+    pub connections: Arc<AtomicU64>,
+    /// Tasks that a shutdown waits for.
+    pub tracker: TaskTracker,
+    /// Told when the game of a room has ended, and when the room is gone.
+    pub watcher: Arc<dyn RoomWatcher>,
+}
+
+/// Who keeps the list of rooms.
+pub trait RoomWatcher: Send + Sync {
+    /// The game of a room has ended; the room is still shown.
+    fn game_over(&self, room: Id);
+    /// The room is gone.
+    fn gone(&self, room: Id);
+}
+
+/// Starts a room.
+pub fn start(header: Arc<GameHeader>, context: TaskContext) -> Handle {
+    let (mailbox, inbox) = mpsc::channel(ROOM_MAILBOX);
+    let handle = Handle {
+        id: header.room_id,
+        mailbox: mailbox.clone(),
+    };
+    let seats = header.fills.len();
+    let task = Task {
+        core: Core::new(header),
+        epoch: Instant::now(),
+        attachments: (0..seats).map(|_| None).collect(),
+        spectators: Vec::new(),
+        on_space: Arc::new(TellSpace(mailbox.downgrade())),
+        releases: Vec::new(),
+        delivered: 0,
+        over_since: None,
+        context: context.clone(),
+    };
+    context.tracker.spawn(task.run(inbox));
+    handle
+}
+
+struct Task {
+    core: Core,
+    epoch: Instant,
+    attachments: Vec<Option<Attachment>>,
+    spectators: Vec<Spectator>,
+    on_space: Arc<dyn OnSpace>,
+    releases: Vec<Release>,
+    /// Length of the log when everybody had last been looked after.
+    delivered: usize,
+    over_since: Option<Duration>,
+    context: TaskContext,
+}
+
+impl Task {
+    async fn run(mut self, mut inbox: mpsc::Receiver<Message>) {
+        let id = self.core.header().room_id;
+        self.core.begin_if_all_built_in(Duration::ZERO);
+        let mut messages = Vec::with_capacity(INPUTS_PER_COMMIT);
+        let alarm = tokio::time::sleep_until(self.epoch);
+        tokio::pin!(alarm);
+        let mut armed = true;
+        loop {
+            if !self.keep_and_tell().await {
+                break;
+            }
+            armed = self.arm(alarm.as_mut(), armed);
+            tokio::select! {
+                biased;
+                received = inbox.recv_many(&mut messages, INPUTS_PER_COMMIT) => {
+                    if received == 0 {
+                        break;
+                    }
+                    for message in messages.drain(..) {
+                        self.receive(message);
+                    }
+                }
+                () = alarm.as_mut(), if armed => {
+                    armed = false;
+                    if self.is_expired() {
+                        break;
+                    }
+                    let handed = self.handed();
+                    self.core.tick(self.now(), handed);
+                }
+            }
+        }
+        self.context.watcher.gone(id);
+        debug!(room = %id, "the room is gone");
+    }
+
+    /// Arms the alarm for the next deadline. An alarm that rings too early finds nothing to do and is armed again, so that a later
+    /// deadline costs nothing.
+    fn arm(&self, alarm: std::pin::Pin<&mut Sleep>, armed: bool) -> bool {
+        let deadline = match self.over_since {
+            Some(since) => Some(since + self.context.retention),
+            None => self.core.deadline(),
+        };
+        let Some(deadline) = deadline else {
+            return false;
+        };
+        let deadline = self.epoch + deadline;
+        if !armed || alarm.deadline() > deadline {
+            alarm.reset(deadline);
+        }
+        true
+    }
+
+    fn is_expired(&self) -> bool {
+        self.over_since
+            .is_some_and(|since| since + self.context.retention <= self.now())
+    }
+
+    fn now(&self) -> Duration {
+        self.epoch.elapsed()
+    }
+
+    /// When the open decision was handed to its seat's transport.
+    fn handed(&self) -> Option<Duration> {
+        let seat = self.core.awaited()?.decision.seat;
+        self.attachments[seat.index()].as_ref()?.handed()
+    }
+
+    fn receive(&mut self, message: Message) {
+        let now = self.now();
+        match message {
+            Message::Join(request, reply) => {
+                let joined = self.join(now, request);
+                self.releases.push(Release::Join(reply, joined));
+            }
+            Message::Attach(request, reply) => self.attach(now, request, reply),
+            Message::Lost(seat, connection, reason) => self.lost(now, seat, connection, reason),
+            Message::Do(seat, connection, action, arrived) => {
+                if self.is_current(seat, connection) {
+                    match self.perform(now, seat, action, arrived) {
+                        Ok(Some(result)) => {
+                            self.releases
+                                .push(Release::Result(seat, connection, result));
+                        }
+                        Ok(None) => {}
+                        Err(error) => {
+                            let refused = refused("EXPRESSION_REFUSED", &error.to_string());
+                            self.releases
+                                .push(Release::Refuse(seat, connection, refused));
+                        }
+                    }
+                }
+            }
+            Message::Act(secret, action, arrived, reply) => {
+                match self.core.seat_of_ticket(&secret) {
+                    Some(seat) => {
+                        let acted = self.perform(now, seat, action, arrived);
+                        self.releases.push(Release::Acted(reply, acted));
+                    }
+                    None => answer(reply, None),
+                }
+            }
+            Message::Spectate(request, reply) => answer(reply, self.spectate(request)),
+            Message::Describe(reply) => answer(reply, convert::describe(&self.core)),
+            Message::Close(secret, reply) => {
+                if self.core.header().owner.matches(&secret) {
+                    self.core.abort(now, AbortReason::Closed);
+                    self.releases.push(Release::Closed(reply));
+                } else {
+                    answer(reply, None);
+                }
+            }
+            Message::Abort(reason) => self.core.abort(now, reason),
+            Message::Space => {}
+        }
+    }
+
+    fn join(&mut self, now: Duration, request: JoinRequest) -> Result<Joined, JoinError> {
+        let ticket = Token::random(self.core.header().room_id);
+        let seat = self.core.join(
+            now,
+            request.seat,
+            SeatedParticipant {
+                name: request.name,
+                kind: request.kind,
+                ticket: ticket.hash(),
+            },
+        )?;
+        Ok(Joined {
+            seat,
+            ticket,
+            room: convert::describe(&self.core),
+        })
+    }
+
+    fn attach(
+        &mut self,
+        now: Duration,
+        request: AttachRequest,
+        reply: oneshot::Sender<Option<(Seat, ConnectionId)>>,
+    ) {
+        let Some(seat) = self.core.seat_of_ticket(&request.secret) else {
+            answer(reply, None);
+            return;
+        };
+        let connection = ConnectionId(self.context.connections.fetch_add(1, Ordering::Relaxed));
+        let handed = self.handed();
+        self.core
+            .attach(now, seat, connection, request.entropy.clone(), handed);
+        self.releases
+            .push(Release::Attach(request, seat, connection, reply));
+    }
+
+    fn lost(
+        &mut self,
+        now: Duration,
+        seat: Seat,
+        connection: ConnectionId,
+        reason: Option<v1::DetachReason>,
+    ) {
+        if !self.is_current(seat, connection) {
+            return;
+        }
+        let handed = self.handed();
+        self.core.lost(now, seat, connection, handed);
+        if let Some(mut attachment) = self.attachments[seat.index()].take()
+            && let Some(reason) = reason
+        {
+            attachment.detach(reason);
+        }
+    }
+
+    fn is_current(&self, seat: Seat, connection: ConnectionId) -> bool {
+        self.attachments[seat.index()]
+            .as_ref()
+            .is_some_and(|attachment| attachment.connection() == connection)
+    }
+
+    fn perform(
+        &mut self,
+        now: Duration,
+        seat: Seat,
+        action: SeatAction,
+        arrived: Instant,
+    ) -> Acted {
+        match action {
+            SeatAction::Answer {
+                decision_id,
+                action,
+                annotations,
+            } => {
+                let handed = self.attachments[seat.index()]
+                    .as_ref()
+                    .and_then(Attachment::handed);
+                let answered: Answered = self.core.answer(
+                    now,
+                    AnswerInput {
+                        seat,
+                        decision_id,
+                        action,
+                        annotations,
+                        arrived: arrived.saturating_duration_since(self.epoch),
+                        handed,
+                    },
+                );
+                Ok(Some(convert::answer_result(decision_id, action, answered)))
+            }
+            SeatAction::Express {
+                record_only,
+                expression,
+            } => self
+                .core
+                .express(now, seat, record_only, expression)
+                .map(|()| None),
+            SeatAction::Resume => {
+                self.core.resume(now, seat);
+                Ok(None)
+            }
+        }
+    }
+
+    fn spectate(&mut self, request: SpectateRequest) -> Result<(), SpectateError> {
+        let policy = &self.core.header().policy;
+        if !policy.spectators {
+            return Err(SpectateError::NotAdmitted);
+        }
+        if request.snapshot && policy.spectator_delay_decisions > 0 {
+            return Err(SpectateError::SnapshotDelayed);
+        }
+        if self.spectators.len() >= MAX_SPECTATORS {
+            return Err(SpectateError::Full);
+        }
+        let spectator = Spectator::new(&self.core, request.outbox, request.from, request.snapshot);
+        self.spectators.push(spectator);
+        Ok(())
+    }
+
+    /// Hands new changes to the store, awaits it, then tells everybody what they may know. `false` when the room must stop.
+    async fn keep_and_tell(&mut self) -> bool {
+        let entries = self.core.take_unkept();
+        if !entries.is_empty() {
+            let game = self.core.header().game_id;
+            if let Err(error) = self.context.store.append(game, entries).await {
+                self.fail(&error.to_string());
+                return false;
+            }
+        }
+        if self.core.state().is_over() && self.over_since.is_none() && !self.conclude().await {
+            return false;
+        }
+        for release in std::mem::take(&mut self.releases) {
+            self.release(release);
+        }
+        self.deliver();
+        true
+    }
+
+    fn release(&mut self, release: Release) {
+        match release {
+            Release::Join(reply, joined) => answer(reply, joined),
+            Release::Attach(request, seat, connection, reply) => {
+                self.release_attach(request, seat, connection, reply);
+            }
+            Release::Result(seat, connection, result) => {
+                if let Some(attachment) = self.current(seat, connection) {
+                    attachment.tell_result(result);
+                }
+            }
+            Release::Refuse(seat, connection, refused) => {
+                if let Some(attachment) = self.current(seat, connection) {
+                    attachment.refuse(refused);
+                }
+            }
+            Release::Acted(reply, acted) => answer(reply, Some(acted)),
+            Release::Closed(reply) => answer(reply, Some(convert::describe(&self.core))),
+        }
+    }
+
+    fn release_attach(
+        &mut self,
+        request: AttachRequest,
+        seat: Seat,
+        connection: ConnectionId,
+        reply: oneshot::Sender<Option<(Seat, ConnectionId)>>,
+    ) {
+        let mut attachment = Attachment::new(
+            connection,
+            request.outbox,
+            request.handle,
+            request.wishes,
+            HandStamp::new(self.epoch),
+            Arc::clone(&self.on_space),
+        );
+        attachment.greet(&self.core, seat, request.request_id);
+        let older = self.attachments[seat.index()].replace(attachment);
+        if let Some(mut older) = older {
+            older.detach(v1::DetachReason::Superseded);
+        }
+        let now = self.now();
+        if let Some(attachment) = &mut self.attachments[seat.index()] {
+            attachment.deliver(&self.core, seat, now, true);
+        }
+        answer(reply, Some((seat, connection)));
+    }
+
+    fn current(&mut self, seat: Seat, connection: ConnectionId) -> Option<&mut Attachment> {
+        self.attachments[seat.index()]
+            .as_mut()
+            .filter(|attachment| attachment.connection() == connection)
+    }
+
+    fn deliver(&mut self) {
+        let now = self.now();
+        let news = self.core.log().since(self.delivered);
+        for seat in self.core.all_seats() {
+            if let Some(attachment) = &mut self.attachments[seat.index()] {
+                let urgent = news.iter().any(|entry| is_urgent(&entry.happening, seat));
+                attachment.deliver(&self.core, seat, now, urgent);
+            }
+        }
+        self.delivered = self.core.log().len();
+        let (core, on_space) = (&self.core, &self.on_space);
+        self.spectators
+            .retain_mut(|spectator| spectator.deliver(core, on_space));
+    }
+
+    /// The game has ended: the store is told, the record is written.
+    async fn conclude(&mut self) -> bool {
+        self.over_since = Some(self.now());
+        let header = Arc::clone(self.core.header());
+        if let Err(error) = self.context.store.finish(header.game_id).await {
+            self.fail(&error.to_string());
+            return false;
+        }
+        info!(
+            room = %header.room_id,
+            game = %header.game_id,
+            finished = self.core.state() == State::Finished,
+            decisions = self.core.decisions(),
+            "the game has ended"
+        );
+        self.context.watcher.game_over(header.room_id);
+        // A room in which nothing was ever dealt leaves no record.
+        if let (Some(data_dir), true) = (&self.context.data_dir, self.core.game().is_some()) {
+            let write = write_record(
+                Arc::clone(&self.context.store),
+                header.game_id,
+                data_dir.clone(),
+            );
+            self.context.tracker.spawn(write);
+        }
+        true
+    }
+
+    /// The store has failed: nobody is told of what may not be kept; everybody is told that the room has stopped.
+    fn fail(&mut self, error: &str) {
+        error!(room = %self.core.header().room_id, error, "the room stops because its store failed");
+        self.releases.clear();
+        for attachment in self.attachments.iter_mut().flatten() {
+            attachment.detach(v1::DetachReason::RoomFailed);
+        }
+        for spectator in self.spectators.drain(..) {
+            spectator.fail();
+        }
+    }
+}
+
+async fn write_record(store: Arc<dyn Store>, game: Id, data_dir: PathBuf) {
+    let kept = match store.finished(game).await {
+        Ok(Some(kept)) => kept,
+        Ok(None) => return,
+        Err(error) => {
+            error!(%game, %error, "the record is not written");
+            return;
+        }
+    };
+    let written = tokio::task::spawn_blocking(move || {
+        let (header, journal) = kept;
+        let lines = convert::record_lines(&header, &journal);
+        let path = chefshat_records::jsonl::path_of(&data_dir, &game.to_string());
+        chefshat_records::jsonl::write(&path, &lines).map(|()| path)
+    })
+    .await;
+    match written {
+        Ok(Ok(path)) => info!(%game, path = %path.display(), "the record is written"),
+        Ok(Err(error)) => error!(%game, %error, "the record is not written"),
+        Err(error) => error!(%game, %error, "the record is not written"),
+    }
+}
+
+/// Answers a caller. One that is no longer there does not want to know.
+fn answer<T>(reply: oneshot::Sender<T>, answer: T) {
+    let _ = reply.send(answer);
+}
+
+fn refused(reason: &str, message: &str) -> v1::Refused {
+    v1::Refused {
+        request_id: 0,
+        reason: reason.into(),
+        message: message.into(),
+        metadata: std::collections::HashMap::new(),
+    }
+}

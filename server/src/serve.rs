@@ -1,0 +1,180 @@
+//! Serving: all services on one port, for gRPC and gRPC-web, over whatever connections come in; and shutting down so that nobody is left
+//! hanging.
+
+use std::future::Future;
+use std::io;
+use std::sync::Arc;
+
+use chefshat_proto::v1;
+use futures::Stream;
+use http::HeaderName;
+use tokio::io::{AsyncRead, AsyncWrite};
+use tokio::net::TcpListener;
+use tokio_util::sync::CancellationToken;
+use tokio_util::task::TaskTracker;
+use tonic::service::Routes;
+use tonic::transport::Server;
+use tonic::transport::server::Connected;
+use tower_http::cors::{AllowOrigin, Any, CorsLayer};
+use tracing::info;
+
+use crate::config::{MAX_MESSAGE_BYTES, MAX_STREAMS_PER_CONNECTION, ServerConfig};
+use crate::connections::{self, Limits};
+use crate::grpc;
+use crate::rooms::Rooms;
+use crate::store::Store;
+
+const KEEPALIVE_INTERVAL: std::time::Duration = std::time::Duration::from_secs(20);
+const KEEPALIVE_TIMEOUT: std::time::Duration = std::time::Duration::from_secs(10);
+/// Largest request headers, bytes.
+const MAX_HEADER_BYTES: u32 = 16 * 1024;
+
+/// Why serving ended otherwise than by a shutdown.
+#[derive(Debug, thiserror::Error)]
+pub enum ServeError {
+    /// The transport failed.
+    #[error("the server's transport failed: {0}")]
+    Transport(#[from] tonic::transport::Error),
+    /// A web origin is not one.
+    #[error("{0:?} is not a web origin; write for instance https://example.org")]
+    Origin(String),
+}
+
+/// Serves on a listening socket until `shutdown` is ready and everything has ended.
+///
+/// # Errors
+/// A failing transport, or a web origin that is none.
+pub async fn serve(
+    listener: TcpListener,
+    config: ServerConfig,
+    store: Arc<dyn Store>,
+    shutdown: impl Future<Output = ()> + Send,
+) -> Result<(), ServeError> {
+    let incoming = connections::accept(
+        listener,
+        Limits {
+            max_connections: config.max_connections,
+            first_byte_timeout: config.first_byte_timeout,
+        },
+    );
+    serve_incoming(incoming, config, store, shutdown).await
+}
+
+/// Serves on connections of any kind until `shutdown` is ready and everything has ended.
+///
+/// # Errors
+/// A failing transport, or a web origin that is none.
+pub async fn serve_incoming<I, C>(
+    incoming: I,
+    config: ServerConfig,
+    store: Arc<dyn Store>,
+    shutdown: impl Future<Output = ()> + Send,
+) -> Result<(), ServeError>
+where
+    I: Stream<Item = io::Result<C>> + Send,
+    C: AsyncRead + AsyncWrite + Connected + Unpin + Send + 'static,
+{
+    let tracker = TaskTracker::new();
+    let closing = CancellationToken::new();
+    let rooms = Rooms::new(&config, store, tracker.clone());
+    let (health, health_service) = tonic_health::server::health_reporter();
+    let routes = routes(&rooms, &config, &closing)
+        .add_service(health_service)
+        .add_service(reflection());
+    health
+        .set_service_status("", tonic_health::ServingStatus::Serving)
+        .await;
+
+    let closed = closing.clone();
+    let serving = Server::builder()
+        .accept_http1(true)
+        .tcp_nodelay(true)
+        .http2_keepalive_interval(Some(KEEPALIVE_INTERVAL))
+        .http2_keepalive_timeout(Some(KEEPALIVE_TIMEOUT))
+        .http2_max_header_list_size(MAX_HEADER_BYTES)
+        .max_concurrent_streams(Some(MAX_STREAMS_PER_CONNECTION))
+        .layer(cors(&config.allowed_origins)?)
+        .layer(tonic_web::GrpcWebLayer::new())
+        .add_routes(routes)
+        .serve_with_incoming_shutdown(incoming, async move { closed.cancelled().await });
+
+    let ending = async {
+        shutdown.await;
+        info!(
+            grace_seconds = config.grace.as_secs(),
+            open_rooms = rooms.open_count(),
+            "shutting down: no new rooms; running games may end"
+        );
+        health
+            .set_service_status("", tonic_health::ServingStatus::NotServing)
+            .await;
+        rooms.shut_down(config.grace).await;
+        closing.cancel();
+    };
+    let (served, ()) = tokio::join!(serving, ending);
+    served?;
+    drop(rooms);
+    tracker.close();
+    tracker.wait().await;
+    Ok(())
+}
+
+fn routes(rooms: &Arc<Rooms>, config: &ServerConfig, closing: &CancellationToken) -> Routes {
+    use v1::play_service_server::PlayServiceServer;
+    use v1::record_service_server::RecordServiceServer;
+    use v1::room_service_server::RoomServiceServer;
+    use v1::server_service_server::ServerServiceServer;
+    use v1::spectator_service_server::SpectatorServiceServer;
+    Routes::new(
+        PlayServiceServer::new(grpc::Play::new(Arc::clone(rooms), closing.clone()))
+            .max_decoding_message_size(MAX_MESSAGE_BYTES),
+    )
+    .add_service(
+        RoomServiceServer::new(grpc::RoomCalls::new(Arc::clone(rooms)))
+            .max_decoding_message_size(MAX_MESSAGE_BYTES),
+    )
+    .add_service(
+        SpectatorServiceServer::new(grpc::Spectate::new(Arc::clone(rooms), closing.clone()))
+            .max_decoding_message_size(MAX_MESSAGE_BYTES),
+    )
+    .add_service(
+        RecordServiceServer::new(grpc::Records::new(Arc::clone(rooms)))
+            .max_decoding_message_size(MAX_MESSAGE_BYTES),
+    )
+    .add_service(
+        ServerServiceServer::new(grpc::Info::new(Arc::clone(rooms), config))
+            .max_decoding_message_size(MAX_MESSAGE_BYTES),
+    )
+}
+
+fn reflection() -> tonic_reflection::server::v1::ServerReflectionServer<
+    impl tonic_reflection::server::v1::ServerReflection,
+> {
+    tonic_reflection::server::Builder::configure()
+        .register_encoded_file_descriptor_set(chefshat_proto::DESCRIPTORS)
+        .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
+        .build_v1()
+        .expect("the descriptors are those the code was generated from")
+}
+
+/// What browsers of other origins may do: call, and read what gRPC puts into headers.
+fn cors(origins: &[String]) -> Result<CorsLayer, ServeError> {
+    let layer = CorsLayer::new()
+        .allow_methods([http::Method::POST])
+        .allow_headers(Any)
+        .expose_headers(
+            ["grpc-status", "grpc-message", "grpc-status-details-bin"].map(HeaderName::from_static),
+        );
+    if origins.iter().any(|origin| origin == "*") {
+        return Ok(layer.allow_origin(Any));
+    }
+    let origins = origins
+        .iter()
+        .map(|origin| {
+            origin
+                .parse()
+                .map_err(|_| ServeError::Origin(origin.clone()))
+        })
+        .collect::<Result<Vec<http::HeaderValue>, _>>()?;
+    Ok(layer.allow_origin(AllowOrigin::list(origins)))
+}

@@ -1,0 +1,92 @@
+//! Starting other programs. Their output goes straight through, so that a person sees what they see.
+
+use std::ffi::OsStr;
+use std::process::{Command, Stdio};
+
+use crate::steps::Failure;
+
+/// A program with the same Cargo that started this one, if it is Cargo.
+pub(crate) fn cargo() -> Command {
+    Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
+}
+
+/// Runs to the end; anything but success is a failure that names the command line.
+pub(crate) fn run(command: &mut Command) -> Result<(), Failure> {
+    println!("    {}", line(command));
+    let status = command
+        .status()
+        .map_err(|error| cannot_start(command, &error))?;
+    if status.success() {
+        Ok(())
+    } else {
+        Err(Failure::new(format!("`{}`: {status}", line(command))))
+    }
+}
+
+/// What the program writes to its standard output, without its last line end; its errors are not shown.
+pub(crate) fn read(command: &mut Command) -> Result<String, Failure> {
+    let output = command
+        .stderr(Stdio::null())
+        .output()
+        .map_err(|error| cannot_start(command, &error))?;
+    if output.status.success() {
+        Ok(String::from_utf8_lossy(&output.stdout)
+            .trim_end()
+            .to_owned())
+    } else {
+        Err(Failure::new(format!(
+            "`{}`: {}",
+            line(command),
+            output.status
+        )))
+    }
+}
+
+/// Whether the program can be started and succeeds; it is not seen.
+pub(crate) fn succeeds(program: impl AsRef<OsStr>, arguments: &[&str]) -> bool {
+    read(Command::new(program).args(arguments)).is_ok()
+}
+
+fn cannot_start(command: &Command, error: &std::io::Error) -> Failure {
+    Failure::new(format!(
+        "cannot start `{}`: {error}",
+        command.get_program().to_string_lossy()
+    ))
+}
+
+/// The command as one would type it (without quoting, which no argument here needs).
+fn line(command: &Command) -> String {
+    let words = std::iter::once(command.get_program()).chain(command.get_args());
+    words
+        .map(OsStr::to_string_lossy)
+        .collect::<Vec<_>>()
+        .join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn failures_name_the_command() {
+        let failure = run(Command::new("sh").args(["-c", "exit 3"])).unwrap_err();
+        assert_eq!(failure.to_string(), "`sh -c exit 3`: exit status: 3");
+        let failure = run(&mut Command::new("no-such-program")).unwrap_err();
+        assert!(
+            failure
+                .to_string()
+                .starts_with("cannot start `no-such-program`: ")
+        );
+    }
+
+    #[test]
+    fn output_is_read_without_its_last_line_end() {
+        assert_eq!(
+            read(Command::new("echo").arg("two words")).unwrap(),
+            "two words"
+        );
+        assert!(
+            succeeds("true", &[]) && !succeeds("false", &[]) && !succeeds("no-such-program", &[])
+        );
+    }
+}

@@ -1,0 +1,73 @@
+//! `cargo xtask lint`: everything that is checked without running the project.
+
+use std::process::Command;
+
+use crate::command::{self, cargo};
+use crate::places::{NO_PYTHON_PACKAGE, Places};
+use crate::setup;
+use crate::steps::{Failure, Steps};
+use crate::test::python_command;
+
+/// Runs all checks, cheapest first.
+pub(crate) fn run(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
+    let fmt = ["fmt", "--all", "--check"];
+    steps.program("cargo fmt", in_root(places, cargo()).args(fmt))?;
+
+    steps.run("set up checkers", || setup::tools(places))?;
+    steps.program("buf lint", tool(places, "buf").args(["lint", "proto"]))?;
+    schema(places, steps, "vendor.citation-file-format", "CITATION.cff")?;
+    schema(places, steps, "vendor.compose-spec", "docker/compose.yaml")?;
+    // Read, not built: there need be no container engine.
+    steps.program(
+        "hadolint",
+        tool(places, "hadolint").arg("docker/Dockerfile"),
+    )?;
+
+    if places.has_python_package() {
+        steps.run("set up Python", || setup::python_package(places))?;
+        python(places, steps)?;
+    } else {
+        steps.skip("ruff, mypy", NO_PYTHON_PACKAGE);
+    }
+
+    let clippy = [
+        "clippy",
+        "--workspace",
+        "--all-targets",
+        "--",
+        "-D",
+        "warnings",
+    ];
+    steps.program("cargo clippy", in_root(places, cargo()).args(clippy))?;
+    steps.run("cargo deny", || {
+        let deny = ["--workspace", "check", "licenses", "bans", "sources"];
+        command::run(in_root(places, setup::cargo_deny(places)?).args(deny))
+    })
+}
+
+/// The linter, formatter and type checker of the Python package, which must be set up.
+pub(crate) fn python(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
+    steps.program(
+        "ruff check",
+        python_command(places, "ruff").args(["check", "."]),
+    )?;
+    let format = ["format", "--check", "."];
+    steps.program("ruff format", python_command(places, "ruff").args(format))?;
+    steps.program("mypy", &mut python_command(places, "mypy"))
+}
+
+/// Checks a file against one of the schemas that the checker brings with it.
+fn schema(places: &Places, steps: &mut Steps, name: &str, file: &str) -> Result<(), Failure> {
+    let arguments = ["--builtin-schema", name, file];
+    let step = format!("schema of {file}");
+    steps.program(&step, tool(places, "check-jsonschema").args(arguments))
+}
+
+fn tool(places: &Places, name: &str) -> Command {
+    in_root(places, Command::new(places.tools().join("bin").join(name)))
+}
+
+fn in_root(places: &Places, mut command: Command) -> Command {
+    command.current_dir(&places.root);
+    command
+}

@@ -1,0 +1,69 @@
+//! `cargo xtask`: sets up what the tests of all languages need, runs them, and runs the linters.
+//!
+//! The command line lives here. What is run lives in [`lint`] and [`test`], what must be there first in [`setup`]. Nothing here
+//! knows a crate of the project: this program only starts others and must build when they do not.
+
+mod command;
+mod lint;
+mod places;
+mod setup;
+mod steps;
+mod test;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand, ValueEnum};
+
+use crate::places::Places;
+use crate::steps::Steps;
+
+/// Set up, test and lint everything in every language.
+#[derive(Parser)]
+#[command(
+    name = "cargo xtask",
+    after_help = "Example: cargo xtask test --only python"
+)]
+struct Cli {
+    #[command(subcommand)]
+    task: Task,
+}
+
+#[derive(Subcommand)]
+enum Task {
+    /// Run all tests; sets up by itself what they need, inside the build folder.
+    Test {
+        /// Run the tests of one language alone.
+        #[arg(long, value_enum)]
+        only: Option<Language>,
+    },
+    /// Check format, lints, protocol, licences and images.
+    Lint,
+}
+
+/// A language whose tests can be run alone.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Language {
+    /// Engine, server, Rust SDK and whole-system tests.
+    Rust,
+    /// The package in clients/python.
+    Python,
+    /// The agent in clients/node.
+    Node,
+}
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let mut steps = Steps::default();
+    let outcome = Places::find().and_then(|places| match cli.task {
+        Task::Test { only } => test::run(&places, &mut steps, only),
+        Task::Lint => lint::run(&places, &mut steps),
+    });
+    print!("{}", steps.summary());
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            eprintln!("\nxtask: {failure}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -1,0 +1,86 @@
+//! Where things lie: the source tree, which is only read, and the build folder, where everything is written.
+
+use std::env;
+use std::path::{Path, PathBuf};
+
+use crate::steps::Failure;
+
+/// Why steps are skipped where [`Places::has_python_package`] is false.
+pub(crate) const NO_PYTHON_PACKAGE: &str = "there is no clients/python/pyproject.toml";
+
+/// Why steps are skipped where [`Places::has_node_package`] is false.
+pub(crate) const NO_NODE_PACKAGE: &str = "there is no clients/node/package-lock.json";
+
+/// The folders this program works with, all absolute.
+pub(crate) struct Places {
+    /// The source tree.
+    pub(crate) root: PathBuf,
+    /// Cargo's build folder.
+    pub(crate) target: PathBuf,
+    /// What this program sets up.
+    pub(crate) own: PathBuf,
+}
+
+impl Places {
+    /// Finds the source tree from the place of this crate, and the build folder as Cargo does.
+    pub(crate) fn find() -> Result<Self, Failure> {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+        let root = root
+            .canonicalize()
+            .map_err(|error| Failure::new(format!("{}: {error}", root.display())))?;
+        let target = env::var_os("CARGO_TARGET_DIR")
+            .map_or_else(|| root.join("target"), |folder| root.join(folder));
+        let own = target.join("xtask");
+        Ok(Self { root, target, own })
+    }
+
+    /// The server built by the `build` step.
+    pub(crate) fn chefshat(&self) -> PathBuf {
+        self.target.join("debug/chefshat")
+    }
+
+    /// The Python package.
+    pub(crate) fn python_package(&self) -> PathBuf {
+        self.root.join("clients/python")
+    }
+
+    /// Whether there is a Python package to set up.
+    pub(crate) fn has_python_package(&self) -> bool {
+        self.python_package().join("pyproject.toml").exists()
+    }
+
+    /// The JavaScript agent.
+    pub(crate) fn node_package(&self) -> PathBuf {
+        self.root.join("clients/node")
+    }
+
+    /// Whether there is a JavaScript agent to set up.
+    pub(crate) fn has_node_package(&self) -> bool {
+        self.node_package().join("package-lock.json").exists()
+    }
+
+    /// Virtual environment of the Python package.
+    pub(crate) fn venv(&self) -> PathBuf {
+        self.own.join("venv")
+    }
+
+    /// Interpreter of the Python package's environment.
+    pub(crate) fn python(&self) -> PathBuf {
+        self.venv().join("bin/python")
+    }
+
+    /// Copy of the JavaScript agent, with its modules.
+    pub(crate) fn node(&self) -> PathBuf {
+        self.own.join("node")
+    }
+
+    /// Virtual environment of the checkers in tools.txt.
+    pub(crate) fn tools(&self) -> PathBuf {
+        self.own.join("tools")
+    }
+
+    /// Where `cargo install` puts checkers written in Rust.
+    pub(crate) fn cargo_tools(&self) -> PathBuf {
+        self.own.join("tools-cargo")
+    }
+}

@@ -1,0 +1,222 @@
+//! What the steps need: virtual environments, node modules, checkers, Debian packages. Everything is made inside the build
+//! folder and made anew only when what it was made from has changed; a Debian package is installed only when it is missing.
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+use crate::command::{cargo, read, run, succeeds};
+use crate::places::Places;
+use crate::steps::Failure;
+
+/// Version of cargo-deny that deny.toml is written for.
+const CARGO_DENY: &str = "0.20.2";
+
+/// Kept in a folder made by this program: what it was made from.
+const MADE_FROM: &str = ".made-from";
+
+/// The Python package, editable, with its development extras, in an environment of its own.
+pub(crate) fn python_package(places: &Places) -> Result<(), Failure> {
+    let package = places.python_package();
+    let project = package.join("pyproject.toml");
+    let text = fs::read_to_string(&project).map_err(|error| at(&project, &error))?;
+    let editable = format!("{}[dev]", package.display());
+    // The place counts too: clones may share a build folder, and the package runs from where it lies.
+    let made_from = format!("{editable}\n{text}");
+    venv(&places.venv(), &made_from, &["--editable", &editable])
+}
+
+/// The checkers of tools.txt, in an environment of their own.
+pub(crate) fn tools(places: &Places) -> Result<(), Failure> {
+    let list = places.root.join("tests/xtask/tools.txt");
+    let made_from = fs::read_to_string(&list).map_err(|error| at(&list, &error))?;
+    venv(
+        &places.tools(),
+        &made_from,
+        &["--requirement", &list.to_string_lossy()],
+    )
+}
+
+/// The JavaScript agent, copied beside its modules: npm writes only next to a package.json.
+pub(crate) fn node_package(places: &Places) -> Result<(), Failure> {
+    if !succeeds("node", &["--version"]) {
+        debian_package("nodejs")?;
+    }
+    if !succeeds("npm", &["--version"]) {
+        debian_package("npm")?;
+    }
+    let (source, copy) = (places.node_package(), places.node());
+    copy_package(&source, &copy).map_err(|error| at(&copy, &error))?;
+    let lock = source.join("package-lock.json");
+    let made_from = fs::read_to_string(&lock).map_err(|error| at(&lock, &error))?;
+    let modules = copy.join("node_modules");
+    if is_made_from(&modules, &made_from) {
+        return Ok(());
+    }
+    run(Command::new("npm")
+        .args(["ci", "--no-audit", "--no-fund"])
+        .current_dir(&copy))?;
+    note_made_from(&modules, &made_from)
+}
+
+/// cargo-deny: the one on the path if it is of the right version, else one built here. Returns the program to start.
+pub(crate) fn cargo_deny(places: &Places) -> Result<Command, Failure> {
+    let wanted = format!("cargo-deny {CARGO_DENY}");
+    let own = places.cargo_tools().join("bin/cargo-deny");
+    for program in [own.as_path(), Path::new("cargo-deny")] {
+        if read(Command::new(program).arg("--version")).is_ok_and(|version| version == wanted) {
+            return Ok(Command::new(program));
+        }
+    }
+    // An unoptimised build takes a fraction of the time and checks our few hundred crates in seconds all the same.
+    let build = places.cargo_tools().join("build");
+    let mut install = cargo();
+    install.args([
+        "install",
+        "cargo-deny",
+        "--locked",
+        "--debug",
+        "--quiet",
+        "--version",
+        CARGO_DENY,
+    ]);
+    run(install
+        .arg("--root")
+        .arg(places.cargo_tools())
+        .arg("--target-dir")
+        .arg(&build))?;
+    fs::remove_dir_all(&build).map_err(|error| at(&build, &error))?;
+    Ok(Command::new(own))
+}
+
+/// A virtual environment with what pip is told to install, unless it is there already.
+fn venv(folder: &Path, made_from: &str, install: &[&str]) -> Result<(), Failure> {
+    if !succeeds("python3", &["--version"]) {
+        debian_package("python3")?;
+    }
+    let python = folder.join("bin/python");
+    if is_made_from(folder, made_from) && succeeds(&python, &["-c", "import pip"]) {
+        return Ok(());
+    }
+    if !succeeds("python3", &["-c", "import ensurepip, venv"]) {
+        debian_package("python3-venv")?;
+    }
+    run(Command::new("python3")
+        .args(["-m", "venv", "--clear"])
+        .arg(folder))?;
+    run(Command::new(&python)
+        .args(["-m", "pip", "install", "--quiet"])
+        .args(install))?;
+    note_made_from(folder, made_from)
+}
+
+/// Installs a Debian package that is missing, or says which one is.
+fn debian_package(name: &str) -> Result<(), Failure> {
+    let root = read(Command::new("id").arg("-u")).is_ok_and(|id| id == "0");
+    if !root || !succeeds("apt-get", &["--version"]) {
+        return Err(Failure::new(format!(
+            "the Debian package `{name}` is missing; install it: apt-get install {name}"
+        )));
+    }
+    run(Command::new("apt-get").args(["update", "--quiet"]))?;
+    run(Command::new("apt-get").args([
+        "install",
+        "--yes",
+        "--quiet",
+        "--no-install-recommends",
+        name,
+    ]))
+}
+
+/// Makes `copy` the same as `source`, but for the modules: those of `copy` stay, those of `source` are not taken.
+fn copy_package(source: &Path, copy: &Path) -> std::io::Result<()> {
+    fs::create_dir_all(copy)?;
+    for entry in fs::read_dir(copy)? {
+        let entry = entry?;
+        if entry.file_name() == "node_modules" {
+            continue;
+        }
+        if entry.file_type()?.is_dir() {
+            fs::remove_dir_all(entry.path())?;
+        } else {
+            fs::remove_file(entry.path())?;
+        }
+    }
+    for entry in fs::read_dir(source)? {
+        let entry = entry?;
+        let to = copy.join(entry.file_name());
+        if entry.file_name() == "node_modules" {
+            continue;
+        }
+        if entry.file_type()?.is_dir() {
+            copy_package(&entry.path(), &to)?;
+        } else {
+            fs::copy(entry.path(), to)?;
+        }
+    }
+    Ok(())
+}
+
+fn is_made_from(folder: &Path, made_from: &str) -> bool {
+    fs::read_to_string(folder.join(MADE_FROM)).is_ok_and(|text| text == made_from)
+}
+
+fn note_made_from(folder: &Path, made_from: &str) -> Result<(), Failure> {
+    fs::write(folder.join(MADE_FROM), made_from).map_err(|error| at(folder, &error))
+}
+
+fn at(path: &Path, error: &std::io::Error) -> Failure {
+    Failure::new(format!("{}: {error}", path.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_copied_package_follows_its_source_and_keeps_its_own_modules() {
+        let folder = std::env::temp_dir().join(format!("xtask-copy-{}", std::process::id()));
+        let (source, copy) = (folder.join("source"), folder.join("copy"));
+        for made in [
+            source.join("tests"),
+            source.join("node_modules"),
+            copy.join("node_modules"),
+            copy.join("old"),
+        ] {
+            fs::create_dir_all(made).unwrap();
+        }
+        for (file, text) in [
+            ("source/agent.js", "new"),
+            ("copy/agent.js", "old"),
+            ("copy/gone.js", "old"),
+        ] {
+            fs::write(folder.join(file), text).unwrap();
+        }
+        fs::write(source.join("tests/one.test.js"), "test").unwrap();
+        fs::write(source.join("node_modules/theirs"), "").unwrap();
+        fs::write(copy.join("node_modules/ours"), "").unwrap();
+
+        copy_package(&source, &copy).unwrap();
+
+        assert_eq!(fs::read_to_string(copy.join("agent.js")).unwrap(), "new");
+        assert_eq!(
+            fs::read_to_string(copy.join("tests/one.test.js")).unwrap(),
+            "test"
+        );
+        assert!(!copy.join("gone.js").exists() && !copy.join("old").exists());
+        assert!(
+            copy.join("node_modules/ours").exists() && !copy.join("node_modules/theirs").exists()
+        );
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn a_folder_is_made_from_what_was_noted_and_nothing_else() {
+        let folder = std::env::temp_dir().join(format!("xtask-made-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        assert!(!is_made_from(&folder, "one"));
+        note_made_from(&folder, "one").unwrap();
+        assert!(is_made_from(&folder, "one") && !is_made_from(&folder, "two"));
+        fs::remove_dir_all(folder).unwrap();
+    }
+}

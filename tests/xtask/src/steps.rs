@@ -1,0 +1,134 @@
+//! The steps of a task: announced, timed, summed up at the end. Which steps there are is not decided here.
+
+use std::fmt;
+use std::fmt::Write as _;
+use std::process::Command;
+use std::time::{Duration, Instant};
+
+use crate::command;
+
+/// Why a task stopped, in words for the person who started it.
+#[derive(Debug)]
+pub(crate) struct Failure(String);
+
+impl Failure {
+    /// A failure that says this.
+    pub(crate) fn new(message: impl Into<String>) -> Self {
+        Self(message.into())
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+/// How a step ended.
+enum Outcome {
+    Passed,
+    Failed,
+    Skipped { reason: String },
+}
+
+struct Step {
+    name: String,
+    outcome: Outcome,
+    took: Duration,
+}
+
+/// The steps of a task so far.
+#[derive(Default)]
+pub(crate) struct Steps {
+    done: Vec<Step>,
+}
+
+impl Steps {
+    /// Runs one step. A failure names the step; the caller stops there.
+    pub(crate) fn run(
+        &mut self,
+        name: &str,
+        work: impl FnOnce() -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        println!("\n==> {name}");
+        let start = Instant::now();
+        let result = work();
+        let outcome = if result.is_ok() {
+            Outcome::Passed
+        } else {
+            Outcome::Failed
+        };
+        self.done.push(Step {
+            name: name.to_owned(),
+            outcome,
+            took: start.elapsed(),
+        });
+        result.map_err(|failure| Failure::new(format!("{name} failed: {failure}")))
+    }
+
+    /// Runs one program as a step.
+    pub(crate) fn program(&mut self, name: &str, command: &mut Command) -> Result<(), Failure> {
+        self.run(name, || command::run(command))
+    }
+
+    /// Notes, visibly, a step that cannot be run.
+    pub(crate) fn skip(&mut self, name: &str, reason: &str) {
+        println!("\n==> {name}: SKIPPED, {reason}");
+        let outcome = Outcome::Skipped {
+            reason: reason.to_owned(),
+        };
+        self.done.push(Step {
+            name: name.to_owned(),
+            outcome,
+            took: Duration::ZERO,
+        });
+    }
+
+    /// A line for each step that was reached.
+    pub(crate) fn summary(&self) -> String {
+        let mut text = String::from("\n");
+        let width = self
+            .done
+            .iter()
+            .map(|step| step.name.len())
+            .max()
+            .unwrap_or(0);
+        for Step {
+            name,
+            outcome,
+            took,
+        } in &self.done
+        {
+            let seconds = took.as_secs_f64();
+            let line = match outcome {
+                Outcome::Passed => format!("ok       {name:width$}  {seconds:6.1} s"),
+                Outcome::Failed => format!("FAILED   {name:width$}  {seconds:6.1} s"),
+                Outcome::Skipped { reason } => format!("skipped  {name:width$}  {reason}"),
+            };
+            writeln!(text, "{line}").expect("a String takes everything written to it");
+        }
+        text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failure_names_its_step_and_stands_in_the_summary() {
+        let mut steps = Steps::default();
+        steps.run("first", || Ok(())).unwrap();
+        steps.skip("second", "nothing there");
+        let failure = steps
+            .run("third", || Err(Failure::new("exit status 1")))
+            .unwrap_err();
+        assert_eq!(failure.to_string(), "third failed: exit status 1");
+        let summary = steps.summary();
+        let lines: Vec<&str> = summary.lines().filter(|line| !line.is_empty()).collect();
+        assert_eq!(lines.len(), 3);
+        assert!(lines[0].starts_with("ok       first "));
+        assert_eq!(lines[1], "skipped  second  nothing there");
+        assert!(lines[2].starts_with("FAILED   third "));
+    }
+}
