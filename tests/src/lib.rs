@@ -1,1 +1,23 @@
-//! Placeholder.
+//! What the whole-system tests share: a server on a free port, rooms on it, and seats that do exactly what a test tells them, over real
+//! sockets. Agents that play by themselves come from the SDKs.
+
+mod seat;
+mod server;
+
+pub use seat::{StreamSeat, first_legal, first_to_hear, is_legal, play_on};
+pub use server::{TestServer, one_shift, room_of_four};
+
+use std::time::Duration;
+
+/// How long a test waits for something that must happen before it says that it did not. Never a measure of speed.
+pub const PATIENCE: Duration = Duration::from_secs(60);
+
+/// Waits for something that must happen.
+///
+/// # Panics
+/// When it does not.
+pub async fn patiently<T>(what: &str, future: impl Future<Output = T>) -> T {
+    tokio::time::timeout(PATIENCE, future)
+        .await
+        .unwrap_or_else(|_| panic!("waited in vain for {what}"))
+}

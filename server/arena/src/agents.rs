@@ -1,13 +1,15 @@
-//! The built-in agents. Each is a function of what its seat may know and of its own generator, and of nothing else.
+//! The built-in agents. Each is a function of what its seat may know and of its own generator, and of nothing else. Who asks them, and
+//! what follows from an answer, is decided in `play` (offline) and by the server's rooms.
 
 use chefshat_engine::{Action, ActionSpace, DecisionKind, Mask, Move, Observation, Role};
-use rand::{Rng as _, RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
 
 /// Which built-in agent.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub enum AgentKind {
     /// Uniform over the legal actions.
+    #[default]
     Random,
     /// At a turn uniform over all T actions of a turn, valid or not (the paper's random agent); elsewhere as `Random`.
     RandomUnmasked,
@@ -63,31 +65,32 @@ impl BuiltInAgent {
         let space = ActionSpace::new(observation.faces).expect("an observation has 4 to 15 faces");
         let turn = observation.kind == Some(DecisionKind::Turn);
         match self.kind {
-            AgentKind::RandomUnmasked if turn => {
-                Action::new(self.generator.random_range(0..space.turn_actions()))
-            }
+            AgentKind::RandomUnmasked if turn => Action::new(self.below(space.turn_actions())),
             AgentKind::Random | AgentKind::RandomUnmasked => self.uniform(legal),
             AgentKind::Greedy => greedy(observation, legal, space),
         }
     }
 
     fn uniform(&mut self, legal: &Mask) -> Action {
-        let count = u32::try_from(legal.len()).expect("a mask has below 400 actions");
-        assert!(count > 0, "a decision has a legal action");
-        // The bias of a multiplication with 32 random bits is below 400 / 2^32.
-        let index = (u64::from(self.generator.next_u32()) * u64::from(count)) >> 32;
+        assert!(!legal.is_empty(), "a decision has a legal action");
+        let count = u16::try_from(legal.len()).expect("a mask has below 400 actions");
         legal
-            .nth(usize::try_from(index).expect("an index below the count"))
+            .nth(usize::from(self.below(count)))
             .expect("the index is below the number of actions")
+    }
+
+    /// A number below `n`. Spelled out, so that no library's next version changes what a seed brings about. Its bias, that of a
+    /// multiplication with 32 random bits, is below 400 / 2^32.
+    fn below(&mut self, n: u16) -> u16 {
+        let number = (u64::from(self.generator.next_u32()) * u64::from(n)) >> 32;
+        u16::try_from(number).expect("the number is below n")
     }
 }
 
 /// Prefers, in this order: no jokers, the least rare face, many cards; a pass only when nothing can be played. Gives its least rare
 /// card. Declares where an exchange would cost it cards.
 fn greedy(observation: &Observation, legal: &Mask, space: ActionSpace) -> Action {
-    let role = observation
-        .seat
-        .and_then(|seat| observation.roles[seat]);
+    let role = observation.seat.and_then(|seat| observation.roles[seat]);
     legal
         .iter()
         .max_by_key(|action| match space.decode(*action) {
@@ -95,7 +98,12 @@ fn greedy(observation: &Observation, legal: &Mask, space: ActionSpace) -> Action
                 face,
                 quantity,
                 jokers,
-            }) => (3, -i16::from(jokers), i16::from(face.get()), i16::from(quantity)),
+            }) => (
+                3,
+                -i16::from(jokers),
+                i16::from(face.get()),
+                i16::from(quantity),
+            ),
             Some(Move::LoneJoker) => (3, -1, -1, 0),
             Some(Move::Give(face)) => (3, 0, i16::from(face.get()), 0),
             Some(Move::GiveJoker) => (2, 0, 0, 0),

@@ -26,7 +26,9 @@ impl Chance {
 
 /// Plays all games, shows each decision to `look`, and gives the number of decisions taken.
 fn play(mut look: impl FnMut(&Game, &Mask)) -> u64 {
-    let rules = RuleSetSpec::default().validate().expect("the standard rule set is valid");
+    let rules = RuleSetSpec::default()
+        .validate()
+        .expect("the standard rule set is valid");
     let mut chance = Chance(7);
     let mut decisions = 0;
     for number in 0..GAMES {
@@ -39,8 +41,11 @@ fn play(mut look: impl FnMut(&Game, &Mask)) -> u64 {
                 break;
             }
             look(&game, &mask);
-            let action = mask.nth(chance.below(mask.len())).expect("the index is below the length");
-            game.apply(action, |_| {}).expect("an action of the mask is legal");
+            let action = mask
+                .nth(chance.below(mask.len()))
+                .expect("the index is below the length");
+            game.apply(action, |_| {})
+                .expect("an action of the mask is legal");
             decisions += 1;
         }
         assert!(game.is_over());
@@ -53,9 +58,11 @@ fn random_play(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("random_play");
     group.throughput(Throughput::Elements(DECISIONS));
     group.bench_function("masks", |bencher| {
-        bencher.iter(|| play(|_, mask| {
-            black_box(mask);
-        }));
+        bencher.iter(|| {
+            play(|_, mask| {
+                black_box(mask);
+            })
+        });
     });
     group.bench_function("observations", |bencher| {
         bencher.iter(|| {
@@ -70,7 +77,8 @@ fn random_play(criterion: &mut Criterion) {
         bencher.iter(|| {
             play(|game, mask| {
                 let decision = game.decision().expect("a decision is open");
-                game.observe(Viewer::Seat(decision.seat)).write_classic_vector(mask, &mut vector);
+                game.observe(Viewer::Seat(decision.seat))
+                    .write_classic_vector(mask, &mut vector);
                 black_box(&vector);
             })
         });

@@ -3,7 +3,7 @@
 
 use std::fmt;
 
-use crate::patterns::{play_offset, PLAYS};
+use crate::patterns::{PLAYS, play_offset};
 use crate::{Action, Face, MAX_FACES};
 
 /// What an action means.
@@ -36,7 +36,11 @@ impl fmt::Display for Move {
     /// The text of the action, for instance `C11;Q3;J1`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Move::Play { face, quantity, jokers } => write!(f, "C{face};Q{quantity};J{jokers}"),
+            Move::Play {
+                face,
+                quantity,
+                jokers,
+            } => write!(f, "C{face};Q{quantity};J{jokers}"),
             Move::LoneJoker => f.write_str("C0;Q0;J1"),
             Move::Pass => f.write_str("pass"),
             Move::Give(face) => write!(f, "give C{face}"),
@@ -57,7 +61,11 @@ pub struct ActionSpace {
 impl ActionSpace {
     /// The numbering for so many faces, 4..=15, or `None`.
     pub const fn new(faces: u8) -> Option<ActionSpace> {
-        if faces >= 4 && faces <= MAX_FACES { Some(ActionSpace { faces }) } else { None }
+        if faces >= 4 && faces <= MAX_FACES {
+            Some(ActionSpace { faces })
+        } else {
+            None
+        }
     }
 
     /// The numbering for a number of faces that is known to be in range.
@@ -102,7 +110,11 @@ impl ActionSpace {
 
     /// Giving one card of a face, or `None` if the deck has no such face.
     pub const fn give(self, face: Face) -> Option<Action> {
-        if face.get() <= self.faces { Some(Action::new(self.turn_actions() + face.get() as u16 - 1)) } else { None }
+        if face.get() <= self.faces {
+            Some(Action::new(self.turn_actions() + face.get() as u16 - 1))
+        } else {
+            None
+        }
     }
 
     /// Giving one joker.
@@ -126,7 +138,11 @@ impl ActionSpace {
         let (index, plays) = (action.index(), self.plays());
         if index < plays {
             let [face, quantity, jokers] = PLAYS[usize::from(index)];
-            return Some(Move::Play { face: Face::of(face), quantity, jokers });
+            return Some(Move::Play {
+                face: Face::of(face),
+                quantity,
+                jokers,
+            });
         }
         let faces = u16::from(self.faces);
         match index - plays {
@@ -143,9 +159,19 @@ impl ActionSpace {
     /// The number of a move, or `None` if no deck of this many faces has such a move.
     pub fn encode(self, meaning: Move) -> Option<Action> {
         match meaning {
-            Move::Play { face, quantity, jokers } => {
-                let exists = face.get() <= self.faces && (1..=face.get()).contains(&quantity) && jokers <= crate::MAX_JOKERS;
-                exists.then(|| Action::new(play_offset(face.get()) + 3 * u16::from(quantity - 1) + u16::from(jokers)))
+            Move::Play {
+                face,
+                quantity,
+                jokers,
+            } => {
+                let exists = face.get() <= self.faces
+                    && (1..=face.get()).contains(&quantity)
+                    && jokers <= crate::MAX_JOKERS;
+                exists.then(|| {
+                    Action::new(
+                        play_offset(face.get()) + 3 * u16::from(quantity - 1) + u16::from(jokers),
+                    )
+                })
             }
             Move::LoneJoker => Some(self.lone_joker()),
             Move::Pass => Some(self.pass()),
@@ -165,7 +191,9 @@ impl ActionSpace {
     pub fn parse(self, text: &str) -> Option<Action> {
         let meaning = parse_move(text)?;
         // Writing it again refuses spellings like `C01;Q1;J0` that would be understood otherwise.
-        (meaning.to_string() == text).then(|| self.encode(meaning)).flatten()
+        (meaning.to_string() == text)
+            .then(|| self.encode(meaning))
+            .flatten()
     }
 
     /// All actions, ascending.
@@ -190,5 +218,9 @@ fn parse_move(text: &str) -> Option<Move> {
     let face = Face::new(parts.next()?.strip_prefix('C')?.parse().ok()?)?;
     let quantity = parts.next()?.strip_prefix('Q')?.parse().ok()?;
     let jokers = parts.next()?.strip_prefix('J')?.parse().ok()?;
-    parts.next().is_none().then_some(Move::Play { face, quantity, jokers })
+    parts.next().is_none().then_some(Move::Play {
+        face,
+        quantity,
+        jokers,
+    })
 }

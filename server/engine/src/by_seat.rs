@@ -25,7 +25,10 @@ impl<T: Copy + Default> BySeat<T> {
         for (index, slot) in values.iter_mut().enumerate().take(players) {
             *slot = value(Seat::new(index));
         }
-        BySeat { values, len: players as u8 }
+        BySeat {
+            values,
+            len: players as u8,
+        }
     }
 
     /// The same value for each of `players` seats.
@@ -34,12 +37,16 @@ impl<T: Copy + Default> BySeat<T> {
     /// If `players` is above [`MAX_SEATS`].
     pub fn filled(players: usize, value: T) -> BySeat<T> {
         assert!(players <= MAX_SEATS, "a game has at most MAX_SEATS seats");
-        BySeat { values: [value; MAX_SEATS], len: players as u8 }
+        BySeat {
+            values: [value; MAX_SEATS],
+            len: players as u8,
+        }
     }
 
     /// The values of a slice, index = seat, or `None` if there are more than [`MAX_SEATS`].
     pub fn from_slice(values: &[T]) -> Option<BySeat<T>> {
-        (values.len() <= MAX_SEATS).then(|| BySeat::from_fn(values.len(), |seat| values[seat.index()]))
+        (values.len() <= MAX_SEATS)
+            .then(|| BySeat::from_fn(values.len(), |seat| values[seat.index()]))
     }
 
     /// The same seats with other values.
@@ -66,7 +73,10 @@ impl<T> BySeat<T> {
 
     /// The seats with their values, in the order of the seats.
     pub fn iter(&self) -> impl DoubleEndedIterator<Item = (Seat, &T)> + ExactSizeIterator {
-        self.as_slice().iter().enumerate().map(|(index, value)| (Seat::new(index), value))
+        self.as_slice()
+            .iter()
+            .enumerate()
+            .map(|(index, value)| (Seat::new(index), value))
     }
 
     /// The values in the order of the seats.

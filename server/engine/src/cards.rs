@@ -108,12 +108,20 @@ impl Cards {
 
     /// The counts of a deck with this many faces: faces 1..=F ascending, then jokers, F+1 numbers.
     pub fn counts(self, faces: u8) -> impl ExactSizeIterator<Item = u8> {
-        (0..faces + 1).map(move |index| if index == faces { self.jokers() } else { self.count_of(index + 1) })
+        (0..faces + 1).map(move |index| {
+            if index == faces {
+                self.jokers()
+            } else {
+                self.count_of(index + 1)
+            }
+        })
     }
 
     /// The cards ascending: faces by their number, then F+1 for each joker.
     pub fn ascending(self, faces: u8) -> impl Iterator<Item = u8> {
-        self.counts(faces).zip(1u8..).flat_map(|(count, number)| std::iter::repeat_n(number, usize::from(count)))
+        self.counts(faces)
+            .zip(1u8..)
+            .flat_map(|(count, number)| std::iter::repeat_n(number, usize::from(count)))
     }
 
     /// These and other cards together. `None` if a count would be larger than any deck has or there would be two Golden cards.
@@ -124,7 +132,9 @@ impl Cards {
                 return None;
             }
         }
-        if self.jokers() + other.jokers() > crate::MAX_JOKERS || (self.has_golden() && other.has_golden()) {
+        if self.jokers() + other.jokers() > crate::MAX_JOKERS
+            || (self.has_golden() && other.has_golden())
+        {
             return None;
         }
         sum.add(other);
@@ -133,7 +143,8 @@ impl Cards {
 
     /// Whether all of `other` is among these cards, the Golden one not considered.
     pub fn contains(self, other: Cards) -> bool {
-        self.jokers() >= other.jokers() && (1..=MAX_FACES).all(|number| self.count_of(number) >= other.count_of(number))
+        self.jokers() >= other.jokers()
+            && (1..=MAX_FACES).all(|number| self.count_of(number) >= other.count_of(number))
     }
 
     /// These cards without `n` of a face; the Golden card goes last of its face. `None` if there are not so many.
@@ -176,14 +187,19 @@ impl Cards {
     }
 
     pub(crate) fn set_golden(&mut self, golden: bool) {
-        self.0 = if golden { self.0 | GOLDEN } else { self.0 & !GOLDEN };
+        self.0 = if golden {
+            self.0 | GOLDEN
+        } else {
+            self.0 & !GOLDEN
+        };
     }
 
     /// Takes `n` cards of a face that are known to be there and returns them; the Golden card goes last of its face.
     pub(crate) fn take_face(&mut self, face: Face, n: u8) -> Cards {
         let mut taken = Cards::EMPTY;
         // The Golden card is of the top face of the deck, so it lies among the highest cards of any hand that holds it.
-        let golden_goes = self.has_golden() && self.highest() == Some(face) && self.count(face) == n;
+        let golden_goes =
+            self.has_golden() && self.highest() == Some(face) && self.count(face) == n;
         self.remove_counts(face.get(), n, 0);
         taken.add_face(face, n);
         if golden_goes {

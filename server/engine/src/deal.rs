@@ -53,7 +53,11 @@ impl Deal {
             Opening::Golden => None,
             Opening::AnyTopFace => Some(Seat::new(draws.below(rules.players() as u32) as usize)),
         };
-        Deal { cards, rules: *rules, drawn }
+        Deal {
+            cards,
+            rules: *rules,
+            drawn,
+        }
     }
 
     /// A seat's cards in the order dealt.
@@ -61,7 +65,10 @@ impl Deal {
     /// # Panics
     /// If the rule set has no such seat.
     pub fn cards(&self, seat: Seat) -> impl ExactSizeIterator<Item = Card> {
-        assert!(seat.index() < self.rules.players(), "the seat is one of the game's");
+        assert!(
+            seat.index() < self.rules.players(),
+            "the seat is one of the game's"
+        );
         self.codes(seat).iter().map(|&code| match code {
             GOLDEN => Card::Golden,
             JOKER => Card::Joker,
@@ -73,7 +80,12 @@ impl Deal {
     pub fn hands(&self) -> BySeat<Cards> {
         let values = packed_values(self.rules.faces());
         BySeat::from_fn(self.rules.players(), |seat| {
-            Cards::from_packed(self.codes(seat).iter().map(|&code| values[usize::from(code & 31)]).sum())
+            Cards::from_packed(
+                self.codes(seat)
+                    .iter()
+                    .map(|&code| values[usize::from(code & 31)])
+                    .sum(),
+            )
         })
     }
 
@@ -108,7 +120,8 @@ pub(crate) fn opening_leader(rules: &RuleSet, hands: &BySeat<Cards>, drawn: Opti
 /// Faces 1..=F ascending, the last card of face F the Golden one, then the jokers.
 fn ordered_deck(rules: &RuleSet) -> [u8; MAX_DECK] {
     let mut cards = [JOKER; MAX_DECK];
-    let faces = (1..=rules.faces()).flat_map(|number| std::iter::repeat_n(number, usize::from(number)));
+    let faces =
+        (1..=rules.faces()).flat_map(|number| std::iter::repeat_n(number, usize::from(number)));
     let mut count = 0;
     for (slot, number) in cards.iter_mut().zip(faces) {
         *slot = number;

@@ -135,7 +135,12 @@ impl Event {
                 shift,
                 hands: BySeat::from_fn(hands.len(), |seat| hands[seat].filter(|_| viewer.is(seat))),
             },
-            Event::CardsExchanged { giver, receiver, count, cards } => Event::CardsExchanged {
+            Event::CardsExchanged {
+                giver,
+                receiver,
+                count,
+                cards,
+            } => Event::CardsExchanged {
                 giver,
                 receiver,
                 count,

@@ -38,7 +38,11 @@ pub struct Face(u8);
 impl Face {
     /// The face with this number, or `None` if there is no such face in any deck.
     pub const fn new(number: u8) -> Option<Face> {
-        if number >= 1 && number <= MAX_FACES { Some(Face(number)) } else { None }
+        if number >= 1 && number <= MAX_FACES {
+            Some(Face(number))
+        } else {
+            None
+        }
     }
 
     /// The face's number, 1..=[`MAX_FACES`].

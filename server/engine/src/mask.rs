@@ -16,7 +16,10 @@ pub struct Mask {
 
 impl Mask {
     /// No action.
-    pub const EMPTY: Mask = Mask { words: [0; WORDS], len: 0 };
+    pub const EMPTY: Mask = Mask {
+        words: [0; WORDS],
+        len: 0,
+    };
     /// Number of actions there is room for.
     pub const CAPACITY: u16 = 64 * WORDS as u16;
 
@@ -34,7 +37,9 @@ impl Mask {
     /// Whether an action is in the set.
     pub fn contains(&self, action: Action) -> bool {
         let index = usize::from(action.index());
-        self.words.get(index / 64).is_some_and(|word| word >> (index % 64) & 1 == 1)
+        self.words
+            .get(index / 64)
+            .is_some_and(|word| word >> (index % 64) & 1 == 1)
     }
 
     /// Number of actions in the set.
@@ -49,13 +54,16 @@ impl Mask {
 
     /// The actions, ascending.
     pub fn iter(&self) -> impl Iterator<Item = Action> + use<> {
-        self.words.into_iter().enumerate().flat_map(|(index, mut word)| {
-            std::iter::from_fn(move || {
-                let bit = (word != 0).then(|| word.trailing_zeros() as u16)?;
-                word &= word - 1;
-                Some(Action::new(64 * index as u16 + bit))
+        self.words
+            .into_iter()
+            .enumerate()
+            .flat_map(|(index, mut word)| {
+                std::iter::from_fn(move || {
+                    let bit = (word != 0).then(|| word.trailing_zeros() as u16)?;
+                    word &= word - 1;
+                    Some(Action::new(64 * index as u16 + bit))
+                })
             })
-        })
     }
 
     /// The action that `k` others of the set come before, or `None` if there are no more than `k`.
@@ -137,7 +145,9 @@ impl FromIterator<Action> for Mask {
 
 impl fmt::Debug for Mask {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_set().entries(self.iter().map(Action::index)).finish()
+        f.debug_set()
+            .entries(self.iter().map(Action::index))
+            .finish()
     }
 }
 
@@ -156,7 +166,7 @@ const fn byte_sums(word: u64) -> u64 {
 /// mispredicted: which byte it is in is counted over all bytes at once, and the bit is looked up.
 #[inline]
 fn select(word: u64, sums: u64, k: u32) -> u16 {
-    let full_bytes = ((u64::from(k) * BYTE_ONES | BYTE_TOPS) - sums) & BYTE_TOPS;
+    let full_bytes = (((u64::from(k) * BYTE_ONES) | BYTE_TOPS) - sums) & BYTE_TOPS;
     let shift = ((full_bytes >> 7).wrapping_mul(BYTE_ONES) >> 56 << 3) as u32 & 63;
     let before = (sums << 8 >> shift) & 0xFF;
     let byte = (word >> shift & 0xFF) as usize;

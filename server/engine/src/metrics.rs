@@ -93,7 +93,9 @@ impl MetricsRecorder {
     /// Counts an event; gives the metrics of the Shift when it ends. It does not matter as seen by whom.
     pub fn on_event(&mut self, event: &Event) -> Option<ShiftMetrics> {
         match *event {
-            Event::Played { seat, cards_left, .. } => {
+            Event::Played {
+                seat, cards_left, ..
+            } => {
                 self.seats[seat].plays += 1;
                 self.finished += u8::from(cards_left == 0);
                 self.valid(seat, cards_left, (cards_left == 0).then_some(self.finished));
@@ -104,13 +106,36 @@ impl MetricsRecorder {
                 self.valid(seat, cards_left, None);
                 None
             }
-            Event::ShiftEnded { shift, order, points, starter, pizzas, laps, turns, special, adjudicated, finished, .. } => {
+            Event::ShiftEnded {
+                shift,
+                order,
+                points,
+                starter,
+                pizzas,
+                laps,
+                turns,
+                special,
+                adjudicated,
+                finished,
+                ..
+            } => {
                 self.end_shift(&order, &points, finished, pizzas);
                 let seats = self.seats;
                 self.seats = BySeat::filled(seats.len(), SeatMetrics::default());
                 self.finished = 0;
                 let starter_won = order.as_slice().first() == Some(&starter);
-                Some(ShiftMetrics { shift, order, pizzas, laps, turns, starter, starter_won, special, adjudicated, seats })
+                Some(ShiftMetrics {
+                    shift,
+                    order,
+                    pizzas,
+                    laps,
+                    turns,
+                    starter,
+                    starter_won,
+                    special,
+                    adjudicated,
+                    seats,
+                })
             }
             _ => None,
         }
@@ -126,7 +151,10 @@ impl MetricsRecorder {
     fn end_shift(&mut self, order: &SeatOrder, points: &BySeat<u32>, finished: u8, pizzas: u32) {
         self.shifts += 1;
         for (&seat, place) in order.as_slice().iter().zip(1u8..) {
-            if let Some(reward) = self.scheme.and_then(|scheme| scheme.shift_end(place, points[seat], place <= finished)) {
+            if let Some(reward) = self
+                .scheme
+                .and_then(|scheme| scheme.shift_end(place, points[seat], place <= finished))
+            {
                 self.reward(seat, reward, 0);
             }
             self.performance_sum[seat] += 10.0 * f64::from(points[seat]) / f64::from(pizzas);

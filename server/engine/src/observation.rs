@@ -54,7 +54,9 @@ pub struct Observation {
 impl Observation {
     /// Length of the classic vector: F + H + T, the paper's 228 for the standard deck.
     pub fn classic_len(&self) -> usize {
-        usize::from(self.faces) + usize::from(self.hand_size) + usize::from(ActionSpace::of(self.faces).turn_actions())
+        usize::from(self.faces)
+            + usize::from(self.hand_size)
+            + usize::from(ActionSpace::of(self.faces).turn_actions())
     }
 
     /// The paper's vector of numbers in 0..=1: board (F slots, the play's cards ascending, jokers as F+1, cut off; an empty board is F+2 in
@@ -70,7 +72,11 @@ impl Observation {
     /// # Panics
     /// If `out` is not [`Observation::classic_len`] numbers long.
     pub fn write_classic_vector(&self, mask: &Mask, out: &mut [f32]) {
-        assert_eq!(out.len(), self.classic_len(), "the buffer has the length of the classic vector");
+        assert_eq!(
+            out.len(),
+            self.classic_len(),
+            "the buffer has the length of the classic vector"
+        );
         let scale = f32::from(self.faces + 2);
         let (board, rest) = out.split_at_mut(usize::from(self.faces));
         let (hand, actions) = rest.split_at_mut(usize::from(self.hand_size));
@@ -81,14 +87,21 @@ impl Observation {
         }
         let quantity = self.board.size - self.board.jokers;
         for (slot, index) in board.iter_mut().zip(0..self.board.size) {
-            let card = if index < quantity { self.board.face } else { self.faces + 1 };
+            let card = if index < quantity {
+                self.board.face
+            } else {
+                self.faces + 1
+            };
             *slot = f32::from(card) / scale;
         }
 
         // A hand never holds more cards than were dealt: the exchange gives back as many as it takes.
         let zeros = hand.len().saturating_sub(usize::from(self.hand.len()));
         hand[..zeros].fill(0.0);
-        for (slot, card) in hand[zeros..].iter_mut().zip(self.hand.ascending(self.faces)) {
+        for (slot, card) in hand[zeros..]
+            .iter_mut()
+            .zip(self.hand.ascending(self.faces))
+        {
             *slot = f32::from(card) / scale;
         }
 

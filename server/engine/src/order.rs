@@ -12,7 +12,10 @@ pub struct SeatOrder {
 }
 
 impl SeatOrder {
-    pub(crate) const EMPTY: SeatOrder = SeatOrder { seats: [Seat::new(0); MAX_SEATS], len: 0 };
+    pub(crate) const EMPTY: SeatOrder = SeatOrder {
+        seats: [Seat::new(0); MAX_SEATS],
+        len: 0,
+    };
 
     /// The order of a slice, or `None` unless it names each of the seats 0..n once.
     pub fn from_slice(seats: &[Seat]) -> Option<SeatOrder> {
@@ -43,7 +46,10 @@ impl SeatOrder {
 
     /// The place of a seat, from 1, or `None` if it is not in the order.
     pub fn place_of(&self, seat: Seat) -> Option<u8> {
-        self.as_slice().iter().position(|&other| other == seat).map(|index| index as u8 + 1)
+        self.as_slice()
+            .iter()
+            .position(|&other| other == seat)
+            .map(|index| index as u8 + 1)
     }
 
     pub(crate) fn push(&mut self, seat: Seat) {
@@ -96,6 +102,9 @@ impl Standings {
 
     /// The lines of the table, best first: place from 1, seat, points.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = (u8, Seat, u64)> {
-        self.as_slice().iter().enumerate().map(|(index, &seat)| (index as u8 + 1, seat, self.points[seat]))
+        self.as_slice()
+            .iter()
+            .enumerate()
+            .map(|(index, &seat)| (index as u8 + 1, seat, self.points[seat]))
     }
 }

@@ -91,7 +91,13 @@ const fn pattern(held: usize, size: usize, count: usize) -> Pattern {
 
 /// The legal actions of a turn: the plays that the patterns allow with these cards of faces, a joker alone and passing if allowed.
 #[inline]
-pub(crate) fn turn_mask(faces: u8, patterns: &Patterns, cards: Cards, lone_joker: bool, pass: bool) -> Mask {
+pub(crate) fn turn_mask(
+    faces: u8,
+    patterns: &Patterns,
+    cards: Cards,
+    lone_joker: bool,
+    pass: bool,
+) -> Mask {
     // One function for each number of faces: every place in the mask is a constant then, and the words stay in registers.
     match faces {
         4 => filled_mask::<4>(patterns, cards, lone_joker, pass),
@@ -109,8 +115,16 @@ pub(crate) fn turn_mask(faces: u8, patterns: &Patterns, cards: Cards, lone_joker
     }
 }
 
-fn filled_mask<const F: u8>(patterns: &Patterns, cards: Cards, lone_joker: bool, pass: bool) -> Mask {
-    let mut set = Filling { words: [0; WORDS], len: 0 };
+fn filled_mask<const F: u8>(
+    patterns: &Patterns,
+    cards: Cards,
+    lone_joker: bool,
+    pass: bool,
+) -> Mask {
+    let mut set = Filling {
+        words: [0; WORDS],
+        len: 0,
+    };
     // Often nothing but passing is left: then no table is looked up.
     if !cards.is_empty() {
         macro_rules! insert_faces {

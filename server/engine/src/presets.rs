@@ -11,7 +11,10 @@ impl RuleSetSpec {
         let standard = RuleSetSpec::default();
         match name {
             "paper" => Some(standard),
-            "rulebook" => Some(RuleSetSpec { points: vec![3, 2, 1, 0], ..standard }),
+            "rulebook" => Some(RuleSetSpec {
+                points: vec![3, 2, 1, 0],
+                ..standard
+            }),
             "original2020" => Some(RuleSetSpec {
                 opening: Opening::AnyTopFace,
                 opening_pass: true,

@@ -40,7 +40,9 @@ impl RewardScheme {
 
     /// The scheme of this name, or `None` if there is none.
     pub fn from_name(name: &str) -> Option<RewardScheme> {
-        RewardScheme::ALL.into_iter().find(|scheme| scheme.name() == name)
+        RewardScheme::ALL
+            .into_iter()
+            .find(|scheme| scheme.name() == name)
     }
 
     /// Reward of an invalid attempt at a turn.
@@ -72,7 +74,9 @@ impl RewardScheme {
     pub fn shift_end(self, place: u8, points: u32, finished: bool) -> Option<f32> {
         match self {
             RewardScheme::Points => Some(points as f32),
-            RewardScheme::Paper | RewardScheme::PaperIntended if !finished => Some(self.finishing(place) as f32),
+            RewardScheme::Paper | RewardScheme::PaperIntended if !finished => {
+                Some(self.finishing(place) as f32)
+            }
             // Only in an adjudicated Shift can a seat with cards be first.
             RewardScheme::Winning if !finished && place == 1 => Some(self.finishing(place) as f32),
             _ => None,
@@ -81,20 +85,38 @@ impl RewardScheme {
 
     /// The rewards that the events of ONE call of [`crate::Game::apply`] bring: calls back with the seat, its reward, and the index of the
     /// event that brings it (a play, a pass or the end of a Shift).
-    pub fn of_events(self, rules: &RuleSet, events: &[Event], mut give: impl FnMut(Seat, f32, usize)) {
+    pub fn of_events(
+        self,
+        rules: &RuleSet,
+        events: &[Event],
+        mut give: impl FnMut(Seat, f32, usize),
+    ) {
         for (index, event) in events.iter().enumerate() {
             match *event {
-                Event::Played { seat, cards_left, .. } => {
+                Event::Played {
+                    seat, cards_left, ..
+                } => {
                     let place = events[index..].iter().find_map(|event| match *event {
-                        Event::SeatFinished { seat: finished, place } if finished == seat => Some(place),
+                        Event::SeatFinished {
+                            seat: finished,
+                            place,
+                        } if finished == seat => Some(place),
                         _ => None,
                     });
                     give(seat, self.turn(rules, cards_left, place), index);
                 }
-                Event::Passed { seat, cards_left } => give(seat, self.turn(rules, cards_left, None), index),
-                Event::ShiftEnded { order, points, finished, .. } => {
+                Event::Passed { seat, cards_left } => {
+                    give(seat, self.turn(rules, cards_left, None), index)
+                }
+                Event::ShiftEnded {
+                    order,
+                    points,
+                    finished,
+                    ..
+                } => {
                     for (&seat, place) in order.as_slice().iter().zip(1u8..) {
-                        if let Some(reward) = self.shift_end(place, points[seat], place <= finished) {
+                        if let Some(reward) = self.shift_end(place, points[seat], place <= finished)
+                        {
                             give(seat, reward, index);
                         }
                     }
@@ -107,7 +129,9 @@ impl RewardScheme {
     /// The part of a reward that finishing with a place, from 1, brings.
     fn finishing(self, place: u8) -> f64 {
         match self {
-            RewardScheme::Paper | RewardScheme::PaperIntended => (1.0 - 0.3 * (f64::from(place) - 1.0)) * 0.3,
+            RewardScheme::Paper | RewardScheme::PaperIntended => {
+                (1.0 - 0.3 * (f64::from(place) - 1.0)) * 0.3
+            }
             RewardScheme::Winning => f64::from(u8::from(place == 1)),
             RewardScheme::Validity | RewardScheme::Points => 0.0,
         }

@@ -83,7 +83,9 @@ pub enum RuleSetError {
     #[error("{0} jokers: choose 0 to 2")]
     Jokers(u8),
     /// Too small a deck for so many players.
-    #[error("{deck} cards among {players} players leave hands of {hand}: choose more faces or fewer players, so that a hand has at least 3 cards")]
+    #[error(
+        "{deck} cards among {players} players leave hands of {hand}: choose more faces or fewer players, so that a hand has at least 3 cards"
+    )]
     SmallHands {
         /// Cards in the deck.
         deck: u8,
@@ -93,7 +95,9 @@ pub enum RuleSetError {
         hand: u8,
     },
     /// Not one number of points for each place.
-    #[error("{given} numbers of points for {players} players: give one for each place, or none for the standard ones")]
+    #[error(
+        "{given} numbers of points for {players} players: give one for each place, or none for the standard ones"
+    )]
     PointsCount {
         /// Numbers given.
         given: usize,
@@ -101,7 +105,9 @@ pub enum RuleSetError {
         players: u8,
     },
     /// A worse place would be worth more than a better one.
-    #[error("place {place} gets more points than the place before it: give the points best place first, never rising")]
+    #[error(
+        "place {place} gets more points than the place before it: give the points best place first, never rising"
+    )]
     PointsRise {
         /// The place at fault, from 1.
         place: usize,
@@ -130,7 +136,9 @@ impl RuleSetError {
             RuleSetError::Players(_) => "players",
             RuleSetError::Faces(_) | RuleSetError::SmallHands { .. } => "faces",
             RuleSetError::Jokers(_) => "jokers",
-            RuleSetError::PointsCount { .. } | RuleSetError::PointsRise { .. } | RuleSetError::PointsFirst => "points",
+            RuleSetError::PointsCount { .. }
+            | RuleSetError::PointsRise { .. }
+            | RuleSetError::PointsFirst => "points",
             RuleSetError::TargetPoints => "target_points",
             RuleSetError::TargetShifts => "target_shifts",
             RuleSetError::MaxIdlePizzas => "max_idle_pizzas",
@@ -154,10 +162,17 @@ impl RuleSetSpec {
         if self.jokers > MAX_JOKERS {
             return Err(RuleSetError::Jokers(self.jokers));
         }
-        let (deck, players) = (self.faces * (self.faces + 1) / 2 + self.jokers, self.players);
+        let (deck, players) = (
+            self.faces * (self.faces + 1) / 2 + self.jokers,
+            self.players,
+        );
         let hand = deck / players;
         if hand < MIN_HAND {
-            return Err(RuleSetError::SmallHands { deck, players, hand });
+            return Err(RuleSetError::SmallHands {
+                deck,
+                players,
+                hand,
+            });
         }
         match self.stop {
             Stop::Points(0) => return Err(RuleSetError::TargetPoints),
@@ -191,9 +206,16 @@ impl RuleSetSpec {
 
     /// The points by place, filled up with zeros behind the last place.
     fn checked_points(&self) -> Result<[u32; MAX_SEATS], RuleSetError> {
-        let given = if self.points.is_empty() { standard_points(self.players) } else { &self.points };
+        let given = if self.points.is_empty() {
+            standard_points(self.players)
+        } else {
+            &self.points
+        };
         if given.len() != usize::from(self.players) {
-            return Err(RuleSetError::PointsCount { given: given.len(), players: self.players });
+            return Err(RuleSetError::PointsCount {
+                given: given.len(),
+                players: self.players,
+            });
         }
         if let Some(index) = given.windows(2).position(|pair| pair[0] < pair[1]) {
             return Err(RuleSetError::PointsRise { place: index + 2 });
@@ -260,7 +282,11 @@ impl RuleSet {
 
     /// Points of a place, from 1; 0 for places that there are not.
     pub fn points(&self, place: u8) -> u32 {
-        usize::from(place).checked_sub(1).and_then(|index| self.points.get(index)).copied().unwrap_or(0)
+        usize::from(place)
+            .checked_sub(1)
+            .and_then(|index| self.points.get(index))
+            .copied()
+            .unwrap_or(0)
     }
 
     /// Points by place, best first, N numbers.

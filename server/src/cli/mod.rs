@@ -1,6 +1,9 @@
 //! The command line of `chefshat`: what it understands, and one module for each command. What the commands do is elsewhere.
 
+mod conformance;
+mod rules_args;
 mod serve;
+mod simulate;
 
 use std::process::ExitCode;
 
@@ -28,6 +31,10 @@ struct Cli {
 enum Command {
     /// Host rooms.
     Serve(serve::Serve),
+    /// Play many games offline and print what they add up to.
+    Simulate(simulate::Simulate),
+    /// Check the rule engine against test vectors.
+    Conformance(conformance::Conformance),
 }
 
 /// Runs what the command line asks for.
@@ -35,6 +42,8 @@ pub fn main() -> ExitCode {
     let cli = Cli::parse();
     let result = start_logging(&cli).and_then(|()| match cli.command {
         Command::Serve(command) => in_runtime(command.run()),
+        Command::Simulate(command) => command.run(),
+        Command::Conformance(command) => command.run(),
     });
     match result {
         Ok(code) => code,

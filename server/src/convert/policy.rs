@@ -6,7 +6,7 @@ use std::time::Duration;
 use chefshat_arena::AgentKind;
 use chefshat_engine::RewardScheme;
 use chefshat_proto::v1;
-use chefshat_records::convert::FieldProblem;
+use chefshat_records::convert::{FieldProblem, reward_scheme_from_proto};
 
 use crate::room::policy::{AbortPolicy, Policy};
 
@@ -47,15 +47,9 @@ pub fn policy_from_proto(message: &v1::RoomPolicy) -> Result<Policy, FieldProble
             Ok(v1::AbortPolicy::Never) => AbortPolicy::Never,
             Err(_) => return Err(unknown("abort", message.abort)),
         },
-        reward_scheme: match v1::RewardScheme::try_from(message.reward_scheme) {
-            Ok(v1::RewardScheme::Unspecified) => None,
-            Ok(v1::RewardScheme::Validity) => Some(RewardScheme::Validity),
-            Ok(v1::RewardScheme::Paper) => Some(RewardScheme::Paper),
-            Ok(v1::RewardScheme::PaperIntended) => Some(RewardScheme::PaperIntended),
-            Ok(v1::RewardScheme::Winning) => Some(RewardScheme::Winning),
-            Ok(v1::RewardScheme::Points) => Some(RewardScheme::Points),
-            Err(_) => return Err(unknown("reward_scheme", message.reward_scheme)),
-        },
+        reward_scheme: v1::RewardScheme::try_from(message.reward_scheme)
+            .map(reward_scheme_from_proto)
+            .map_err(|_| unknown("reward_scheme", message.reward_scheme))?,
         pace: millis("pace_ms", message.pace_ms, 0..=60_000)?.unwrap_or(standard.pace),
         waiting_time: millis("waiting_time_ms", message.waiting_time_ms, 1_000..=DAY_MS)?
             .unwrap_or(standard.waiting_time),

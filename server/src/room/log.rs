@@ -117,6 +117,21 @@ impl Log {
         });
     }
 
+    /// Puts other hands in place of those dealt, as a test of what is hidden needs it.
+    #[cfg(test)]
+    pub(super) fn replace_hands(
+        &mut self,
+        hands: &chefshat_engine::BySeat<chefshat_engine::Cards>,
+    ) {
+        for entry in &mut self.entries {
+            if let Happening::Game(game) = &mut entry.happening
+                && let Event::ShiftStarted { hands: dealt, .. } = &mut game.event
+            {
+                *dealt = hands.map(Some);
+            }
+        }
+    }
+
     /// Number of events.
     pub fn len(&self) -> usize {
         self.entries.len()

@@ -1,2 +1,78 @@
-//! Placeholder.
-fn main() {}
+//! The load program: plays many rooms against a server and against a bare tonic room, in turns, and says what a decision costs. This
+//! file only parses and wires; see the README beside this crate for what is measured and how.
+
+mod bare;
+mod error;
+mod gauge;
+mod host;
+mod options;
+mod ping;
+mod play;
+mod pulse;
+mod report;
+mod scenario;
+mod server;
+mod tally;
+
+use std::process::ExitCode;
+
+use clap::Parser as _;
+use tokio::runtime::{Builder, Runtime};
+
+use error::LoadError;
+use options::{Load, Options, Place, Role};
+use report::Report;
+
+fn main() -> ExitCode {
+    let options = Options::parse();
+    let result = match &options.role {
+        Some(Role::Serve(options)) => runtime(options.place, options.place.core)
+            .and_then(|runtime| runtime.block_on(server::serve(options))),
+        None => {
+            let place = options.load.place;
+            runtime(place, place.client_core.unwrap_or(place.core))
+                .and_then(|runtime| runtime.block_on(measure(&options.load)))
+        }
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("chefshat-load: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+async fn measure(load: &Load) -> Result<(), LoadError> {
+    let mut outcomes = Vec::new();
+    for scenario in scenario::scenarios(load) {
+        eprintln!("{} ...", scenario.name());
+        outcomes.push(scenario::run(load, scenario).await?);
+    }
+    let report = Report::new(load, &outcomes);
+    if load.json {
+        let json = serde_json::to_string_pretty(&report).expect("a report is plain data");
+        println!("{json}");
+    } else {
+        print!("{}", report.to_text());
+    }
+    Ok(())
+}
+
+/// The runtime of one side; bound to a core before any of its threads is started, if it is to be.
+fn runtime(place: Place, core: usize) -> Result<Runtime, LoadError> {
+    let mut builder = if place.pin {
+        gauge::bind_to_core(core).map_err(LoadError::io("binding to a core"))?;
+        Builder::new_current_thread()
+    } else {
+        let mut builder = Builder::new_multi_thread();
+        if place.threads > 0 {
+            builder.worker_threads(place.threads.into());
+        }
+        builder
+    };
+    builder
+        .enable_all()
+        .build()
+        .map_err(LoadError::io("starting a runtime"))
+}

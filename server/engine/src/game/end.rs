@@ -10,10 +10,19 @@ impl Game {
     pub(super) fn adjudicate(&mut self, acted_last: Seat) {
         let table = &self.table;
         let mut waiting = SeatOrder::EMPTY;
-        for seat in self.hands.seats().filter(|&seat| table.holding & bit(seat) != 0) {
+        for seat in self
+            .hands
+            .seats()
+            .filter(|&seat| table.holding & bit(seat) != 0)
+        {
             waiting.push(seat);
         }
-        waiting.sort_by_key(|&seat| (self.cards_left[seat], table.distance_left(acted_last, bit(seat))));
+        waiting.sort_by_key(|&seat| {
+            (
+                self.cards_left[seat],
+                table.distance_left(acted_last, bit(seat)),
+            )
+        });
         for &seat in waiting.as_slice() {
             self.table.order.push(seat);
         }
@@ -21,7 +30,12 @@ impl Game {
 
     /// Gives the points of the Shift and starts the next one, or ends the game.
     pub(super) fn end_shift(&mut self, adjudicated: bool, on_event: &mut impl FnMut(Event)) {
-        let finished = self.table.places.values().filter(|&&place| place > 0).count() as u8;
+        let finished = self
+            .table
+            .places
+            .values()
+            .filter(|&&place| place > 0)
+            .count() as u8;
         if !adjudicated {
             let last = Seat::new(self.table.holding.trailing_zeros() as usize);
             self.table.order.push(last);
@@ -50,7 +64,9 @@ impl Game {
         });
         if self.is_decided() {
             self.stage = Stage::Over;
-            on_event(Event::GameEnded { standings: self.final_table() });
+            on_event(Event::GameEnded {
+                standings: self.final_table(),
+            });
         } else {
             let shift = self.shift + 1;
             let deal = Deal::new(&self.rules, self.seed, shift);
@@ -62,7 +78,10 @@ impl Game {
         // After 2^32 - 1 Shifts there is no number for another one.
         self.shift == u32::MAX
             || match self.rules.stop() {
-                Stop::Points(target) => self.scores.values().any(|&score| score >= u64::from(target)),
+                Stop::Points(target) => self
+                    .scores
+                    .values()
+                    .any(|&score| score >= u64::from(target)),
                 Stop::Shifts(target) => self.shift >= target,
             }
     }
@@ -72,6 +91,9 @@ impl Game {
         let mut order = self.last_order;
         // The sort is stable, so seats with equal points keep the order of the last Shift.
         order.sort_by_key(|&seat| std::cmp::Reverse(self.scores[seat]));
-        Standings { order, points: self.scores }
+        Standings {
+            order,
+            points: self.scores,
+        }
     }
 }

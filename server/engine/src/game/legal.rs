@@ -37,7 +37,11 @@ impl Game {
         let (hand, table, faces) = (self.hands[seat], &self.table, self.rules.faces());
         let (jokers, size) = (hand.jokers(), table.board.size);
         // A face on the board, F+1 included, leaves the faces below it; an empty board all.
-        let below = if table.board.face == 0 { faces + 1 } else { table.board.face };
+        let below = if table.board.face == 0 {
+            faces + 1
+        } else {
+            table.board.face
+        };
         let mut allowed = (1u64 << (4 * (below - 1))) - 1;
         if table.is_first_turn() {
             allowed = 0xF << (4 * (faces - 1));
@@ -46,13 +50,22 @@ impl Game {
         let possible = playable.has_face_with_at_least(size.saturating_sub(jokers).max(1));
         let patterns = &PATTERNS[usize::from(jokers)][usize::from(size)];
         let lone_joker = size == 0 && jokers > 0 && !table.is_first_turn();
-        turn_mask(faces, patterns, if possible { playable } else { Cards::EMPTY }, lone_joker, self.check_pass().is_ok())
+        turn_mask(
+            faces,
+            patterns,
+            if possible { playable } else { Cards::EMPTY },
+            lone_joker,
+            self.check_pass().is_ok(),
+        )
     }
 
     fn legal_gifts(&self, giver: Seat) -> Mask {
         let (hand, space) = (self.hands[giver], self.rules.actions());
         let mut mask = Mask::EMPTY;
-        for face in (1..=self.rules.faces()).filter_map(Face::new).filter(|&face| hand.count(face) > 0) {
+        for face in (1..=self.rules.faces())
+            .filter_map(Face::new)
+            .filter(|&face| hand.count(face) > 0)
+        {
             mask.insert(space.give(face).expect("a face of the deck"));
         }
         if hand.jokers() > 0 {
@@ -62,20 +75,34 @@ impl Game {
     }
 
     #[inline]
-    pub(super) fn check_play(&self, seat: Seat, face: Face, quantity: u8, jokers: u8) -> Result<(), Refusal> {
+    pub(super) fn check_play(
+        &self,
+        seat: Seat,
+        face: Face,
+        quantity: u8,
+        jokers: u8,
+    ) -> Result<(), Refusal> {
         let (hand, table) = (self.hands[seat], &self.table);
         if hand.count(face) < quantity || hand.jokers() < jokers {
             return Err(Refusal::NotInHand);
         }
         if table.board.face != 0 {
             if face.get() >= table.board.face {
-                return Err(Refusal::FaceNotLower { board: table.board.face });
+                return Err(Refusal::FaceNotLower {
+                    board: table.board.face,
+                });
             }
             if quantity + jokers < table.board.size {
-                return Err(Refusal::TooFewCards { board: table.board.size });
+                return Err(Refusal::TooFewCards {
+                    board: table.board.size,
+                });
             }
         }
-        if table.is_first_turn() && face.get() != self.rules.faces() { Err(self.opening_refusal()) } else { Ok(()) }
+        if table.is_first_turn() && face.get() != self.rules.faces() {
+            Err(self.opening_refusal())
+        } else {
+            Ok(())
+        }
     }
 
     pub(super) fn check_lone_joker(&self, seat: Seat) -> Result<(), Refusal> {
@@ -109,7 +136,11 @@ impl Game {
             Move::Give(face) => hand.count(face),
             _ => hand.jokers(),
         };
-        if held > 0 { Ok(()) } else { Err(Refusal::NotInHand) }
+        if held > 0 {
+            Ok(())
+        } else {
+            Err(Refusal::NotInHand)
+        }
     }
 
     fn opening_refusal(&self) -> Refusal {

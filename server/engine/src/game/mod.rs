@@ -14,7 +14,10 @@ mod view;
 pub use error::{ActionError, Refusal};
 pub use script::{Script, ScriptError};
 
-use crate::{Action, BySeat, Cards, Deal, Event, Move, Role, RuleSet, Seat, SeatOrder, Seed, SpecialAction, Standings};
+use crate::{
+    Action, BySeat, Cards, Deal, Event, Move, Role, RuleSet, Seat, SeatOrder, Seed, SpecialAction,
+    Standings,
+};
 use table::Table;
 
 /// What kind of decision is open.
@@ -43,7 +46,11 @@ enum Stage {
     /// This seat was dealt two jokers.
     Special(Seat),
     /// This seat has to give a card; so many gifts of the Chef and of the Sous-Chef are still to come, this one included.
-    Exchange { giver: Seat, chef_left: u8, sous_chef_left: u8 },
+    Exchange {
+        giver: Seat,
+        chef_left: u8,
+        sous_chef_left: u8,
+    },
     /// This seat has to play or pass.
     Turn(Seat),
     /// The game has ended.
@@ -80,7 +87,13 @@ impl Game {
     pub fn new(rules: RuleSet, seed: Seed, mut on_event: impl FnMut(Event)) -> Game {
         let mut game = Game::blank(rules, seed);
         let deal = Deal::new(&rules, seed, 1);
-        game.start_shift(1, deal.hands(), deal.drawn(), SeatOrder::EMPTY, &mut on_event);
+        game.start_shift(
+            1,
+            deal.hands(),
+            deal.drawn(),
+            SeatOrder::EMPTY,
+            &mut on_event,
+        );
         game
     }
 
@@ -110,9 +123,18 @@ impl Game {
     #[inline]
     pub fn decision(&self) -> Option<Decision> {
         match self.stage {
-            Stage::Turn(seat) => Some(Decision { seat, kind: DecisionKind::Turn }),
-            Stage::Exchange { giver, .. } => Some(Decision { seat: giver, kind: DecisionKind::Exchange }),
-            Stage::Special(seat) => Some(Decision { seat, kind: DecisionKind::SpecialAction }),
+            Stage::Turn(seat) => Some(Decision {
+                seat,
+                kind: DecisionKind::Turn,
+            }),
+            Stage::Exchange { giver, .. } => Some(Decision {
+                seat: giver,
+                kind: DecisionKind::Exchange,
+            }),
+            Stage::Special(seat) => Some(Decision {
+                seat,
+                kind: DecisionKind::SpecialAction,
+            }),
             Stage::Over => None,
         }
     }
@@ -122,32 +144,64 @@ impl Game {
     /// # Errors
     /// If the action is not legal; the game is left as it was and nothing is told.
     #[inline]
-    pub fn apply(&mut self, action: Action, mut on_event: impl FnMut(Event)) -> Result<(), ActionError> {
-        let Some(decision) = self.decision() else { return Err(ActionError::GameOver) };
+    pub fn apply(
+        &mut self,
+        action: Action,
+        mut on_event: impl FnMut(Event),
+    ) -> Result<(), ActionError> {
+        let Some(decision) = self.decision() else {
+            return Err(ActionError::GameOver);
+        };
         let space = self.rules.actions();
         let Some(meaning) = space.decode(action) else {
-            return Err(ActionError::OutOfRange { action, size: space.size() });
+            return Err(ActionError::OutOfRange {
+                action,
+                size: space.size(),
+            });
         };
         match (self.stage, meaning) {
-            (Stage::Turn(seat), Move::Play { face, quantity, jokers }) => {
-                self.check_play(seat, face, quantity, jokers).map_err(|reason| ActionError::not_legal(meaning, reason))?;
+            (
+                Stage::Turn(seat),
+                Move::Play {
+                    face,
+                    quantity,
+                    jokers,
+                },
+            ) => {
+                self.check_play(seat, face, quantity, jokers)
+                    .map_err(|reason| ActionError::not_legal(meaning, reason))?;
                 self.play_face(seat, action, face, quantity, jokers, &mut on_event);
             }
             (Stage::Turn(seat), Move::LoneJoker) => {
-                self.check_lone_joker(seat).map_err(|reason| ActionError::not_legal(meaning, reason))?;
+                self.check_lone_joker(seat)
+                    .map_err(|reason| ActionError::not_legal(meaning, reason))?;
                 self.play_lone_joker(seat, action, &mut on_event);
             }
             (Stage::Turn(seat), Move::Pass) => {
-                self.check_pass().map_err(|reason| ActionError::not_legal(meaning, reason))?;
+                self.check_pass()
+                    .map_err(|reason| ActionError::not_legal(meaning, reason))?;
                 self.pass(seat, &mut on_event);
             }
-            (Stage::Exchange { giver, chef_left, sous_chef_left }, Move::Give(_) | Move::GiveJoker) => {
-                self.check_gift(giver, meaning).map_err(|reason| ActionError::not_legal(meaning, reason))?;
+            (
+                Stage::Exchange {
+                    giver,
+                    chef_left,
+                    sous_chef_left,
+                },
+                Move::Give(_) | Move::GiveJoker,
+            ) => {
+                self.check_gift(giver, meaning)
+                    .map_err(|reason| ActionError::not_legal(meaning, reason))?;
                 self.give(giver, meaning, chef_left, sous_chef_left, &mut on_event);
             }
             (Stage::Special(_), Move::Decline) => self.start_exchange(&mut on_event),
             (Stage::Special(seat), Move::Declare) => self.declare(seat, &mut on_event),
-            _ => return Err(ActionError::WrongKind { attempted: meaning, kind: decision.kind }),
+            _ => {
+                return Err(ActionError::WrongKind {
+                    attempted: meaning,
+                    kind: decision.kind,
+                });
+            }
         }
         Ok(())
     }

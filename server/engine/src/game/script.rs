@@ -24,7 +24,13 @@ pub struct Script {
 impl Script {
     /// The first Shift of a game with these hands.
     pub fn first_shift(hands: BySeat<Cards>) -> Script {
-        Script { shift: 1, hands, last_order: None, scores: BySeat::filled(hands.len(), 0), drawn: None }
+        Script {
+            shift: 1,
+            hands,
+            last_order: None,
+            scores: BySeat::filled(hands.len(), 0),
+            drawn: None,
+        }
     }
 }
 
@@ -46,10 +52,14 @@ pub enum ScriptError {
     #[error("the hands hold cards that are not left in the deck")]
     NotInDeck,
     /// The Golden card is missing, or is not where it must be.
-    #[error("the Golden card must be in exactly one hand, among cards of the top face, unless it has been played")]
+    #[error(
+        "the Golden card must be in exactly one hand, among cards of the top face, unless it has been played"
+    )]
     Golden,
     /// A Shift number without sense.
-    #[error("the first Shift has number 1 and no last order; a later one needs the order of the Shift before")]
+    #[error(
+        "the first Shift has number 1 and no last order; a later one needs the order of the Shift before"
+    )]
     Shift,
     /// The game would have ended before.
     #[error("the game would have ended before this Shift")]
@@ -77,7 +87,11 @@ impl Game {
         mut on_event: impl FnMut(Event),
     ) -> Result<Game, ScriptError> {
         let players = rules.players();
-        let seats = [script.hands.len(), script.scores.len(), script.last_order.map_or(players, |order| order.len())];
+        let seats = [
+            script.hands.len(),
+            script.scores.len(),
+            script.last_order.map_or(players, |order| order.len()),
+        ];
         if seats != [players; 3] {
             return Err(ScriptError::Seats(players));
         }
@@ -85,10 +99,18 @@ impl Game {
             return Err(ScriptError::Shift);
         }
         let needs_draw = rules.opening() == Opening::AnyTopFace;
-        if script.drawn.is_some() != needs_draw || script.drawn.is_some_and(|seat| seat.index() >= players) {
+        if script.drawn.is_some() != needs_draw
+            || script.drawn.is_some_and(|seat| seat.index() >= players)
+        {
             return Err(ScriptError::Drawn);
         }
-        check_hands(&rules, &script.hands, &script.hands.map(|_| rules.hand_size()), Cards::EMPTY, true)?;
+        check_hands(
+            &rules,
+            &script.hands,
+            &script.hands.map(|_| rules.hand_size()),
+            Cards::EMPTY,
+            true,
+        )?;
         let mut game = Game::blank(rules, seed);
         game.scores = script.scores.map(u64::from);
         game.shift = script.shift - 1;
@@ -96,7 +118,13 @@ impl Game {
             return Err(ScriptError::Ended);
         }
         let ranking = script.last_order.unwrap_or(SeatOrder::EMPTY);
-        game.start_shift(script.shift, script.hands, script.drawn, ranking, &mut on_event);
+        game.start_shift(
+            script.shift,
+            script.hands,
+            script.drawn,
+            ranking,
+            &mut on_event,
+        );
         Ok(game)
     }
 
@@ -113,12 +141,22 @@ impl Game {
             return Err(ScriptError::Seats(self.rules.players()));
         }
         let golden_held = self.hands.values().any(|hand| hand.has_golden());
-        check_hands(&self.rules, &hands, &self.cards_left, self.played, golden_held)?;
+        check_hands(
+            &self.rules,
+            &hands,
+            &self.cards_left,
+            self.played,
+            golden_held,
+        )?;
         let first_turn = self.table.is_first_turn();
-        if first_turn && self.stage != Stage::Turn(opening_leader(&self.rules, &hands, self.drawn)) {
+        if first_turn && self.stage != Stage::Turn(opening_leader(&self.rules, &hands, self.drawn))
+        {
             return Err(ScriptError::Leader);
         }
-        Ok(Game { hands, ..self.clone() })
+        Ok(Game {
+            hands,
+            ..self.clone()
+        })
     }
 }
 
@@ -133,7 +171,10 @@ fn check_hands(
     let mut all = played;
     for (seat, &hand) in hands.iter() {
         if hand.len() != sizes[seat] {
-            return Err(ScriptError::HandSize { seat, expected: sizes[seat] });
+            return Err(ScriptError::HandSize {
+                seat,
+                expected: sizes[seat],
+            });
         }
         let top = crate::Face::of(rules.faces());
         if hand.has_golden() && (hand.count(top) == 0 || all.has_golden()) {
@@ -144,5 +185,9 @@ fn check_hands(
     if !Cards::deck(rules.faces(), rules.jokers()).contains(all) {
         return Err(ScriptError::NotInDeck);
     }
-    if all.has_golden() == golden_held { Ok(()) } else { Err(ScriptError::Golden) }
+    if all.has_golden() == golden_held {
+        Ok(())
+    } else {
+        Err(ScriptError::Golden)
+    }
 }

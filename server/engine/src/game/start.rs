@@ -34,7 +34,10 @@ impl Game {
         self.received = BySeat::filled(players, Cards::EMPTY);
         self.special = None;
         self.table = Table::new(players);
-        on_event(Event::ShiftStarted { shift, hands: hands.map(Some) });
+        on_event(Event::ShiftStarted {
+            shift,
+            hands: hands.map(Some),
+        });
         if ranking.is_empty() {
             return self.open_first_turn();
         }
@@ -83,14 +86,23 @@ impl Game {
         self.ask_for_gift(chef_left, sous_chef_left, on_event);
     }
 
-    fn ask_for_gift(&mut self, chef_left: u8, sous_chef_left: u8, on_event: &mut impl FnMut(Event)) {
+    fn ask_for_gift(
+        &mut self,
+        chef_left: u8,
+        sous_chef_left: u8,
+        on_event: &mut impl FnMut(Event),
+    ) {
         let rank = match (chef_left, sous_chef_left) {
             (0, 0) => return self.complete_exchange(on_event),
             (0, _) => 1,
             _ => 0,
         };
         let giver = self.ranking.as_slice()[rank];
-        self.stage = Stage::Exchange { giver, chef_left, sous_chef_left };
+        self.stage = Stage::Exchange {
+            giver,
+            chef_left,
+            sous_chef_left,
+        };
     }
 
     /// Takes a gift that has been found legal out of the giver's hand.
@@ -118,10 +130,18 @@ impl Game {
 
     /// Hands over all gifts at once: nobody has seen what it receives before.
     fn complete_exchange(&mut self, on_event: &mut impl FnMut(Event)) {
-        let pairs = if self.rules.players() < SOUS_CHEF_PLAYERS { 1 } else { 2 };
+        let pairs = if self.rules.players() < SOUS_CHEF_PLAYERS {
+            1
+        } else {
+            2
+        };
         for rank in 0..pairs {
             let (chooser, forced) = (self.ranking.as_slice()[rank], self.ranked_from_last(rank));
-            let limit = if rank == 0 { CHEF_GIFTS } else { SOUS_CHEF_GIFTS };
+            let limit = if rank == 0 {
+                CHEF_GIFTS
+            } else {
+                SOUS_CHEF_GIFTS
+            };
             self.gave[forced] = self.hands[forced].take_rarest(limit);
             self.hand_over(forced, chooser, on_event);
             self.hand_over(chooser, forced, on_event);
@@ -135,7 +155,12 @@ impl Game {
         if !cards.is_empty() {
             self.hands[receiver].add(cards);
             self.received[receiver] = cards;
-            on_event(Event::CardsExchanged { giver, receiver, count: cards.len(), cards: Some(cards) });
+            on_event(Event::CardsExchanged {
+                giver,
+                receiver,
+                count: cards.len(),
+                cards: Some(cards),
+            });
         }
     }
 

@@ -94,7 +94,11 @@ impl Table {
     pub(super) fn left_of(&self, from: Seat, distance: u8) -> Seat {
         let index = from.index() + usize::from(distance);
         let players = usize::from(self.players);
-        Seat::new(if index >= players { index - players } else { index })
+        Seat::new(if index >= players {
+            index - players
+        } else {
+            index
+        })
     }
 
     /// Moves the turn so far to the left and counts a lap if it reaches or passes over the starter.

@@ -27,27 +27,57 @@ impl Game {
         }
         self.played.add_counts(number, quantity, jokers);
         let size = quantity + jokers;
-        self.table.board = Board { face: number, size, jokers };
+        self.table.board = Board {
+            face: number,
+            size,
+            jokers,
+        };
         self.cards_left[seat] -= size;
         let cards_left = self.cards_left[seat];
-        on_event(Event::Played { seat, action, face: number, quantity, jokers, cards_left });
+        on_event(Event::Played {
+            seat,
+            action,
+            face: number,
+            quantity,
+            jokers,
+            cards_left,
+        });
         self.after_play(seat, cards_left, on_event);
     }
 
-    pub(super) fn play_lone_joker(&mut self, seat: Seat, action: Action, on_event: &mut impl FnMut(Event)) {
+    pub(super) fn play_lone_joker(
+        &mut self,
+        seat: Seat,
+        action: Action,
+        on_event: &mut impl FnMut(Event),
+    ) {
         let joker = self.hands[seat].take_joker();
         self.played.add(joker);
         let face = self.rules.faces() + 1;
-        self.table.board = Board { face, size: 1, jokers: 1 };
+        self.table.board = Board {
+            face,
+            size: 1,
+            jokers: 1,
+        };
         self.cards_left[seat] -= 1;
         let cards_left = self.cards_left[seat];
-        on_event(Event::Played { seat, action, face, quantity: 0, jokers: 1, cards_left });
+        on_event(Event::Played {
+            seat,
+            action,
+            face,
+            quantity: 0,
+            jokers: 1,
+            cards_left,
+        });
         self.after_play(seat, cards_left, on_event);
     }
 
     pub(super) fn pass(&mut self, seat: Seat, on_event: &mut impl FnMut(Event)) {
         self.table.passed |= bit(seat);
-        on_event(Event::Passed { seat, cards_left: self.cards_left[seat] });
+        on_event(Event::Passed {
+            seat,
+            cards_left: self.cards_left[seat],
+        });
         self.end_turn(seat, on_event);
     }
 
@@ -81,10 +111,17 @@ impl Game {
         let next = if table.others_in_pizza() == 0 {
             let (pizza, last_to_play) = (table.pizza, table.last_to_play);
             let next_leader = table.next_pizza();
-            on_event(Event::PizzaDone { pizza, last_to_play, next_leader });
+            on_event(Event::PizzaDone {
+                pizza,
+                last_to_play,
+                next_leader,
+            });
             table.move_turn(seat, table.distance_left(seat, bit(next_leader)))
         } else {
-            table.move_turn(seat, table.distance_left(seat, table.holding & !table.passed))
+            table.move_turn(
+                seat,
+                table.distance_left(seat, table.holding & !table.passed),
+            )
         };
         self.stage = Stage::Turn(next);
     }

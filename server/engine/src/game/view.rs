@@ -15,11 +15,16 @@ impl Game {
             Viewer::Seat(seat) => Some(seat),
             Viewer::Spectator | Viewer::Everything => None,
         };
-        let own = |cards: &BySeat<Cards>| seat.map_or(Cards::EMPTY, |seat| cards.as_slice()[seat.index()]);
+        let own = |cards: &BySeat<Cards>| {
+            seat.map_or(Cards::EMPTY, |seat| cards.as_slice()[seat.index()])
+        };
         let table = &self.table;
         Observation {
             seat,
-            kind: self.decision().filter(|decision| Some(decision.seat) == seat).map(|decision| decision.kind),
+            kind: self
+                .decision()
+                .filter(|decision| Some(decision.seat) == seat)
+                .map(|decision| decision.kind),
             faces: self.rules.faces(),
             hand_size: self.rules.hand_size(),
             shift: self.shift,

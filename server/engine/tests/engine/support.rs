@@ -1,9 +1,10 @@
 //! What several subjects need: rule sets from the vectors' JSON, hands from a line of text, playing a game at random.
 
 use chefshat_engine::{
-    Action, BySeat, Card, Cards, Event, Face, Game, Opening, PassScope, RuleSet, RuleSetSpec, Seat, SeatOrder, Seed,
-    Stop,
+    Action, BySeat, Cards, Event, Game, Opening, PassScope, RuleSet, RuleSetSpec, Seat, SeatOrder,
+    Seed, Stop,
 };
+use proptest::prelude::*;
 use serde::Deserialize;
 
 /// A rule set as the vectors write it.
@@ -63,4 +64,135 @@ pub(crate) fn seed_from_hex(text: &str) -> Seed {
         *byte = u8::from_str_radix(&text[2 * index..2 * index + 2], 16).unwrap();
     }
     Seed(bytes)
+}
+
+/// Cards from a line such as `1 2 2 G J`.
+pub(crate) fn cards(faces: u8, line: &str) -> Cards {
+    let mut counts = vec![0; usize::from(faces) + 1];
+    let mut golden = false;
+    for word in line.split_whitespace() {
+        let index = match word {
+            "J" => usize::from(faces),
+            "G" => {
+                golden = true;
+                usize::from(faces) - 1
+            }
+            number => number.parse::<usize>().unwrap() - 1,
+        };
+        counts[index] += 1;
+    }
+    Cards::from_counts(faces, &counts, golden).unwrap()
+}
+
+/// Hands from lines, one for each seat.
+pub(crate) fn hands(faces: u8, lines: &[&str]) -> BySeat<Cards> {
+    BySeat::from_fn(lines.len(), |seat| cards(faces, lines[seat.index()]))
+}
+
+/// An order of seats from their numbers.
+pub(crate) fn order(seats: &[usize]) -> SeatOrder {
+    SeatOrder::from_slice(&seats.iter().copied().map(Seat::new).collect::<Vec<_>>()).unwrap()
+}
+
+/// Takes the open decision with the action of this text and gives what happened.
+pub(crate) fn act(game: &mut Game, text: &str) -> Vec<Event> {
+    let action = game
+        .rules()
+        .actions()
+        .parse(text)
+        .unwrap_or_else(|| panic!("no action {text}"));
+    let mut events = Vec::new();
+    game.apply(action, |event| events.push(event))
+        .unwrap_or_else(|error| panic!("{error}"));
+    events
+}
+
+/// The texts of the legal actions, ascending.
+pub(crate) fn legal_texts(game: &Game) -> Vec<String> {
+    let space = game.rules().actions();
+    game.legal_actions()
+        .iter()
+        .map(|action| space.text(action).unwrap())
+        .collect()
+}
+
+/// A small seeded generator, so that a failing case can be run again (SplitMix64).
+pub(crate) struct Chance(pub(crate) u64);
+
+impl Chance {
+    pub(crate) fn below(&mut self, n: usize) -> usize {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut word = self.0;
+        word = (word ^ (word >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        word = (word ^ (word >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        (((word >> 32) * n as u64) >> 32) as usize
+    }
+
+    /// A legal action of the open decision, uniformly.
+    pub(crate) fn legal_action(&mut self, game: &Game) -> Action {
+        let mask = game.legal_actions();
+        mask.nth(self.below(mask.len()))
+            .expect("an open decision has a legal action")
+    }
+}
+
+/// Any rule set that makes sense, with games short enough to be played many times.
+pub(crate) fn any_rules() -> impl Strategy<Value = RuleSet> {
+    let stop = prop_oneof![
+        (1u32..12).prop_map(Stop::Points),
+        (1u32..5).prop_map(Stop::Shifts)
+    ];
+    let max_turns = prop_oneof![1u32..120, Just(10_000)];
+    (
+        (
+            2u8..=6,
+            4u8..=15,
+            0u8..=2,
+            stop,
+            prop::collection::vec(0u32..6, 6),
+        ),
+        (any::<[bool; 5]>(), 1u32..4, max_turns),
+    )
+        .prop_filter_map(
+            "a hand needs three cards",
+            |((players, faces, jokers, stop, mut points), rest)| {
+                let (
+                    [
+                        exchange,
+                        special_actions,
+                        any_top_face,
+                        opening_pass,
+                        turn_scope,
+                    ],
+                    max_idle_pizzas,
+                    max_turns,
+                ) = rest;
+                points.truncate(usize::from(players));
+                points.sort_unstable_by(|a, b| b.cmp(a));
+                points[0] = points[0].max(1);
+                let spec = RuleSetSpec {
+                    players,
+                    faces,
+                    jokers,
+                    stop,
+                    points,
+                    exchange,
+                    special_actions,
+                    opening: if any_top_face {
+                        Opening::AnyTopFace
+                    } else {
+                        Opening::Golden
+                    },
+                    opening_pass,
+                    pass_scope: if turn_scope {
+                        PassScope::Turn
+                    } else {
+                        PassScope::Pizza
+                    },
+                    max_idle_pizzas,
+                    max_turns,
+                };
+                spec.validate().ok()
+            },
+        )
 }

@@ -14,9 +14,14 @@ const DEALS: usize = 87;
 const GAMES: usize = 57;
 
 fn lines<T: DeserializeOwned>(file: &str) -> Vec<T> {
-    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../tests/fixtures/vectors").join(file);
-    let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
-    text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+        .join("../../tests/fixtures/vectors")
+        .join(file);
+    let text = std::fs::read_to_string(&path)
+        .unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    text.lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect()
 }
 
 #[derive(Deserialize)]
@@ -37,14 +42,31 @@ fn deals() {
         let deal = Deal::new(&rules, seed_from_hex(&vector.seed), vector.shift);
         assert_eq!(vector.hands.len(), rules.players());
         for (seat, expected) in vector.hands.iter().enumerate() {
-            let hand: Vec<Value> = deal.cards(Seat::new(seat)).map(|card| card_json(card, rules.faces())).collect();
+            let hand: Vec<Value> = deal
+                .cards(Seat::new(seat))
+                .map(|card| card_json(card, rules.faces()))
+                .collect();
             assert_eq!(&hand, expected, "deal {line}, seat {seat}");
 
             let packed = deal.hands()[Seat::new(seat)];
-            let mut sorted: Vec<u64> = expected.iter().map(|card| card.as_u64().unwrap_or(rules.faces().into())).collect();
+            let mut sorted: Vec<u64> = expected
+                .iter()
+                .map(|card| card.as_u64().unwrap_or(rules.faces().into()))
+                .collect();
             sorted.sort_unstable();
-            assert_eq!(packed.ascending(rules.faces()).map(u64::from).collect::<Vec<_>>(), sorted, "deal {line}");
-            assert_eq!(packed.has_golden(), expected.contains(&json!("G")), "deal {line}");
+            assert_eq!(
+                packed
+                    .ascending(rules.faces())
+                    .map(u64::from)
+                    .collect::<Vec<_>>(),
+                sorted,
+                "deal {line}"
+            );
+            assert_eq!(
+                packed.has_golden(),
+                expected.contains(&json!("G")),
+                "deal {line}"
+            );
         }
         assert_eq!(deal.leader(), Seat::new(vector.leader), "deal {line}");
     }
@@ -79,12 +101,22 @@ fn games() {
                 shifts.push(shift);
             }
         };
-        let mut game = Game::new(vector.rules.rule_set(), seed_from_hex(&vector.seed), &mut on_event);
+        let mut game = Game::new(
+            vector.rules.rule_set(),
+            seed_from_hex(&vector.seed),
+            &mut on_event,
+        );
         for (step, (seat, action, legal)) in vector.steps.iter().enumerate() {
-            let decision = game.decision().unwrap_or_else(|| panic!("game {line} ended before step {step}"));
+            let decision = game
+                .decision()
+                .unwrap_or_else(|| panic!("game {line} ended before step {step}"));
             assert_eq!(decision.seat.index(), *seat, "game {line}, step {step}");
             let mask = game.legal_actions();
-            assert_eq!(mask.iter().map(Action::index).collect::<Vec<_>>(), *legal, "game {line}, step {step}");
+            assert_eq!(
+                mask.iter().map(Action::index).collect::<Vec<_>>(),
+                *legal,
+                "game {line}, step {step}"
+            );
             assert_eq!(mask.len(), legal.len(), "game {line}, step {step}");
             game.apply(Action::new(*action), &mut on_event).unwrap();
         }
@@ -98,7 +130,18 @@ fn games() {
 
 /// The end of a Shift as the vectors write it.
 fn shift_json(event: &Event) -> Option<Value> {
-    let Event::ShiftEnded { shift, order, starter, pizzas, laps, turns, special, adjudicated, .. } = event else {
+    let Event::ShiftEnded {
+        shift,
+        order,
+        starter,
+        pizzas,
+        laps,
+        turns,
+        special,
+        adjudicated,
+        ..
+    } = event
+    else {
         return None;
     };
     let special = special.map(|special| match special {

@@ -5,4 +5,7 @@ mod events;
 mod rules;
 
 pub use events::{By, event_kind, seat_cards};
-pub use rules::{FieldProblem, action_space, role_from_number, rules_from_proto, rules_to_proto};
+pub use rules::{
+    FieldProblem, action_space, reward_scheme_from_proto, role_from_number, rules_from_proto,
+    rules_to_proto,
+};

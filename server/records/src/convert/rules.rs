@@ -1,6 +1,8 @@
 //! Rule sets, roles and the numbering of actions, in both directions.
 
-use chefshat_engine::{ActionSpace, Opening, PassScope, Role, RuleSet, RuleSetSpec, Stop};
+use chefshat_engine::{
+    ActionSpace, Opening, PassScope, RewardScheme, Role, RuleSet, RuleSetSpec, Stop,
+};
 use chefshat_proto::v1;
 
 /// A field of a request that cannot be accepted, and why.
@@ -141,6 +143,18 @@ pub fn role_from_number(number: u8) -> Option<Role> {
     ]
     .into_iter()
     .find(|role| *role as u8 == number)
+}
+
+/// The reward scheme a message names; `None` when it names none.
+pub fn reward_scheme_from_proto(scheme: v1::RewardScheme) -> Option<RewardScheme> {
+    match scheme {
+        v1::RewardScheme::Unspecified => None,
+        v1::RewardScheme::Validity => Some(RewardScheme::Validity),
+        v1::RewardScheme::Paper => Some(RewardScheme::Paper),
+        v1::RewardScheme::PaperIntended => Some(RewardScheme::PaperIntended),
+        v1::RewardScheme::Winning => Some(RewardScheme::Winning),
+        v1::RewardScheme::Points => Some(RewardScheme::Points),
+    }
 }
 
 fn small(field: &'static str, value: u32) -> Result<u8, FieldProblem> {

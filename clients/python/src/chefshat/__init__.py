@@ -1,0 +1,48 @@
+"""Agents for the card game Chef's Hat, played on a server over gRPC.
+
+Subclass `Agent` with one method, `decide`, and give it to `play`, or to a `Client` (blocking) or `aio.Client` (asyncio), which also
+make and find rooms, watch them and fetch records. The messages of the protocol are in `pb`. The package knows no rules: the server
+says what is legal.
+"""
+
+from chefshat import aio, pb
+from chefshat.agents import Agent, RandomAgent
+from chefshat.backoff import Backoff
+from chefshat.client import Client
+from chefshat.decision import Decision, SeatInfo
+from chefshat.errors import ChefsHatError
+from chefshat.result import SeatResult, Standing
+from chefshat.session import PlayOptions
+
+__all__ = [
+    "Agent",
+    "Backoff",
+    "ChefsHatError",
+    "Client",
+    "Decision",
+    "PlayOptions",
+    "RandomAgent",
+    "SeatInfo",
+    "SeatResult",
+    "Standing",
+    "aio",
+    "pb",
+    "play",
+]
+
+
+def play(agent: Agent, address: str, *, join_code: str, name: str, seat: int | None = None) -> SeatResult:
+    """Joins a room, plays its game to the end and returns the result: all an agent needs.
+
+    Args:
+        agent: the player.
+        address: "host:port", "http://host:port" or, for TLS, "https://host:port".
+        join_code: the room's join code.
+        name: name to show, 1..=64 characters.
+        seat: a certain seat; the first free one if None.
+
+    Raises:
+        ChefsHatError: the room or the seat was refused, another connection took the seat, or the server stayed unreachable.
+    """
+    with Client(address) as client:
+        return client.play(agent, client.join_room(join_code, name, seat=seat).ticket)

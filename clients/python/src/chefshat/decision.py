@@ -1,0 +1,245 @@
+"""What an agent is asked: a typed view of one decision request, and what is known of the seat it is asked for.
+
+The view adds names and numpy arrays to the message, no rules: what is legal is for the server to say.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chefshat import pb
+
+Counts: TypeAlias = NDArray[np.uint8]
+
+
+class SeatInfo:
+    """What is known of the seat an agent plays on.
+
+    Attributes:
+        room_id: 32 hexadecimal digits.
+        game_id: 32 hexadecimal digits.
+        seat: number of the seat, from 0.
+        game_started: the start of the game (rule set, policy, participants, action space); None until the game has started.
+    """
+
+    __slots__ = ("game_id", "game_started", "room_id", "seat")
+
+    def __init__(self, room_id: str, game_id: str, seat: int) -> None:
+        self.room_id = room_id
+        self.game_id = game_id
+        self.seat = seat
+        self.game_started: pb.GameStarted | None = None
+
+    def __repr__(self) -> str:
+        return f"SeatInfo(room_id={self.room_id!r}, game_id={self.game_id!r}, seat={self.seat})"
+
+
+class Decision:
+    """One decision put to a seat. Answer it with the index of any action in `legal_actions`.
+
+    F is the number of faces (standard 11), N the number of seats (standard 4). Arrays of cards hold F+1 counts: index f-1 counts
+    face f, index F the jokers. Arrays of seats hold one number a seat. All arrays are read-only views of the message's bytes.
+
+    Attributes:
+        request: the message itself.
+        seat_info: what is known of the seat.
+    """
+
+    __slots__ = ("_attempts_left", "annotations", "request", "seat_info")
+
+    def __init__(self, request: pb.DecisionRequest, seat_info: SeatInfo, attempts_left: int | None = None) -> None:
+        self.request = request
+        self.seat_info = seat_info
+        self.annotations: pb.Annotations | None = None
+        self._attempts_left = attempts_left
+
+    def __repr__(self) -> str:
+        kind = pb.DecisionKind.Name(self.kind).removeprefix("DECISION_KIND_")
+        return f"Decision(seat={self.seat_info.seat}, decision_id={self.decision_id}, kind={kind})"
+
+    def annotate(
+        self,
+        *,
+        value_estimate: float | None = None,
+        action_scores: Sequence[float] = (),
+        extra: Mapping[str, str] | None = None,
+    ) -> None:
+        """Says why the agent answers as it does: recorded with the answer, shown to nobody before the game has ended.
+
+        Args:
+            value_estimate: how good the agent thinks its position is, in its own unit.
+            action_scores: a score per action in the agent's own unit, index = action.
+            extra: free keys and values. All together at most 4 KiB a decision and 256 KiB a game, or it is not recorded.
+        """
+        self.annotations = pb.Annotations(value_estimate=value_estimate, action_scores=action_scores, extra=extra or {})
+
+    @property
+    def decision_id(self) -> int:
+        """Number of the decision: counts up by one per seat, from 1."""
+        return self.request.decision_id
+
+    @property
+    def kind(self) -> pb.DecisionKind.ValueType:
+        """What is to be decided: `pb.DECISION_KIND_TURN`, `..._EXCHANGE` or `..._SPECIAL_ACTION`."""
+        return self.request.kind
+
+    @property
+    def time_left_ms(self) -> int:
+        """Milliseconds left before the time bank is touched, when the server wrote the request."""
+        return self.request.time_left_ms
+
+    @property
+    def bank_left_ms(self) -> int:
+        """Milliseconds left in the seat's time bank, when the server wrote the request."""
+        return self.request.bank_left_ms
+
+    @property
+    def invalid_attempts_left(self) -> int | None:
+        """Invalid answers left before the server decides instead; None when unlimited."""
+        if self._attempts_left is not None:
+            return self._attempts_left
+        return self.request.invalid_attempts_left if self.request.HasField("invalid_attempts_left") else None
+
+    @property
+    def seat(self) -> int:
+        """The seat that is asked, from 0."""
+        return self.seat_info.seat
+
+    @property
+    def faces(self) -> int:
+        """F, the number of faces in the deck: 4..=15, standard 11."""
+        return len(self.request.observation.hand) - 1
+
+    @property
+    def size(self) -> int:
+        """Number of actions in all, 3F(F+1)/2 + F + 5: standard 214."""
+        return self.turn_actions + self.faces + 3
+
+    @property
+    def turn_actions(self) -> int:
+        """T, the number of actions of a turn, 3F(F+1)/2 + 2: standard 200. They come first, and the last of them is passing."""
+        faces = self.faces
+        return 3 * faces * (faces + 1) // 2 + 2
+
+    @property
+    def mask_bytes(self) -> bytes:
+        """The legal actions as they were sent: bit i%8 of byte i/8 is action i."""
+        return self.request.action_mask
+
+    @property
+    def mask(self) -> NDArray[np.bool_]:
+        """Whether each action is legal: `size` booleans."""
+        packed = np.frombuffer(self.request.action_mask, np.uint8)
+        return np.unpackbits(packed, count=self.size, bitorder="little").view(np.bool_)
+
+    @property
+    def legal_actions(self) -> NDArray[np.intp]:
+        """Indices of the legal actions, ascending; at least one."""
+        return np.flatnonzero(self.mask)
+
+    @property
+    def shift(self) -> int:
+        """The current Shift, from 1."""
+        return self.request.observation.shift
+
+    @property
+    def pizza(self) -> int:
+        """The pizza of the Shift being made, from 1; 0 before the Shift's first turn is open."""
+        return self.request.observation.pizza
+
+    @property
+    def hand(self) -> Counts:
+        """Own hand: F+1 counts."""
+        return np.frombuffer(self.request.observation.hand, np.uint8)
+
+    @property
+    def golden(self) -> bool:
+        """Whether the own hand holds the Golden card."""
+        return self.request.observation.golden
+
+    @property
+    def board_face(self) -> int:
+        """The face on the board: 0 empty, 1..F, F+1 for a joker played alone."""
+        return self.request.observation.board_face
+
+    @property
+    def board_size(self) -> int:
+        """Number of cards on the board, jokers included."""
+        return self.request.observation.board_size
+
+    @property
+    def board_jokers(self) -> int:
+        """Number of jokers among the cards on the board."""
+        return self.request.observation.board_jokers
+
+    @property
+    def cards_left(self) -> Counts:
+        """Number of cards in each seat's hand: N numbers."""
+        return np.frombuffer(self.request.observation.cards_left, np.uint8)
+
+    @property
+    def passed(self) -> Counts:
+        """1 where a seat has passed and is out of the current pizza: N numbers, 0 or 1."""
+        return np.frombuffer(self.request.observation.passed, np.uint8)
+
+    @property
+    def places(self) -> Counts:
+        """Place of each seat that has finished this Shift, from 1, and 0 for the others: N numbers."""
+        return np.frombuffer(self.request.observation.places, np.uint8)
+
+    @property
+    def roles(self) -> Counts:
+        """Role of each seat: N values of `pb.Role`, all 0 in the first Shift."""
+        return np.frombuffer(self.request.observation.roles, np.uint8)
+
+    @property
+    def points(self) -> NDArray[np.uint64]:
+        """Points of each seat so far in the game: N numbers."""
+        return np.array(self.request.observation.points, np.uint64)
+
+    @property
+    def played(self) -> Counts:
+        """Cards played so far in this Shift by anybody: F+1 counts."""
+        return np.frombuffer(self.request.observation.played, np.uint8)
+
+    @property
+    def gave(self) -> Counts:
+        """Cards this seat gave in this Shift's exchange: F+1 counts, or no numbers at all if it gave none."""
+        return np.frombuffer(self.request.observation.gave, np.uint8)
+
+    @property
+    def received(self) -> Counts:
+        """Cards this seat received in this Shift's exchange: F+1 counts, or no numbers at all if it received none."""
+        return np.frombuffer(self.request.observation.received, np.uint8)
+
+    @property
+    def hand_size(self) -> int:
+        """H, the number of cards dealt to each seat: standard 17. Known once the game's start has been seen, else ValueError."""
+        if self.seat_info.game_started is None:
+            raise ValueError("the start of the game has not been seen, so the number of cards dealt is not known")
+        return self.seat_info.game_started.hand_size
+
+    def classic_vector(self) -> NDArray[np.float32]:
+        """The observation as the 228 numbers of the 2020 paper (F + H + T in general), each 0..=1.
+
+        First the board, F slots: the cards of the play ascending with jokers as F+1, cut off after F slots; an empty board is F+2
+        in the first slot; unused slots are 0. Then the hand, H slots, ascending, zeros first. Both are divided by F+2. Last the
+        first T entries of the mask as 0 or 1.
+        """
+        faces = self.faces
+        joker = faces + 1
+        dealt = self.hand_size
+        vector = np.zeros(faces + dealt + self.turn_actions, np.float32)
+        observation = self.request.observation
+        face, size, jokers = observation.board_face, observation.board_size, observation.board_jokers
+        board = [face] * (size - jokers) + [joker] * jokers if face else [faces + 2]
+        board = board[:faces]
+        vector[: len(board)] = board
+        hand = np.repeat(np.arange(1, joker + 1), self.hand)
+        if len(hand) > 0:
+            vector[faces + dealt - len(hand) : faces + dealt] = hand
+        vector[: faces + dealt] /= faces + 2
+        vector[faces + dealt :] = self.mask[: self.turn_actions]
+        return vector

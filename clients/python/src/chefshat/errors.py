@@ -1,0 +1,83 @@
+"""The one exception this package raises for what a server refuses or a connection suffers, and how it is read from gRPC.
+
+Wrong use of the package itself (a bad argument) raises ValueError or TypeError; what an agent raises is passed on untouched.
+"""
+
+from collections.abc import Iterable, Mapping
+
+import grpc
+from google.rpc import error_details_pb2, status_pb2
+
+DETAILS_KEY = "grpc-status-details-bin"
+
+# Codes after which trying again with the same arguments cannot help.
+_FINAL_CODES = frozenset(
+    {
+        grpc.StatusCode.INVALID_ARGUMENT,
+        grpc.StatusCode.NOT_FOUND,
+        grpc.StatusCode.ALREADY_EXISTS,
+        grpc.StatusCode.PERMISSION_DENIED,
+        grpc.StatusCode.FAILED_PRECONDITION,
+        grpc.StatusCode.OUT_OF_RANGE,
+        grpc.StatusCode.UNIMPLEMENTED,
+        grpc.StatusCode.UNAUTHENTICATED,
+    }
+)
+
+
+class ChefsHatError(Exception):
+    """Something a server refused, or a connection that is lost for good.
+
+    Attributes:
+        reason: why, in UPPER_SNAKE, for programs: for instance "ROOM_FULL" or "TICKET_UNKNOWN". Without a reason from the server it
+            is the name of the gRPC code, for instance "UNAVAILABLE".
+        message: the same in words, for people.
+        metadata: names the offending field or limit; may be empty.
+        code: the gRPC status code, or None if the refusal came inside a stream.
+    """
+
+    def __init__(
+        self,
+        reason: str,
+        message: str = "",
+        metadata: Mapping[str, str] | None = None,
+        code: grpc.StatusCode | None = None,
+    ) -> None:
+        super().__init__(f"{reason}: {message}" if message else reason)
+        self.reason = reason
+        self.message = message
+        self.metadata = dict(metadata or {})
+        self.code = code
+
+    @property
+    def retryable(self) -> bool:
+        """Whether the same attempt may succeed later (a lost connection, a restarting server)."""
+        return self.code is not None and self.code not in _FINAL_CODES
+
+
+def connection_lost(message: str = "the server ended the stream before the game was over") -> ChefsHatError:
+    """The error of a stream that ended without a status that says why."""
+    return ChefsHatError("CONNECTION_LOST", message, code=grpc.StatusCode.UNAVAILABLE)
+
+
+def from_rpc_error(error: grpc.RpcError) -> ChefsHatError:
+    """Reads reason and metadata (google.rpc.ErrorInfo) out of a failed call, blocking or asyncio."""
+    # Every error grpcio raises from a call is a call too, but the common base class does not say so.
+    code = getattr(error, "code", lambda: None)() or grpc.StatusCode.UNKNOWN
+    message = getattr(error, "details", lambda: None)() or ""
+    trailers = getattr(error, "trailing_metadata", lambda: None)() or ()
+    reason, metadata = _error_info(trailers)
+    return ChefsHatError(reason or code.name, message, metadata, code)
+
+
+def _error_info(trailers: Iterable[tuple[str, str | bytes]]) -> tuple[str, dict[str, str]]:
+    """The reason and metadata in a call's trailers; empty where the server gave none."""
+    for key, value in trailers:
+        if key != DETAILS_KEY or not isinstance(value, bytes):
+            continue
+        status = status_pb2.Status.FromString(value)
+        for detail in status.details:
+            info = error_details_pb2.ErrorInfo()
+            if detail.Is(info.DESCRIPTOR) and detail.Unpack(info):
+                return info.reason, dict(info.metadata)
+    return "", {}

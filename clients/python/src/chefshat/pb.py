@@ -1,0 +1,17 @@
+"""All messages and enums of the protocol under one name: `from chefshat import pb`, then `pb.RuleSet(preset="rulebook")`.
+
+What each field means is written in the .proto files and shown by editors from the typed stubs. The services' stubs are not here:
+`Client` and `aio.Client` wrap them.
+"""
+
+# ruff: noqa: F403
+from chefshat._gen.chefshat.v1.decision_pb2 import *
+from chefshat._gen.chefshat.v1.event_pb2 import *
+from chefshat._gen.chefshat.v1.play_service_pb2 import *
+from chefshat._gen.chefshat.v1.record_pb2 import *
+from chefshat._gen.chefshat.v1.record_service_pb2 import *
+from chefshat._gen.chefshat.v1.room_pb2 import *
+from chefshat._gen.chefshat.v1.room_service_pb2 import *
+from chefshat._gen.chefshat.v1.rules_pb2 import *
+from chefshat._gen.chefshat.v1.server_service_pb2 import *
+from chefshat._gen.chefshat.v1.spectator_service_pb2 import *

@@ -1,0 +1,66 @@
+"""What both clients share around a call: where the server is, how the channel behaves, and how arguments become requests."""
+
+from collections.abc import Sequence
+from typing import NamedTuple, TypeAlias
+
+from chefshat import pb
+
+# Times in milliseconds. Waits between attempts to connect are `Backoff`'s business, so the channel's own are kept short; pings
+# notice a peer that is gone without having said so.
+CHANNEL_OPTIONS: list[tuple[str, int]] = [
+    ("grpc.initial_reconnect_backoff_ms", 100),
+    ("grpc.min_reconnect_backoff_ms", 100),
+    ("grpc.max_reconnect_backoff_ms", 1000),
+    ("grpc.keepalive_time_ms", 30_000),
+    ("grpc.keepalive_timeout_ms", 10_000),
+    # Two clients of one process are two agents, and one connection each is how they would run apart.
+    ("grpc.use_local_subchannel_pool", 1),
+]
+
+SeatSpec: TypeAlias = "pb.SeatConfig | pb.ParticipantKind.ValueType | str | None"
+"""How to fill a seat: a built-in agent's name, a kind it is reserved for, None (open to everybody), or the message itself."""
+
+
+class Target(NamedTuple):
+    """Where a server is: what gRPC connects to, and whether by TLS."""
+
+    authority: str
+    tls: bool
+
+
+def target(address: str) -> Target:
+    """Reads "host:port", "http://host:port" (the same) or "https://host:port" (TLS)."""
+    scheme, separator, rest = address.partition("://")
+    if not separator:
+        return Target(address, tls=False)
+    if scheme not in ("http", "https"):
+        raise ValueError(f"the address {address!r} begins with neither http:// nor https://")
+    return Target(rest.rstrip("/"), tls=scheme == "https")
+
+
+def create_room(
+    name: str,
+    rules: pb.RuleSet | str | None,
+    seats: Sequence[SeatSpec],
+    policy: pb.RoomPolicy | None,
+    game_seed: bytes,
+) -> pb.CreateRoomRequest:
+    """The request for a room."""
+    if isinstance(rules, str):
+        rules = pb.RuleSet(preset=rules)
+    configs = [seat_config(seat) for seat in seats]
+    return pb.CreateRoomRequest(name=name, rules=rules, seats=configs, policy=policy, game_seed=game_seed)
+
+
+def seat_config(seat: SeatSpec) -> pb.SeatConfig:
+    """The message for one seat."""
+    if isinstance(seat, pb.SeatConfig):
+        return seat
+    if isinstance(seat, str):
+        return pb.SeatConfig(built_in_agent=seat)
+    return pb.SeatConfig(reserved_for=pb.PARTICIPANT_KIND_UNSPECIFIED if seat is None else seat)
+
+
+def watch_request(room_id: str, last_sequence: int) -> pb.SpectatorServiceWatchRequest:
+    """The request for a room's events after `last_sequence`; all of them if that is 0."""
+    return pb.SpectatorServiceWatchRequest(room_id=room_id, from_sequence=last_sequence + 1 if last_sequence else 0)

@@ -1,0 +1,77 @@
+"""What is left of a seat's game when it is over."""
+
+from dataclasses import dataclass
+
+from chefshat import pb
+from chefshat.errors import ChefsHatError
+
+
+@dataclass(frozen=True)
+class Standing:
+    """One line of the final table: a seat (from 0), its points and its place (from 1)."""
+
+    seat: int
+    points: int
+    place: int
+
+
+@dataclass(frozen=True)
+class SeatResult:
+    """How the game ended for one seat: finished (it has standings), aborted (it has none), or with an error of the seat's own.
+
+    Attributes:
+        room_id: the room; empty if the seat was never attached.
+        game_id: the game; empty if the seat was never attached.
+        seat: number of the seat, from 0; -1 if the seat was never attached.
+        standings: the final table, best first; empty unless the game finished.
+        abort_reason: why the game was aborted, for instance "SHUTDOWN"; empty unless it was.
+        decisions: answers the server accepted.
+        invalid: answers that were not legal.
+        late: answers that came when the decision was closed already.
+        reconnects: how often the connection was made anew.
+        error: why the seat left before its game was over (reason "SUPERSEDED": a newer connection took it); None otherwise.
+    """
+
+    room_id: str
+    game_id: str
+    seat: int
+    standings: tuple[Standing, ...] = ()
+    abort_reason: str = ""
+    decisions: int = 0
+    invalid: int = 0
+    late: int = 0
+    reconnects: int = 0
+    error: ChefsHatError | None = None
+
+    @property
+    def finished(self) -> bool:
+        """Whether the game ended with a result."""
+        return bool(self.standings)
+
+    @property
+    def place(self) -> int | None:
+        """This seat's place in the game, from 1; None unless the game finished."""
+        return next((standing.place for standing in self.standings if standing.seat == self.seat), None)
+
+    @property
+    def points(self) -> int | None:
+        """This seat's points; None unless the game finished."""
+        return next((standing.points for standing in self.standings if standing.seat == self.seat), None)
+
+    def raise_for_error(self) -> None:
+        """Raises `error` if there is one."""
+        if self.error is not None:
+            raise self.error
+
+
+def standings_of(ended: pb.GameEnded) -> tuple[Standing, ...]:
+    """The final table of a finished game."""
+    return tuple(Standing(line.seat, line.points, line.place) for line in ended.standings)
+
+
+def abort_reason_of(aborted: pb.GameAborted) -> str:
+    """The name of the reason, without its prefix."""
+    values = pb.AbortReason.values()
+    if aborted.reason not in values:
+        return str(int(aborted.reason))  # A server newer than this package.
+    return pb.AbortReason.Name(aborted.reason).removeprefix("ABORT_REASON_")

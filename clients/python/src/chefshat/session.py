@@ -1,0 +1,329 @@
+"""The protocol of a `Play` stream without the stream: responses go in, requests come out.
+
+Both clients, blocking and asyncio, drive one `PlaySession` for any number of seats and through any number of connections, so that
+attaching, resuming, answering and ending exist once. There is no IO, clock, thread or waiting here, and no knowledge of the rules.
+
+A connection's life, as its driver sees it: `connected()`, send `take_requests()`; for each response `receive(response)`, decide
+what it returns, `answer(...)` each, send `take_requests()`; stop when `done`. When it is lost, `lost()`, and begin again.
+"""
+
+import logging
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple, SupportsIndex
+
+from chefshat import pb
+from chefshat.agents import Agent
+from chefshat.decision import Decision, SeatInfo
+from chefshat.errors import ChefsHatError
+from chefshat.result import SeatResult, Standing, abort_reason_of, standings_of
+
+LOG = logging.getLogger("chefshat")
+
+# The protocol's bound on commands in one request.
+MAX_COMMANDS = 1024
+
+
+class Ask(NamedTuple):
+    """A decision to be put to an agent."""
+
+    place: "SeatPlace"
+    decision: Decision
+
+    @property
+    def agent(self) -> Agent:
+        """Who is asked."""
+        return self.place.agent
+
+
+@dataclass(frozen=True)
+class PlayOptions:
+    """How seats attach.
+
+    Attributes:
+        entropy: the seats' own part of the game seed, 0..=32 bytes; counts when given before the game starts.
+        delivery: how events reach the seats; unspecified means together with the next decision.
+    """
+
+    entropy: bytes = b""
+    delivery: pb.EventDelivery.ValueType = pb.EVENT_DELIVERY_UNSPECIFIED
+
+
+class SeatPlace:
+    """One seat's part of a session; it outlives connections."""
+
+    def __init__(self, ticket: str, request_id: int, agent: Agent) -> None:
+        self.ticket = ticket
+        self.request_id = request_id
+        self.agent = agent
+        self.info: SeatInfo | None = None
+        # Handle on the present connection; None while not attached.
+        self.handle: int | None = None
+        # Number of the last event seen; 0 before any.
+        self.last_sequence = 0
+        # The decision the agent has been asked and has not answered yet.
+        self.asked: Decision | None = None
+        # The answer the server has not acknowledged yet, and the decision it answers.
+        self.unacknowledged: pb.Answer | None = None
+        self.answered: Decision | None = None
+        self.standings: tuple[Standing, ...] = ()
+        self.abort_reason = ""
+        self.decisions = 0
+        self.invalid = 0
+        self.late = 0
+        self.result: SeatResult | None = None
+        # Agents that do not listen cost no call per event.
+        self.hears_events = type(agent).on_event is not Agent.on_event
+        self.hears_results = type(agent).on_result is not Agent.on_result
+
+    @property
+    def game_is_over(self) -> bool:
+        """Whether the event that ends the game has been seen."""
+        return bool(self.standings or self.abort_reason)
+
+
+class PlaySession:
+    """Plays any number of seats over one stream at a time. Not thread-safe: one thread at a time may call it."""
+
+    def __init__(self, agents: Mapping[str, Agent], options: PlayOptions | None = None) -> None:
+        """Begins a session.
+
+        Args:
+            agents: the agent for each ticket.
+            options: how the seats attach.
+        """
+        self._options = options or PlayOptions()
+        # Request ids count from 1, so that 0 (not set) is no seat's.
+        self._places = [SeatPlace(ticket, index, agent) for index, (ticket, agent) in enumerate(agents.items(), 1)]
+        self._by_handle: dict[int, SeatPlace] = {}
+        self._outbox: list[pb.SeatCommand] = []
+        self._open = len(self._places)
+        self._connections = 0
+        #: Grows whenever the game has moved on for a seat. A connection that brought none was of no use.
+        self.progress = 0
+
+    @property
+    def done(self) -> bool:
+        """Whether every seat has its result."""
+        return self._open == 0
+
+    def results(self) -> dict[str, SeatResult]:
+        """The result of each ticket whose seat is done, in the order of the tickets given."""
+        return {place.ticket: place.result for place in self._places if place.result is not None}
+
+    def connected(self) -> None:
+        """A new connection stands: attaches every seat that is not done, from the event after the last one seen."""
+        self._connections += 1
+        self._by_handle.clear()
+        self._outbox.clear()
+        for place in self._places:
+            place.handle = None
+            if place.result is not None:
+                continue
+            command = pb.SeatCommand()
+            command.attach.ticket = place.ticket
+            command.attach.request_id = place.request_id
+            command.attach.from_sequence = place.last_sequence + 1 if place.last_sequence else 0
+            command.attach.delivery = self._options.delivery
+            command.attach.entropy = self._options.entropy
+            self._outbox.append(command)
+
+    def lost(self, unasked: Iterable[Ask] = ()) -> None:
+        """The connection is gone. Seats that have seen their game end are done; the others wait for `connected`.
+
+        Args:
+            unasked: decisions no agent has been asked for and none will be: the server will put them again.
+        """
+        for place, decision in unasked:
+            if place.asked is decision:
+                place.asked = None
+        self._by_handle.clear()
+        self._outbox.clear()
+        for place in self._places:
+            place.handle = None
+            if place.result is None and place.game_is_over:
+                self._finish(place)
+
+    def give_up(self, error: ChefsHatError) -> None:
+        """No connection will come any more: every seat that is not done gets this error as its result."""
+        for place in self._places:
+            if place.result is None:
+                self._finish(place, error)
+
+    def take_requests(self) -> list[pb.PlayRequest]:
+        """What is to be sent now, in order; usually nothing or one request."""
+        outbox = self._outbox
+        if not outbox:
+            return []
+        self._outbox = []
+        return [pb.PlayRequest(commands=outbox[at : at + MAX_COMMANDS]) for at in range(0, len(outbox), MAX_COMMANDS)]
+
+    def receive(self, response: pb.PlayResponse) -> list[Ask]:
+        """Takes in what the server said and calls the agents' hooks, in the order in which it was said.
+
+        Returns:
+            The decisions now to be made. Answer each with `answer`, in any order, at any time.
+        """
+        asks: list[Ask] = []
+        by_handle = self._by_handle
+        for update in response.updates:
+            what = update.WhichOneof("update")
+            if what == "attached":
+                self._attached(update.handle, update.attached)
+                continue
+            if what == "refused":
+                self._refused(update.handle, update.refused)
+                continue
+            place = by_handle.get(update.handle)
+            if place is None:
+                continue
+            if what == "decision":
+                self._decision(place, update.decision, asks)
+            elif what == "events":
+                self._events(place, update.events)
+            elif what == "result":
+                self._result(place, update.result, asks)
+            elif what == "snapshot":
+                self._snapshot(place, update.snapshot)
+            elif what == "detached":
+                self._detached(place, update.handle, update.detached)
+        return asks
+
+    def answer(self, ask: Ask, action: SupportsIndex) -> None:
+        """Answers a decision. If the seat is not attached just now, the answer is sent as soon as it is again."""
+        place, decision = ask
+        if place.asked is not decision:
+            return  # The server has closed the decision in the meantime.
+        answer = pb.Answer(decision_id=decision.decision_id, action=action.__index__(), annotations=decision.annotations)
+        place.asked = None
+        place.unacknowledged = answer
+        place.answered = decision
+        self._send_answer(place)
+
+    def _send_answer(self, place: SeatPlace) -> None:
+        if place.handle is not None and place.unacknowledged is not None:
+            self._outbox.append(pb.SeatCommand(handle=place.handle, answer=place.unacknowledged))
+
+    def _attached(self, handle: int, attached: pb.Attached) -> None:
+        place = self._place_of_request(attached.request_id)
+        if place is None:
+            return
+        place.handle = handle
+        self._by_handle[handle] = place
+        if place.info is None:
+            place.info = SeatInfo(attached.room_id, attached.game_id, attached.seat)
+        place.agent.on_attached(place.info)
+        # Whether the last answer arrived before the connection broke is unknown. The same answer twice gets the same
+        # acknowledgement, so it is simply given again.
+        self._send_answer(place)
+
+    def _refused(self, handle: int, refused: pb.Refused) -> None:
+        place = self._place_of_request(refused.request_id)
+        if place is not None and place.handle is None:
+            error = ChefsHatError(refused.reason, refused.message, refused.metadata)
+            self._finish(place, None if place.game_is_over else error)
+            return
+        place = self._by_handle.get(handle)
+        LOG.warning("the server refused a command: %s: %s", refused.reason, refused.message)
+        if place is not None:
+            place.agent.on_refused(refused)
+
+    def _events(self, place: SeatPlace, batch: pb.EventBatch) -> None:
+        for event in batch.events:
+            if event.sequence <= place.last_sequence:
+                continue  # Seen before a reconnection.
+            place.last_sequence = event.sequence
+            self.progress += 1
+            what = event.WhichOneof("kind")
+            if what == "game_started":
+                if place.info is not None:
+                    place.info.game_started = event.game_started
+            elif what == "game_ended":
+                place.standings = standings_of(event.game_ended)
+            elif what == "game_aborted":
+                place.abort_reason = abort_reason_of(event.game_aborted)
+            if place.hears_events:
+                place.agent.on_event(event)
+
+    def _snapshot(self, place: SeatPlace, snapshot: pb.Snapshot) -> None:
+        place.last_sequence = max(place.last_sequence, snapshot.next_sequence - 1)
+        self.progress += 1
+        if place.info is not None and snapshot.HasField("game_started"):
+            place.info.game_started = snapshot.game_started
+        place.agent.on_snapshot(snapshot)
+
+    def _decision(self, place: SeatPlace, request: pb.DecisionRequest, asks: list[Ask]) -> None:
+        decision_id = request.decision_id
+        if place.unacknowledged is not None:
+            if place.unacknowledged.decision_id == decision_id:
+                return  # Told again after a reconnection; the answer is on its way again already.
+            place.unacknowledged = None
+        if place.asked is not None and place.asked.decision_id == decision_id:
+            return  # Told again while the agent is still thinking about it.
+        self._ask(place, request, None, asks)
+
+    def _ask(self, place: SeatPlace, request: pb.DecisionRequest, attempts_left: int | None, asks: list[Ask]) -> None:
+        if place.info is None:
+            return  # A seat without a handle is told nothing.
+        place.asked = Decision(request, place.info, attempts_left)
+        asks.append(Ask(place, place.asked))
+
+    def _result(self, place: SeatPlace, result: pb.AnswerResult, asks: list[Ask]) -> None:
+        answered = place.answered
+        awaited = place.unacknowledged is not None and place.unacknowledged.decision_id == result.decision_id
+        if awaited:
+            place.unacknowledged = None
+            place.answered = None
+        if result.status == pb.ANSWER_STATUS_ACCEPTED:
+            if awaited:
+                place.decisions += 1
+                self.progress += 1
+        elif result.status == pb.ANSWER_STATUS_INVALID:
+            if awaited:
+                place.invalid += 1
+                self.progress += 1
+        else:
+            place.late += 1
+        if place.hears_results:
+            place.agent.on_result(result)
+        if awaited and answered is not None and result.status == pb.ANSWER_STATUS_INVALID:
+            # The decision stays open until the server's limit of attempts, which is what ends a stubborn agent's loop.
+            limited = result.HasField("invalid_attempts_left")
+            if not limited or result.invalid_attempts_left > 0:
+                attempts_left = result.invalid_attempts_left if limited else None
+                self._ask(place, answered.request, attempts_left, asks)
+
+    def _detached(self, place: SeatPlace, handle: int, detached: pb.Detached) -> None:
+        del self._by_handle[handle]
+        place.handle = None
+        if detached.reason == pb.DETACH_REASON_GAME_OVER:
+            self._finish(place)
+        elif detached.reason == pb.DETACH_REASON_SUPERSEDED:
+            # Taking the seat back would only make two connections fight over it.
+            self._finish(place, ChefsHatError("SUPERSEDED", "a newer connection has taken the seat"))
+        else:
+            self._finish(place, ChefsHatError("DETACHED", "the seat has left the stream"))
+
+    def _finish(self, place: SeatPlace, error: ChefsHatError | None = None) -> None:
+        info = place.info
+        place.asked = None
+        place.unacknowledged = None
+        place.answered = None
+        place.result = SeatResult(
+            room_id=info.room_id if info else "",
+            game_id=info.game_id if info else "",
+            seat=info.seat if info else -1,
+            standings=place.standings,
+            abort_reason=place.abort_reason,
+            decisions=place.decisions,
+            invalid=place.invalid,
+            late=place.late,
+            reconnects=max(self._connections - 1, 0),
+            error=error,
+        )
+        self._open -= 1
+        if error is None:
+            place.agent.on_game_over(place.result)
+
+    def _place_of_request(self, request_id: int) -> SeatPlace | None:
+        return self._places[request_id - 1] if 1 <= request_id <= len(self._places) else None

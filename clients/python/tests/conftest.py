@@ -1,0 +1,48 @@
+"""Servers for the tests: the fake one always, the real one if CHEFSHAT_BIN names its binary."""
+
+import os
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from fake_server import FakeServer
+from real_server import RealServer
+
+BINARY = "CHEFSHAT_BIN"
+
+
+@pytest.fixture
+def fake() -> Iterator[FakeServer]:
+    """A fake server on a free port, stopped after the test."""
+    with FakeServer() as server:
+        yield server
+
+
+@pytest.fixture(scope="session")
+def real_address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """The address of the real server, one for the whole run. A binary that is named but does not serve is a failure."""
+    binary = os.environ.get(BINARY)
+    if not binary:
+        pytest.skip(f"{BINARY} is not set: name the chefshat binary to play against the real server")
+    with RealServer(Path(binary), tmp_path_factory.mktemp("data")) as server:
+        yield server.address
+
+
+@pytest.fixture(params=["fake", pytest.param("real", marks=pytest.mark.server)])
+def address(request: pytest.FixtureRequest) -> str:
+    """The address of a server: the test runs once with the fake one and once with the real one."""
+    if request.param == "fake":
+        return str(request.getfixturevalue("fake").address)
+    return str(request.getfixturevalue("real_address"))
+
+
+@pytest.fixture
+def processes() -> Iterator[list[subprocess.Popen[str]]]:
+    """A list for processes a test starts; those still running after it are killed."""
+    started: list[subprocess.Popen[str]] = []
+    yield started
+    for process in started:
+        if process.poll() is None:
+            process.kill()
+        process.communicate()

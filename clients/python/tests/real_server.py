@@ -1,0 +1,55 @@
+"""The real server as a child process. What it is asked to do is the tests' business."""
+
+import json
+import subprocess
+import threading
+from pathlib import Path
+from typing import Self
+
+# Seconds to start listening: generous, because nothing is measured by it.
+START_S = 60.0
+
+
+class RealServer:
+    """`chefshat serve` on a free port, with a data directory of its own; a context manager."""
+
+    def __init__(self, binary: Path, data_dir: Path) -> None:
+        self._log = (data_dir / "server.log").open("w+")
+        self._process = subprocess.Popen(
+            [str(binary), "serve", "--listen", "127.0.0.1:0", "--data-dir", str(data_dir), "--json"],
+            stdout=subprocess.PIPE,
+            stderr=self._log,
+            text=True,
+        )
+        self.address = ""
+
+    def __enter__(self) -> Self:
+        # A server that hangs is killed, which ends its output and so the wait for its first line.
+        watchdog = threading.Timer(START_S, self._process.kill)
+        watchdog.start()
+        try:
+            assert self._process.stdout is not None
+            for line in self._process.stdout:
+                said = json.loads(line)
+                if said.get("event") == "listening":
+                    self.address = said["address"]
+                    return self
+        finally:
+            watchdog.cancel()
+        self.stop()
+        self._log.seek(0)
+        raise AssertionError(f"the server named by CHEFSHAT_BIN did not start listening; it said:\n{self._log.read()}")
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
+    def stop(self) -> None:
+        """Ends the process."""
+        self._process.terminate()
+        try:
+            self._process.wait(10)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        if self._process.stdout is not None:
+            self._process.stdout.close()

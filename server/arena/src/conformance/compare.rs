@@ -1,0 +1,47 @@
+//! Comparing what a vector expects with what the engine does. What is compared is decided in `game` and `deal`.
+
+use serde::Serialize;
+use serde_json::Value;
+use thiserror::Error;
+
+/// The first place where the engine does not do what a vector says.
+#[derive(Clone, Eq, PartialEq, Debug, Error)]
+#[error("{place}: expected {expected}, got {got}")]
+pub struct Disagreement {
+    /// What differs, in the words of the vector: for instance `steps[41], legal actions`.
+    pub place: String,
+    /// Index, from 0, of the step it showed at; `None` for a deal.
+    pub step: Option<usize>,
+    /// What the vector says, as JSON or in words.
+    pub expected: String,
+    /// What the engine does, as JSON or in words.
+    pub got: String,
+}
+
+/// Compares two values by their JSON. In objects it is the first field that differs which is named, after the place and a dot.
+pub(super) fn agree(
+    place: &str,
+    step: Option<usize>,
+    expected: impl Serialize,
+    got: impl Serialize,
+) -> Result<(), Disagreement> {
+    let (expected, got) = (json(expected), json(got));
+    if expected == got {
+        return Ok(());
+    }
+    if let (Value::Object(expected), Value::Object(got)) = (&expected, &got) {
+        for (field, expected) in expected {
+            agree(&format!("{place}.{field}"), step, expected, &got[field])?;
+        }
+    }
+    Err(Disagreement {
+        place: place.to_owned(),
+        step,
+        expected: expected.to_string(),
+        got: got.to_string(),
+    })
+}
+
+fn json(value: impl Serialize) -> Value {
+    serde_json::to_value(value).expect("vectors are made of numbers, words and lists")
+}

@@ -1,0 +1,156 @@
+//! Checking the engine against test vectors: files of one JSON object a line, each a deal or a whole game as another engine played it. This
+//! file reads lines and says which of them agree; how a line is replayed is in `game` and `deal`.
+
+mod compare;
+mod deal;
+mod game;
+
+use std::io::{BufRead, Read};
+
+use serde_json::Value;
+use thiserror::Error;
+
+pub use compare::Disagreement;
+
+/// Longest line that is read: far longer than any game of the standard rules, and a bound on memory.
+pub const MAX_LINE_BYTES: u64 = 64 << 20;
+
+/// How many vectors agreed.
+#[derive(Copy, Clone, Eq, PartialEq, Debug, Default)]
+pub struct Agreed {
+    /// Deals that came out card for card.
+    pub deals: u64,
+    /// Games replayed to the same end.
+    pub games: u64,
+    /// Decisions in those games.
+    pub steps: u64,
+}
+
+impl Agreed {
+    /// Vectors of both kinds.
+    pub fn vectors(&self) -> u64 {
+        self.deals + self.games
+    }
+}
+
+/// What came of a file: how many vectors agreed until the first that did not, or the end.
+#[derive(Debug)]
+pub struct Report {
+    /// Vectors that agreed.
+    pub agreed: Agreed,
+    /// Why checking stopped before the end of the file, if it did.
+    pub failure: Option<Failure>,
+}
+
+/// Why checking stopped. Lines are counted from 1.
+#[derive(Debug, Error)]
+pub enum Failure {
+    /// The engine does not do what the vector says.
+    #[error("line {line} does not agree: {disagreement}")]
+    Disagrees {
+        /// The line.
+        line: u64,
+        /// Where, what was expected, what came out.
+        disagreement: Disagreement,
+    },
+    /// The line is no vector.
+    #[error("line {line} is not a vector: {reason}")]
+    Unreadable {
+        /// The line.
+        line: u64,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// The file cannot be read on.
+    #[error("line {line} cannot be read: {source}")]
+    Read {
+        /// The line.
+        line: u64,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// Nothing to check.
+    #[error("there are no vectors in it: one JSON object a line was expected")]
+    Empty,
+}
+
+/// What a single line turned out not to be.
+#[derive(Clone, Eq, PartialEq, Debug, Error)]
+pub enum LineError {
+    /// The engine does something else.
+    #[error(transparent)]
+    Disagrees(#[from] Disagreement),
+    /// The line is no vector.
+    #[error("{0}")]
+    Unreadable(String),
+}
+
+/// Checks all lines, one at a time, until the first that does not agree. `progress` is told the number of bytes of each line read. Empty
+/// lines are passed over.
+pub fn check(mut input: impl BufRead, mut progress: impl FnMut(u64)) -> Report {
+    let mut agreed = Agreed::default();
+    let mut bytes = Vec::new();
+    for line in 1u64.. {
+        bytes.clear();
+        let read = (&mut input)
+            .take(MAX_LINE_BYTES + 1)
+            .read_until(b'\n', &mut bytes);
+        let failure = match read {
+            Ok(0) => {
+                let failure = (agreed.vectors() == 0).then_some(Failure::Empty);
+                return Report { agreed, failure };
+            }
+            Ok(read) if read as u64 > MAX_LINE_BYTES => Failure::Unreadable {
+                line,
+                reason: format!("it is longer than {MAX_LINE_BYTES} bytes"),
+            },
+            Ok(_) if bytes.iter().all(u8::is_ascii_whitespace) => continue,
+            Ok(read) => match check_line(&bytes, &mut agreed) {
+                Ok(()) => {
+                    progress(read as u64);
+                    continue;
+                }
+                Err(LineError::Disagrees(disagreement)) => {
+                    Failure::Disagrees { line, disagreement }
+                }
+                Err(LineError::Unreadable(reason)) => Failure::Unreadable { line, reason },
+            },
+            Err(source) => Failure::Read { line, source },
+        };
+        return Report {
+            agreed,
+            failure: Some(failure),
+        };
+    }
+    unreachable!("a file has fewer than 2^64 lines")
+}
+
+/// Checks one line and counts it if it agrees. Its keys say whether it is a deal or a game.
+///
+/// # Errors
+/// If it is no vector, or the engine does something else.
+pub fn check_line(line: &[u8], agreed: &mut Agreed) -> Result<(), LineError> {
+    let value: Value = serde_json::from_slice(line)
+        .map_err(|error| LineError::Unreadable(format!("it is no JSON: {error}")))?;
+    if value.get("steps").is_some() {
+        agreed.steps += game::check(parse(value)?)?;
+        agreed.games += 1;
+    } else if value.get("hands").is_some() {
+        deal::check(&parse(value)?)?;
+        agreed.deals += 1;
+    } else {
+        return Err(LineError::Unreadable(
+            "it is neither a game (rules, seed, steps, shifts, scores, winner) nor a deal (rules, seed, shift, hands, leader)"
+                .to_owned(),
+        ));
+    }
+    Ok(())
+}
+
+fn parse<T: serde::de::DeserializeOwned>(value: Value) -> Result<T, LineError> {
+    serde_json::from_value(value).map_err(unreadable)
+}
+
+fn unreadable(error: impl std::fmt::Display) -> LineError {
+    LineError::Unreadable(error.to_string())
+}

@@ -1,0 +1,144 @@
+//! `chefshat simulate`: a batch of offline games on all cores, and what it adds up to. How the result is written is in `report`; the games
+//! are played by `chefshat-arena`.
+
+mod report;
+
+use std::io::Write as _;
+use std::num::{NonZeroU32, NonZeroUsize};
+use std::process::ExitCode;
+use std::time::Instant;
+
+use chefshat_arena::{AgentKind, Batch, BatchTable};
+use chefshat_engine::{RewardScheme, RuleSet};
+use chefshat_records::convert::FieldProblem;
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::CommandError;
+use super::rules_args::RulesArgs;
+
+const EXAMPLES: &str = "\
+Examples:
+  chefshat simulate --games 2000 --seed 7
+  chefshat simulate --games 500 --agents greedy,random_unmasked,random --players 3 --reward validity
+  chefshat simulate --games 10000 --preset original2020 --no-exchange --no-special-actions --json
+
+The same seed gives the same output, on any number of threads.";
+
+/// Play many games offline, on all cores, and print what they add up to.
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Simulate {
+    /// Games to play.
+    #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..))]
+    games: u64,
+    /// The number that all chance is drawn from.
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// The agent on each seat, from seat 0, separated by commas. Standard: greedy on seat 0, random on the others.
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = agents())]
+    agents: Vec<AgentKind>,
+    /// Reward the turns by this scheme and print each seat's mean reward.
+    #[arg(long, value_name = "SCHEME", value_parser = schemes())]
+    reward: Option<RewardScheme>,
+    /// Take the default decision after so many invalid answers to one decision. Standard: ask again without end.
+    #[arg(long, value_name = "N")]
+    max_invalid_attempts: Option<NonZeroU32>,
+    /// Threads to play on. Standard: one for each core.
+    #[arg(long, value_name = "N")]
+    threads: Option<NonZeroUsize>,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    rules: RulesArgs,
+    /// Short for --exchange off.
+    #[arg(long, conflicts_with = "exchange", help_heading = "Rules")]
+    no_exchange: bool,
+    /// Short for --special-actions off.
+    #[arg(long, conflicts_with = "special_actions", help_heading = "Rules")]
+    no_special_actions: bool,
+}
+
+fn agents() -> impl TypedValueParser<Value = AgentKind> {
+    PossibleValuesParser::new(AgentKind::ALL.map(AgentKind::name))
+        .map(|name| AgentKind::from_name(&name).expect("the possible values are the names"))
+}
+
+fn schemes() -> impl TypedValueParser<Value = RewardScheme> {
+    PossibleValuesParser::new(RewardScheme::ALL.map(RewardScheme::name))
+        .map(|name| RewardScheme::from_name(&name).expect("the possible values are the names"))
+}
+
+impl Simulate {
+    pub(super) fn run(self) -> Result<ExitCode, CommandError> {
+        let batch = self.batch()?;
+        let mut pool = rayon::ThreadPoolBuilder::new();
+        if let Some(threads) = self.threads {
+            pool = pool.num_threads(threads.get());
+        }
+        let pool = pool.build()?;
+        let bar = ProgressBar::new(batch.games()).with_style(ProgressStyle::with_template(
+            "{bar:40} {human_pos} of {human_len} games, {eta} left",
+        )?);
+        let start = Instant::now();
+        let table = pool.install(|| batch.run(|games| bar.inc(games)));
+        bar.finish_and_clear();
+        if !bar.is_hidden() {
+            say_speed(&table, start.elapsed().as_secs_f64());
+        }
+        let mut out = anstream::stdout().lock();
+        if self.json {
+            writeln!(out, "{}", report::json(&batch, &table))?;
+        } else {
+            write!(out, "{}", report::text(&batch, &table))?;
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+
+    /// What is to be played.
+    fn batch(&self) -> Result<Batch, CommandError> {
+        let rules = self.rule_set().map_err(|problem| {
+            let flag = problem.field.replace('_', "-");
+            format!("--{flag}: {}", problem.message)
+        })?;
+        let players = rules.players();
+        let agents = if self.agents.is_empty() {
+            let mut agents = vec![AgentKind::Random; players];
+            agents[0] = AgentKind::Greedy;
+            agents
+        } else {
+            self.agents.clone()
+        };
+        let mut batch = Batch::new(rules, &agents, self.games, self.seed).map_err(|error| {
+            let example = vec!["random"; players].join(",");
+            format!("--agents: {error}, for instance --agents {example}, or change --players")
+        })?;
+        if let Some(scheme) = self.reward {
+            batch = batch.with_rewards(scheme);
+        }
+        if let Some(attempts) = self.max_invalid_attempts {
+            batch = batch.with_max_invalid_attempts(attempts);
+        }
+        Ok(batch)
+    }
+
+    fn rule_set(&self) -> Result<RuleSet, FieldProblem> {
+        let mut spec = self.rules.rules()?.spec();
+        spec.exchange &= !self.no_exchange;
+        spec.special_actions &= !self.no_special_actions;
+        spec.validate()
+            .map_err(|error| FieldProblem::new(error.field(), error.to_string()))
+    }
+}
+
+/// For people who watch: to standard error, because it is never the same twice.
+fn say_speed(table: &BatchTable, seconds: f64) {
+    let answers = table.decisions + table.seats.values().map(|seat| seat.wrong).sum::<u64>();
+    eprintln!(
+        "{} answers of agents in {seconds:.1} s, {:.1} million a second",
+        report::grouped(answers),
+        answers as f64 / seconds / 1e6
+    );
+}

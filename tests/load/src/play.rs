@@ -1,0 +1,361 @@
+//! The load on the game server: a client of its own, as small as one can be. Each stream is a task that decodes what comes, picks a
+//! random set bit of each mask, and answers all updates of one response in one request. `host` makes the rooms.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use chefshat_proto::v1::{
+    self, game_event::Kind, play_service_client::PlayServiceClient, seat_command::Command,
+    seat_update::Update,
+};
+use prost::Message as _;
+use rand::rngs::SmallRng;
+use rand::{RngExt as _, SeedableRng as _};
+use tokio::sync::{mpsc, oneshot};
+use tokio::task::JoinSet;
+use tokio_stream::wrappers::ReceiverStream;
+use tonic::Streaming;
+use tonic::transport::Endpoint;
+
+use crate::error::LoadError;
+use crate::host::Host;
+use crate::options::SEATS;
+use crate::pulse::{Latencies, Plan, Pulse, Window, latencies};
+use crate::tally::{Counts, Traffic};
+
+/// Requests that wait for one stream.
+const REQUESTS: usize = 1_024;
+/// How long the last games may take to end, and the streams to close.
+const END_LIMIT: Duration = Duration::from_secs(300);
+
+/// What a segment on the game server showed.
+#[derive(Debug)]
+pub(crate) struct Played {
+    /// The window.
+    pub(crate) window: Window,
+    /// Decision times as the server measured them, microseconds: from handing a request to its transport to the answer's arrival.
+    pub(crate) server_us: Latencies,
+    /// From sending an answer to the arrival of the room's next decision, at whichever stream, nanoseconds.
+    pub(crate) client_ns: Latencies,
+    /// What all of the segment amounted to, checked.
+    pub(crate) counts: Counts,
+    /// The weight of messages, if it was asked for.
+    pub(crate) traffic: Traffic,
+}
+
+/// Plays rooms on a server until the window has closed and every game has ended.
+pub(crate) async fn segment(
+    url: &str,
+    server: Option<u32>,
+    plan: &Plan,
+) -> Result<Played, LoadError> {
+    let endpoint = Endpoint::from_shared(url.to_owned())?.tcp_nodelay(true);
+    let pulse = Arc::new(Pulse::new(plan.rooms));
+    let (over, ended) = mpsc::unbounded_channel();
+    let mut senders = Vec::with_capacity(plan.streams);
+    let mut streams = JoinSet::new();
+    for number in 0..plan.streams {
+        let (requests, waiting) = mpsc::channel(REQUESTS);
+        let mut client = PlayServiceClient::new(endpoint.connect().await?);
+        let inbound = client
+            .play(ReceiverStream::new(waiting))
+            .await?
+            .into_inner();
+        let stream = Stream {
+            requests: requests.downgrade(),
+            over: over.clone(),
+            pulse: Arc::clone(&pulse),
+            slots: Vec::new(),
+            random: SmallRng::seed_from_u64(plan.seed.wrapping_add(number as u64)),
+            weigh: plan.weigh,
+            tally: Tally::default(),
+        };
+        senders.push(requests);
+        streams.spawn(stream.run(inbound));
+    }
+    drop(over);
+    let host = Host::new(endpoint.connect().await?, plan.clone(), senders, ended);
+    let (ready, all_rooms_made) = oneshot::channel();
+    let mut host = tokio::spawn(host.run(Arc::clone(&pulse), ready));
+
+    // A stream or the host that ends before its time has failed.
+    let measuring = async {
+        // If the host fails, its end is what is reported.
+        let _ = all_rooms_made.await;
+        pulse.measure(plan, server).await
+    };
+    let window = tokio::select! {
+        window = measuring => window?,
+        early = streams.join_next() => return Err(early_end(early)),
+        early = &mut host => return Err(early_end(Some(early))),
+    };
+    pulse.stop();
+    let (games, senders) = tokio::select! {
+        () = tokio::time::sleep(END_LIMIT) => return Err(LoadError::Stuck("the last games")),
+        early = streams.join_next() => return Err(early_end(early)),
+        hosted = &mut host => hosted.expect("the host does not panic")?,
+    };
+    // Half-closes the streams, whose tasks hold no sender of their own.
+    drop(senders);
+    let mut sum = Tally::default();
+    let closing = async {
+        while let Some(stream) = streams.join_next().await {
+            sum.add(stream.expect("a stream's task does not panic")?);
+        }
+        Ok::<_, LoadError>(())
+    };
+    tokio::time::timeout(END_LIMIT, closing)
+        .await
+        .map_err(|_| LoadError::Stuck("the streams"))??;
+    sum.counts
+        .check(games, pulse.decisions(), window.decisions)?;
+    Ok(Played {
+        window,
+        server_us: sum.server_us,
+        client_ns: sum.client_ns,
+        counts: sum.counts,
+        traffic: sum.traffic,
+    })
+}
+
+/// Why a task ended before its time.
+fn early_end<T>(end: Option<Result<Result<T, LoadError>, tokio::task::JoinError>>) -> LoadError {
+    match end {
+        Some(Ok(Err(error))) => error,
+        Some(Err(error)) => LoadError::Protocol(error.to_string()),
+        _ => LoadError::Protocol("a stream ended in mid-game".into()),
+    }
+}
+
+/// A seat behind a handle: its room, and its number in the room in the order of joining.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Slot {
+    /// The room.
+    pub(crate) room: usize,
+    /// The seat, in the order of joining. The first counts the room's events.
+    pub(crate) seat: usize,
+}
+
+impl Slot {
+    /// As the request id of an attachment, which is never 0.
+    pub(crate) fn request_id(self) -> u32 {
+        u32::try_from(self.room * SEATS + self.seat + 1).expect("rooms are bounded")
+    }
+
+    fn from_request_id(id: u32) -> Option<Self> {
+        let index = usize::try_from(id).ok()?.checked_sub(1)?;
+        Some(Self {
+            room: index / SEATS,
+            seat: index % SEATS,
+        })
+    }
+}
+
+/// What one stream saw, or all.
+#[derive(Debug)]
+struct Tally {
+    counts: Counts,
+    traffic: Traffic,
+    server_us: Latencies,
+    client_ns: Latencies,
+}
+
+impl Default for Tally {
+    fn default() -> Self {
+        Self {
+            counts: Counts::default(),
+            traffic: Traffic::default(),
+            server_us: latencies(),
+            client_ns: latencies(),
+        }
+    }
+}
+
+impl Tally {
+    fn add(&mut self, other: Self) {
+        self.counts.add(&other.counts);
+        self.traffic.add(&other.traffic);
+        self.server_us += other.server_us;
+        self.client_ns += other.client_ns;
+    }
+}
+
+/// One stream of seats.
+struct Stream {
+    /// Weak, so that the stream ends when the segment lets go of its sender.
+    requests: mpsc::WeakSender<v1::PlayRequest>,
+    /// Told of each seat whose game is over, by its room.
+    over: mpsc::UnboundedSender<usize>,
+    pulse: Arc<Pulse>,
+    /// Index = handle.
+    slots: Vec<Option<Slot>>,
+    random: SmallRng,
+    weigh: bool,
+    tally: Tally,
+}
+
+impl Stream {
+    async fn run(mut self, mut inbound: Streaming<v1::PlayResponse>) -> Result<Tally, LoadError> {
+        while let Some(response) = inbound.message().await? {
+            if self.weigh {
+                self.tally.traffic.received(response.encoded_len());
+            }
+            let mut commands = Vec::with_capacity(response.updates.len());
+            for update in response.updates {
+                let handle = update.handle;
+                if let Some(answer) = self.take(handle, update.update)? {
+                    commands.push(v1::SeatCommand {
+                        handle,
+                        command: Some(Command::Answer(answer)),
+                    });
+                }
+            }
+            if commands.is_empty() {
+                continue;
+            }
+            let request = v1::PlayRequest { commands };
+            if self.weigh {
+                self.tally.traffic.sent(request.encoded_len());
+            }
+            let requests = self
+                .requests
+                .upgrade()
+                .ok_or_else(|| LoadError::Protocol("asked after the last game had ended".into()))?;
+            // A stream that is gone says why when it is read.
+            let _ = requests.send(request).await;
+        }
+        Ok(self.tally)
+    }
+
+    /// Takes one update; an answer if it asks for one.
+    fn take(
+        &mut self,
+        handle: u32,
+        update: Option<Update>,
+    ) -> Result<Option<v1::Answer>, LoadError> {
+        if let Some(Update::Attached(attached)) = &update {
+            let index = handle as usize;
+            if index >= self.slots.len() {
+                self.slots.resize(index + 1, None);
+            }
+            self.slots[index] = Slot::from_request_id(attached.request_id);
+            return Ok(None);
+        }
+        if let Some(Update::Refused(refused)) = update {
+            return Err(LoadError::Protocol(format!(
+                "{}: {}",
+                refused.reason, refused.message
+            )));
+        }
+        let slot = self.slots.get(handle as usize).copied().flatten();
+        let slot = slot
+            .ok_or_else(|| LoadError::Protocol(format!("handle {handle} was never announced")))?;
+        match update {
+            Some(Update::Decision(decision)) => return self.decide(slot, &decision).map(Some),
+            Some(Update::Result(result)) => self.acknowledge(&result)?,
+            Some(Update::Events(batch)) => self.follow(slot, &batch)?,
+            Some(Update::Detached(detached)) => {
+                if detached.reason() != v1::DetachReason::GameOver {
+                    let reason = detached.reason().as_str_name();
+                    return Err(LoadError::Protocol(format!(
+                        "a seat was detached: {reason}"
+                    )));
+                }
+                self.slots[handle as usize] = None;
+                self.tally.counts.detached += 1;
+                // The host is gone only when the segment has failed already.
+                let _ = self.over.send(slot.room);
+            }
+            other => {
+                return Err(LoadError::Protocol(format!("nobody asked for {other:?}")));
+            }
+        }
+        Ok(None)
+    }
+
+    fn decide(
+        &mut self,
+        slot: Slot,
+        decision: &v1::DecisionRequest,
+    ) -> Result<v1::Answer, LoadError> {
+        self.pulse.asked(slot.room, &mut self.tally.client_ns);
+        let action = self
+            .pick(&decision.action_mask)
+            .ok_or_else(|| LoadError::Protocol("a decision without a legal action".into()))?;
+        self.tally.counts.answers += 1;
+        if decision.kind() == v1::DecisionKind::Turn {
+            self.tally.counts.turn_answers += 1;
+        }
+        self.pulse.answer(slot.room);
+        Ok(v1::Answer {
+            decision_id: decision.decision_id,
+            action,
+            annotations: None,
+        })
+    }
+
+    /// Any set bit, each as likely as the others.
+    fn pick(&mut self, mask: &[u8]) -> Option<u32> {
+        let legal: u32 = mask.iter().map(|byte| byte.count_ones()).sum();
+        let mut left = (legal > 0).then(|| self.random.random_range(0..legal))?;
+        for (index, &byte) in (0u32..).zip(mask) {
+            let ones = byte.count_ones();
+            if left < ones {
+                let mut rest = byte;
+                for _ in 0..left {
+                    rest &= rest - 1;
+                }
+                return Some(8 * index + rest.trailing_zeros());
+            }
+            left -= ones;
+        }
+        None
+    }
+
+    fn acknowledge(&mut self, result: &v1::AnswerResult) -> Result<(), LoadError> {
+        if result.status() != v1::AnswerStatus::Accepted {
+            return Err(LoadError::Protocol(format!(
+                "a legal answer met {result:?}"
+            )));
+        }
+        self.tally.counts.accepted += 1;
+        if self.pulse.is_open() {
+            self.tally
+                .server_us
+                .saturating_record(result.decision_time_us);
+        }
+        Ok(())
+    }
+
+    /// Counts what happened in a room: its first seat for all of them, the end of the game each for itself.
+    fn follow(&mut self, slot: Slot, batch: &v1::EventBatch) -> Result<(), LoadError> {
+        let first = slot.seat == 0;
+        for event in &batch.events {
+            let source = match &event.kind {
+                Some(Kind::Play(play)) => play.source(),
+                Some(Kind::Pass(pass)) => pass.source(),
+                Some(Kind::ShiftEnded(_)) => {
+                    self.tally.counts.shifts += u64::from(first);
+                    continue;
+                }
+                Some(Kind::GameEnded(_)) => {
+                    self.tally.counts.game_ends += 1;
+                    continue;
+                }
+                Some(Kind::GameAborted(aborted)) => {
+                    let reason = aborted.reason().as_str_name();
+                    return Err(LoadError::Protocol(format!("a game was aborted: {reason}")));
+                }
+                _ => continue,
+            };
+            if source != v1::DecisionSource::Agent {
+                return Err(LoadError::Protocol(format!(
+                    "a turn was decided otherwise than by its agent: {}",
+                    source.as_str_name()
+                )));
+            }
+            self.tally.counts.turn_events += u64::from(first);
+        }
+        Ok(())
+    }
+}

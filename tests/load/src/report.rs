@@ -1,0 +1,347 @@
+//! What is printed: figures from outcomes, as JSON and as tables. Figures of a scenario are medians of its rounds; ratios are medians of
+//! the ratios of each round's pair.
+
+use comfy_table::{CellAlignment, Table, presets};
+use serde::Serialize;
+
+use crate::options::Load;
+use crate::pulse::{Latencies, Window};
+use crate::scenario::{Outcome, Purpose, Round};
+use crate::tally::{Counts, Traffic};
+
+/// The least of the bare room's throughput the server is to reach.
+const GOAL_THROUGHPUT: f64 = 0.90;
+/// The most of the bare room's CPU time for a decision the server may take.
+const GOAL_CPU: f64 = 1.15;
+/// How many times the throughput of connections apart a shared connection is to reach.
+const GOAL_SHARED: f64 = 2.0;
+/// The most memory a seat may take, KiB.
+const GOAL_KIB: f64 = 100.0;
+
+/// A whole run.
+#[derive(Debug, Serialize)]
+pub(crate) struct Report {
+    pinned: bool,
+    records_written: bool,
+    seconds: f64,
+    scenarios: Vec<Figures>,
+    goals: Vec<Goal>,
+}
+
+/// A scenario.
+#[derive(Debug, Serialize)]
+struct Figures {
+    name: String,
+    rooms: usize,
+    seats: usize,
+    connections: usize,
+    rounds: usize,
+    server: Side,
+    /// Decision times as the server measures them: from handing a request to the transport to the arrival of the answer.
+    decision_time_us: Quantiles,
+    bare: Option<Side>,
+    throughput_ratio: Option<Spread>,
+    server_cpu_ratio: Option<Spread>,
+    memory_per_seat_kib: Option<f64>,
+    bytes_per_decision: PerDecision,
+    messages: Traffic,
+    checked: Counts,
+    bare_answers: u64,
+}
+
+/// One side of a comparison.
+#[derive(Debug, Serialize)]
+struct Side {
+    decisions_per_second: f64,
+    server_cpu_us_per_decision: Option<f64>,
+    client_cpu_us_per_decision: f64,
+    /// From sending an answer to the arrival of the room's next decision, at whichever stream.
+    response_time_us: Quantiles,
+    decisions_in_windows: u64,
+}
+
+#[derive(Debug, Serialize)]
+struct PerDecision {
+    request: f64,
+    response: f64,
+    response_messages: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct Quantiles {
+    p50: f64,
+    p99: f64,
+}
+
+/// A figure over the rounds.
+#[derive(Debug, Clone, Copy, Serialize)]
+struct Spread {
+    median: f64,
+    least: f64,
+    most: f64,
+}
+
+/// Something aimed at.
+#[derive(Debug, Serialize)]
+struct Goal {
+    what: String,
+    aim: String,
+    reached: f64,
+    met: bool,
+}
+
+impl Report {
+    /// The report of outcomes.
+    pub(crate) fn new(load: &Load, outcomes: &[Outcome]) -> Self {
+        let scenarios: Vec<Figures> = outcomes.iter().map(Figures::new).collect();
+        Self {
+            pinned: load.place.pin,
+            records_written: false,
+            seconds: load.seconds.as_secs_f64(),
+            goals: goals(outcomes, &scenarios),
+            scenarios,
+        }
+    }
+
+    /// As tables for people.
+    pub(crate) fn to_text(&self) -> String {
+        let mut text = String::new();
+        for figures in &self.scenarios {
+            text.push_str(&figures.to_text());
+            text.push('\n');
+        }
+        if !self.goals.is_empty() {
+            let mut table = new_table(&["goal", "aim", "reached", ""]);
+            for goal in &self.goals {
+                let met = if goal.met { "met" } else { "missed" };
+                table.add_row([
+                    goal.what.clone(),
+                    goal.aim.clone(),
+                    format!("{:.2}", goal.reached),
+                    met.to_owned(),
+                ]);
+            }
+            text.push_str(&format!("{table}\n"));
+        }
+        text.push_str(
+            "No records are written. Times are of this machine; ratios are what compares.\n",
+        );
+        text
+    }
+}
+
+impl Figures {
+    fn new(outcome: &Outcome) -> Self {
+        let scenario = &outcome.scenario;
+        let windows = |of: fn(&Round) -> Option<Window>| -> Vec<Window> {
+            outcome.rounds.iter().filter_map(of).collect()
+        };
+        let bare = windows(|round| round.bare);
+        let ratio = |of: fn(&Window) -> Option<f64>| {
+            Spread::of(outcome.rounds.iter().filter_map(|round| {
+                let bare = of(round.bare.as_ref()?)?;
+                Some(of(&round.server)? / bare).filter(|ratio| ratio.is_finite())
+            }))
+        };
+        let weighed = outcome.weighed_decisions as f64;
+        Self {
+            name: scenario.name(),
+            rooms: scenario.rooms,
+            seats: scenario.seats(),
+            connections: scenario.streams,
+            rounds: outcome.rounds.len(),
+            server: Side::new(&windows(|round| Some(round.server)), &outcome.client_ns),
+            decision_time_us: Quantiles::of(&outcome.server_us, 1.0),
+            throughput_ratio: ratio(|window| Some(rate(window))),
+            server_cpu_ratio: ratio(server_cpu_us),
+            bare: (!bare.is_empty()).then(|| Side::new(&bare, &outcome.bare_ns)),
+            memory_per_seat_kib: median(
+                outcome
+                    .rounds
+                    .iter()
+                    .filter_map(|round| round.bytes_per_seat),
+            )
+            .map(|bytes| bytes / 1024.0),
+            bytes_per_decision: PerDecision {
+                request: outcome.traffic.request_bytes as f64 / weighed,
+                response: outcome.traffic.response_bytes as f64 / weighed,
+                response_messages: outcome.traffic.responses as f64 / weighed,
+            },
+            messages: outcome.traffic,
+            checked: outcome.counts.clone(),
+            bare_answers: outcome.bare_answers,
+        }
+    }
+
+    fn to_text(&self) -> String {
+        let mut table = new_table(&[
+            "",
+            "decisions/s",
+            "server CPU µs",
+            "client CPU µs",
+            "response p50 µs",
+            "p99 µs",
+        ]);
+        let mut row = |name: &str, side: &Side| {
+            table.add_row([
+                name.to_owned(),
+                format!("{:.0}", side.decisions_per_second),
+                side.server_cpu_us_per_decision
+                    .map_or_else(|| "-".into(), |us| format!("{us:.2}")),
+                format!("{:.2}", side.client_cpu_us_per_decision),
+                format!("{:.0}", side.response_time_us.p50),
+                format!("{:.0}", side.response_time_us.p99),
+            ]);
+        };
+        row("server", &self.server);
+        if let Some(bare) = &self.bare {
+            row("bare room", bare);
+        }
+        if let (Some(throughput), Some(cpu)) = (self.throughput_ratio, self.server_cpu_ratio) {
+            table.add_row(["ratio".into(), throughput.to_string(), cpu.to_string()]);
+        }
+        let memory = self.memory_per_seat_kib.map_or_else(String::new, |kib| {
+            format!("; {kib:.0} KiB of memory per seat")
+        });
+        format!(
+            "{}, {} rounds\n{table}\ndecision time by the server's clock: p50 {:.0} µs, p99 {:.0} µs{memory}\n\
+             bytes per decision: {:.0} to the server, {:.0} from it in {:.2} messages; checked: {} games, {} decisions\n",
+            self.name,
+            self.rounds,
+            self.decision_time_us.p50,
+            self.decision_time_us.p99,
+            self.bytes_per_decision.request,
+            self.bytes_per_decision.response,
+            self.bytes_per_decision.response_messages,
+            self.checked.games,
+            self.checked.accepted,
+        )
+    }
+}
+
+impl Side {
+    fn new(windows: &[Window], response_ns: &Latencies) -> Self {
+        Self {
+            decisions_per_second: median(windows.iter().map(rate)).unwrap_or_default(),
+            server_cpu_us_per_decision: median(windows.iter().filter_map(server_cpu_us)),
+            client_cpu_us_per_decision: median(windows.iter().map(client_cpu_us))
+                .unwrap_or_default(),
+            response_time_us: Quantiles::of(response_ns, 1_000.0),
+            decisions_in_windows: windows.iter().map(|window| window.decisions).sum(),
+        }
+    }
+}
+
+impl Quantiles {
+    fn of(latencies: &Latencies, per_us: f64) -> Self {
+        let at = |quantile| latencies.value_at_quantile(quantile) as f64 / per_us;
+        Self {
+            p50: at(0.50),
+            p99: at(0.99),
+        }
+    }
+}
+
+impl Spread {
+    fn of(values: impl Iterator<Item = f64>) -> Option<Self> {
+        let values: Vec<f64> = values.collect();
+        Some(Self {
+            median: median(values.iter().copied())?,
+            least: values.iter().copied().fold(f64::INFINITY, f64::min),
+            most: values.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+        })
+    }
+}
+
+impl std::fmt::Display for Spread {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(
+            formatter,
+            "{:.3} ({:.2}-{:.2})",
+            self.median, self.least, self.most
+        )
+    }
+}
+
+/// How the scenarios stand to what is aimed at.
+fn goals(outcomes: &[Outcome], scenarios: &[Figures]) -> Vec<Goal> {
+    let mut goals = Vec::new();
+    let with = |purpose| {
+        outcomes
+            .iter()
+            .zip(scenarios)
+            .filter(move |(outcome, _)| outcome.scenario.purpose == purpose)
+            .map(|(_, figures)| figures)
+    };
+    for figures in with(Purpose::Apart) {
+        if let Some(throughput) = figures.throughput_ratio {
+            goals.push(Goal {
+                what: format!("throughput to bare, {}", figures.name),
+                aim: format!(">= {GOAL_THROUGHPUT:.2}"),
+                reached: throughput.median,
+                met: throughput.median >= GOAL_THROUGHPUT,
+            });
+        }
+        if let Some(cpu) = figures.server_cpu_ratio {
+            goals.push(Goal {
+                what: format!("server CPU to bare, {}", figures.name),
+                aim: format!("<= {GOAL_CPU:.2}"),
+                reached: cpu.median,
+                met: cpu.median <= GOAL_CPU,
+            });
+        }
+    }
+    for shared in with(Purpose::Shared) {
+        if let Some(apart) = with(Purpose::Apart).find(|apart| apart.seats == shared.seats) {
+            let times = shared.server.decisions_per_second / apart.server.decisions_per_second;
+            goals.push(Goal {
+                what: "throughput of one shared connection to connections apart".into(),
+                aim: format!(">= {GOAL_SHARED:.2}"),
+                reached: times,
+                met: times >= GOAL_SHARED,
+            });
+        }
+    }
+    for figures in with(Purpose::Memory) {
+        if let Some(kib) = figures.memory_per_seat_kib {
+            goals.push(Goal {
+                what: format!("KiB of memory per seat, {}", figures.name),
+                aim: format!("<= {GOAL_KIB:.0}"),
+                reached: kib,
+                met: kib <= GOAL_KIB,
+            });
+        }
+    }
+    goals
+}
+
+fn rate(window: &Window) -> f64 {
+    window.decisions as f64 / window.elapsed.as_secs_f64()
+}
+
+fn server_cpu_us(window: &Window) -> Option<f64> {
+    let cpu = window.server_cpu?;
+    Some(cpu.as_secs_f64() * 1e6 / window.decisions as f64)
+}
+
+fn client_cpu_us(window: &Window) -> f64 {
+    window.client_cpu.as_secs_f64() * 1e6 / window.decisions as f64
+}
+
+fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    let upper = *values.get(values.len() / 2)?;
+    let lower = values[(values.len() - 1) / 2];
+    Some(f64::midpoint(lower, upper))
+}
+
+fn new_table(header: &[&str]) -> Table {
+    let mut table = Table::new();
+    table.load_style(presets::UTF8_BORDERS_ONLY);
+    table.set_header(header.iter().copied());
+    for column in table.column_iter_mut().skip(1) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    table
+}

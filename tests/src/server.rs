@@ -1,0 +1,143 @@
+//! A server in this process, on a free port of the loopback interface.
+
+use std::net::SocketAddr;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+use chefshat_client::Client;
+use chefshat_proto::v1;
+use chefshat_server::config::ServerConfig;
+use chefshat_server::serve::{ServeError, serve};
+use chefshat_server::store::{MemoryStore, Store};
+use tempfile::TempDir;
+use tokio::net::TcpListener;
+use tokio::sync::oneshot;
+use tokio::task::JoinHandle;
+use tonic::transport::Channel;
+
+/// A server that runs until it is stopped or dropped.
+#[derive(Debug)]
+pub struct TestServer {
+    /// Where it listens.
+    pub address: SocketAddr,
+    data: TempDir,
+    stop: Option<oneshot::Sender<()>>,
+    serving: JoinHandle<Result<(), ServeError>>,
+}
+
+impl TestServer {
+    /// A server with a memory store and records in a folder of its own.
+    pub async fn start() -> Self {
+        Self::with(|_| {}, Arc::new(MemoryStore::default())).await
+    }
+
+    /// A server configured by `configure`, with a store of the test's choice.
+    pub async fn with(configure: impl FnOnce(&mut ServerConfig), store: Arc<dyn Store>) -> Self {
+        let data = tempfile::tempdir().expect("a temporary folder");
+        let listener = TcpListener::bind("127.0.0.1:0")
+            .await
+            .expect("a free port");
+        let address = listener.local_addr().expect("a bound socket has an address");
+        let mut config = ServerConfig {
+            data_dir: Some(data.path().to_path_buf()),
+            grace: Duration::ZERO,
+            ..ServerConfig::default()
+        };
+        configure(&mut config);
+        let (stop, stopped) = oneshot::channel::<()>();
+        let serving = tokio::spawn(async move {
+            serve(listener, config, store, async {
+                let _ = stopped.await;
+            })
+            .await
+        });
+        Self {
+            address,
+            data,
+            stop: Some(stop),
+            serving,
+        }
+    }
+
+    /// Its URL.
+    pub fn url(&self) -> String {
+        format!("http://{}", self.address)
+    }
+
+    /// Its data folder.
+    pub fn data_dir(&self) -> &Path {
+        self.data.path()
+    }
+
+    /// A connection of its own to the server.
+    pub async fn channel(&self) -> Channel {
+        Channel::from_shared(self.url())
+            .expect("a URL")
+            .connect()
+            .await
+            .expect("the server listens")
+    }
+
+    /// An SDK client with a connection of its own.
+    pub async fn client(&self) -> Client {
+        Client::connect(&self.url())
+            .await
+            .expect("the server listens")
+    }
+
+    /// Asks the server to stop.
+    pub fn ask_to_stop(&mut self) {
+        if let Some(stop) = self.stop.take() {
+            stop.send(()).expect("the server is running");
+        }
+    }
+
+    /// Stops the server and waits until it has ended; gives the folder it leaves behind.
+    pub async fn stop(mut self) -> TempDir {
+        self.ask_to_stop();
+        crate::patiently("the server to stop", self.serving)
+            .await
+            .expect("the server does not panic")
+            .expect("the server ends well");
+        self.data
+    }
+}
+
+/// Asks for a game of one Shift.
+pub fn one_shift() -> v1::RuleSet {
+    v1::RuleSet {
+        stop: Some(v1::rule_set::Stop::TargetShifts(1)),
+        ..v1::RuleSet::default()
+    }
+}
+
+/// A room of four open seats with this policy and these rules, and the four tickets in seat order.
+pub async fn room_of_four(
+    client: &Client,
+    rules: v1::RuleSet,
+    policy: v1::RoomPolicy,
+) -> (v1::CreateRoomResponse, Vec<String>) {
+    let created = client
+        .create_room(v1::CreateRoomRequest {
+            rules: Some(rules),
+            policy: Some(policy),
+            ..v1::CreateRoomRequest::default()
+        })
+        .await
+        .expect("the room is made");
+    let mut tickets = Vec::new();
+    for seat in 0..4 {
+        let joined = client
+            .join(v1::JoinRoomRequest {
+                join_code: created.join_code.clone(),
+                name: format!("agent {seat}"),
+                seat: Some(seat),
+                ..v1::JoinRoomRequest::default()
+            })
+            .await
+            .expect("the seat is free");
+        tickets.push(joined.ticket);
+    }
+    (created, tickets)
+}

@@ -1,0 +1,11 @@
+//! Whole-system tests over real sockets: what a participant, a spectator or a stranger can do to a server, and what it makes of it.
+
+mod answers;
+mod connections;
+mod doors;
+mod languages;
+mod rooms;
+mod spectators;
+mod stops;
+mod stranger;
+mod web;

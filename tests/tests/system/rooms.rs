@@ -1,0 +1,303 @@
+//! Making and finding rooms, and the promises about seeds, rewards and records.
+
+use chefshat_client::{Client, RandomAgent};
+use chefshat_engine::RuleSetSpec;
+use chefshat_proto::v1::{self, game_event::Kind, record_line::Line, seat_config::FilledBy};
+use chefshat_records::{jsonl, replay};
+use chefshat_tests::{StreamSeat, TestServer, one_shift, patiently, play_on, room_of_four};
+
+fn built_in(name: &str) -> v1::SeatConfig {
+    v1::SeatConfig {
+        filled_by: Some(FilledBy::BuiltInAgent(name.into())),
+    }
+}
+
+async fn until_over(client: &Client, room_id: &str) -> v1::Room {
+    let mut watching = client.spectate(room_id, 0);
+    while watching.next().await.expect("it can be watched").is_some() {}
+    client.get_room(room_id).await.expect("it is still shown")
+}
+
+#[tokio::test]
+async fn what_makes_no_sense_is_refused_with_the_field() {
+    let server = TestServer::start().await;
+    let client = server.client().await;
+    let rules = |rules| v1::CreateRoomRequest {
+        rules: Some(rules),
+        ..v1::CreateRoomRequest::default()
+    };
+    let policy = |policy| v1::CreateRoomRequest {
+        policy: Some(policy),
+        ..v1::CreateRoomRequest::default()
+    };
+    let cases = [
+        (
+            rules(v1::RuleSet {
+                preset: "house".into(),
+                ..v1::RuleSet::default()
+            }),
+            "RULE_SET_REFUSED",
+            "preset",
+        ),
+        (
+            rules(v1::RuleSet {
+                players: Some(7),
+                ..v1::RuleSet::default()
+            }),
+            "RULE_SET_REFUSED",
+            "players",
+        ),
+        (
+            rules(v1::RuleSet {
+                players: Some(300),
+                ..v1::RuleSet::default()
+            }),
+            "RULE_SET_REFUSED",
+            "players",
+        ),
+        (
+            rules(v1::RuleSet {
+                points: vec![1, 2, 3, 4],
+                ..v1::RuleSet::default()
+            }),
+            "RULE_SET_REFUSED",
+            "points",
+        ),
+        (
+            rules(v1::RuleSet {
+                stop: Some(v1::rule_set::Stop::TargetShifts(1_000_000)),
+                ..v1::RuleSet::default()
+            }),
+            "RULE_SET_REFUSED",
+            "stop",
+        ),
+        (
+            policy(v1::RoomPolicy {
+                decision_time_ms: Some(1),
+                ..v1::RoomPolicy::default()
+            }),
+            "POLICY_REFUSED",
+            "decision_time_ms",
+        ),
+        (
+            policy(v1::RoomPolicy {
+                substitute: "genius".into(),
+                ..v1::RoomPolicy::default()
+            }),
+            "POLICY_REFUSED",
+            "substitute",
+        ),
+        (
+            policy(v1::RoomPolicy {
+                spectators_see_hands: Some(true),
+                ..v1::RoomPolicy::default()
+            }),
+            "POLICY_REFUSED",
+            "spectators_see_hands",
+        ),
+        (
+            v1::CreateRoomRequest {
+                seats: vec![built_in("greedy")],
+                ..v1::CreateRoomRequest::default()
+            },
+            "SEATS_REFUSED",
+            "seats",
+        ),
+        (
+            v1::CreateRoomRequest {
+                game_seed: vec![1, 2, 3],
+                ..v1::CreateRoomRequest::default()
+            },
+            "SEED_REFUSED",
+            "game_seed",
+        ),
+    ];
+    for (request, reason, field) in cases {
+        let error = client
+            .create_room(request.clone())
+            .await
+            .expect_err("it makes no sense");
+        assert_eq!(error.reason(), Some(reason), "{request:?}");
+        assert_eq!(
+            error.metadata().get("field").map(String::as_str),
+            Some(field),
+            "{request:?}"
+        );
+    }
+    let info = client.server_info().await.expect("the server answers");
+    assert_eq!(info.open_rooms, 0, "nothing was made");
+    assert_eq!(info.presets.len(), RuleSetSpec::PRESETS.len());
+}
+
+#[tokio::test]
+async fn rooms_are_listed_by_pages_and_states() {
+    let server = TestServer::start().await;
+    let client = server.client().await;
+    let mut made = Vec::new();
+    for number in 0..5 {
+        let created = client
+            .create_room(v1::CreateRoomRequest {
+                name: format!("room {number}"),
+                ..v1::CreateRoomRequest::default()
+            })
+            .await
+            .expect("the room is made");
+        made.push(created.room.expect("a room").room_id);
+    }
+    let mut listed = Vec::new();
+    let mut page_token = String::new();
+    loop {
+        let page = client
+            .list_rooms(v1::ListRoomsRequest {
+                page_size: 2,
+                page_token,
+                ..v1::ListRoomsRequest::default()
+            })
+            .await
+            .expect("a page");
+        assert!(page.rooms.len() <= 2);
+        listed.extend(page.rooms.into_iter().map(|room| room.room_id));
+        page_token = page.next_page_token;
+        if page_token.is_empty() {
+            break;
+        }
+    }
+    assert_eq!(listed, made);
+    let playing = client
+        .list_rooms(v1::ListRoomsRequest {
+            state: v1::RoomState::Playing.into(),
+            ..v1::ListRoomsRequest::default()
+        })
+        .await
+        .expect("a page");
+    assert!(playing.rooms.is_empty());
+}
+
+#[tokio::test]
+async fn a_room_of_built_in_agents_plays_by_itself_and_a_fixed_seed_repeats() {
+    let server = TestServer::start().await;
+    let client = server.client().await;
+    let mut ends = Vec::new();
+    for _ in 0..2 {
+        let created = client
+            .create_room(v1::CreateRoomRequest {
+                seats: ["greedy", "random", "random_unmasked", "greedy"].map(built_in).into(),
+                game_seed: vec![9; 32],
+                ..v1::CreateRoomRequest::default()
+            })
+            .await
+            .expect("the room is made");
+        let room = created.room.expect("a room");
+        assert!(room.seed_fixed && room.seed_commitment.is_empty());
+        let over = until_over(&client, &room.room_id).await;
+        assert_eq!(over.state(), v1::RoomState::Finished);
+        let record = client.record(&room.game_id).await.expect("the record");
+        ends.push(
+            record
+                .into_iter()
+                .filter_map(|line| match line.line? {
+                    Line::Decision(decision) => Some((decision.seat, decision.action)),
+                    _ => None,
+                })
+                .collect::<Vec<_>>(),
+        );
+    }
+    assert!(ends[0].len() > 50);
+    assert_eq!(ends[0], ends[1]);
+}
+
+#[tokio::test]
+async fn the_record_on_disk_is_the_record_told_and_replays() {
+    let server = TestServer::start().await;
+    let client = server.client().await;
+    let (created, tickets) = room_of_four(
+        &client,
+        v1::RuleSet::default(),
+        v1::RoomPolicy {
+            reward_scheme: v1::RewardScheme::Paper.into(),
+            ..v1::RoomPolicy::default()
+        },
+    )
+    .await;
+    let room = created.room.expect("a room");
+    assert_eq!(room.seed_commitment.len(), 32);
+    let early = client.record(&room.game_id).await.expect_err("not yet");
+    assert_eq!(early.reason(), Some("GAME_UNKNOWN"));
+    let seats = tickets
+        .into_iter()
+        .zip(0..)
+        .map(|(ticket, seed)| (ticket, RandomAgent::new(seed)))
+        .collect::<Vec<_>>();
+    let outcomes = patiently("the game to end", client.play_many(seats)).await;
+    for outcome in outcomes {
+        assert_eq!(outcome.expect("it ended").standings().len(), 4);
+    }
+    let told = client.record(&room.game_id).await.expect("the record");
+    let data = server.stop().await;
+    let kept = jsonl::read(&jsonl::path_of(data.path(), &room.game_id)).expect("it was written");
+    assert_eq!(kept, told);
+    let replayed = replay::replay(&kept).expect("it replays");
+    assert_eq!(replayed.state, v1::RoomState::Finished);
+    assert!(replayed.decisions > 50);
+
+    // A record that was tampered with does not.
+    let mut tampered = kept.clone();
+    let decision = tampered
+        .iter_mut()
+        .find_map(|line| match line.line.as_mut() {
+            Some(Line::Decision(decision)) if decision.action != 199 => Some(decision),
+            _ => None,
+        })
+        .expect("somebody played");
+    decision.action = 199;
+    assert!(replay::replay(&tampered).is_err());
+}
+
+#[tokio::test]
+async fn rewards_are_told_to_their_own_seat_alone() {
+    let server = TestServer::start().await;
+    let client = server.client().await;
+    let (created, tickets) = room_of_four(
+        &client,
+        one_shift(),
+        v1::RoomPolicy {
+            reward_scheme: v1::RewardScheme::Points.into(),
+            ..v1::RoomPolicy::default()
+        },
+    )
+    .await;
+    let mut seats = Vec::new();
+    for ticket in &tickets {
+        seats.push(StreamSeat::attached(server.channel().await, ticket).await);
+    }
+    let mut watching = client.spectate(&created.room.expect("a room").room_id, 0);
+    futures::future::join_all(seats.iter_mut().map(play_on)).await;
+    for (seat, number) in seats.iter().zip(0..) {
+        let mut turns = 0;
+        let mut points = None;
+        for event in &seat.events {
+            assert!(event.rewards.iter().all(|reward| reward.seat == number));
+            match &event.kind {
+                Some(Kind::Play(_) | Kind::Pass(_)) => turns += event.rewards.len(),
+                Some(Kind::ShiftEnded(ended)) => {
+                    let own = usize::try_from(number).expect("small");
+                    points = Some((event.rewards[0].value, ended.points[own]));
+                }
+                Some(Kind::ShiftStarted(started)) => {
+                    assert_eq!(started.hands.len(), 1);
+                    assert_eq!(started.hands[0].seat, number);
+                }
+                _ => assert!(event.rewards.is_empty()),
+            }
+        }
+        assert!(turns > 0);
+        let (reward, points) = points.expect("the Shift ended");
+        assert!((f64::from(reward) - f64::from(points)).abs() < 1e-6);
+    }
+    while let Some(event) = watching.next().await.expect("it can be watched") {
+        assert!(event.rewards.is_empty());
+        if let Some(Kind::ShiftStarted(started)) = &event.kind {
+            assert!(started.hands.is_empty());
+        }
+    }
+}

@@ -1,0 +1,116 @@
+//! Those who watch: live, late, delayed, and not at all.
+
+use chefshat_client::RandomAgent;
+use chefshat_proto::v1::{
+    self, SpectatorServiceWatchRequest, game_event::Kind,
+    spectator_service_client::SpectatorServiceClient,
+};
+use chefshat_tests::{TestServer, one_shift, patiently, room_of_four};
+use tonic::Code;
+use tonic_types::StatusExt as _;
+
+async fn play_out(server: &TestServer, tickets: Vec<String>) {
+    let client = server.client().await;
+    let seats = tickets
+        .into_iter()
+        .zip(0..)
+        .map(|(ticket, seed)| (ticket, RandomAgent::new(seed)))
+        .collect::<Vec<_>>();
+    for outcome in patiently("the game to end", client.play_many(seats)).await {
+        outcome.expect("the game ended");
+    }
+}
+
+#[tokio::test]
+async fn a_spectator_that_stops_reading_is_cut_and_the_game_goes_on() {
+    let server = TestServer::start().await;
+    let client = server.client().await;
+    let rules = v1::RuleSet {
+        stop: Some(v1::rule_set::Stop::TargetShifts(400)),
+        ..v1::RuleSet::default()
+    };
+    let (created, tickets) = room_of_four(&client, rules, v1::RoomPolicy::default()).await;
+    let room_id = created.room.expect("a room").room_id;
+    let mut deaf = SpectatorServiceClient::new(server.channel().await)
+        .watch(SpectatorServiceWatchRequest {
+            room_id,
+            ..SpectatorServiceWatchRequest::default()
+        })
+        .await
+        .expect("it may watch")
+        .into_inner();
+    // It does not read while four hundred Shifts are played.
+    play_out(&server, tickets).await;
+    let mut events = 0;
+    let status = loop {
+        match patiently("the end of the stream", deaf.message()).await {
+            Ok(Some(message)) => events += message.events.len(),
+            Ok(None) => panic!("it saw all {events} events without reading"),
+            Err(status) => break status,
+        }
+    };
+    assert_eq!(status.code(), Code::ResourceExhausted);
+    assert_eq!(
+        status.get_details_error_info().map(|info| info.reason),
+        Some("SPECTATOR_TOO_SLOW".into())
+    );
+}
+
+#[tokio::test]
+async fn spectators_see_everything_public_from_the_event_they_name() {
+    let server = TestServer::start().await;
+    let client = server.client().await;
+    let (created, tickets) =
+        room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
+    let room_id = created.room.expect("a room").room_id;
+    play_out(&server, tickets).await;
+    let mut all = Vec::new();
+    let mut watching = client.spectate(&room_id, 0);
+    while let Some(event) = watching.next().await.expect("it can be watched") {
+        all.push(event);
+    }
+    let numbers: Vec<u64> = all.iter().map(|event| event.sequence).collect();
+    let expected: Vec<u64> = (1..).take(all.len()).collect();
+    assert_eq!(numbers, expected);
+    assert!(matches!(
+        all.last().and_then(|event| event.kind.as_ref()),
+        Some(Kind::GameEnded(_))
+    ));
+    let mut late = client.spectate(&room_id, 20);
+    let first = late.next().await.expect("it can be watched");
+    assert_eq!(first.as_ref(), all.get(19));
+}
+
+#[tokio::test]
+async fn a_policy_can_close_the_door_or_delay() {
+    let server = TestServer::start().await;
+    let client = server.client().await;
+    let watch = |room: v1::CreateRoomResponse, snapshot| {
+        let channel = client.channel();
+        async move {
+            SpectatorServiceClient::new(channel)
+                .watch(SpectatorServiceWatchRequest {
+                    room_id: room.room.expect("a room").room_id,
+                    snapshot,
+                    ..SpectatorServiceWatchRequest::default()
+                })
+                .await
+                .expect_err("it may not")
+                .get_details_error_info()
+                .expect("a reason")
+                .reason
+        }
+    };
+    let policy = v1::RoomPolicy {
+        spectators: Some(false),
+        ..v1::RoomPolicy::default()
+    };
+    let (closed, _) = room_of_four(&client, one_shift(), policy).await;
+    assert_eq!(watch(closed, false).await, "SPECTATORS_NOT_ADMITTED");
+    let policy = v1::RoomPolicy {
+        spectator_delay_decisions: Some(5),
+        ..v1::RoomPolicy::default()
+    };
+    let (delayed, _) = room_of_four(&client, one_shift(), policy).await;
+    assert_eq!(watch(delayed, true).await, "SNAPSHOT_DELAYED");
+}

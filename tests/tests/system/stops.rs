@@ -1,0 +1,164 @@
+//! A server that stops, and a store that fails.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use chefshat_client::RandomAgent;
+use chefshat_proto::v1::{self, game_event::Kind, seat_update::Update};
+use chefshat_server::store::{FailingStore, MemoryStore};
+use chefshat_tests::{
+    StreamSeat, TestServer, first_legal, one_shift, patiently, play_on, room_of_four,
+};
+use tonic_health::pb::health_client::HealthClient;
+use tonic_health::pb::{HealthCheckRequest, health_check_response::ServingStatus};
+
+#[tokio::test]
+async fn a_shutdown_in_mid_game_aborts_it_as_such() {
+    let mut server = TestServer::start().await;
+    let client = server.client().await;
+    let (created, tickets) =
+        room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
+    let game_id = created.room.expect("a room").game_id;
+    let mut seats = Vec::new();
+    for ticket in &tickets {
+        seats.push(StreamSeat::attached(server.channel().await, ticket).await);
+    }
+    server.ask_to_stop();
+    for seat in &mut seats {
+        let reason = loop {
+            match seat.next().await {
+                Update::Detached(detached) => break detached.reason(),
+                Update::Decision(_) | Update::Result(_) => {}
+                other => panic!("unexpected {other:?}"),
+            }
+        };
+        assert_eq!(reason, v1::DetachReason::GameOver);
+        let last = seat.events.last().and_then(|event| event.kind.clone());
+        let Some(Kind::GameAborted(aborted)) = last else {
+            panic!("not aborted, but {last:?}");
+        };
+        assert_eq!(aborted.reason(), v1::AbortReason::Shutdown);
+        assert!(aborted.reveal.is_some(), "the deals can be checked all the same");
+        // The server ends the stream by itself.
+        assert!(seat.next_or_end().await.expect("a clean end").is_none());
+    }
+    let data = server.stop().await;
+    let path = chefshat_records::jsonl::path_of(data.path(), &game_id);
+    let record = chefshat_records::jsonl::read(&path).expect("an aborted game has a record");
+    let replayed = chefshat_records::replay::replay(&record).expect("it replays");
+    assert_eq!(replayed.state, v1::RoomState::Aborted);
+}
+
+#[tokio::test]
+async fn a_running_game_gets_its_grace_and_no_new_rooms_are_made() {
+    let mut server = TestServer::with(
+        |config| config.grace = Duration::from_secs(3600),
+        Arc::new(MemoryStore::default()),
+    )
+    .await;
+    let client = server.client().await;
+    let (_, tickets) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
+    let (waiting, _) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
+    let mut seats = Vec::new();
+    for ticket in &tickets {
+        seats.push(StreamSeat::attached(server.channel().await, ticket).await);
+    }
+    let mut health = HealthClient::new(server.channel().await);
+    let status = health
+        .check(HealthCheckRequest::default())
+        .await
+        .expect("health is answered")
+        .into_inner();
+    assert_eq!(status.status(), ServingStatus::Serving);
+    server.ask_to_stop();
+    // The room that waited is aborted at once; from then on the shutdown is under way.
+    let waiting = waiting.room.expect("a room").room_id;
+    while client
+        .get_room(&waiting)
+        .await
+        .expect("it is still shown")
+        .state()
+        != v1::RoomState::Aborted
+    {
+        tokio::task::yield_now().await;
+    }
+    let refused = client
+        .create_room(v1::CreateRoomRequest::default())
+        .await
+        .expect_err("no new rooms");
+    assert_eq!(refused.reason(), Some("SHUTTING_DOWN"));
+    let status = health
+        .check(HealthCheckRequest::default())
+        .await
+        .expect("health is answered")
+        .into_inner();
+    assert_eq!(status.status(), ServingStatus::NotServing);
+    let reasons = futures::future::join_all(seats.iter_mut().map(play_on)).await;
+    assert_eq!(reasons, [v1::DetachReason::GameOver; 4]);
+    for seat in &seats {
+        let last = seat.events.last().and_then(|event| event.kind.as_ref());
+        assert!(matches!(last, Some(Kind::GameEnded(_))), "played to its end");
+    }
+    server.stop().await;
+}
+
+#[tokio::test]
+async fn a_store_that_fails_stops_its_room_and_tells_nobody_of_the_decision() {
+    // Four joins and the start are kept, then ten decisions; the next is not.
+    let server = TestServer::with(|_| {}, Arc::new(FailingStore::after(15))).await;
+    let client = server.client().await;
+    let (created, tickets) =
+        room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
+    let room_id = created.room.expect("a room").room_id;
+    let mut seats = Vec::new();
+    for ticket in &tickets {
+        seats.push(StreamSeat::attached(server.channel().await, ticket).await);
+    }
+    let ends = futures::future::join_all(seats.iter_mut().map(async |seat| {
+        loop {
+            match seat.next().await {
+                Update::Decision(decision) => {
+                    let action = first_legal(&decision);
+                    seat.answer(decision.decision_id, action).await;
+                }
+                Update::Detached(detached) => return detached.reason(),
+                _ => {}
+            }
+        }
+    }))
+    .await;
+    assert_eq!(ends, [v1::DetachReason::RoomFailed; 4]);
+    for seat in &seats {
+        let turns = seat
+            .events
+            .iter()
+            .filter(|event| matches!(event.kind, Some(Kind::Play(_) | Kind::Pass(_))))
+            .count();
+        assert!(turns <= 10, "{turns} decisions were told, ten were kept");
+    }
+    let gone = loop {
+        match client.get_room(&room_id).await {
+            Err(error) => break error,
+            Ok(_) => tokio::task::yield_now().await,
+        }
+    };
+    assert_eq!(gone.reason(), Some("ROOM_UNKNOWN"));
+    // Nothing else is harmed: the server answers, and stops when it is told to.
+    client.server_info().await.expect("the server answers");
+    drop(seats);
+    patiently("the server to stop", server.stop()).await;
+}
+
+#[tokio::test]
+async fn an_agent_of_the_sdk_hears_of_a_failed_room() {
+    let server = TestServer::with(|_| {}, Arc::new(FailingStore::after(8))).await;
+    let client = server.client().await;
+    let (_, tickets) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
+    let seats = tickets
+        .into_iter()
+        .map(|ticket| (ticket, RandomAgent::new(1)))
+        .collect::<Vec<_>>();
+    for outcome in patiently("the streams to end", client.play_many(seats)).await {
+        outcome.expect_err("there is no result");
+    }
+}

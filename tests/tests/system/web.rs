@@ -1,0 +1,135 @@
+//! What browsers do: gRPC-web over HTTP/1.1, watching on one stream and acting by single calls; and what tools do: reflection.
+
+use std::collections::VecDeque;
+
+use chefshat_proto::v1::{
+    self, play_service_client::PlayServiceClient, room_service_client::RoomServiceClient,
+    seat_update::Update,
+};
+use chefshat_tests::{StreamSeat, TestServer, first_legal, one_shift, patiently, play_on, room_of_four};
+use hyper_util::client::legacy::Client as HttpClient;
+use hyper_util::rt::TokioExecutor;
+use tonic_reflection::pb::v1::server_reflection_client::ServerReflectionClient;
+use tonic_reflection::pb::v1::{
+    ServerReflectionRequest, server_reflection_request::MessageRequest,
+    server_reflection_response::MessageResponse,
+};
+use tonic_web::GrpcWebClientLayer;
+use tower::ServiceBuilder;
+
+#[tokio::test]
+async fn a_seat_plays_over_grpc_web_on_the_same_port() {
+    let server = TestServer::start().await;
+    let client = server.client().await;
+    let (created, tickets) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
+    let mut others = Vec::new();
+    for ticket in &tickets[1..] {
+        others.push(StreamSeat::attached(server.channel().await, ticket).await);
+    }
+    let others = tokio::spawn(async move {
+        futures::future::join_all(others.iter_mut().map(play_on)).await
+    });
+
+    // HTTP/1.1 alone, as browsers speak it to a server without TLS.
+    let http = HttpClient::builder(TokioExecutor::new()).build_http();
+    let web = ServiceBuilder::new()
+        .layer(GrpcWebClientLayer::new())
+        .service(http);
+    let origin: http::Uri = server.url().parse().expect("a URL");
+    let mut rooms = RoomServiceClient::with_origin(web.clone(), origin.clone());
+    let room_id = created.room.expect("a room").room_id;
+    let room = rooms
+        .get_room(v1::GetRoomRequest { room_id })
+        .await
+        .expect("the server answers")
+        .into_inner();
+    assert!(room.room.is_some());
+
+    let mut play = PlayServiceClient::with_origin(web.clone(), origin);
+    let mut updates = play
+        .watch(v1::PlayServiceWatchRequest {
+            seats: vec![v1::Attach {
+                ticket: tickets[0].clone(),
+                ..v1::Attach::default()
+            }],
+        })
+        .await
+        .expect("it may watch")
+        .into_inner();
+    let mut waiting: VecDeque<v1::SeatUpdate> = VecDeque::new();
+    let mut decisions = 0;
+    let mut last_event = 0;
+    let reason = loop {
+        let Some(update) = waiting.pop_front() else {
+            let message = patiently("the next message", updates.message())
+                .await
+                .expect("no error")
+                .expect("the stream goes on");
+            waiting.extend(message.updates);
+            continue;
+        };
+        match update.update.expect("an update says something") {
+            Update::Events(batch) => {
+                for event in batch.events {
+                    assert_eq!(event.sequence, last_event + 1);
+                    last_event = event.sequence;
+                }
+            }
+            Update::Decision(decision) => {
+                decisions += 1;
+                let result = play
+                    .act(v1::ActRequest {
+                        ticket: tickets[0].clone(),
+                        command: Some(v1::act_request::Command::Answer(v1::Answer {
+                            decision_id: decision.decision_id,
+                            action: first_legal(&decision),
+                            annotations: None,
+                        })),
+                    })
+                    .await
+                    .expect("the answer is taken")
+                    .into_inner()
+                    .result
+                    .expect("an answer has a result");
+                assert_eq!(result.status(), v1::AnswerStatus::Accepted);
+            }
+            Update::Detached(detached) => break detached.reason(),
+            _ => {}
+        }
+    };
+    assert_eq!(reason, v1::DetachReason::GameOver);
+    assert!(decisions > 0);
+    assert_eq!(
+        others.await.expect("the others play"),
+        [v1::DetachReason::GameOver; 3]
+    );
+}
+
+#[tokio::test]
+async fn reflection_names_every_service() {
+    let server = TestServer::start().await;
+    let mut reflection = ServerReflectionClient::new(server.channel().await);
+    let request = ServerReflectionRequest {
+        message_request: Some(MessageRequest::ListServices(String::new())),
+        ..ServerReflectionRequest::default()
+    };
+    let mut answers = reflection
+        .server_reflection_info(tokio_stream::iter([request]))
+        .await
+        .expect("reflection is served")
+        .into_inner();
+    let answer = answers
+        .message()
+        .await
+        .expect("no error")
+        .expect("an answer");
+    let Some(MessageResponse::ListServicesResponse(list)) = answer.message_response else {
+        panic!("no list, but {answer:?}");
+    };
+    let names: Vec<String> = list.service.into_iter().map(|service| service.name).collect();
+    for service in ["Play", "Room", "Spectator", "Record", "Server"] {
+        let name = format!("chefshat.v1.{service}Service");
+        assert!(names.contains(&name), "{name} is not among {names:?}");
+    }
+    assert!(names.contains(&"grpc.health.v1.Health".to_owned()));
+}
