@@ -263,3 +263,97 @@ impl<T: Weigh> Drop for OutboxStream<T> {
         self.outbox.gone.notify_waiters();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::AtomicUsize;
+
+    use chefshat_proto::v1;
+    use futures::{FutureExt as _, StreamExt as _};
+
+    use super::*;
+
+    fn update(handle: u32, events: usize) -> SeatUpdate {
+        SeatUpdate {
+            handle,
+            update: Some(Update::Events(v1::EventBatch {
+                events: vec![v1::GameEvent::default(); events],
+            })),
+        }
+    }
+
+    #[derive(Default)]
+    struct Count(AtomicUsize);
+
+    impl OnSpace for Count {
+        fn space(&self) {
+            self.0.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    #[test]
+    fn what_is_ready_goes_out_as_one_message() {
+        let (outbox, mut stream) = Outbox::new();
+        assert!(stream.next().now_or_never().is_none());
+        for handle in 0..5 {
+            assert!(outbox.push(&mut vec![update(handle, 2)], None, None));
+        }
+        let message = stream.next().now_or_never().flatten();
+        let handles: Vec<u32> = message
+            .expect("something is ready")
+            .expect("no error")
+            .iter()
+            .map(|update| update.handle)
+            .collect();
+        assert_eq!(handles, [0, 1, 2, 3, 4]);
+        outbox.end(Ok(()));
+        assert!(stream.next().now_or_never().expect("ended").is_none());
+    }
+
+    #[test]
+    fn a_full_outbox_refuses_and_says_when_it_has_space() {
+        let (outbox, mut stream) = Outbox::new();
+        let count = Arc::new(Count::default());
+        let on_space: Arc<dyn OnSpace> = Arc::clone(&count) as _;
+        let mut pushed = 0;
+        let mut refused = loop {
+            let mut updates = vec![update(pushed, 255)];
+            if !outbox.push(&mut updates, None, Some(&on_space)) {
+                break updates;
+            }
+            pushed += 1;
+        };
+        assert_eq!(refused.len(), 1, "nothing is lost");
+        assert_eq!(usize::try_from(pushed), Ok(OUTBOX_CAPACITY / 256));
+        let message = stream
+            .next()
+            .now_or_never()
+            .flatten()
+            .expect("ready")
+            .expect("no error");
+        assert_eq!(message.len(), MESSAGE_CAPACITY / 256);
+        assert_eq!(count.0.load(Ordering::Relaxed), 1);
+        assert!(outbox.push(&mut refused, None, Some(&on_space)));
+        let rest: Vec<u32> = std::iter::from_fn(|| stream.next().now_or_never().flatten())
+            .flat_map(|message| message.expect("no error"))
+            .map(|update| update.handle)
+            .collect();
+        let expected: Vec<u32> = (u32::try_from(message.len()).expect("small")..=pushed).collect();
+        assert_eq!(rest, expected, "in order, once");
+    }
+
+    #[test]
+    fn a_cut_drops_what_waits_and_a_dropped_stream_takes_nothing_more() {
+        let (outbox, mut stream) = Outbox::new();
+        outbox.push(&mut vec![update(0, 1)], None, None);
+        outbox.cut(Status::resource_exhausted("too slow"));
+        let end = stream.next().now_or_never().flatten().expect("an end");
+        assert_eq!(end.expect_err("cut").code(), tonic::Code::ResourceExhausted);
+        drop(stream);
+        assert!(outbox.is_abandoned());
+        assert!(outbox.abandoned().now_or_never().is_some());
+        let mut updates = vec![update(0, 1)];
+        assert!(outbox.push(&mut updates, None, None));
+        assert!(updates.is_empty());
+    }
+}

@@ -35,10 +35,10 @@ impl TestServer {
     /// A server configured by `configure`, with a store of the test's choice.
     pub async fn with(configure: impl FnOnce(&mut ServerConfig), store: Arc<dyn Store>) -> Self {
         let data = tempfile::tempdir().expect("a temporary folder");
-        let listener = TcpListener::bind("127.0.0.1:0")
-            .await
-            .expect("a free port");
-        let address = listener.local_addr().expect("a bound socket has an address");
+        let listener = TcpListener::bind("127.0.0.1:0").await.expect("a free port");
+        let address = listener
+            .local_addr()
+            .expect("a bound socket has an address");
         let mut config = ServerConfig {
             data_dir: Some(data.path().to_path_buf()),
             grace: Duration::ZERO,

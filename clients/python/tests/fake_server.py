@@ -208,7 +208,6 @@ class FakeServer(
     room_grpc.RoomServiceServicer,
     server_grpc.ServerServiceServicer,
     record_grpc.RecordServiceServicer,
-    spectator_grpc.SpectatorServiceServicer,
 ):
     """The fake server; a context manager.
 
@@ -238,23 +237,23 @@ class FakeServer(
 
     # Rooms.
 
-    def CreateRoom(self, request: pb.CreateRoomRequest, context: Context) -> pb.CreateRoomResponse:  # noqa: N802
+    def CreateRoom(self, request: pb.CreateRoomRequest, context: Context) -> pb.CreateRoomResponse:
         """Makes a room."""
         game = FakeGame(len(self.games) + 1, request, self.questions)
         self.games.append(game)
         return pb.CreateRoomResponse(room=game.room, join_code=game.join_code, owner_token="owner")
 
-    def GetRoom(self, request: pb.GetRoomRequest, context: Context) -> pb.GetRoomResponse:  # noqa: N802
+    def GetRoom(self, request: pb.GetRoomRequest, context: Context) -> pb.GetRoomResponse:
         """One room."""
         return pb.GetRoomResponse(room=self.game(request.room_id, context).room)
 
-    def ListRooms(self, request: pb.ListRoomsRequest, context: Context) -> pb.ListRoomsResponse:  # noqa: N802
+    def ListRooms(self, request: pb.ListRoomsRequest, context: Context) -> pb.ListRoomsResponse:
         """Rooms, two a page."""
         at = int(request.page_token or "0")
         page = [game.room for game in self.games[at : at + 2]]
         return pb.ListRoomsResponse(rooms=page, next_page_token=str(at + 2) if at + 2 < len(self.games) else "")
 
-    def JoinRoom(self, request: pb.JoinRoomRequest, context: Context) -> pb.JoinRoomResponse:  # noqa: N802
+    def JoinRoom(self, request: pb.JoinRoomRequest, context: Context) -> pb.JoinRoomResponse:
         """Takes the first free seat."""
         found = [game for game in self.games if game.join_code == request.join_code]
         if not found:
@@ -267,7 +266,7 @@ class FakeServer(
                     return pb.JoinRoomResponse(room=game.room, seat=seat.number, ticket=seat.ticket)
         refuse(context, grpc.StatusCode.RESOURCE_EXHAUSTED, "ROOM_FULL", "every seat is taken")
 
-    def CloseRoom(self, request: pb.CloseRoomRequest, context: Context) -> pb.CloseRoomResponse:  # noqa: N802
+    def CloseRoom(self, request: pb.CloseRoomRequest, context: Context) -> pb.CloseRoomResponse:
         """Aborts the game."""
         if request.owner_token != "owner":
             refuse(context, grpc.StatusCode.PERMISSION_DENIED, "OWNER_TOKEN_WRONG", "not the token of this room's creator")
@@ -285,16 +284,16 @@ class FakeServer(
 
     # Server and records.
 
-    def GetServerInfo(self, request: pb.GetServerInfoRequest, context: Context) -> pb.GetServerInfoResponse:  # noqa: N802
+    def GetServerInfo(self, request: pb.GetServerInfoRequest, context: Context) -> pb.GetServerInfoResponse:
         """Says that it is fake."""
         return pb.GetServerInfoResponse(server_version="fake", built_in_agents=["random", "random_unmasked", "greedy"])
 
-    def GetActionTable(self, request: pb.GetActionTableRequest, context: Context) -> pb.GetActionTableResponse:  # noqa: N802
+    def GetActionTable(self, request: pb.GetActionTableRequest, context: Context) -> pb.GetActionTableResponse:
         """The right number of texts, the right first one."""
         space = pb.ActionSpace(id="chefshat-11", size=SIZE, turn_actions=200)
         return pb.GetActionTableResponse(action_space=space, texts=["C1;Q1;J0", *["?"] * (SIZE - 1)])
 
-    def GetRecord(self, request: pb.GetRecordRequest, context: Context) -> Iterator[pb.GetRecordResponse]:  # noqa: N802
+    def GetRecord(self, request: pb.GetRecordRequest, context: Context) -> Iterator[pb.GetRecordResponse]:
         """The events of a game that is over, between a header and a footer."""
         for game in self.games:
             if game.room.game_id == request.game_id:
@@ -306,7 +305,7 @@ class FakeServer(
 
     # Playing.
 
-    def Play(self, request_iterator: Iterator[pb.PlayRequest], context: Context) -> Iterator[pb.PlayResponse]:  # noqa: N802
+    def Play(self, request_iterator: Iterator[pb.PlayRequest], context: Context) -> Iterator[pb.PlayResponse]:
         """One stream of seats."""
         self.streams += 1
         outbox: Outbox = queue.SimpleQueue()
@@ -325,7 +324,12 @@ class FakeServer(
         if broken.is_set():
             context.abort(grpc.StatusCode.UNAVAILABLE, "the stream was broken on purpose")
 
-    def Act(self, request: pb.ActRequest, context: Context) -> pb.ActResponse:  # noqa: N802
+    def Watch(self, request: pb.PlayServiceWatchRequest, context: Context) -> NoReturn:
+        """Not for clients that can stream."""
+        context.abort(grpc.StatusCode.UNIMPLEMENTED, "the package does not use it")
+        raise AssertionError("abort always raises")
+
+    def Act(self, request: pb.ActRequest, context: Context) -> pb.ActResponse:
         """Notes an expression as an event."""
         found = self.find(request.ticket)
         if found is None:
@@ -351,10 +355,9 @@ class FakeServer(
                 for command in request.commands:
                     if command.HasField("attach"):
                         self._attach(command.attach, outbox, handles)
-                    elif command.HasField("answer"):
-                        if not self._answer(command, outbox, handles):
-                            broken.set()
-                            return
+                    elif command.HasField("answer") and not self._answer(command, outbox, handles):
+                        broken.set()
+                        return
         except grpc.RpcError:
             pass  # The client has cancelled.
         finally:
@@ -399,16 +402,15 @@ class _Spectators(spectator_grpc.SpectatorServiceServicer):
     def __init__(self, server: FakeServer) -> None:
         self._server = server
 
-    def Watch(  # noqa: N802
-        self, request: pb.SpectatorServiceWatchRequest, context: Context
-    ) -> Iterator[pb.SpectatorServiceWatchResponse]:
+    def Watch(self, request: pb.SpectatorServiceWatchRequest, context: Context) -> Iterator[pb.SpectatorServiceWatchResponse]:
         """The events of a room until its game is over."""
         game = self._server.game(request.room_id, context)
         told = max(request.from_sequence - 1, 0)
         yield pb.SpectatorServiceWatchResponse(room=game.room)
         while context.is_active():
             with game.lock:
-                game.changed.wait_for(lambda: len(game.events) > told or game.over, timeout=0.2)
+                if len(game.events) <= told and not game.over:
+                    game.changed.wait(timeout=0.2)
                 events, over = game.events[told:], game.over
             yield pb.SpectatorServiceWatchResponse(events=events)
             told += len(events)

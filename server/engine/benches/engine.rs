@@ -1,5 +1,6 @@
-//! How many decisions the engine takes in a second on one core, uniformly random among the legal ones: with the mask of each decision alone, and
-//! with the deciding seat's observation, or its classic vector, as well. Elements are decisions; dealing is included.
+//! How many decisions the engine takes in a second on one core, uniformly random among the legal
+//! ones: with the mask of each decision alone, and with the deciding seat's observation, or its
+//! classic vector, as well. Elements are decisions; dealing is included.
 
 use std::hint::black_box;
 
@@ -8,7 +9,8 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 
 /// Games played in one iteration.
 const GAMES: u64 = 100;
-/// Decisions in those games: what is measured, counted anew in every iteration, so that a benchmark cannot measure nothing.
+/// Decisions in those games: what is measured, counted anew in every iteration, so that a benchmark
+/// cannot measure nothing.
 const DECISIONS: u64 = 49_186;
 
 /// A cheap generator, so that the engine is measured and not the choice (SplitMix64).

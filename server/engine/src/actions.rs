@@ -1,5 +1,5 @@
-//! The numbering of actions: what each index means, and its text. The numbering depends on the number of faces alone; what is legal
-//! is the game's affair.
+//! The numbering of actions: what each index means, and its text. The numbering depends on the
+//! number of faces alone; what is legal is the game's affair.
 
 use std::fmt;
 
@@ -51,8 +51,9 @@ impl fmt::Display for Move {
     }
 }
 
-/// The numbering of actions for a number of faces F. With T = 3F(F+1)/2 + 2 (standard 200) the actions of a turn are 0..T, in the
-/// order of the paper's look-up table; exchange and special action follow.
+/// The numbering of actions for a number of faces F. With T = 3F(F+1)/2 + 2 (standard 200) the
+/// actions of a turn are 0..T, in the order of the paper's look-up table; exchange and special
+/// action follow.
 #[derive(Copy, Clone, Eq, PartialEq, Hash, Debug)]
 pub struct ActionSpace {
     faces: u8,

@@ -6,8 +6,8 @@ use std::ops::{Index, IndexMut};
 
 use crate::{MAX_SEATS, Seat};
 
-/// One value for each seat of a game. Fixed in size, so that it is copied and never allocates; only the seats that the game has are
-/// compared, hashed and shown.
+/// One value for each seat of a game. Fixed in size, so that it is copied and never allocates; only
+/// the seats that the game has are compared, hashed and shown.
 #[derive(Copy, Clone)]
 pub struct BySeat<T> {
     values: [T; MAX_SEATS],

@@ -1,5 +1,5 @@
-//! Cards as the engine counts them: a multiset packed in one number. The order in which cards were dealt is not kept here (see
-//! [`crate::Deal`]).
+//! Cards as the engine counts them: a multiset packed in one number. The order in which cards were
+//! dealt is not kept here (see [`crate::Deal`]).
 
 use std::fmt;
 
@@ -14,10 +14,11 @@ const FACE_BITS: u64 = JOKER_ONE - 1;
 const LOW_NIBBLES: u64 = 0x0F0F_0F0F_0F0F_0F0F;
 const BYTE_ONES: u64 = 0x0101_0101_0101_0101;
 
-/// A multiset of cards: how many of each face, how many jokers, and whether one of the cards of the top face is the Golden one.
+/// A multiset of cards: how many of each face, how many jokers, and whether one of the cards of the
+/// top face is the Golden one.
 ///
-/// Four bits for each face from face 1 in the lowest, jokers in bits 60 and 61, the Golden card's flag in bit 62. The Golden card counts
-/// among the cards of its face.
+/// Four bits for each face from face 1 in the lowest, jokers in bits 60 and 61, the Golden card's
+/// flag in bit 62. The Golden card counts among the cards of its face.
 #[derive(Copy, Clone, Eq, PartialEq, Default, Hash)]
 pub struct Cards(u64);
 
@@ -25,8 +26,9 @@ impl Cards {
     /// No cards.
     pub const EMPTY: Cards = Cards(0);
 
-    /// The cards with these counts (faces 1..=F ascending, then jokers: F+1 numbers), one of face F the Golden card if `golden`. `None` if a
-    /// count is larger than any deck has, the number of counts is wrong or there is no card of face F to be golden.
+    /// The cards with these counts (faces 1..=F ascending, then jokers: F+1 numbers), one of face F
+    /// the Golden card if `golden`. `None` if a count is larger than any deck has, the number of
+    /// counts is wrong or there is no card of face F to be golden.
     pub fn from_counts(faces: u8, counts: &[u8], golden: bool) -> Option<Cards> {
         if faces == 0 || faces > MAX_FACES || counts.len() != usize::from(faces) + 1 {
             return None;
@@ -124,7 +126,8 @@ impl Cards {
             .flat_map(|(count, number)| std::iter::repeat_n(number, usize::from(count)))
     }
 
-    /// These and other cards together. `None` if a count would be larger than any deck has or there would be two Golden cards.
+    /// These and other cards together. `None` if a count would be larger than any deck has or there
+    /// would be two Golden cards.
     pub fn union(self, other: Cards) -> Option<Cards> {
         let mut sum = self;
         for number in 1..=MAX_FACES {
@@ -147,7 +150,8 @@ impl Cards {
             && (1..=MAX_FACES).all(|number| self.count_of(number) >= other.count_of(number))
     }
 
-    /// These cards without `n` of a face; the Golden card goes last of its face. `None` if there are not so many.
+    /// These cards without `n` of a face; the Golden card goes last of its face. `None` if there
+    /// are not so many.
     pub fn without_face(self, face: Face, n: u8) -> Option<Cards> {
         let mut left = self;
         (self.count(face) >= n).then(|| {
@@ -175,7 +179,8 @@ impl Cards {
         self.0 += other.0;
     }
 
-    /// Takes cards that are known to be among these, without regard to the Golden flag, which stays as it is.
+    /// Takes cards that are known to be among these, without regard to the Golden flag, which stays
+    /// as it is.
     pub(crate) fn remove_counts(&mut self, face: u8, n: u8, jokers: u8) {
         let counts = (u64::from(n) << (BITS * u32::from(face - 1))) + u64::from(jokers) * JOKER_ONE;
         self.0 -= counts;
@@ -194,10 +199,12 @@ impl Cards {
         };
     }
 
-    /// Takes `n` cards of a face that are known to be there and returns them; the Golden card goes last of its face.
+    /// Takes `n` cards of a face that are known to be there and returns them; the Golden card goes
+    /// last of its face.
     pub(crate) fn take_face(&mut self, face: Face, n: u8) -> Cards {
         let mut taken = Cards::EMPTY;
-        // The Golden card is of the top face of the deck, so it lies among the highest cards of any hand that holds it.
+        // The Golden card is of the top face of the deck, so it lies among the highest cards of any
+        // hand that holds it.
         let golden_goes =
             self.has_golden() && self.highest() == Some(face) && self.count(face) == n;
         self.remove_counts(face.get(), n, 0);
@@ -226,7 +233,8 @@ impl Cards {
         taken
     }
 
-    /// The cards whose bits are in a set of bits of faces; no jokers, and the Golden card is not told apart.
+    /// The cards whose bits are in a set of bits of faces; no jokers, and the Golden card is not
+    /// told apart.
     pub(crate) const fn among_faces(self, bits: u64) -> Cards {
         Cards(self.0 & bits & FACE_BITS)
     }
@@ -236,7 +244,8 @@ impl Cards {
         if need > MAX_FACES {
             return false;
         }
-        // Adding 16 - need to a count carries into the bit above its four exactly if the count is at least `need`.
+        // Adding 16 - need to a count carries into the bit above its four exactly if the count is
+        // at least `need`.
         let carry = (16 - need as u64) * BYTE_ONES;
         let (even, odd) = (self.0 & LOW_NIBBLES, self.0 >> BITS & LOW_NIBBLES);
         ((even + carry) | (odd + carry)) & (BYTE_ONES << BITS) != 0

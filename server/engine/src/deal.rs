@@ -1,5 +1,8 @@
-//! The deal: which cards each seat gets in a Shift, a function of rule set, seed and number of the Shift. The shuffle is spelled out here word
-//! for word, because records must replay to the same cards on any machine for ever; no library's shuffle may replace it.
+//! The deal: which cards each seat gets in a Shift, a function of rule set, seed and number of the
+//! Shift. The shuffle is spelled out here word for word, because records must replay to the same
+//! cards on any machine for ever; no library's shuffle may replace it.
+
+use std::fmt;
 
 use rand_chacha::ChaCha20Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -14,8 +17,15 @@ const GOLDEN: u8 = 0;
 const JOKER: u8 = MAX_FACES + 1;
 
 /// The 32 bytes that all deals of a game come from. Never shown while the game is played.
-#[derive(Copy, Clone, Eq, PartialEq, Debug)]
+#[derive(Copy, Clone, Eq, PartialEq)]
 pub struct Seed(pub [u8; 32]);
+
+impl fmt::Debug for Seed {
+    /// Without the bytes, so that no log tells the hands of a running game.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Seed(..)")
+    }
+}
 
 /// One card as it was dealt.
 #[derive(Copy, Clone, Eq, PartialEq, Debug)]
@@ -105,7 +115,8 @@ impl Deal {
     }
 }
 
-/// Who takes a Shift's first turn: the holder of the Golden card, or the first seat from the drawn one that holds the top face.
+/// Who takes a Shift's first turn: the holder of the Golden card, or the first seat from the drawn
+/// one that holds the top face.
 pub(crate) fn opening_leader(rules: &RuleSet, hands: &BySeat<Cards>, drawn: Option<Seat>) -> Seat {
     let (first, players) = (drawn.map_or(0, Seat::index), rules.players());
     (0..players)
@@ -142,7 +153,8 @@ fn packed_values(faces: u8) -> [u64; 32] {
     values
 }
 
-/// Uniform numbers from the words of ChaCha20, keyed with the seed, the number of the Shift as stream.
+/// Uniform numbers from the words of ChaCha20, keyed with the seed, the number of the Shift as
+/// stream.
 struct Draws(ChaCha20Rng);
 
 impl Draws {

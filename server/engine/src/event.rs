@@ -1,10 +1,11 @@
-//! What happens in a game, and the one place that decides what a viewer may see of it. Events of rooms (somebody sat down, a
-//! connection was lost) do not live here.
+//! What happens in a game, and the one place that decides what a viewer may see of it. Events of
+//! rooms (somebody sat down, a connection was lost) do not live here.
 
 use crate::{Action, BySeat, Cards, Role, Seat, SeatOrder, SpecialAction, Standings};
 
-/// One thing that happened in a game. What only some viewers may see stands in fields that can be left out ([`Event::seen_by`]); what must
-/// not even be known to have happened, such as a declined special action, is no event.
+/// One thing that happened in a game. What only some viewers may see stands in fields that can be
+/// left out ([`Event::seen_by`]); what must not even be known to have happened, such as a declined
+/// special action, is no event.
 #[derive(Copy, Clone, Eq, PartialEq, Debug)]
 pub enum Event {
     /// Cards were dealt.
@@ -81,7 +82,8 @@ pub enum Event {
         shift: u32,
         /// Seats by place.
         order: SeatOrder,
-        /// How many seats got rid of their cards: those with the places 1..=finished. One less than there are seats, unless adjudicated.
+        /// How many seats got rid of their cards: those with the places 1..=finished. One less than
+        /// there are seats, unless adjudicated.
         finished: u8,
         /// Points of this Shift.
         points: BySeat<u32>,
@@ -125,7 +127,8 @@ impl Viewer {
 }
 
 impl Event {
-    /// The event as a viewer may see it: the same variant, private fields left out where they are not the viewer's.
+    /// The event as a viewer may see it: the same variant, private fields left out where they are
+    /// not the viewer's.
     pub fn seen_by(&self, viewer: Viewer) -> Event {
         if viewer == Viewer::Everything {
             return *self;
@@ -146,7 +149,8 @@ impl Event {
                 count,
                 cards: cards.filter(|_| viewer.is(giver) || viewer.is(receiver)),
             },
-            // Named one by one, so that a new event with a private field is not shown to everybody by oversight.
+            // Named one by one, so that a new event with a private field is not shown to everybody
+            // by oversight.
             public @ (Event::RolesAssigned { .. }
             | Event::SpecialActionDeclared { .. }
             | Event::Played { .. }

@@ -1,11 +1,12 @@
-//! The small numbers of the game, each a type of its own: seats, faces and actions. What an action means is said by
-//! [`crate::ActionSpace`], not here.
+//! The small numbers of the game, each a type of its own: seats, faces and actions. What an action
+//! means is said by [`crate::ActionSpace`], not here.
 
 use std::fmt;
 
 use crate::{MAX_FACES, MAX_SEATS};
 
-/// A place at the table, numbered from 0. The seat to the left of seat s is s+1, that of the last is seat 0.
+/// A place at the table, numbered from 0. The seat to the left of seat s is s+1, that of the last
+/// is seat 0.
 #[derive(Copy, Clone, Eq, PartialEq, Ord, PartialOrd, Hash, Debug, Default)]
 pub struct Seat(u8);
 
@@ -13,7 +14,8 @@ impl Seat {
     /// The seat with this number.
     ///
     /// # Panics
-    /// If `index` is not below [`MAX_SEATS`]; check numbers that come from outside against the number of players first.
+    /// If `index` is not below [`MAX_SEATS`]; check numbers that come from outside against the
+    /// number of players first.
     pub const fn new(index: usize) -> Seat {
         assert!(index < MAX_SEATS, "a seat's number is below MAX_SEATS");
         Seat(index as u8)
@@ -63,8 +65,8 @@ impl fmt::Display for Face {
     }
 }
 
-/// The number of a decision a player takes, as an agent sends it: just an index, which may be out of range of an
-/// [`crate::ActionSpace`].
+/// The number of a decision a player takes, as an agent sends it: just an index, which may be out
+/// of range of an [`crate::ActionSpace`].
 #[derive(Copy, Clone, Eq, PartialEq, Ord, PartialOrd, Hash, Debug)]
 pub struct Action(u16);
 

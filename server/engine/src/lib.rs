@@ -1,11 +1,13 @@
 //! The rule engine of Chef's Hat: pure values, nothing else.
 //!
-//! A validated [`RuleSet`] and a [`Seed`] make a [`Game`]. A game says whose decision is open ([`Game::decision`]) and what is
-//! legal ([`Game::legal_actions`]), takes an [`Action`] ([`Game::apply`]), tells what happened as [`Event`]s and gives any
-//! seat its [`Observation`]. What a viewer may see of an event is decided in [`Event::seen_by`] alone.
+//! A validated [`RuleSet`] and a [`Seed`] make a [`Game`]. A game says whose decision is open
+//! ([`Game::decision`]) and what is legal ([`Game::legal_actions`]), takes an [`Action`]
+//! ([`Game::apply`]), tells what happened as [`Event`]s and gives any seat its [`Observation`].
+//! What a viewer may see of an event is decided in [`Event::seen_by`] alone.
 //!
-//! What deliberately does not live here: files, sockets, clocks, serialisation, threads, global randomness, agents. A game is a
-//! function of its rule set, its seed and the decisions taken, on every machine.
+//! What deliberately does not live here: files, sockets, clocks, serialisation, threads, global
+//! randomness, agents. A game is a function of its rule set, its seed and the decisions taken, on
+//! every machine.
 //!
 //! ```
 //! use chefshat_engine::{Game, RuleSetSpec, Seed};

@@ -7,7 +7,8 @@ use crate::Action;
 /// Words of a set.
 pub(crate) const WORDS: usize = 6;
 
-/// A set of up to 384 actions, one bit each. Knows its size, so that a uniform choice is one look-up.
+/// A set of up to 384 actions, one bit each. Knows its size, so that a uniform choice is one
+/// look-up.
 #[derive(Copy, Clone, Eq, PartialEq, Hash, Default)]
 pub struct Mask {
     words: [u64; WORDS],
@@ -93,8 +94,9 @@ impl Mask {
         &self.words
     }
 
-    /// Writes the set to a caller's buffer, as many bytes as it has room for: bit i%8 of byte i/8 is action i. A space of `size` actions
-    /// fills `size.div_ceil(8)` bytes; bytes beyond the capacity are set to 0.
+    /// Writes the set to a caller's buffer, as many bytes as it has room for: bit i%8 of byte i/8
+    /// is action i. A space of `size` actions fills `size.div_ceil(8)` bytes; bytes beyond the
+    /// capacity are set to 0.
     pub fn write_bytes(&self, out: &mut [u8]) {
         out.fill(0);
         for (chunk, word) in out.chunks_mut(8).zip(self.words) {
@@ -162,8 +164,9 @@ const fn byte_sums(word: u64) -> u64 {
     ((fours + (fours >> 4)) & 0x0F0F_0F0F_0F0F_0F0F).wrapping_mul(BYTE_ONES)
 }
 
-/// Index of the set bit of a word that `k` others come before; there are more than `k`. Without a branch, for a random choice would be
-/// mispredicted: which byte it is in is counted over all bytes at once, and the bit is looked up.
+/// Index of the set bit of a word that `k` others come before; there are more than `k`. Without a
+/// branch, for a random choice would be mispredicted: which byte it is in is counted over all bytes
+/// at once, and the bit is looked up.
 #[inline]
 fn select(word: u64, sums: u64, k: u32) -> u16 {
     let full_bytes = (((u64::from(k) * BYTE_ONES) | BYTE_TOPS) - sums) & BYTE_TOPS;

@@ -1,4 +1,5 @@
-//! What the paper and this project count in each Shift, gathered from events. How games are averaged and printed is not decided here.
+//! What the paper and this project count in each Shift, gathered from events. How games are
+//! averaged and printed is not decided here.
 
 use crate::{BySeat, Event, RewardScheme, RuleSet, Seat, SeatOrder, SpecialAction};
 
@@ -82,7 +83,8 @@ impl MetricsRecorder {
         }
     }
 
-    /// Counts an invalid attempt of a seat at a turn (attempts at other decisions are neither counted nor rewarded).
+    /// Counts an invalid attempt of a seat at a turn (attempts at other decisions are neither
+    /// counted nor rewarded).
     pub fn wrong(&mut self, seat: Seat) {
         self.seats[seat].wrong += 1;
         if let Some(scheme) = self.scheme {
@@ -90,7 +92,8 @@ impl MetricsRecorder {
         }
     }
 
-    /// Counts an event; gives the metrics of the Shift when it ends. It does not matter as seen by whom.
+    /// Counts an event; gives the metrics of the Shift when it ends. It does not matter as seen by
+    /// whom.
     pub fn on_event(&mut self, event: &Event) -> Option<ShiftMetrics> {
         match *event {
             Event::Played {

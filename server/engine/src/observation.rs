@@ -1,5 +1,6 @@
-//! What a seat may know of a game, as one value, and the paper's classic vector of it. How a game fills it in is in `game::view`;
-//! the mask of legal actions is not part of it ([`crate::Game::legal_actions`]).
+//! What a seat may know of a game, as one value, and the paper's classic vector of it. How a game
+//! fills it in is in `game::view`; the mask of legal actions is not part of it
+//! ([`crate::Game::legal_actions`]).
 
 use crate::{ActionSpace, BySeat, Cards, DecisionKind, Mask, Role, Seat};
 
@@ -14,7 +15,8 @@ pub struct Board {
     pub jokers: u8,
 }
 
-/// Everything that a seat may know at one moment. For a spectator hand, gave and received are empty.
+/// Everything that a seat may know at one moment. For a spectator hand, gave and received are
+/// empty.
 #[derive(Copy, Clone, Eq, PartialEq, Debug)]
 pub struct Observation {
     /// Whose observation it is; `None` for a spectator.
@@ -35,7 +37,8 @@ pub struct Observation {
     pub board: Board,
     /// Number of cards in each hand. A card given in the exchange leaves its giver's hand at once.
     pub cards_left: BySeat<u8>,
-    /// Which seats have passed since the pizza began; with [`crate::PassScope::Turn`] since the last play.
+    /// Which seats have passed since the pizza began; with [`crate::PassScope::Turn`] since the
+    /// last play.
     pub passed: BySeat<bool>,
     /// Place of each seat that has finished the Shift, from 1; 0 for the others.
     pub places: BySeat<u8>,
@@ -59,8 +62,9 @@ impl Observation {
             + usize::from(ActionSpace::of(self.faces).turn_actions())
     }
 
-    /// The paper's vector of numbers in 0..=1: board (F slots, the play's cards ascending, jokers as F+1, cut off; an empty board is F+2 in
-    /// slot 0), hand (H slots, ascending, zeros first), both divided by F+2; then the mask of a turn's actions as 0 and 1.
+    /// The paper's vector of numbers in 0..=1: board (F slots, the play's cards ascending, jokers
+    /// as F+1, cut off; an empty board is F+2 in slot 0), hand (H slots, ascending, zeros first),
+    /// both divided by F+2; then the mask of a turn's actions as 0 and 1.
     pub fn classic_vector(&self, mask: &Mask) -> Vec<f32> {
         let mut vector = vec![0.0; self.classic_len()];
         self.write_classic_vector(mask, &mut vector);
@@ -95,7 +99,8 @@ impl Observation {
             *slot = f32::from(card) / scale;
         }
 
-        // A hand never holds more cards than were dealt: the exchange gives back as many as it takes.
+        // A hand never holds more cards than were dealt: the exchange gives back as many as it
+        // takes.
         let zeros = hand.len().saturating_sub(usize::from(self.hand.len()));
         hand[..zeros].fill(0.0);
         for (slot, card) in hand[zeros..]

@@ -1,5 +1,5 @@
-//! Tables computed at compile time: what each play's index means, and which plays a count of cards allows. The numbering they follow
-//! is described in `actions`.
+//! Tables computed at compile time: what each play's index means, and which plays a count of cards
+//! allows. The numbering they follow is described in `actions`.
 
 use crate::mask::WORDS;
 use crate::{Cards, MAX_FACES, Mask};
@@ -34,7 +34,8 @@ pub(crate) static PLAYS: [[u8; 3]; MAX_PLAYS] = {
     table
 };
 
-/// The plays of one face that a hand allows: bit i for the i-th play of the face, their number above [`PATTERN_BITS`] bits.
+/// The plays of one face that a hand allows: bit i for the i-th play of the face, their number
+/// above [`PATTERN_BITS`] bits.
 #[derive(Copy, Clone)]
 pub(crate) struct Pattern(u64);
 
@@ -51,7 +52,8 @@ impl Pattern {
     }
 }
 
-/// The patterns for one number of jokers held and one least size of the play, by the number of cards held of a face.
+/// The patterns for one number of jokers held and one least size of the play, by the number of
+/// cards held of a face.
 pub(crate) type Patterns = [Pattern; 16];
 
 /// By jokers held (0..=2) and least size of the play (0..=17).
@@ -89,7 +91,8 @@ const fn pattern(held: usize, size: usize, count: usize) -> Pattern {
     Pattern(bits | (bits.count_ones() as u64) << PATTERN_BITS)
 }
 
-/// The legal actions of a turn: the plays that the patterns allow with these cards of faces, a joker alone and passing if allowed.
+/// The legal actions of a turn: the plays that the patterns allow with these cards of faces, a
+/// joker alone and passing if allowed.
 #[inline]
 pub(crate) fn turn_mask(
     faces: u8,
@@ -98,7 +101,8 @@ pub(crate) fn turn_mask(
     lone_joker: bool,
     pass: bool,
 ) -> Mask {
-    // One function for each number of faces: every place in the mask is a constant then, and the words stay in registers.
+    // One function for each number of faces: every place in the mask is a constant then, and the
+    // words stay in registers.
     match faces {
         4 => filled_mask::<4>(patterns, cards, lone_joker, pass),
         5 => filled_mask::<5>(patterns, cards, lone_joker, pass),
@@ -128,7 +132,11 @@ fn filled_mask<const F: u8>(
     // Often nothing but passing is left: then no table is looked up.
     if !cards.is_empty() {
         macro_rules! insert_faces {
-            ($($number:literal)*) => { $(if $number <= F { set.insert_face::<$number>(patterns, cards); })* };
+            ($($number:literal)*) => {
+                $(if $number <= F {
+                    set.insert_face::<$number>(patterns, cards);
+                })*
+            };
         }
         insert_faces!(1 2 3 4 5 6 7 8 9 10 11 12 13 14 15);
     }
@@ -149,7 +157,8 @@ impl Filling {
         let pattern = patterns[usize::from(cards.count_of(NUMBER))];
         let (index, shift) = const { place(play_offset(NUMBER)) };
         self.words[index] |= pattern.bits() << shift;
-        // Three bits for each card the deck has of the face: those beyond the word go into the next one.
+        // Three bits for each card the deck has of the face: those beyond the word go into the next
+        // one.
         if shift + 3 * u32::from(NUMBER) > 64 {
             self.words[index + 1] |= pattern.bits() >> (64 - shift);
         }

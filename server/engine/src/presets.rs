@@ -1,4 +1,5 @@
-//! The named presets. A preset is a starting point: any field can be overridden before the rule set is validated.
+//! The named presets. A preset is a starting point: any field can be overridden before the rule set
+//! is validated.
 
 use crate::{Opening, PassScope, RuleSetSpec, Stop};
 

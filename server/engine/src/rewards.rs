@@ -1,8 +1,10 @@
-//! Rewards by named schemes, worked out from events. Agents that want others can define their own from the same events.
+//! Rewards by named schemes, worked out from events. Agents that want others can define their own
+//! from the same events.
 
 use crate::{Event, RuleSet, Seat};
 
-/// How turns, and invalid attempts at turns, are rewarded. Exchange and special action give nothing in any scheme.
+/// How turns, and invalid attempts at turns, are rewarded. Exchange and special action give nothing
+/// in any scheme.
 #[derive(Copy, Clone, Eq, PartialEq, Hash, Debug)]
 pub enum RewardScheme {
     /// +1 for a valid action, -1 for an invalid one (the paper's Experiment 2).
@@ -54,7 +56,8 @@ impl RewardScheme {
         }
     }
 
-    /// Reward of a valid turn after which the seat has `cards_left` cards; `place` (from 1) if this turn made it finish.
+    /// Reward of a valid turn after which the seat has `cards_left` cards; `place` (from 1) if this
+    /// turn made it finish.
     pub fn turn(self, rules: &RuleSet, cards_left: u8, place: Option<u8>) -> f32 {
         let (left, dealt) = (f64::from(cards_left), f64::from(rules.hand_size()));
         let finishing = place.map_or(0.0, |place| self.finishing(place));
@@ -69,8 +72,9 @@ impl RewardScheme {
         reward as f32
     }
 
-    /// What a seat gets when a Shift ends, in addition to its turns: `place` from 1, `points` of the Shift, `finished` whether it got rid
-    /// of its cards (a seat that did has had its finishing part with its last turn). `None` if it gets nothing.
+    /// What a seat gets when a Shift ends, in addition to its turns: `place` from 1, `points` of
+    /// the Shift, `finished` whether it got rid of its cards (a seat that did has had its finishing
+    /// part with its last turn). `None` if it gets nothing.
     pub fn shift_end(self, place: u8, points: u32, finished: bool) -> Option<f32> {
         match self {
             RewardScheme::Points => Some(points as f32),
@@ -83,8 +87,9 @@ impl RewardScheme {
         }
     }
 
-    /// The rewards that the events of ONE call of [`crate::Game::apply`] bring: calls back with the seat, its reward, and the index of the
-    /// event that brings it (a play, a pass or the end of a Shift).
+    /// The rewards that the events of ONE call of [`crate::Game::apply`] bring: calls back with the
+    /// seat, its reward, and the index of the event that brings it (a play, a pass or the end of a
+    /// Shift).
     pub fn of_events(
         self,
         rules: &RuleSet,

@@ -2,7 +2,8 @@
 
 use crate::{BySeat, SeatOrder};
 
-/// A seat's standing in a Shift, by its place in the Shift before. There are none in the first Shift.
+/// A seat's standing in a Shift, by its place in the Shift before. There are none in the first
+/// Shift.
 #[derive(Copy, Clone, Eq, PartialEq, Ord, PartialOrd, Hash, Debug)]
 pub enum Role {
     /// Finished the last Shift first.

@@ -1,5 +1,5 @@
-//! Rule sets: what may be varied, as somebody asks for it ([`RuleSetSpec`]) and as the engine plays it ([`RuleSet`], validated once).
-//! The named presets live in `presets`.
+//! Rule sets: what may be varied, as somebody asks for it ([`RuleSetSpec`]) and as the engine plays
+//! it ([`RuleSet`], validated once). The named presets live in `presets`.
 
 use std::ops::RangeInclusive;
 
@@ -28,7 +28,8 @@ pub enum Stop {
 pub enum Opening {
     /// The holder of the Golden card, who must play it (rulebook).
     Golden,
-    /// The first seat from a drawn one that holds the top face, who may play only that face (reference implementation).
+    /// The first seat from a drawn one that holds the top face, who may play only that face
+    /// (reference implementation).
     AnyTopFace,
 }
 
@@ -52,7 +53,8 @@ pub struct RuleSetSpec {
     pub jokers: u8,
     /// When the game ends.
     pub stop: Stop,
-    /// Points by place, N non-increasing numbers, the first >= 1. Empty stands for the standard list for N.
+    /// Points by place, N non-increasing numbers, the first >= 1. Empty stands for the standard
+    /// list for N.
     pub points: Vec<u32>,
     /// Whether cards are exchanged before a Shift, from the second on.
     pub exchange: bool,
@@ -240,7 +242,8 @@ fn standard_points(players: u8) -> &'static [u32] {
     }
 }
 
-/// A validated rule set: every value makes sense together with the others. Made by [`RuleSetSpec::validate`] alone.
+/// A validated rule set: every value makes sense together with the others. Made by
+/// [`RuleSetSpec::validate`] alone.
 #[derive(Copy, Clone, Eq, PartialEq, Debug)]
 pub struct RuleSet {
     stop: Stop,

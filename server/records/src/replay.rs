@@ -265,7 +265,9 @@ impl Replay {
             .ok_or("the game began, but its seed is not revealed at its end")?;
         let seed = plan.game_seed(&reveal.seat_entropy);
         if reveal.game_seed != seed.0 {
-            return Err("the game seed does not follow from the server's seed and the seats' bytes".into());
+            return Err(
+                "the game seed does not follow from the server's seed and the seats' bytes".into(),
+            );
         }
         let mut events = Vec::new();
         self.game = Some(Game::new(self.rules, seed, |event| events.push(event)));

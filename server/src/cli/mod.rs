@@ -1,6 +1,12 @@
 //! The command line of `chefshat`: what it understands, and one module for each command. What the commands do is elsewhere.
 
+mod agent;
 mod conformance;
+mod connect;
+mod demo;
+mod narrator;
+mod remote;
+mod room;
 mod rules_args;
 mod serve;
 mod simulate;
@@ -31,6 +37,12 @@ struct Cli {
 enum Command {
     /// Host rooms.
     Serve(serve::Serve),
+    /// Play a game between agents over real connections and watch it.
+    Demo(demo::Demo),
+    /// Play as a built-in agent on a server.
+    Agent(agent::AgentCommand),
+    /// Make, list, watch and close rooms of a server.
+    Room(room::RoomCommand),
     /// Play many games offline and print what they add up to.
     Simulate(simulate::Simulate),
     /// Check the rule engine against test vectors.
@@ -42,6 +54,9 @@ pub fn main() -> ExitCode {
     let cli = Cli::parse();
     let result = start_logging(&cli).and_then(|()| match cli.command {
         Command::Serve(command) => in_runtime(command.run()),
+        Command::Demo(command) => in_runtime(command.run()),
+        Command::Agent(command) => in_runtime(command.run()),
+        Command::Room(command) => in_runtime(command.run()),
         Command::Simulate(command) => command.run(),
         Command::Conformance(command) => command.run(),
     });

@@ -153,7 +153,10 @@ mod tests {
                 });
                 let observation = game.observe(Viewer::Seat(decision.seat));
                 let expected = inside.decide(&observation, &game.legal_actions());
-                assert_eq!(remote.decide(&request(&game)).0, u32::from(expected.index()));
+                assert_eq!(
+                    remote.decide(&request(&game)).0,
+                    u32::from(expected.index())
+                );
                 let action = if game.legal_actions().contains(expected) {
                     expected
                 } else {

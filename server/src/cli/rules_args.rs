@@ -148,7 +148,10 @@ mod tests {
     #[test]
     fn every_flag_sets_its_field() {
         let paper = spec("");
-        let standard = RuleSetSpec::default().validate().expect("the standard").spec();
+        let standard = RuleSetSpec::default()
+            .validate()
+            .expect("the standard")
+            .spec();
         assert_eq!(paper, standard);
         assert_eq!(spec("--preset rulebook").points, [3, 2, 1, 0]);
         let changed = spec(
@@ -170,7 +173,9 @@ mod tests {
             max_turns: 99,
         };
         assert_eq!(changed, expected);
-        let back = spec("--preset original2020 --opening golden --opening-pass forbidden --pass-scope pizza");
+        let back = spec(
+            "--preset original2020 --opening golden --opening-pass forbidden --pass-scope pizza",
+        );
         assert_eq!(back, standard);
     }
 

@@ -115,7 +115,7 @@ pub fn observation_from_proto(
         .as_ref()
         .ok_or_else(|| FieldProblem::new("observation", "a decision request has one"))?;
     let faces = rules.faces();
-    let players = usize::from(rules.players());
+    let players = rules.players();
     let cards = |field, counts: &[u8], golden| {
         if counts.is_empty() {
             return Ok(Cards::EMPTY);

@@ -16,7 +16,7 @@ pub fn fills_from_proto(
     seats: &[v1::SeatConfig],
     rules: &RuleSet,
 ) -> Result<Vec<Fill>, FieldProblem> {
-    let players = usize::from(rules.players());
+    let players = rules.players();
     if seats.is_empty() {
         return Ok(vec![Fill::Open { reserved_for: None }; players]);
     }

@@ -144,7 +144,7 @@ impl RoomService for RoomCalls {
             .map_err(Refusal::from)?
             .map_err(Refusal::from)?;
         Ok(Response::new(v1::JoinRoomResponse {
-            room: Some(joined.room),
+            room: Some(*joined.room),
             seat: u32::try_from(joined.seat.index()).expect("a seat is below six"),
             ticket: joined.ticket.word(),
         }))

@@ -7,6 +7,8 @@ pub mod log;
 pub mod policy;
 mod spectators;
 mod task;
+#[cfg(test)]
+mod tests;
 
 pub use spectators::{MAX_SPECTATOR_LAG, MAX_SPECTATORS};
 pub use task::{

@@ -50,7 +50,7 @@ pub struct Joined {
     /// Its ticket.
     pub ticket: Token,
     /// The room with it.
-    pub room: v1::Room,
+    pub room: Box<v1::Room>,
 }
 
 /// Asks to attach a stream to a seat.
@@ -487,7 +487,7 @@ impl Task {
         Ok(Joined {
             seat,
             ticket,
-            room: convert::describe(&self.core),
+            room: Box::new(convert::describe(&self.core)),
         })
     }
 

@@ -1,7 +1,9 @@
 //! Answers that are late, wrong, repeated, or for another decision.
 
 use chefshat_proto::v1::{self, game_event::Kind, seat_update::Update};
-use chefshat_tests::{StreamSeat, TestServer, first_legal, first_to_hear, is_legal, one_shift, play_on, room_of_four};
+use chefshat_tests::{
+    StreamSeat, TestServer, first_legal, first_to_hear, is_legal, one_shift, play_on, room_of_four,
+};
 
 /// The seat whose decision is open first, on a stream of its own, with its decision; and the others.
 async fn first_to_act(
@@ -77,8 +79,7 @@ async fn a_deadline_that_passes_takes_the_default_and_says_so() {
 #[tokio::test]
 async fn ten_invalid_answers_take_the_default() {
     let server = TestServer::start().await;
-    let (mut wrong, decision, mut others) =
-        first_to_act(&server, v1::RoomPolicy::default()).await;
+    let (mut wrong, decision, mut others) = first_to_act(&server, v1::RoomPolicy::default()).await;
     assert_eq!(decision.invalid_attempts_left, Some(10));
     for left in (0..10).rev() {
         wrong.answer(decision.decision_id, illegal(&decision)).await;
@@ -91,14 +92,17 @@ async fn ten_invalid_answers_take_the_default() {
     let seats = finish(others).await;
     assert_eq!(sources(&seats[3])[0], v1::DecisionSource::Invalid);
     let rest = sources(&seats[3]);
-    assert!(rest[1..].iter().all(|source| *source == v1::DecisionSource::Agent));
+    assert!(
+        rest[1..]
+            .iter()
+            .all(|source| *source == v1::DecisionSource::Agent)
+    );
 }
 
 #[tokio::test]
 async fn an_answer_counts_once_however_often_it_comes() {
     let server = TestServer::start().await;
-    let (mut seat, decision, mut others) =
-        first_to_act(&server, v1::RoomPolicy::default()).await;
+    let (mut seat, decision, mut others) = first_to_act(&server, v1::RoomPolicy::default()).await;
     let action = first_legal(&decision);
     for _ in 0..3 {
         seat.answer(decision.decision_id, action).await;
@@ -125,5 +129,9 @@ async fn an_answer_counts_once_however_often_it_comes() {
     others.push(seat);
     let seats = finish(others).await;
     let plays = sources(&seats[3]);
-    assert!(plays.iter().all(|source| *source == v1::DecisionSource::Agent));
+    assert!(
+        plays
+            .iter()
+            .all(|source| *source == v1::DecisionSource::Agent)
+    );
 }

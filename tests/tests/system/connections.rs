@@ -1,7 +1,9 @@
 //! Connections that come, go, and come twice.
 
 use chefshat_proto::v1::{self, game_event::Kind, seat_command::Command, seat_update::Update};
-use chefshat_tests::{StreamSeat, TestServer, first_legal, first_to_hear, one_shift, play_on, room_of_four};
+use chefshat_tests::{
+    StreamSeat, TestServer, first_legal, first_to_hear, one_shift, play_on, room_of_four,
+};
 
 async fn attach_all(server: &TestServer, tickets: &[String]) -> Vec<StreamSeat> {
     let mut seats = Vec::new();
@@ -40,19 +42,24 @@ async fn a_seat_that_reconnects_gets_what_it_missed_and_its_open_decision() {
     drop(gone);
 
     // Everybody hears of it; a spectator that starts now too.
-    let mut watching = client.spectate(&room_id(&created), 0);
+    let mut watching = client.spectate(room_id(&created), 0);
     while let Some(event) = watching.next().await.expect("the room can be watched") {
-        if matches!(event.kind, Some(Kind::Disconnected(v1::Disconnected { seat: 2 }))) {
+        if matches!(
+            event.kind,
+            Some(Kind::Disconnected(v1::Disconnected { seat: 2 }))
+        ) {
             break;
         }
     }
-    let mut back =
-        StreamSeat::attached_from(server.channel().await, &tickets[2], seen + 1).await;
+    let mut back = StreamSeat::attached_from(server.channel().await, &tickets[2], seen + 1).await;
     let again = back.decision().await;
     assert_eq!(again.decision_id, decision.decision_id);
     assert_eq!(again.observation, decision.observation);
     assert_eq!(again.action_mask, decision.action_mask);
-    assert!(again.time_left_ms <= decision.time_left_ms, "the clock ran on");
+    assert!(
+        again.time_left_ms <= decision.time_left_ms,
+        "the clock ran on"
+    );
     let action = first_legal(&again);
     back.answer(again.decision_id, action).await;
     seats.push(back);
@@ -68,7 +75,11 @@ async fn a_seat_that_reconnects_gets_what_it_missed_and_its_open_decision() {
         .collect();
     let other: Vec<u64> = seats[0].events.iter().map(|event| event.sequence).collect();
     assert_eq!(all, other);
-    assert!(back.events.iter().any(|event| matches!(event.kind, Some(Kind::Returned(_)))));
+    assert!(
+        back.events
+            .iter()
+            .any(|event| matches!(event.kind, Some(Kind::Returned(_))))
+    );
 }
 
 #[tokio::test]
@@ -152,5 +163,10 @@ async fn a_snapshot_stands_in_for_the_events_so_far() {
 }
 
 fn room_id(created: &v1::CreateRoomResponse) -> String {
-    created.room.as_ref().expect("a room was made").room_id.clone()
+    created
+        .room
+        .as_ref()
+        .expect("a room was made")
+        .room_id
+        .clone()
 }

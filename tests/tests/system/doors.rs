@@ -124,7 +124,12 @@ async fn only_its_owner_closes_a_room() {
     let (mine, tickets) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
     let (other, _) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
     let id = |created: &v1::CreateRoomResponse| {
-        created.room.as_ref().expect("a room was made").room_id.clone()
+        created
+            .room
+            .as_ref()
+            .expect("a room was made")
+            .room_id
+            .clone()
     };
     for token in [other.owner_token.as_str(), tickets[0].as_str(), ""] {
         let error = client

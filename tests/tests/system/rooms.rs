@@ -181,7 +181,9 @@ async fn a_room_of_built_in_agents_plays_by_itself_and_a_fixed_seed_repeats() {
     for _ in 0..2 {
         let created = client
             .create_room(v1::CreateRoomRequest {
-                seats: ["greedy", "random", "random_unmasked", "greedy"].map(built_in).into(),
+                seats: ["greedy", "random", "random_unmasked", "greedy"]
+                    .map(built_in)
+                    .into(),
                 game_seed: vec![9; 32],
                 ..v1::CreateRoomRequest::default()
             })

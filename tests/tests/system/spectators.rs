@@ -7,6 +7,7 @@ use chefshat_proto::v1::{
 };
 use chefshat_tests::{TestServer, one_shift, patiently, room_of_four};
 use tonic::Code;
+use tonic::transport::Channel;
 use tonic_types::StatusExt as _;
 
 async fn play_out(server: &TestServer, tickets: Vec<String>) {
@@ -31,7 +32,14 @@ async fn a_spectator_that_stops_reading_is_cut_and_the_game_goes_on() {
     };
     let (created, tickets) = room_of_four(&client, rules, v1::RoomPolicy::default()).await;
     let room_id = created.room.expect("a room").room_id;
-    let mut deaf = SpectatorServiceClient::new(server.channel().await)
+    // A small window, so that what is not read waits at the server, not in this process.
+    let channel = Channel::from_shared(server.url())
+        .expect("a URL")
+        .initial_stream_window_size(8 * 1024)
+        .connect()
+        .await
+        .expect("the server listens");
+    let mut deaf = SpectatorServiceClient::new(channel)
         .watch(SpectatorServiceWatchRequest {
             room_id,
             ..SpectatorServiceWatchRequest::default()
@@ -60,8 +68,7 @@ async fn a_spectator_that_stops_reading_is_cut_and_the_game_goes_on() {
 async fn spectators_see_everything_public_from_the_event_they_name() {
     let server = TestServer::start().await;
     let client = server.client().await;
-    let (created, tickets) =
-        room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
+    let (created, tickets) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
     let room_id = created.room.expect("a room").room_id;
     play_out(&server, tickets).await;
     let mut all = Vec::new();

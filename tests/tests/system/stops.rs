@@ -16,8 +16,7 @@ use tonic_health::pb::{HealthCheckRequest, health_check_response::ServingStatus}
 async fn a_shutdown_in_mid_game_aborts_it_as_such() {
     let mut server = TestServer::start().await;
     let client = server.client().await;
-    let (created, tickets) =
-        room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
+    let (created, tickets) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
     let game_id = created.room.expect("a room").game_id;
     let mut seats = Vec::new();
     for ticket in &tickets {
@@ -38,7 +37,10 @@ async fn a_shutdown_in_mid_game_aborts_it_as_such() {
             panic!("not aborted, but {last:?}");
         };
         assert_eq!(aborted.reason(), v1::AbortReason::Shutdown);
-        assert!(aborted.reveal.is_some(), "the deals can be checked all the same");
+        assert!(
+            aborted.reveal.is_some(),
+            "the deals can be checked all the same"
+        );
         // The server ends the stream by itself.
         assert!(seat.next_or_end().await.expect("a clean end").is_none());
     }
@@ -97,7 +99,10 @@ async fn a_running_game_gets_its_grace_and_no_new_rooms_are_made() {
     assert_eq!(reasons, [v1::DetachReason::GameOver; 4]);
     for seat in &seats {
         let last = seat.events.last().and_then(|event| event.kind.as_ref());
-        assert!(matches!(last, Some(Kind::GameEnded(_))), "played to its end");
+        assert!(
+            matches!(last, Some(Kind::GameEnded(_))),
+            "played to its end"
+        );
     }
     server.stop().await;
 }
@@ -107,8 +112,7 @@ async fn a_store_that_fails_stops_its_room_and_tells_nobody_of_the_decision() {
     // Four joins and the start are kept, then ten decisions; the next is not.
     let server = TestServer::with(|_| {}, Arc::new(FailingStore::after(15))).await;
     let client = server.client().await;
-    let (created, tickets) =
-        room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
+    let (created, tickets) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
     let room_id = created.room.expect("a room").room_id;
     let mut seats = Vec::new();
     for ticket in &tickets {

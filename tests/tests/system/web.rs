@@ -6,7 +6,9 @@ use chefshat_proto::v1::{
     self, play_service_client::PlayServiceClient, room_service_client::RoomServiceClient,
     seat_update::Update,
 };
-use chefshat_tests::{StreamSeat, TestServer, first_legal, one_shift, patiently, play_on, room_of_four};
+use chefshat_tests::{
+    StreamSeat, TestServer, first_legal, one_shift, patiently, play_on, room_of_four,
+};
 use hyper_util::client::legacy::Client as HttpClient;
 use hyper_util::rt::TokioExecutor;
 use tonic_reflection::pb::v1::server_reflection_client::ServerReflectionClient;
@@ -26,9 +28,10 @@ async fn a_seat_plays_over_grpc_web_on_the_same_port() {
     for ticket in &tickets[1..] {
         others.push(StreamSeat::attached(server.channel().await, ticket).await);
     }
-    let others = tokio::spawn(async move {
-        futures::future::join_all(others.iter_mut().map(play_on)).await
-    });
+    let others =
+        tokio::spawn(
+            async move { futures::future::join_all(others.iter_mut().map(play_on)).await },
+        );
 
     // HTTP/1.1 alone, as browsers speak it to a server without TLS.
     let http = HttpClient::builder(TokioExecutor::new()).build_http();
@@ -126,7 +129,11 @@ async fn reflection_names_every_service() {
     let Some(MessageResponse::ListServicesResponse(list)) = answer.message_response else {
         panic!("no list, but {answer:?}");
     };
-    let names: Vec<String> = list.service.into_iter().map(|service| service.name).collect();
+    let names: Vec<String> = list
+        .service
+        .into_iter()
+        .map(|service| service.name)
+        .collect();
     for service in ["Play", "Room", "Spectator", "Record", "Server"] {
         let name = format!("chefshat.v1.{service}Service");
         assert!(names.contains(&name), "{name} is not among {names:?}");

@@ -292,11 +292,12 @@ class _Run:
 
 
 async def _part(call: PlayCall) -> None:
-    """Half-closes the stream and gives the server the time to end it."""
+    """Half-closes the stream and gives the server the time to end it. What it still says is of no interest."""
     try:
         async with asyncio.timeout(FAREWELL_S):
             await call.done_writing()
-            await call.code()
+            while isinstance(await call.read(), pb.PlayResponse):
+                pass
     except TimeoutError:
         return  # The caller cancels the call.
 

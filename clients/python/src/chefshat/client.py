@@ -7,7 +7,7 @@ import random
 import threading
 import time
 from collections import deque
-from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Coroutine, Iterator, Mapping, Sequence
 from typing import Self, TypeAlias, TypeVar
 
 import grpc
@@ -190,7 +190,8 @@ class Client:
         """Plays several seats, of any rooms, over one stream until all their games are over.
 
         A lost connection is made again, and the seats resume where they were. Agents decide one after the other, in a
-        thread of the stream's; what they raise is raised here. A seat that cannot go on has its `error` set in its result; the others play on.
+        thread of the stream's; what they raise is raised here. A seat that cannot go on has its `error` set in its result; the
+        others play on.
 
         Args:
             agents: the agent for each ticket.
@@ -313,6 +314,8 @@ class _Pump(Iterator[pb.PlayRequest]):
             ask = asks.popleft()
             action = ask.place.agent.decide(ask.decision)
             if type(action) is not int and isinstance(action, Awaitable):
+                if isinstance(action, Coroutine):
+                    action.close()  # Or Python warns that nobody awaited it.
                 raise TypeError("an agent with an async `decide` plays under chefshat.aio")
             self._session.answer(ask, action)
             if time.monotonic() > until:
@@ -320,10 +323,17 @@ class _Pump(Iterator[pb.PlayRequest]):
 
 
 def _part(call: "PlayCall") -> None:
-    """Gives the server the time to end a stream that this side has half-closed."""
-    ended = threading.Event()
-    if call.add_callback(ended.set) and not ended.wait(FAREWELL_S):
-        call.cancel()
+    """Gives the server the time to end a stream that this side has half-closed. What it still says is of no interest."""
+    limit = threading.Timer(FAREWELL_S, call.cancel)
+    limit.start()
+    try:
+        # Without reading, the end of the stream would never be seen behind an unread message.
+        for _ in call:
+            pass
+    except grpc.RpcError:
+        return  # However the stream ended, the games are over.
+    finally:
+        limit.cancel()
 
 
 def _called(call: Callable[[], Answered]) -> Answered:

@@ -25,7 +25,7 @@ class SeatResult:
         seat: number of the seat, from 0; -1 if the seat was never attached.
         standings: the final table, best first; empty unless the game finished.
         abort_reason: why the game was aborted, for instance "SHUTDOWN"; empty unless it was.
-        decisions: answers the server accepted.
+        decisions: answers the server said it accepted.
         invalid: answers that were not legal.
         late: answers that came when the decision was closed already.
         reconnects: how often the connection was made anew.

@@ -61,7 +61,11 @@ pub(super) fn check(vector: GameVector) -> Result<u64, LineError> {
         };
         agree(&at("seat"), Some(step), seat, decision.seat.index())?;
         let mask: Vec<u16> = game.legal_actions().iter().map(Action::index).collect();
-        agree(&at("legal actions"), Some(step), legal, mask)?;
+        if *legal != mask {
+            let expected = format!("{legal:?}");
+            let got = format!("{mask:?}{}", difference(legal, &mask));
+            return Err(in_words(&at("legal actions"), step, expected, got).into());
+        }
         let mut end = None;
         let on_event = |event: Event| end = shift_end(&event).or(end.take());
         if let Err(error) = game.apply(Action::new(*action), on_event) {
@@ -104,6 +108,27 @@ fn in_words(place: &str, step: usize, expected: String, got: String) -> Disagree
         expected,
         got,
     }
+}
+
+/// What a long list of actions lacks, and has besides the expected ones, in words.
+fn difference(expected: &[u16], got: &[u16]) -> String {
+    let without = |these: &[u16], those: &[u16]| -> Vec<u16> {
+        let rest = these.iter().filter(|action| !those.contains(action));
+        rest.copied().collect()
+    };
+    let (lacks, more) = (without(expected, got), without(got, expected));
+    let mut words = String::new();
+    if !lacks.is_empty() {
+        words += &format!(", which lacks {lacks:?}");
+    }
+    if !more.is_empty() {
+        words += &format!(", too many by {more:?}");
+    }
+    if words.is_empty() {
+        // The vector has the same actions, but one of them twice or not in order.
+        words += ", each once, ascending";
+    }
+    words
 }
 
 /// The end of a Shift as the vectors write it.

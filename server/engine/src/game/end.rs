@@ -5,8 +5,9 @@ use super::{Game, Stage};
 use crate::{BySeat, Deal, Event, Seat, SeatOrder, Standings, Stop};
 
 impl Game {
-    /// Orders the seats that still hold cards when a Shift reaches its limit of turns: fewest cards first, ties by their distance to the
-    /// left of the seat that acted last. They get their places in [`Game::end_shift`].
+    /// Orders the seats that still hold cards when a Shift reaches its limit of turns: fewest cards
+    /// first, ties by their distance to the left of the seat that acted last. They get their places
+    /// in [`Game::end_shift`].
     pub(super) fn adjudicate(&mut self, acted_last: Seat) {
         let table = &self.table;
         let mut waiting = SeatOrder::EMPTY;

@@ -1,5 +1,6 @@
-//! What is legal: as a mask of all legal actions, as the reason why a single one is not, and the default decision. Mask and reason are
-//! written apart, for speed; a property test holds them together.
+//! What is legal: as a mask of all legal actions, as the reason why a single one is not, and the
+//! default decision. Mask and reason are written apart, for speed; a property test holds them
+//! together.
 
 use super::{Game, Refusal, Stage};
 use crate::patterns::{PATTERNS, turn_mask};
@@ -20,8 +21,9 @@ impl Game {
         }
     }
 
-    /// The decision that is taken for a seat that takes none: pass if that is legal, else the lowest legal turn; give the highest plain face,
-    /// else the Golden card, else a joker; decline. `None` if the game has ended.
+    /// The decision that is taken for a seat that takes none: pass if that is legal, else the
+    /// lowest legal turn; give the highest plain face, else the Golden card, else a joker; decline.
+    /// `None` if the game has ended.
     pub fn default_action(&self) -> Option<Action> {
         let space = self.rules.actions();
         match self.stage {
@@ -123,7 +125,8 @@ impl Game {
         if table.is_first_turn() && !self.rules.opening_pass() {
             Err(Refusal::MayNotPassFirst)
         } else if table.idle >= self.rules.max_idle_pizzas() {
-            // The leader of a pizza after so many idle ones plays, which begins the count anew: nobody else meets it.
+            // The leader of a pizza after so many idle ones plays, which begins the count anew:
+            // nobody else meets it.
             Err(Refusal::MayNotPassIdle(table.idle))
         } else {
             Ok(())

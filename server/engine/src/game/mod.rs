@@ -1,6 +1,7 @@
-//! A game as a value: whose decision is open, taking a decision, and what can be asked of the state. The parts of a Shift lie in the
-//! modules below: `start` (deal, special action, exchange), `turn` (plays, passes, pizzas), `end` (places, points), `legal` (what is
-//! allowed), `view` (what a seat may know), `script` (games from given hands).
+//! A game as a value: whose decision is open, taking a decision, and what can be asked of the
+//! state. The parts of a Shift lie in the modules below: `start` (deal, special action, exchange),
+//! `turn` (plays, passes, pizzas), `end` (places, points), `legal` (what is allowed), `view` (what
+//! a seat may know), `script` (games from given hands).
 
 mod end;
 mod error;
@@ -45,7 +46,8 @@ pub struct Decision {
 enum Stage {
     /// This seat was dealt two jokers.
     Special(Seat),
-    /// This seat has to give a card; so many gifts of the Chef and of the Sous-Chef are still to come, this one included.
+    /// This seat has to give a card; so many gifts of the Chef and of the Sous-Chef are still to
+    /// come, this one included.
     Exchange {
         giver: Seat,
         chef_left: u8,
@@ -57,7 +59,8 @@ enum Stage {
     Over,
 }
 
-/// A game being played, or played to its end. Fixed in size and without heap, so that a clone is a copy of memory.
+/// A game being played, or played to its end. Fixed in size and without heap, so that a clone is a
+/// copy of memory.
 #[derive(Clone, Eq, PartialEq, Debug)]
 pub struct Game {
     rules: RuleSet,
@@ -139,7 +142,8 @@ impl Game {
         }
     }
 
-    /// Takes the open decision. What happens is told in order, private fields included ([`Event::seen_by`]).
+    /// Takes the open decision. What happens is told in order, private fields included
+    /// ([`Event::seen_by`]).
     ///
     /// # Errors
     /// If the action is not legal; the game is left as it was and nothing is told.
@@ -226,7 +230,8 @@ impl Game {
         self.table.turns
     }
 
-    /// All hands, which no seat may see. A card given in the exchange is in nobody's hand until the exchange is complete.
+    /// All hands, which no seat may see. A card given in the exchange is in nobody's hand until the
+    /// exchange is complete.
     pub fn hands(&self) -> &BySeat<Cards> {
         &self.hands
     }
@@ -236,7 +241,8 @@ impl Game {
         self.played
     }
 
-    /// Cards given in this Shift's exchange by each seat, those of an exchange not yet complete included.
+    /// Cards given in this Shift's exchange by each seat, those of an exchange not yet complete
+    /// included.
     pub fn gave(&self) -> &BySeat<Cards> {
         &self.gave
     }

@@ -1,4 +1,5 @@
-//! Games from given hands instead of a deal: for puzzles, experiments, imagining what hidden cards may be, and tests.
+//! Games from given hands instead of a deal: for puzzles, experiments, imagining what hidden cards
+//! may be, and tests.
 
 use thiserror::Error;
 
@@ -128,11 +129,12 @@ impl Game {
         Ok(game)
     }
 
-    /// The same game with other hands, each of its present size: one that hidden cards may make of it. What was given in this Shift's exchange is
-    /// left as it was.
+    /// The same game with other hands, each of its present size: one that hidden cards may make of
+    /// it. What was given in this Shift's exchange is left as it was.
     ///
     /// # Errors
-    /// If the cards are not left in the deck, or the game could not have come this far with these hands.
+    /// If the cards are not left in the deck, or the game could not have come this far with these
+    /// hands.
     pub fn with_hands(&self, hands: BySeat<Cards>) -> Result<Game, ScriptError> {
         if !self.is_turn() {
             return Err(ScriptError::NotATurn);

@@ -13,7 +13,8 @@ const SOUS_CHEF_GIFTS: u8 = 1;
 const SOUS_CHEF_PLAYERS: usize = 4;
 
 impl Game {
-    /// Starts a Shift with these hands. `ranking` is the order of the last Shift, empty in the first.
+    /// Starts a Shift with these hands. `ranking` is the order of the last Shift, empty in the
+    /// first.
     pub(super) fn start_shift(
         &mut self,
         shift: u32,
@@ -71,8 +72,8 @@ impl Game {
         }
     }
 
-    /// Asks for the first gift. A giver without a choice is short if its hand holds too few ingredient cards; its partner then gives as
-    /// many as it receives.
+    /// Asks for the first gift. A giver without a choice is short if its hand holds too few
+    /// ingredient cards; its partner then gives as many as it receives.
     pub(super) fn start_exchange(&mut self, on_event: &mut impl FnMut(Event)) {
         if !self.rules.exchange() {
             return self.open_first_turn();

@@ -1,4 +1,5 @@
-//! The pizzas of one Shift: board, turn order, laps and places. Knows nothing of cards in hands, points or events.
+//! The pizzas of one Shift: board, turn order, laps and places. Knows nothing of cards in hands,
+//! points or events.
 
 use crate::observation::Board;
 use crate::{BySeat, Seat, SeatOrder};
@@ -28,7 +29,8 @@ pub(super) struct Table {
     pub(super) last_to_play: Option<Seat>,
     /// Set of seats that hold cards.
     pub(super) holding: u8,
-    /// Set of seats that have passed in this pizza, or since the last play if a pass binds for its turn only.
+    /// Set of seats that have passed in this pizza, or since the last play if a pass binds for its
+    /// turn only.
     pub(super) passed: u8,
     /// Place of each seat that has finished, from 1; 0 for the others.
     pub(super) places: BySeat<u8>,
@@ -84,7 +86,8 @@ impl Table {
         self.holding & !self.passed & !self.last_to_play.map_or(0, bit)
     }
 
-    /// How far to the left of a seat the next one of a set is that is not empty, 1..=N: the seat itself is a full circle away.
+    /// How far to the left of a seat the next one of a set is that is not empty, 1..=N: the seat
+    /// itself is a full circle away.
     pub(super) fn distance_left(&self, from: Seat, set: u8) -> u8 {
         let twice = u32::from(set) | u32::from(set) << self.players;
         (twice >> (from.index() + 1)).trailing_zeros() as u8 + 1

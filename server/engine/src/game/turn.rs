@@ -1,4 +1,5 @@
-//! Taking a turn that has been found legal: the cards move, and the turn goes on, to the next pizza or to the Shift's end.
+//! Taking a turn that has been found legal: the cards move, and the turn goes on, to the next pizza
+//! or to the Shift's end.
 
 use super::table::bit;
 use super::{Game, Stage};

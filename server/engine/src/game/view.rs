@@ -1,11 +1,13 @@
-//! Filling in what a seat may know. Nothing that is not written here reaches an agent's observation.
+//! Filling in what a seat may know. Nothing that is not written here reaches an agent's
+//! observation.
 
 use super::table::bit;
 use super::{Game, Stage};
 use crate::{BySeat, Cards, Observation, Viewer};
 
 impl Game {
-    /// What a viewer may know now. A spectator, and one who sees everything in the events, gets no hand.
+    /// What a viewer may know now. A spectator, and one who sees everything in the events, gets no
+    /// hand.
     ///
     /// # Panics
     /// If the game has no such seat.

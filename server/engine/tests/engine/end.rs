@@ -134,7 +134,8 @@ fn a_pass_for_its_turn_only_can_be_followed_by_a_play() {
         act(game, "C3;Q1;J0");
         act(game, "pass");
     }
-    // In both seat 0 has passed since the last play; seat 1 passed before it, which binds in one of them alone.
+    // In both seat 0 has passed since the last play; seat 1 passed before it, which binds in one of
+    // them alone.
     assert_eq!(turn_of(&bound), 2);
     assert_eq!(turn_of(&free), 1);
     assert_eq!(legal_texts(&free)[0], "C1;Q1;J0");

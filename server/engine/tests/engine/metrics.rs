@@ -63,7 +63,8 @@ fn a_shift_by_hand() {
         (2, 0, 3, 0, 2, 1)
     );
     assert!((first.performance - 50.0 / 3.0).abs() < 1e-9 && last.performance == 0.0);
-    // Two wrong actions at -1, then -0.28, 0 and 0.44; the last seat -0.28 three times and 0.21 at the end.
+    // Two wrong actions at -1, then -0.28, 0 and 0.44; the last seat -0.28 three times and 0.21 at
+    // the end.
     assert!((first.reward_sum - (-2.0 - 0.28 + 0.44)).abs() < 1e-6 && first.reward_count == 5);
     assert!((last.reward_sum - (-0.84 + 0.21)).abs() < 1e-6 && last.reward_count == 3);
     assert!((last.mean_reward().unwrap() + 0.21).abs() < 1e-6);

@@ -1,5 +1,6 @@
-//! A second reading of the rules, as plain as it can be: it follows a game by its events, keeps every card in a list, and says of each
-//! action by its text whether it is legal. It shares no table and no packed number with the engine.
+//! A second reading of the rules, as plain as it can be: it follows a game by its events, keeps
+//! every card in a list, and says of each action by its text whether it is legal. It shares no
+//! table and no packed number with the engine.
 
 use chefshat_engine::{Cards, DecisionKind, Event, Game, Opening, RuleSet};
 
@@ -158,7 +159,8 @@ impl Model {
         }
     }
 
-    /// Checks that the engine holds the same cards in the same places, and that none is lost or doubled.
+    /// Checks that the engine holds the same cards in the same places, and that none is lost or
+    /// doubled.
     pub(crate) fn check_cards(&self, game: &Game) {
         let in_exchange = game
             .decision()

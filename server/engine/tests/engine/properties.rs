@@ -1,4 +1,5 @@
-//! What must hold in every game: for any rule set that makes sense, any seed and any way of playing.
+//! What must hold in every game: for any rule set that makes sense, any seed and any way of
+//! playing.
 
 use chefshat_engine::{Action, Game, Mask, RuleSet, Seed, Stop};
 use proptest::prelude::*;
@@ -19,7 +20,12 @@ enum Policy {
 }
 
 fn any_policy() -> impl Strategy<Value = Policy> {
-    prop_oneof![3 => Just(Policy::Random), 1 => Just(Policy::Default), 1 => Just(Policy::Lowest), 1 => Just(Policy::Highest)]
+    prop_oneof![
+        3 => Just(Policy::Random),
+        1 => Just(Policy::Default),
+        1 => Just(Policy::Lowest),
+        1 => Just(Policy::Highest),
+    ]
 }
 
 fn choose(policy: Policy, game: &Game, chance: &mut Chance) -> Action {
@@ -33,7 +39,8 @@ fn choose(policy: Policy, game: &Game, chance: &mut Chance) -> Action {
     choice.expect("an open decision has a legal action")
 }
 
-/// The most decisions that a game may take: no Shift is longer than its limit of turns, a special action and three gifts.
+/// The most decisions that a game may take: no Shift is longer than its limit of turns, a special
+/// action and three gifts.
 fn most_decisions(rules: &RuleSet) -> u64 {
     let shifts = match rules.stop() {
         Stop::Shifts(shifts) => u64::from(shifts),
@@ -44,21 +51,30 @@ fn most_decisions(rules: &RuleSet) -> u64 {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 192, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig {
+        cases: 192,
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    })]
 
     #[test]
     fn games_end_with_all_cards_and_by_legal_actions(
-        rules in any_rules(), seed in any::<[u8; 32]>(), policy in any_policy(), chance in any::<u64>()
+        rules in any_rules(),
+        seed in any::<[u8; 32]>(),
+        policy in any_policy(),
+        chance in any::<u64>(),
     ) {
         let mut chance = Chance(chance);
         let mut model = Model::new(rules);
-        let texts: Vec<String> = rules.actions().iter().map(|action| rules.actions().text(action).unwrap()).collect();
+        let space = rules.actions();
+        let texts: Vec<String> = space.iter().map(|action| space.text(action).unwrap()).collect();
         let mut game = Game::new(rules, Seed(seed), |event| model.follow(&event));
         let mut decisions = 0;
         while !game.is_over() {
             let mask = game.legal_actions();
             prop_assert!(!mask.is_empty());
-            let plain: Mask = rules.actions().iter().filter(|action| model.allows(&game, &texts[usize::from(action.index())])).collect();
+            let allowed = |action: &Action| model.allows(&game, &texts[usize::from(action.index())]);
+            let plain: Mask = space.iter().filter(allowed).collect();
             prop_assert_eq!(mask, plain);
             prop_assert!(mask.contains(game.default_action().unwrap()));
             game.apply(choose(policy, &game, &mut chance), |event| model.follow(&event)).unwrap();

@@ -66,7 +66,8 @@ fn check(scheme: RewardScheme, max_turns: u32, expected: &[&[(usize, f32, usize)
 
 #[test]
 fn a_whole_shift() {
-    // Cards left after each turn: 3 3 3 1 3 0, of five; the last turn yields Played, SeatFinished, ShiftEnded, GameEnded.
+    // Cards left after each turn: 3 3 3 1 3 0, of five; the last turn yields Played, SeatFinished,
+    // ShiftEnded, GameEnded.
     check(
         RewardScheme::Validity,
         10,
@@ -169,7 +170,8 @@ fn an_adjudicated_shift_gives_the_finishing_part_to_all_who_held_cards() {
 #[test]
 fn single_turns_of_the_standard_game() {
     let rules = RuleSetSpec::default().validate().unwrap();
-    // Hands of 17 cards. As printed, nothing left is worth 1/17 of 0.7, and a full hand nearly -0.66.
+    // Hands of 17 cards. As printed, nothing left is worth 1/17 of 0.7, and a full hand nearly
+    // -0.66.
     let table = [
         (RewardScheme::Paper, 0, Some(1), 0.7 / 17.0 + 0.3),
         (RewardScheme::Paper, 0, Some(3), 0.7 / 17.0 + 0.12),

@@ -1,13 +1,14 @@
-//! How a Shift begins, with hands one can check by eye: roles, special action, exchange, who opens.
+//! How a Shift begins, with hands one can check by eye: roles, special action, who opens. The
+//! exchange has a module of its own.
 
 use chefshat_engine::{
-    BySeat, Cards, DecisionKind, Event, Game, Opening, Role, RuleSetSpec, Script, Seat, Seed,
-    SpecialAction, Stop, Viewer,
+    BySeat, DecisionKind, Event, Game, Opening, Role, RuleSetSpec, Script, Seat, Seed,
+    SpecialAction, Stop,
 };
 
 use crate::support::{act, cards, hands, legal_texts, order};
 
-fn spec(players: u8, faces: u8) -> RuleSetSpec {
+pub(crate) fn spec(players: u8, faces: u8) -> RuleSetSpec {
     RuleSetSpec {
         players,
         faces,
@@ -16,7 +17,11 @@ fn spec(players: u8, faces: u8) -> RuleSetSpec {
 }
 
 /// The second Shift of a game: hands, and the order of the first.
-fn second_shift(spec: &RuleSetSpec, lines: &[&str], last_order: &[usize]) -> (Game, Vec<Event>) {
+pub(crate) fn second_shift(
+    spec: &RuleSetSpec,
+    lines: &[&str],
+    last_order: &[usize],
+) -> (Game, Vec<Event>) {
     let script = Script {
         shift: 2,
         last_order: Some(order(last_order)),
@@ -29,12 +34,12 @@ fn second_shift(spec: &RuleSetSpec, lines: &[&str], last_order: &[usize]) -> (Ga
     (game, events)
 }
 
-fn open(game: &Game) -> (usize, DecisionKind) {
+pub(crate) fn open(game: &Game) -> (usize, DecisionKind) {
     let decision = game.decision().unwrap();
     (decision.seat.index(), decision.kind)
 }
 
-fn exchanged(giver: usize, receiver: usize, line: &str) -> Event {
+pub(crate) fn exchanged(giver: usize, receiver: usize, line: &str) -> Event {
     let cards = cards(5, line);
     Event::CardsExchanged {
         giver: Seat::new(giver),
@@ -45,158 +50,8 @@ fn exchanged(giver: usize, receiver: usize, line: &str) -> Event {
 }
 
 /// Chef is seat 2, Sous-Chef seat 0, Waiter seat 3, Dishwasher seat 1.
-const ORDER: [usize; 4] = [2, 0, 3, 1];
-const HANDS: [&str; 4] = ["3 4 5 5", "2 3 5 J", "1 2 4 G", "3 4 4 5"];
-
-#[test]
-fn exchange_of_four() {
-    let (mut game, events) = second_shift(&spec(4, 5), &HANDS, &ORDER);
-    let roles =
-        BySeat::from_slice(&[Role::SousChef, Role::Dishwasher, Role::Chef, Role::Waiter].map(Some))
-            .unwrap();
-    assert_eq!(events[1..], [Event::RolesAssigned { roles }]);
-
-    // The Chef chooses from the hand as dealt: the Dishwasher's 2 and 3 are not there yet.
-    assert_eq!(open(&game), (2, DecisionKind::Exchange));
-    assert_eq!(
-        legal_texts(&game),
-        ["give C1", "give C2", "give C4", "give C5"]
-    );
-    assert_eq!(act(&mut game, "give C4"), []);
-    assert_eq!(open(&game), (2, DecisionKind::Exchange));
-    assert_eq!(
-        legal_texts(&game),
-        ["give C1", "give C2", "give C5"],
-        "a given card leaves the hand at once"
-    );
-    let chef = game.observe(Viewer::Seat(Seat::new(2)));
-    assert_eq!(
-        (chef.hand, chef.gave, chef.received),
-        (cards(5, "1 2 G"), cards(5, "4"), Cards::EMPTY)
-    );
-    assert_eq!(
-        (chef.pizza, chef.cards_left.as_slice()),
-        (0, &[4, 4, 3, 4][..])
-    );
-
-    assert_eq!(act(&mut game, "give C5"), []);
-    assert_eq!(open(&game), (0, DecisionKind::Exchange));
-    assert_eq!(legal_texts(&game), ["give C3", "give C4", "give C5"]);
-    let complete = [
-        exchanged(1, 2, "2 3"),
-        exchanged(2, 1, "4 G"),
-        exchanged(3, 0, "3"),
-        exchanged(0, 3, "5"),
-    ];
-    assert_eq!(act(&mut game, "give C5"), complete);
-
-    assert_eq!(
-        *game.hands(),
-        hands(5, &["3 3 4 5", "4 5 G J", "1 2 2 3", "4 4 5 5"])
-    );
-    assert_eq!(
-        open(&game),
-        (1, DecisionKind::Turn),
-        "the Golden card went to the Dishwasher, who opens"
-    );
-    assert_eq!(
-        legal_texts(&game),
-        ["C5;Q1;J0", "C5;Q1;J1", "C5;Q2;J0", "C5;Q2;J1"]
-    );
-    for (seat, gave, received) in [
-        (0, "5", "3"),
-        (1, "2 3", "4 G"),
-        (2, "4 G", "2 3"),
-        (3, "3", "5"),
-    ] {
-        let view = game.observe(Viewer::Seat(Seat::new(seat)));
-        assert_eq!(
-            (view.gave, view.received, view.pizza),
-            (cards(5, gave), cards(5, received), 1)
-        );
-    }
-}
-
-#[test]
-fn a_plain_card_is_given_before_the_golden_one() {
-    let (mut game, _) = second_shift(
-        &spec(4, 5),
-        &["3 4 5 5", "2 3 4 J", "1 2 5 G", "3 4 4 5"],
-        &ORDER,
-    );
-    act(&mut game, "give C5");
-    assert_eq!(game.gave()[Seat::new(2)], cards(5, "5"));
-    act(&mut game, "give C5");
-    assert_eq!(game.gave()[Seat::new(2)], cards(5, "5 G"));
-}
-
-#[test]
-fn forced_gifts_are_the_rarest_and_the_golden_card_last() {
-    let (mut game, _) = second_shift(
-        &spec(4, 5),
-        &["2 2 3 3", "5 5 G J", "1 3 4 4", "4 4 5 5"],
-        &ORDER,
-    );
-    act(&mut game, "give C1");
-    act(&mut game, "give C3");
-    act(&mut game, "give C2");
-    assert_eq!(game.gave()[Seat::new(1)], cards(5, "5 5"));
-    assert_eq!(game.gave()[Seat::new(3)], cards(5, "4"));
-}
-
-#[test]
-fn jokers_may_be_chosen() {
-    let (mut game, _) = second_shift(
-        &spec(4, 5),
-        &["3 4 5 J", "2 3 5 5", "1 2 G J", "3 4 4 5"],
-        &ORDER,
-    );
-    assert_eq!(
-        legal_texts(&game),
-        ["give C1", "give C2", "give C5", "give J"]
-    );
-    act(&mut game, "give J");
-    assert_eq!(legal_texts(&game), ["give C1", "give C2", "give C5"]);
-    act(&mut game, "give C1");
-    act(&mut game, "give J");
-    assert_eq!(
-        *game.hands(),
-        hands(5, &["3 3 4 5", "1 5 5 J", "2 2 3 G", "4 4 5 J"])
-    );
-}
-
-#[test]
-fn a_giver_short_of_ingredient_cards_gives_what_it_has_and_gets_as_many() {
-    let lines = ["2 3 4", "3 J J", "1 2 G", "3 4 4"];
-    let (mut game, _) = second_shift(&spec(4, 4), &lines, &ORDER);
-    assert_eq!(open(&game), (1, DecisionKind::SpecialAction));
-    assert_eq!(legal_texts(&game), ["decline", "declare"]);
-    assert_eq!(
-        act(&mut game, "decline"),
-        [],
-        "declining is known to nobody"
-    );
-    assert_eq!(open(&game), (2, DecisionKind::Exchange));
-    act(&mut game, "give C2");
-    assert_eq!(
-        open(&game),
-        (0, DecisionKind::Exchange),
-        "one card is given for the one that comes"
-    );
-    let events = act(&mut game, "give C4");
-    let counts: Vec<u8> = events
-        .iter()
-        .map(|event| match event {
-            Event::CardsExchanged { count, .. } => *count,
-            other => panic!("{other:?}"),
-        })
-        .collect();
-    assert_eq!(counts, [1, 1, 1, 1]);
-    assert_eq!(
-        *game.hands(),
-        hands(4, &["2 3 3", "2 J J", "1 3 G", "4 4 4"])
-    );
-}
+pub(crate) const ORDER: [usize; 4] = [2, 0, 3, 1];
+pub(crate) const HANDS: [&str; 4] = ["3 4 5 5", "2 3 5 J", "1 2 4 G", "3 4 4 5"];
 
 #[test]
 fn food_fight_reverses_the_roles_and_the_exchange() {
@@ -256,7 +111,7 @@ fn dinner_is_served_leaves_out_the_exchange() {
 }
 
 #[test]
-fn special_action_and_exchange_can_be_switched_off() {
+pub(crate) fn special_action_and_exchange_can_be_switched_off() {
     let lines = ["3 4 J J", "2 3 5 5", "1 2 4 G", "3 4 4 5"];
     let (game, _) = second_shift(
         &RuleSetSpec {
@@ -316,58 +171,6 @@ fn roles_by_number_of_players() {
         let roles: Vec<Role> = game.roles().values().map(|role| role.unwrap()).collect();
         assert_eq!(roles, expected);
     }
-}
-
-#[test]
-fn two_and_three_players_exchange_two_cards() {
-    let (mut game, _) = second_shift(&spec(2, 4), &["1 3 3 4 4 J", "2 2 3 4 G J"], &[1, 0]);
-    assert_eq!(open(&game), (1, DecisionKind::Exchange));
-    act(&mut game, "give C4");
-    act(&mut game, "give C4");
-    assert_eq!(*game.hands(), hands(4, &["3 4 4 4 G J", "1 2 2 3 3 J"]));
-    assert_eq!(open(&game), (0, DecisionKind::Turn));
-
-    let (mut game, _) = second_shift(&spec(3, 4), &["1 3 3 4", "2 2 3 4", "4 G J J"], &[0, 2, 1]);
-    act(&mut game, "decline");
-    assert_eq!(open(&game), (0, DecisionKind::Exchange));
-    act(&mut game, "give C3");
-    act(&mut game, "give C4");
-    assert_eq!(
-        *game.hands(),
-        hands(4, &["1 2 2 3", "3 3 4 4", "4 G J J"]),
-        "the Cook gives nothing"
-    );
-}
-
-#[test]
-fn default_gifts() {
-    let table = [
-        (["2 3 3 4", "2 5 5 J", "1 4 5 G", "3 4 4 5"], "give C5"),
-        (["2 3 3 4", "5 5 5 J", "1 2 4 G", "3 4 4 5"], "give C4"),
-        (["2 3 3 4", "5 5 G J", "1 2 4 5", "3 4 4 5"], "give C5"),
-    ];
-    for (lines, expected) in table {
-        let (game, _) = second_shift(&spec(4, 5), &lines, &ORDER);
-        let action = game.default_action().unwrap();
-        assert_eq!(
-            game.rules().actions().text(action).as_deref(),
-            Some(expected),
-            "{lines:?}"
-        );
-    }
-    // Nothing but the Golden card and jokers: the Golden card first, then a joker.
-    let (mut game, _) = second_shift(&spec(4, 4), &["2 3 4", "3 4 4", "G J J", "1 2 3"], &ORDER);
-    let mut defaults = Vec::new();
-    for _ in 0..3 {
-        let text = game
-            .rules()
-            .actions()
-            .text(game.default_action().unwrap())
-            .unwrap();
-        act(&mut game, &text);
-        defaults.push(text);
-    }
-    assert_eq!(defaults, ["decline", "give C4", "give J"]);
 }
 
 #[test]

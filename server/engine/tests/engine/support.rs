@@ -1,4 +1,5 @@
-//! What several subjects need: rule sets from the vectors' JSON, hands from a line of text, playing a game at random.
+//! What several subjects need: rule sets from the vectors' JSON, hands from a line of text, playing
+//! a game at random.
 
 use chefshat_engine::{
     Action, BySeat, Cards, Event, Game, Opening, PassScope, RuleSet, RuleSetSpec, Seat, SeatOrder,

@@ -1,4 +1,5 @@
-//! The vectors of `tests/fixtures/vectors`: deals and whole games played by another engine, to be met card for card.
+//! The vectors of `tests/fixtures/vectors`: deals and whole games played by another engine, to be
+//! met card for card.
 
 use std::path::PathBuf;
 

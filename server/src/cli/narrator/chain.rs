@@ -10,7 +10,7 @@ use super::text::{BOLD, DIM, GOLD, PLAIN, Piece, WIDTH, clean, columns, seat_sty
 /// Columns before the first play of a line: the pizza's number.
 const START: usize = 7;
 /// Columns for what each seat has left, all seats together.
-const SIDE: usize = 38;
+const SIDE: usize = 42;
 /// Room kept behind a last card for the place it brings.
 const PLACE: usize = 4;
 
@@ -29,6 +29,8 @@ pub(super) struct Chain {
     column: usize,
     /// Something stands on the line to which the next item is linked.
     linked: bool,
+    /// A line of another kind has come between; what follows is to begin below it.
+    broken: bool,
     /// Who has passed since somebody last played.
     passed: Vec<(u32, v1::DecisionSource)>,
     left: Vec<Left>,
@@ -83,9 +85,11 @@ impl Chain {
         if self.column == 0 {
             return String::new();
         }
+        let mut out = self.resumed();
         let place = Piece::new(BOLD, &format!(" {}", ordinal(finished.place)));
         self.column += place.width();
-        place.as_str().to_owned()
+        out.push_str(place.as_str());
+        out
     }
 
     /// The pizza is done: the line ends.
@@ -105,6 +109,7 @@ impl Chain {
         let mut out = String::new();
         if self.column > 0 {
             out.push_str(&self.passes(names, |source| reason(source).is_some()));
+            out.push_str(&self.resumed());
             let gap = self.body().saturating_sub(self.column);
             out.push_str(&" ".repeat(gap));
             for (seat, left) in (0u32..).zip(&self.left) {
@@ -128,9 +133,23 @@ impl Chain {
         if self.column == 0 {
             return format!("{line}\n");
         }
+        let end = if std::mem::replace(&mut self.broken, true) {
+            ""
+        } else {
+            "\n"
+        };
         self.column = START;
         self.linked = false;
-        format!("\n{line}\n{}", " ".repeat(START))
+        format!("{end}{line}\n")
+    }
+
+    /// Goes on below what came between.
+    fn resumed(&mut self) -> String {
+        if std::mem::take(&mut self.broken) {
+            " ".repeat(START)
+        } else {
+            String::new()
+        }
     }
 
     /// Begins a line, unless one is open.
@@ -147,7 +166,7 @@ impl Chain {
             }
             out = format!("\n{}\n", head.as_str());
         }
-        let number = Piece::new(DIM, &format!("{:>4}   ", self.pizza));
+        let number = Piece::new(DIM, &format!("{:>5}  ", self.pizza));
         out.push_str(number.as_str());
         self.column = START;
         out
@@ -155,17 +174,22 @@ impl Chain {
 
     /// An item of the line, linked to the one before it, with so many columns kept free behind it.
     fn put(&mut self, item: &Piece, reserve: usize) -> String {
-        let mut out = String::new();
+        self.put_after("› ", item, reserve)
+    }
+
+    fn put_after(&mut self, link: &str, item: &Piece, reserve: usize) -> String {
+        let mut out = self.resumed();
         if self.linked {
-            let wanted = self.column + 3 + item.width() + reserve;
-            let link = if wanted > self.body() {
+            let wanted = self.column + 1 + columns(link) + item.width() + reserve;
+            if wanted > self.body() {
                 out.push('\n');
                 out.push_str(&" ".repeat(START));
                 self.column = START;
-                Piece::new(DIM, "› ")
             } else {
-                Piece::new(DIM, " › ")
-            };
+                out.push(' ');
+                self.column += 1;
+            }
+            let link = Piece::new(DIM, link);
             out.push_str(link.as_str());
             self.column += link.width();
         }
@@ -190,7 +214,9 @@ impl Chain {
         for (index, pass) in passed.iter().enumerate() {
             let before = if index == 0 { "(" } else { "" };
             let after = if index == last { ")" } else { "," };
-            out.push_str(&self.put(&Piece::new(DIM, &format!("{before}{pass}{after}")), 0));
+            let link = if index == 0 { "› " } else { "" };
+            let item = Piece::new(DIM, &format!("{before}{pass}{after}"));
+            out.push_str(&self.put_after(link, &item, 0));
         }
         out
     }
@@ -200,7 +226,10 @@ impl Chain {
     }
 
     fn set_left(&mut self, seat: u32, left: Left) {
-        if let Some(place) = usize::try_from(seat).ok().and_then(|seat| self.left.get_mut(seat)) {
+        if let Some(place) = usize::try_from(seat)
+            .ok()
+            .and_then(|seat| self.left.get_mut(seat))
+        {
             *place = left;
         }
     }

@@ -13,9 +13,9 @@ use chefshat_engine::{Opening, PassScope, RuleSet, RuleSetSpec, Stop};
 use chefshat_records::convert::rules_from_proto;
 
 use chain::Chain;
-pub(super) use tables::{abort_reason, ordinal};
-use text::{BOLD, DIM, GOLD, MAX_NAME, PLAIN, Piece, seat_style, wrapped};
-pub(super) use text::{clean, heading};
+pub(super) use tables::abort_reason;
+use text::{BOLD, DIM, GOLD, MAX_NAME, PLAIN, Piece, label, seat_style, wrapped};
+pub(super) use text::{clean, heading, row};
 
 /// Where lines that belong to a Shift begin.
 const INDENT: &str = "   ";
@@ -84,9 +84,15 @@ impl Narrator {
             Kind::Seated(seated) => {
                 let label = participant_label(seated.kind(), &seated.built_in_agent);
                 let name = clean(&seated.name, MAX_NAME);
-                self.remark(seated.seat, Some(&name), &format!(" ({label}) takes seat {}", seated.seat))
+                self.remark(
+                    seated.seat,
+                    Some(&name),
+                    &format!(" ({label}) takes seat {}", seated.seat),
+                )
             }
-            Kind::Vacated(seat) => self.remark(seat.seat, Some("nobody"), " holds this seat any more"),
+            Kind::Vacated(seat) => {
+                self.remark(seat.seat, Some("nobody"), " holds this seat any more")
+            }
             Kind::Disconnected(seat) => self.remark(seat.seat, None, " has lost the connection"),
             Kind::Returned(seat) => self.remark(seat.seat, None, " is back"),
             Kind::Substituted(seat) => {
@@ -95,7 +101,10 @@ impl Narrator {
                 self.remark(seat.seat, None, &words)
             }
             Kind::ExpressionShown(shown) => {
-                let label = shown.expression.as_ref().map_or("", |expression| &expression.label);
+                let label = shown
+                    .expression
+                    .as_ref()
+                    .map_or("", |expression| &expression.label);
                 let words = format!(" shows {}", clean(label, 40));
                 self.remark(shown.seat, None, &words)
             }
@@ -103,21 +112,28 @@ impl Narrator {
     }
 
     fn game_started(&mut self, start: &v1::GameStarted) -> String {
-        self.rules = start.rules.as_ref().and_then(|rules| rules_from_proto(rules).ok());
+        self.rules = start
+            .rules
+            .as_ref()
+            .and_then(|rules| rules_from_proto(rules).ok());
         self.hand_size = start.hand_size;
         self.scores = vec![0; start.seats.len()];
         self.names = names(&start.seats);
         if self.labels.len() != start.seats.len() {
-            let label = |seat: &v1::Participant| participant_label(seat.kind(), &seat.built_in_agent);
-            self.labels = start.seats.iter().map(label).collect();
+            let played_by =
+                |seat: &v1::Participant| participant_label(seat.kind(), &seat.built_in_agent);
+            self.labels = start.seats.iter().map(played_by).collect();
         }
         let seats: Vec<Piece> = (0u32..)
             .zip(&self.labels)
-            .map(|(seat, label)| self.name(seat).and(DIM, &format!(" {}", clean(label, MAX_NAME * 2))))
+            .map(|(seat, label)| {
+                self.name(seat)
+                    .and(DIM, &format!(" {}", clean(label, MAX_NAME * 2)))
+            })
             .collect();
-        let mut out = wrapped(&Piece::new(DIM, "   at the table  "), &seats);
+        let mut out = wrapped(&label("at the table"), &seats);
         if let Some(rules) = &self.rules {
-            out.push_str(&wrapped(&Piece::new(DIM, "   the rules     "), &in_words(rules)));
+            out.push_str(&wrapped(&label("the rules"), &in_words(rules)));
         }
         out
     }
@@ -127,12 +143,15 @@ impl Narrator {
         self.roles.clear();
         self.declared = false;
         self.exchanges.clear();
-        let golden = self.rules.is_some_and(|rules| rules.opening() == Opening::Golden);
+        let golden = self
+            .rules
+            .is_some_and(|rules| rules.opening() == Opening::Golden);
         self.chain = Chain::new(&self.names, self.hand_size, golden);
         out.push_str(&heading(&format!("Shift {}", start.shift)));
         if start.shift == 1 && golden {
             let top = self.rules.map_or(0, |rules| rules.faces());
-            let words = format!("nobody has a role yet; who holds the Golden {top} (★) must open with it");
+            let words =
+                format!("nobody has a role yet; who holds the Golden {top} (★) must open with it");
             out.push_str(&format!("{INDENT}{}\n", Piece::new(DIM, &words).as_str()));
         }
         out
@@ -144,7 +163,11 @@ impl Narrator {
         seats.sort_by_key(|(_, role)| *role);
         let items: Vec<Piece> = seats
             .into_iter()
-            .map(|(seat, role)| Piece::new(DIM, title(role)).and(PLAIN, " ").join(&self.name(seat)))
+            .map(|(seat, role)| {
+                Piece::new(DIM, title(role))
+                    .and(PLAIN, " ")
+                    .join(&self.name(seat))
+            })
             .collect();
         let start = if self.declared { "now  " } else { "" };
         wrapped(&Piece::new(PLAIN, INDENT).and(BOLD, start), &items)
@@ -152,16 +175,22 @@ impl Narrator {
 
     fn special(&mut self, declared: &v1::SpecialActionDeclared) -> String {
         self.declared = true;
-        let role = usize::try_from(declared.seat).ok().and_then(|seat| self.roles.get(seat).copied());
-        let title = role.map_or("", title);
+        let role = usize::try_from(declared.seat)
+            .ok()
+            .and_then(|seat| self.roles.get(seat).copied());
+        let title = role.map_or("seat", title);
         let (name, words) = match declared.action() {
-            v1::SpecialAction::FoodFight => ("Food Fight!", "two jokers: all roles are turned around"),
-            v1::SpecialAction::DinnerIsServed => ("Dinner is served!", "two jokers: nobody exchanges cards"),
+            v1::SpecialAction::FoodFight => {
+                ("Food Fight!", "two jokers: all roles are turned around")
+            }
+            v1::SpecialAction::DinnerIsServed => {
+                ("Dinner is served!", "two jokers: nobody exchanges cards")
+            }
             v1::SpecialAction::Unspecified => ("A special action!", ""),
         };
         let line = Piece::new(PLAIN, INDENT)
             .and(GOLD, &format!("✦ {name} "))
-            .and(PLAIN, &format!("the {title} "))
+            .and(PLAIN, &format!("{title} "))
             .join(&self.name(declared.seat))
             .and(PLAIN, &format!(" has {words}"));
         format!("{}\n", line.as_str())
@@ -170,7 +199,8 @@ impl Narrator {
     fn exchange(&mut self, cards: &v1::CardsExchanged) {
         let item = self
             .name(cards.giver)
-            .and(DIM, &format!(" gives {} to ", cards.count))
+            .and(PLAIN, &format!(" {} ", cards.count))
+            .and(DIM, "→ ")
             .join(&self.name(cards.receiver));
         self.exchanges.push(item);
     }
@@ -209,7 +239,10 @@ fn name_of(names: &[String], seat: u32) -> String {
 
 /// Names as they are shown: short, safe, and no two alike.
 fn names(seats: &[v1::Participant]) -> Vec<String> {
-    let short: Vec<String> = seats.iter().map(|seat| clean(&seat.name, MAX_NAME)).collect();
+    let short: Vec<String> = seats
+        .iter()
+        .map(|seat| clean(&seat.name, MAX_NAME))
+        .collect();
     (0..short.len())
         .map(|seat| {
             let name = &short[seat];

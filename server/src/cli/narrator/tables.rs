@@ -4,7 +4,7 @@ use chefshat_client::v1;
 use chefshat_engine::Stop;
 
 use super::text::{BOLD, DIM, GOLD, MAX_NAME, PLAIN, Piece, clean, heading, seat_style};
-use super::{INDENT, Narrator};
+use super::{INDENT, Narrator, name_of};
 
 /// Columns of the bar that shows how far a seat is.
 const BAR: u64 = 45;
@@ -24,7 +24,7 @@ impl Narrator {
             let score = of(&end.scores, *seat);
             let points = of(&end.points, *seat);
             let old = of(&before, *seat).min(score);
-            let cells = |points: u64| (points * BAR + full / 2) / full;
+            let cells = |points: u64| points.saturating_mul(BAR).saturating_add(full / 2) / full;
             let style = seat_style(*seat);
             let bar = Piece::new(style, &"█".repeat(length(cells(old))))
                 .and(style, &"▓".repeat(length(cells(score) - cells(old))))
@@ -47,7 +47,10 @@ impl Narrator {
         let mut out = self.chain.close(&self.names);
         out.push_str(&heading("Standings"));
         for line in &end.standings {
-            let name = self.name(line.seat).padded(MAX_NAME + 2);
+            let first = line.place == 1;
+            let style = seat_style(line.seat);
+            let style = if first { style.bold() } else { style };
+            let name = Piece::new(style, &name_of(&self.names, line.seat)).padded(MAX_NAME + 2);
             let label = usize::try_from(line.seat)
                 .ok()
                 .and_then(|seat| self.labels.get(seat))
@@ -56,10 +59,15 @@ impl Narrator {
                 1 => "1 point".to_owned(),
                 points => format!("{points} points"),
             };
-            let row = Piece::new(PLAIN, INDENT).and(PLAIN, &ordinal(line.place)).and(PLAIN, "  ").join(&name);
+            let row = Piece::new(PLAIN, INDENT)
+                .and(PLAIN, &ordinal(line.place))
+                .and(PLAIN, "  ")
+                .join(&name);
             let points = Piece::new(PLAIN, &points).right(10);
-            let mut row = row.join(&Piece::new(DIM, &clean(label, 16)).padded(16)).join(&points);
-            if line.place == 1 {
+            let mut row = row
+                .join(&Piece::new(DIM, &clean(label, 16)).padded(16))
+                .join(&points);
+            if first {
                 row = row.and(GOLD, "   ★ wins the game");
             }
             out.push_str(&format!("{}\n", row.as_str()));
@@ -82,7 +90,7 @@ impl Narrator {
 }
 
 /// A place: 1st, 2nd, …
-pub(in crate::cli) fn ordinal(place: u32) -> String {
+pub(super) fn ordinal(place: u32) -> String {
     let ending = match place {
         1 => "st",
         2 => "nd",

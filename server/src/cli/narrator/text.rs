@@ -4,9 +4,12 @@ use anstyle::{AnsiColor, Color, Style};
 use unicode_width::{UnicodeWidthChar as _, UnicodeWidthStr as _};
 
 /// Columns that no line goes beyond.
-pub(in crate::cli) const WIDTH: usize = 98;
+pub(super) const WIDTH: usize = 98;
 /// Most columns of a name.
 pub(super) const MAX_NAME: usize = 12;
+
+/// Columns of the label of a line outside of Shifts.
+const LABEL: usize = 17;
 
 /// The colours of the seats, by number.
 const SEAT_COLOURS: [AnsiColor; 6] = [
@@ -132,6 +135,17 @@ pub(in crate::cli) fn heading(words: &str) -> String {
     format!("\n{}\n", line.as_str())
 }
 
+/// What begins a line outside of Shifts.
+pub(super) fn label(words: &str) -> Piece {
+    Piece::new(PLAIN, "   ").and(DIM, words).padded(LABEL)
+}
+
+/// A line outside of Shifts: a label and what belongs to it. Not wrapped, for addresses and paths.
+pub(in crate::cli) fn row(words: &str, text: &str) -> String {
+    let line = label(words).and(PLAIN, text);
+    format!("{}\n", line.as_str())
+}
+
 /// A name or label from outside as it may be shown: nothing that steers a terminal, at most `width` columns.
 pub(in crate::cli) fn clean(text: &str, width: usize) -> String {
     let shown = |letter: &char| !steers(*letter);
@@ -180,7 +194,10 @@ mod tests {
     #[test]
     fn items_wrap_behind_their_start() {
         let item = Piece::new(PLAIN, &"x".repeat(40));
-        let text = wrapped(&Piece::new(PLAIN, "   a "), &[item.clone(), item.clone(), item]);
+        let text = wrapped(
+            &Piece::new(PLAIN, "   a "),
+            &[item.clone(), item.clone(), item],
+        );
         let text = anstream::adapter::strip_str(&text).to_string();
         let x = "x".repeat(40);
         assert_eq!(text, format!("   a {x} · {x}\n     {x}\n"));

@@ -315,7 +315,10 @@ fn built_in_agents_play_by_themselves_at_their_pace() {
             .filter(|entry| matches!(&entry.change, Change::Decided(decided) if decided.source == source))
             .count()
     };
-    assert!(by_default(Source::Invalid) > 0, "random_unmasked was wrong five times in a row");
+    assert!(
+        by_default(Source::Invalid) > 0,
+        "random_unmasked was wrong five times in a row"
+    );
     assert_eq!(by_default(Source::Timeout), 0);
     table.assert_replays();
 }

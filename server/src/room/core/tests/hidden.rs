@@ -14,7 +14,9 @@ fn swapped(hands: &BySeat<Cards>, one: Seat, other: Seat, faces: u8) -> Option<B
     // Not the top face: who holds the Golden card is known.
     let top = usize::from(faces) - 1;
     let mine = (0..top).find(|face| ours[*face] > 0 && theirs[*face] == 0)?;
-    let yours = (0..top).rev().find(|face| theirs[*face] > 0 && *face != mine)?;
+    let yours = (0..top)
+        .rev()
+        .find(|face| theirs[*face] > 0 && *face != mine)?;
     ours[mine] -= 1;
     theirs[mine] += 1;
     theirs[yours] -= 1;
@@ -31,10 +33,13 @@ fn told(table: &Table, viewer: Seat, see: Viewer) -> Vec<Vec<u8>> {
         .filter_map(|position| convert::view(&table.core, position, see))
         .map(|event| event.encode_to_vec())
         .collect();
-    if let Some(open) = table.core.open().filter(|open| open.decision.seat == viewer) {
-        messages.push(
-            convert::decision_request(&table.core, open, table.now, true).encode_to_vec(),
-        );
+    if let Some(open) = table
+        .core
+        .open()
+        .filter(|open| open.decision.seat == viewer)
+    {
+        messages
+            .push(convert::decision_request(&table.core, open, table.now, true).encode_to_vec());
     }
     messages
 }
@@ -69,7 +74,11 @@ fn pair(viewer: Seat, one: Seat, other: Seat, seed: u8) -> Option<(Table, Table)
 }
 
 /// Plays both tables by the same decisions until one of them cannot take the other's; how many turns that was.
-fn play_both(plain: &mut Table, swapped: &mut Table, mut each: impl FnMut(&Table, &Table)) -> usize {
+fn play_both(
+    plain: &mut Table,
+    swapped: &mut Table,
+    mut each: impl FnMut(&Table, &Table),
+) -> usize {
     for turn in 0.. {
         each(plain, swapped);
         let (seat, id) = plain.open();

@@ -47,9 +47,7 @@ impl Table {
             rules: rules.validate().expect("the rule set makes sense"),
             policy,
             fills,
-            seed: SeedPlan::Fixed {
-                game_seed: [7; 32],
-            },
+            seed: SeedPlan::Fixed { game_seed: [7; 32] },
             created_at_ms: 0,
             join_code: "CODE".into(),
             owner: SecretHash::of(b"owner"),

@@ -91,10 +91,7 @@ fn answers_are_taken_once_and_acknowledged_twice() {
         Verdict::Unknown,
         "it was not asked yet"
     );
-    assert_eq!(
-        table.answer(seat, id + 1, action).verdict,
-        Verdict::Unknown
-    );
+    assert_eq!(table.answer(seat, id + 1, action).verdict, Verdict::Unknown);
     assert_eq!(table.answer(seat, 0, action).verdict, Verdict::Unknown);
     table.now += ms(20);
     let first = table.answer(seat, id, action);
@@ -116,7 +113,10 @@ fn the_newest_connection_has_the_seat() {
     let seat = Seat::new(0);
     let newer = table.attach(seat);
     table.lost(seat, ConnectionId(1));
-    assert!(table.core.standing(seat).connected, "the older one is not missed");
+    assert!(
+        table.core.standing(seat).connected,
+        "the older one is not missed"
+    );
     table.lost(seat, newer);
     assert!(!table.core.standing(seat).connected);
 }

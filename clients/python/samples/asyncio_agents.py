@@ -1,0 +1,43 @@
+"""Several games at once in one event loop, each with an agent that takes its time.
+
+Run it beside a server: `python samples/asyncio_agents.py 127.0.0.1:50051`.
+"""
+
+import asyncio
+import sys
+
+import chefshat
+from chefshat import aio
+
+GAMES = 3
+
+
+class Slow(chefshat.Agent):
+    """Waits a moment, as if it asked a model far away, and then plays its rarest legal action."""
+
+    async def decide(self, request: chefshat.Decision) -> int:
+        """Decides after a while; the other games go on meanwhile."""
+        await asyncio.sleep(0.001)
+        return int(request.legal_actions[0])
+
+
+async def play(address: str) -> None:
+    """Plays all games over one stream."""
+    async with aio.Client(address) as client:
+        tickets = []
+        for number in range(GAMES):
+            room = await client.create_room(f"table {number}", seats=[None, "greedy", "greedy", "random"])
+            tickets.append((await client.join_room(room.join_code, "Slow")).ticket)
+        results = await client.play_many({ticket: Slow() for ticket in tickets})
+    for number, result in enumerate(results.values()):
+        result.raise_for_error()
+        print(f"table {number}: place {result.place}")
+
+
+def main(address: str = "127.0.0.1:50051") -> None:
+    """Runs the event loop."""
+    asyncio.run(play(address))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,71 @@
+"""How refusals reach the caller, over a real connection, and how long the waits between attempts are."""
+
+import random
+
+import grpc
+import pytest
+from fake_server import FakeServer
+
+import chefshat
+from chefshat import Backoff, ChefsHatError, aio
+
+
+def test_a_refusal_carries_reason_metadata_and_code(fake: FakeServer) -> None:
+    with chefshat.Client(fake.address) as client, pytest.raises(ChefsHatError) as caught:
+        client.join_room("WRONG", "Ada")
+    error = caught.value
+    assert error.reason == "JOIN_CODE_WRONG"
+    assert error.message == "no room has this join code"
+    assert error.metadata == {"field": "join_code"}
+    assert error.code is grpc.StatusCode.PERMISSION_DENIED
+    assert not error.retryable
+    assert str(error) == "JOIN_CODE_WRONG: no room has this join code"
+
+
+async def async_refusal(address: str) -> ChefsHatError:
+    async with aio.Client(address) as client:
+        with pytest.raises(ChefsHatError) as caught:
+            await client.get_room("nowhere")
+    return caught.value
+
+
+def test_a_refusal_reaches_asyncio_alike(fake: FakeServer) -> None:
+    import asyncio
+
+    error = asyncio.run(async_refusal(fake.address))
+    assert (error.reason, error.metadata) == ("ROOM_UNKNOWN", {"room_id": "nowhere"})
+
+
+def test_a_refused_stream_raises_too(fake: FakeServer) -> None:
+    with chefshat.Client(fake.address) as client:
+        with pytest.raises(ChefsHatError, match="GAME_UNKNOWN"):
+            list(client.record("nothing"))
+        with pytest.raises(ChefsHatError, match="ROOM_UNKNOWN"):
+            list(client.watch("nothing"))
+
+
+def test_without_details_the_code_is_the_reason() -> None:
+    # Nothing listens on port 1.
+    with chefshat.Client("127.0.0.1:1", backoff=Backoff(attempts=0)) as client:
+        with pytest.raises(ChefsHatError) as caught:
+            client.server_info()
+        assert caught.value.reason == "UNAVAILABLE"
+        assert caught.value.retryable
+        with pytest.raises(ChefsHatError, match="UNAVAILABLE"):
+            client.play(chefshat.RandomAgent(), "ticket")
+
+
+def test_addresses() -> None:
+    for address in ("127.0.0.1:1", "http://127.0.0.1:1/", "https://127.0.0.1:1"):
+        chefshat.Client(address).close()
+    with pytest.raises(ValueError, match="neither http"):
+        chefshat.Client("ftp://127.0.0.1:1")
+
+
+def test_backoff_grows_up_to_its_bound() -> None:
+    backoff = Backoff(first_s=0.1, factor=2.0, max_s=1.0)
+    chance = random.Random(3)
+    for failures, nominal in [(1, 0.1), (2, 0.2), (4, 0.8), (5, 1.0), (10_000, 1.0)]:
+        delays = [backoff.delay_s(failures, chance) for _ in range(100)]
+        assert all(nominal / 2 <= delay <= nominal for delay in delays)
+        assert len(set(delays)) > 90

@@ -1,0 +1,281 @@
+"""Both clients over real connections to the fake server: whole games, broken streams, refused seats, agents that fail."""
+
+import asyncio
+import threading
+from collections.abc import Callable, Mapping
+
+import pytest
+from fake_server import QUESTIONS, FakeGame, FakeSeat, FakeServer
+
+import chefshat
+from chefshat import Agent, Backoff, ChefsHatError, Decision, RandomAgent, SeatResult, aio, pb
+
+QUICK = Backoff(first_s=0.001, max_s=0.01)
+Results = dict[str, SeatResult]
+Player = Callable[[str, Mapping[str, Agent]], Results]
+
+
+def play_blocking(address: str, agents: Mapping[str, Agent]) -> Results:
+    with chefshat.Client(address, backoff=QUICK) as client:
+        return client.play_many(agents)
+
+
+def play_asyncio(address: str, agents: Mapping[str, Agent]) -> Results:
+    async def run() -> Results:
+        async with aio.Client(address, backoff=QUICK) as client:
+            return await client.play_many(agents)
+
+    return asyncio.run(run())
+
+
+@pytest.fixture(params=[play_blocking, play_asyncio], ids=["blocking", "asyncio"])
+def play(request: pytest.FixtureRequest) -> Player:
+    """The test runs once with each client."""
+    player: Player = request.param
+    return player
+
+
+class Listener(Agent):
+    """Plays the first legal action and remembers the events and the decisions it was asked for."""
+
+    def __init__(self) -> None:
+        self.events: list[int] = []
+        self.asked: list[int] = []
+
+    def decide(self, request: Decision) -> int:
+        self.asked.append(request.decision_id)
+        return int(request.legal_actions[0])
+
+    def on_event(self, event: pb.GameEvent) -> None:
+        self.events.append(event.sequence)
+
+
+class Thinker(Listener):
+    """The same in a coroutine."""
+
+    async def decide(self, request: Decision) -> int:  # type: ignore[override]
+        await asyncio.sleep(0)
+        return super().decide(request)
+
+
+def seats(server: FakeServer, *, games: int = 1, played: int = 4) -> list[str]:
+    """Makes rooms and joins them; returns the tickets."""
+    tickets = []
+    with chefshat.Client(server.address) as client:
+        for _ in range(games):
+            room = client.create_room(seats=[None] * played + ["random"] * (4 - played))
+            tickets += [client.join_room(room.join_code, f"player {seat}").ticket for seat in range(played)]
+    return tickets
+
+
+def test_several_seats_of_several_games_over_one_stream(fake: FakeServer, play: Player) -> None:
+    tickets = seats(fake, games=3)
+    results = play(fake.address, {ticket: RandomAgent(seed) for seed, ticket in enumerate(tickets)})
+    assert list(results) == tickets
+    assert [result.place for result in results.values()] == [1, 2, 3, 4] * 3
+    assert all(result.decisions == QUESTIONS and result.reconnects == 0 for result in results.values())
+    assert fake.streams == 1
+
+
+def test_coroutines_play_too(fake: FakeServer) -> None:
+    agents = {ticket: Thinker() for ticket in seats(fake)}
+    results = play_asyncio(fake.address, agents)
+    assert all(result.finished and result.decisions == QUESTIONS for result in results.values())
+    assert all(agent.asked == list(range(1, QUESTIONS + 1)) for agent in agents.values())
+
+
+def test_a_coroutine_in_the_blocking_client_is_refused(fake: FakeServer) -> None:
+    (ticket,) = seats(fake, played=1)
+    with pytest.raises(TypeError, match=r"chefshat\.aio"):
+        play_blocking(fake.address, {ticket: Thinker()})
+
+
+@pytest.mark.parametrize("moment", ["before", "after"])
+@pytest.mark.parametrize(("play", "agent_class"), [(play_blocking, Listener), (play_asyncio, Listener), (play_asyncio, Thinker)])
+def test_a_broken_stream_is_made_again(fake: FakeServer, play: Player, moment: str, agent_class: type[Listener]) -> None:
+    broken: set[tuple[int, int]] = set()
+
+    def fault(game: FakeGame, seat: FakeSeat, answer: pb.Answer) -> str:
+        mark = (seat.number, answer.decision_id)
+        if answer.decision_id % 2 == 0 or mark in broken:
+            return ""
+        broken.add(mark)
+        return moment
+
+    fake.fault = fault
+    agents = {ticket: agent_class() for ticket in seats(fake)}
+    results = play(fake.address, agents)
+    breaks = 4 * 3
+    assert len(broken) == breaks
+    assert fake.streams == 1 + breaks
+    (game,) = fake.games
+    plays = [event.play for event in game.events if event.HasField("play")]
+    assert len(plays) == 4 * QUESTIONS
+    assert all(entry.source == pb.DECISION_SOURCE_AGENT for entry in plays)
+    for ticket, agent in agents.items():
+        assert results[ticket].finished
+        # Every event once and in order, no decision thought over twice, every answer acknowledged in the end.
+        assert agent.events == list(range(1, len(game.events) + 1))
+        assert agent.asked == list(range(1, QUESTIONS + 1))
+        # The acknowledgement of the answer that ends the game is lost with its connection: the game is over before the answer
+        # could be repeated.
+        unheard = 1 if moment == "after" and results[ticket].seat == 3 else 0
+        assert results[ticket].decisions == QUESTIONS - unheard
+        assert results[ticket].invalid == results[ticket].late == 0
+    for seat in game.seats.values():
+        # Each connection asks for what the ones before did not bring.
+        wanted = [attach.from_sequence for attach in seat.attaches]
+        assert wanted[0] == 0
+        assert wanted == sorted(wanted)
+        assert wanted[-1] > 4 * QUESTIONS - 4
+
+
+def test_connecting_that_leads_nowhere_is_given_up(fake: FakeServer, play: Player) -> None:
+    fake.fault = lambda game, seat, answer: "before"
+    (ticket,) = seats(fake, played=1)
+    result = play(fake.address, {ticket: Listener()})[ticket]
+    assert result.error is not None
+    assert result.error.reason == "UNAVAILABLE"
+    # The first stream brought the start of the game, which is progress; the ten attempts that may follow brought nothing.
+    assert fake.streams == 1 + QUICK.attempts
+
+
+class Stubborn(Agent):
+    """Answers what is never legal, and counts."""
+
+    def __init__(self) -> None:
+        self.attempts_left: list[int | None] = []
+
+    def decide(self, request: Decision) -> int:
+        self.attempts_left.append(request.invalid_attempts_left)
+        return int((~request.mask).nonzero()[0][0])
+
+
+def test_invalid_answers_are_asked_again_as_often_as_the_server_allows(fake: FakeServer, play: Player) -> None:
+    (ticket,) = seats(fake, played=1)
+    agent = Stubborn()
+    result = play(fake.address, {ticket: agent})[ticket]
+    assert result.finished
+    assert (result.decisions, result.invalid) == (0, 3 * QUESTIONS)
+    assert agent.attempts_left == [3, 2, 1] * QUESTIONS
+
+
+class Broken(Agent):
+    """Raises."""
+
+    def decide(self, request: Decision) -> int:
+        raise ZeroDivisionError("an agent's own mistake")
+
+
+class BrokenLater(Broken):
+    """Raises in a coroutine."""
+
+    async def decide(self, request: Decision) -> int:  # type: ignore[override]
+        await asyncio.sleep(0)
+        return super().decide(request)
+
+
+def test_what_an_agent_raises_reaches_the_caller(fake: FakeServer, play: Player) -> None:
+    (ticket,) = seats(fake, played=1)
+    with pytest.raises(ZeroDivisionError, match="own mistake"):
+        play(fake.address, {ticket: Broken()})
+
+
+def test_what_a_coroutine_raises_reaches_the_caller(fake: FakeServer) -> None:
+    (ticket,) = seats(fake, played=1)
+    with pytest.raises(ZeroDivisionError, match="own mistake"):
+        play_asyncio(fake.address, {ticket: BrokenLater()})
+
+
+def test_an_unknown_ticket_stops_its_seat_alone(fake: FakeServer, play: Player) -> None:
+    (ticket,) = seats(fake, played=1)
+    results = play(fake.address, {"nonsense": RandomAgent(), ticket: RandomAgent()})
+    assert results[ticket].finished
+    with pytest.raises(ChefsHatError, match="TICKET_UNKNOWN"):
+        results["nonsense"].raise_for_error()
+
+
+class Waiting(Agent):
+    """Waits before its first answer until the test lets it go on."""
+
+    def __init__(self) -> None:
+        self.reached = threading.Event()
+        self.go_on = threading.Event()
+
+    def decide(self, request: Decision) -> int:
+        self.reached.set()
+        assert self.go_on.wait(60)
+        return int(request.legal_actions[0])
+
+
+def test_the_newest_connection_has_the_seat(fake: FakeServer, play: Player) -> None:
+    (ticket,) = seats(fake, played=1)
+    waiting = Waiting()
+    older: list[SeatResult] = []
+    thread = threading.Thread(target=lambda: older.append(play(fake.address, {ticket: waiting})[ticket]))
+    thread.start()
+    assert waiting.reached.wait(60)
+    newer = play_blocking(fake.address, {ticket: RandomAgent()})[ticket]
+    waiting.go_on.set()
+    thread.join(60)
+    assert newer.finished
+    (result,) = older
+    assert result.error is not None
+    assert result.error.reason == "SUPERSEDED"
+    with pytest.raises(ChefsHatError, match="SUPERSEDED"):
+        result.raise_for_error()
+
+
+def test_a_closed_room_is_an_aborted_game(fake: FakeServer, play: Player) -> None:
+    with chefshat.Client(fake.address) as client:
+        room = client.create_room(seats=[None, None, "random", "random"])
+        ticket = client.join_room(room.join_code, "Ada").ticket
+        client.join_room(room.join_code, "nobody who ever attaches")
+        over: list[SeatResult] = []
+        thread = threading.Thread(target=lambda: over.append(play(fake.address, {ticket: RandomAgent()})[ticket]))
+        thread.start()
+        client.close_room(room.room.room_id, room.owner_token)
+        thread.join(60)
+    (result,) = over
+    assert not result.finished
+    assert result.abort_reason == "CLOSED"
+    assert result.error is None
+
+
+def test_the_rest_of_the_blocking_client(fake: FakeServer) -> None:
+    with chefshat.Client(fake.address) as client:
+        made = [client.create_room(f"room {number}").room.room_id for number in range(5)]
+        assert [room.room_id for room in client.list_rooms()] == made
+        assert client.get_room(made[2]).name == "room 2"
+        assert client.server_info().server_version == "fake"
+        assert client.action_table().action_space.size == 214
+        room = client.create_room(seats=[None, "random", "random", "random"])
+        joined = client.join_room(room.join_code, "Ada")
+        client.express(joined.ticket, pb.Expression(label="joy"))
+        assert client.play(RandomAgent(1), joined.ticket).place == 1
+        watched = [event.sequence for event in client.watch(room.room.room_id)]
+        assert watched == list(range(1, len(watched) + 1))
+        assert [event.sequence for event in client.watch(room.room.room_id, from_sequence=4)] == watched[3:]
+        lines = list(client.record(room.room.game_id))
+        assert len(lines) == len(watched) + 2
+        assert lines[1].event.HasField("expression_shown")
+
+
+def test_the_rest_of_the_asyncio_client(fake: FakeServer) -> None:
+    async def run() -> None:
+        async with aio.Client(fake.address) as client:
+            made = [(await client.create_room(f"room {number}")).room.room_id for number in range(5)]
+            assert [room.room_id async for room in client.list_rooms()] == made
+            assert (await client.get_room(made[2])).name == "room 2"
+            assert (await client.server_info()).server_version == "fake"
+            assert (await client.action_table()).action_space.size == 214
+            room = await client.create_room(seats=[None, "random", "random", "random"])
+            joined = await client.join_room(room.join_code, "Ada")
+            await client.express(joined.ticket, pb.Expression(label="joy"))
+            assert (await client.play(RandomAgent(1), joined.ticket)).place == 1
+            watched = [event.sequence async for event in client.watch(room.room.room_id)]
+            assert watched == list(range(1, len(watched) + 1))
+            assert [event.sequence async for event in client.watch(room.room.room_id, from_sequence=4)] == watched[3:]
+            assert len([line async for line in client.record(room.room.game_id)]) == len(watched) + 2
+
+    asyncio.run(run())

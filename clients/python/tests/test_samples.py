@@ -1,0 +1,89 @@
+"""Every sample runs: the Python in the README, the files in samples/, and the command, against both servers."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from fake_server import FakeServer
+
+import chefshat
+from chefshat import agent as command
+
+PACKAGE = Path(__file__).resolve().parents[1]
+PRINTED_ADDRESS = "127.0.0.1:50051"
+README = re.findall(r"^```python\n(.*?)^```", (PACKAGE / "README.md").read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+SAMPLES = sorted(path.name for path in (PACKAGE / "samples").glob("*.py"))
+# Seconds a sample may take before it counts as hanging.
+LIMIT_S = 120
+
+
+def run_python(*arguments: str) -> str:
+    """Runs a Python of its own, and returns what it printed."""
+    done = subprocess.run([sys.executable, *arguments], capture_output=True, text=True, timeout=LIMIT_S, cwd=PACKAGE)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_there_are_samples() -> None:
+    assert len(README) >= 6
+    assert len(SAMPLES) >= 4
+
+
+@pytest.mark.parametrize("number", range(len(README)))
+def test_readme(number: int, address: str) -> None:
+    assert PRINTED_ADDRESS in README[number]
+    assert run_python("-c", README[number].replace(PRINTED_ADDRESS, address)) != ""
+
+
+@pytest.mark.parametrize("name", SAMPLES)
+def test_sample(name: str, address: str) -> None:
+    assert run_python(f"samples/{name}", address) != ""
+
+
+@pytest.mark.parametrize("agent", ["random", "samples.careful_agent:Careful"])
+def test_command_prints_one_line_of_json(address: str, agent: str) -> None:
+    with chefshat.Client(address) as client:
+        code = client.create_room(seats=[None, "random", "random", "random"]).join_code
+    printed = run_python("-m", "chefshat.agent", "--address", address, "--code", code, "--name", "Ada", "--agent", agent, "--json")
+    said = json.loads(printed)
+    assert printed.count("\n") == 1
+    assert said["event"] == "finished"
+    assert sorted(line["seat"] for line in said["standings"]) == [0, 1, 2, 3]
+    assert said["place"] == next(line["place"] for line in said["standings"] if line["seat"] == said["seat"])
+    assert said["decisions"] > 0
+    assert said["invalid"] == 0
+
+
+def test_command_prints_a_table(fake: FakeServer, capsys: pytest.CaptureFixture[str]) -> None:
+    with chefshat.Client(fake.address) as client:
+        code = client.create_room(seats=[None, "random", "random", "random"]).join_code
+    assert command.main(["--address", fake.address, "--code", code, "--name", "Ada", "--seed", "3"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].split() == ["place", "seat", "points"]
+    assert lines[1].endswith("<- this agent")
+    assert lines[-1] == "5 decisions, 0 invalid answers, 0 too late"
+
+
+def test_command_says_what_was_refused(fake: FakeServer, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["--address", fake.address, "--code", "WRONG", "--name", "Ada"]
+    assert command.main(arguments) == 1
+    assert "JOIN_CODE_WRONG" in capsys.readouterr().err
+    assert command.main([*arguments, "--json"]) == 1
+    assert json.loads(capsys.readouterr().out)["reason"] == "JOIN_CODE_WRONG"
+
+
+@pytest.mark.parametrize("agent", ["greedy", "no_such_module:Agent", "json:JSONDecoder", "samples.careful_agent:Nobody"])
+def test_command_refuses_what_is_no_agent(agent: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.chdir(PACKAGE)
+    with pytest.raises(SystemExit) as exit_info:
+        command.main(["--address", "127.0.0.1:1", "--code", "X", "--name", "Ada", "--agent", agent])
+    assert exit_info.value.code == 2
+    assert agent in capsys.readouterr().err
+
+
+def test_there_is_no_path_of_this_machine_in_the_readme() -> None:
+    assert os.sep + "home" not in (PACKAGE / "README.md").read_text(encoding="utf-8")

@@ -1,0 +1,232 @@
+"""Games against the real server: four agents of one process and of four, blocking and asyncio, watched and recorded."""
+
+import asyncio
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from proxy import Proxy
+
+import chefshat
+from chefshat import Agent, Backoff, Decision, RandomAgent, aio, pb
+
+pytestmark = pytest.mark.server
+
+QUICK = Backoff(first_s=0.001, max_s=0.05, attempts=100)
+
+
+class Checking(RandomAgent):
+    """Plays at random and checks what it is told against itself."""
+
+    def __init__(self, seed: int) -> None:
+        super().__init__(seed)
+        self.sequences: list[int] = []
+        self.ids: list[int] = []
+        self.accepted = 0
+
+    def decide(self, request: Decision) -> int:
+        self.ids.append(request.decision_id)
+        assert request.faces == 11
+        assert request.mask.shape == (214,)
+        assert len(request.legal_actions) > 0
+        assert request.cards_left.shape == request.passed.shape == request.places.shape == request.roles.shape == (4,)
+        assert request.hand.sum() == request.cards_left[request.seat]
+        vector = request.classic_vector()
+        assert vector.shape == (228,)
+        assert np.count_nonzero(vector[11:28]) == request.hand.sum()
+        assert vector.min() >= 0.0
+        assert vector.max() <= 1.0
+        return super().decide(request)
+
+    def on_event(self, event: pb.GameEvent) -> None:
+        self.sequences.append(event.sequence)
+
+    def on_result(self, result: pb.AnswerResult) -> None:
+        assert result.status == pb.ANSWER_STATUS_ACCEPTED
+        self.accepted += 1
+
+
+def check(agents: dict[str, Checking], results: dict[str, chefshat.SeatResult]) -> None:
+    """The four seats of one game agree about it."""
+    assert sorted(result.seat for result in results.values()) == [0, 1, 2, 3]
+    assert len({result.standings for result in results.values()}) == 1
+    assert sorted(result.place or 0 for result in results.values()) == [1, 2, 3, 4]
+    for ticket, agent in agents.items():
+        assert results[ticket].finished
+        assert results[ticket].decisions == agent.accepted == len(agent.ids) > 0
+        assert agent.ids == list(range(1, len(agent.ids) + 1))
+        assert agent.sequences == list(range(1, len(agent.sequences) + 1))
+    assert len({len(agent.sequences) for agent in agents.values()}) == 1
+
+
+def test_a_game_over_one_blocking_stream(real_address: str) -> None:
+    with chefshat.Client(real_address) as client:
+        room = client.create_room("blocking")
+        agents = {client.join_room(room.join_code, f"player {number}").ticket: Checking(number) for number in range(4)}
+        results = client.play_many(agents)
+        check(agents, results)
+        assert client.get_room(room.room.room_id).state == pb.ROOM_STATE_FINISHED
+        # Built-in agents played nothing here, so the record holds the decisions of these four.
+        lines = list(client.record(room.room.game_id))
+        assert lines[0].header.game_id == room.room.game_id
+        assert lines[-1].footer.decisions == sum(result.decisions for result in results.values())
+        watched = [event.sequence for event in client.watch(room.room.room_id)]
+        assert watched == next(iter(agents.values())).sequences
+
+
+def test_a_game_over_one_asyncio_stream(real_address: str) -> None:
+    async def run() -> None:
+        async with aio.Client(real_address) as client:
+            room = await client.create_room("asyncio")
+            agents = {}
+            for number in range(4):
+                agents[(await client.join_room(room.join_code, f"player {number}")).ticket] = Checking(number)
+            check(agents, await client.play_many(agents))
+
+    asyncio.run(run())
+
+
+def test_a_game_of_four_asyncio_streams(real_address: str) -> None:
+    async def run() -> None:
+        async with aio.Client(real_address) as client:
+            room = await client.create_room("four streams", rules=pb.RuleSet(target_shifts=2))
+            agents = {}
+            for number in range(4):
+                agents[(await client.join_room(room.join_code, f"player {number}")).ticket] = Checking(number)
+            games = [client.play_many({ticket: agent}) for ticket, agent in agents.items()]
+            results: dict[str, chefshat.SeatResult] = {}
+            for result in await asyncio.gather(*games):
+                results |= result
+            check(agents, results)
+
+    asyncio.run(run())
+
+
+def test_a_game_of_four_processes(real_address: str, processes: list[subprocess.Popen[str]]) -> None:
+    with chefshat.Client(real_address) as client:
+        code = client.create_room("four processes").join_code
+    for number in range(4):
+        arguments = ["--address", real_address, "--code", code, "--name", f"player {number}", "--seed", str(number), "--json"]
+        processes.append(subprocess.Popen([sys.executable, "-m", "chefshat.agent", *arguments], stdout=subprocess.PIPE, text=True))
+    said = [json.loads(process.communicate(timeout=120)[0]) for process in processes]
+    assert all(process.returncode == 0 for process in processes)
+    assert all(line["event"] == "finished" for line in said)
+    assert sorted(line["seat"] for line in said) == [0, 1, 2, 3]
+    assert len({json.dumps(line["standings"]) for line in said}) == 1
+
+
+class Cutter(Checking):
+    """Cuts its own connection now and then: before it answers, or after an answer was acknowledged."""
+
+    def __init__(self, seed: int, proxy: Proxy) -> None:
+        super().__init__(seed)
+        self.proxy = proxy
+
+    def decide(self, request: Decision) -> int:
+        if request.decision_id % 7 == 3:
+            self.proxy.cut()
+        return super().decide(request)
+
+    def on_result(self, result: pb.AnswerResult) -> None:
+        super().on_result(result)
+        if result.decision_id % 7 == 6:
+            self.proxy.cut()
+
+
+def play_blocking(address: str, agents: dict[str, Checking]) -> dict[str, chefshat.SeatResult]:
+    with chefshat.Client(address, backoff=QUICK) as client:
+        return client.play_many(agents)
+
+
+def play_asyncio(address: str, agents: dict[str, Checking]) -> dict[str, chefshat.SeatResult]:
+    async def run() -> dict[str, chefshat.SeatResult]:
+        async with aio.Client(address, backoff=QUICK) as client:
+            return await client.play_many(agents)
+
+    return asyncio.run(run())
+
+
+@pytest.mark.parametrize("play", [play_blocking, play_asyncio])
+def test_lost_connections_are_made_again_and_nothing_is_missed(
+    real_address: str, play: Callable[[str, dict[str, Checking]], dict[str, chefshat.SeatResult]]
+) -> None:
+    with chefshat.Client(real_address) as client, Proxy(real_address) as proxy:
+        # Generous times: what is tested is that no decision is lost, not how fast connections are made.
+        policy = pb.RoomPolicy(decision_time_ms=60_000)
+        room = client.create_room("cut", rules=pb.RuleSet(target_shifts=2), policy=policy)
+        agents: dict[str, Checking] = {}
+        for number in range(4):
+            agents[client.join_room(room.join_code, f"player {number}").ticket] = Cutter(number, proxy)
+        results = play(proxy.address, agents)
+        lines = list(client.record(room.room.game_id))
+        assert proxy.cuts > 4
+        assert all(0 < result.reconnects <= proxy.cuts for result in results.values())
+        for ticket, agent in agents.items():
+            result = results[ticket]
+            assert result.finished
+            assert agent.sequences == list(range(1, len(agent.sequences) + 1))
+            assert agent.ids == list(range(1, len(agent.ids) + 1))
+            recorded = [line.decision for line in lines if line.HasField("decision") and line.decision.seat == result.seat]
+            assert len(recorded) == len(agent.ids)
+            assert all(decision.source == pb.DECISION_SOURCE_AGENT for decision in recorded)
+            assert all(not decision.invalid_attempts for decision in recorded)
+
+
+class Stubborn(Agent):
+    """Answers what is not legal whenever it may, and counts."""
+
+    def __init__(self) -> None:
+        self.asked = 0
+
+    def decide(self, request: Decision) -> int:
+        self.asked += 1
+        return int((~request.mask).nonzero()[0][0])
+
+
+def test_a_stubborn_agent_meets_the_servers_limit(real_address: str) -> None:
+    with chefshat.Client(real_address) as client:
+        policy = pb.RoomPolicy(max_invalid_attempts=3)
+        rules = pb.RuleSet(target_shifts=1)
+        room = client.create_room("stubborn", rules=rules, policy=policy, seats=[None, "random", "random", "random"])
+        agent = Stubborn()
+        result = client.play(agent, client.join_room(room.join_code, "Stubborn").ticket)
+    assert result.finished
+    assert result.decisions == 0
+    assert result.invalid == agent.asked > 0
+    assert result.invalid % 3 == 0
+
+
+def test_annotations_and_expressions_are_recorded(real_address: str) -> None:
+    class Talkative(RandomAgent):
+        def decide(self, request: Decision) -> int:
+            request.annotate(value_estimate=0.5, extra={"why": "chance"})
+            return super().decide(request)
+
+    with chefshat.Client(real_address) as client:
+        room = client.create_room("talk", rules=pb.RuleSet(target_shifts=1), seats=[None, "random", "random", "random"])
+        ticket = client.join_room(room.join_code, "Talkative").ticket
+        client.express(ticket, pb.Expression(label="joy", valence=0.5))
+        result = client.play(Talkative(1), ticket)
+        lines = list(client.record(room.room.game_id))
+    assert any(line.HasField("event") and line.event.expression_shown.expression.label == "joy" for line in lines)
+    noted = [
+        line.decision for line in lines if line.HasField("decision") and line.decision.annotations.extra.get("why") == "chance"
+    ]
+    assert len(noted) == result.decisions
+    assert all(decision.seat == result.seat for decision in noted)
+
+
+def test_refusals(real_address: str) -> None:
+    with chefshat.Client(real_address) as client:
+        with pytest.raises(chefshat.ChefsHatError) as caught:
+            client.create_room(rules=pb.RuleSet(players=9))
+        assert caught.value.reason == "RULE_SET_REFUSED"
+        with pytest.raises(chefshat.ChefsHatError, match="JOIN_CODE_WRONG"):
+            client.join_room("NOSUCHCODE", "Ada")
+        with pytest.raises(chefshat.ChefsHatError, match="TICKET_UNKNOWN"):
+            client.play(RandomAgent(), "nonsense")
+        with pytest.raises(chefshat.ChefsHatError, match="ROOM_UNKNOWN"):
+            client.get_room("0" * 32)

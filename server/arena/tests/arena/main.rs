@@ -1,0 +1,11 @@
+//! The tests of offline play, one binary. Each module below is a subject.
+
+#![allow(
+    clippy::unwrap_used,
+    reason = "a test fails by it, in its helpers as well"
+)]
+
+mod agents;
+mod batch;
+mod conformance;
+mod play;

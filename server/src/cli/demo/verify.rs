@@ -1,0 +1,142 @@
+//! Whether the deals of a finished game are those that were promised: the seed the server revealed is the one it committed to before
+//! anybody was asked for anything (or the one that was asked for), the agents' own bytes are in it, and every hand of the record
+//! follows from it.
+
+use chefshat_client::{Outcome, v1};
+use chefshat_engine::{Deal, RuleSet, Seed};
+use chefshat_records::convert::{rules_from_proto, seat_cards};
+use chefshat_records::seeds::{MAX_ENTROPY, SeedPlan};
+use v1::game_event::Kind;
+use v1::record_line::Line;
+
+/// What was found to be right.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) struct Checked {
+    /// Deals that follow from the seed.
+    pub(super) deals: usize,
+    /// Whether the server had committed to its part of the seed.
+    pub(super) committed: bool,
+}
+
+impl Checked {
+    /// For people.
+    pub(super) fn in_words(&self) -> String {
+        let deals = match self.deals {
+            1 => "the deal follows".to_owned(),
+            deals => format!("all {deals} deals follow"),
+        };
+        let seed = if self.committed {
+            "the seed committed to"
+        } else {
+            "the seed asked for"
+        };
+        format!("check out: {deals} from {seed}")
+    }
+}
+
+/// Why the deals are not to be trusted.
+#[derive(Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the deals do not check out: {0}")]
+pub(super) struct Unproven(&'static str);
+
+/// Checks a record against what was known before the game: the commitment, the seed asked for if any, and what each agent added.
+pub(super) fn check(
+    record: &[v1::RecordLine],
+    commitment: &[u8],
+    asked: Option<[u8; 32]>,
+    outcomes: &[Outcome],
+) -> Result<Checked, Unproven> {
+    let mut rules = None;
+    let mut game_id = String::new();
+    let mut shifts = Vec::new();
+    let mut reveal = None;
+    for line in record.iter().filter_map(|line| line.line.as_ref()) {
+        match line {
+            Line::Header(header) => {
+                rules = header
+                    .rules
+                    .as_ref()
+                    .and_then(|rules| rules_from_proto(rules).ok());
+                game_id.clone_from(&header.game_id);
+            }
+            Line::Event(event) => match &event.kind {
+                Some(Kind::ShiftStarted(start)) => shifts.push(start),
+                Some(Kind::GameEnded(end)) => reveal = end.reveal.as_ref(),
+                _ => {}
+            },
+            _ => {}
+        }
+    }
+    let rules = rules.ok_or(Unproven("the record has no rules"))?;
+    let reveal = reveal.ok_or(Unproven("the record has no seed"))?;
+    let seed: [u8; 32] = exactly(&reveal.game_seed).ok_or(Unproven("the seed is not 32 bytes"))?;
+    match asked {
+        Some(asked) if asked == seed => {}
+        Some(_) => return Err(Unproven("the seed is not the one asked for")),
+        None => check_commitment(reveal, &game_id, commitment, seed, outcomes)?,
+    }
+    for start in &shifts {
+        check_deal(&rules, Seed(seed), start)?;
+    }
+    if shifts.is_empty() {
+        return Err(Unproven("nothing was dealt"));
+    }
+    Ok(Checked {
+        deals: shifts.len(),
+        committed: asked.is_none(),
+    })
+}
+
+fn check_commitment(
+    reveal: &v1::SeedReveal,
+    game_id: &str,
+    commitment: &[u8],
+    seed: [u8; 32],
+    outcomes: &[Outcome],
+) -> Result<(), Unproven> {
+    let short = Unproven("what the server revealed is not of the right length");
+    let (Some(server_seed), Some(nonce)) = (exactly(&reveal.server_seed), exactly(&reveal.nonce))
+    else {
+        return Err(short);
+    };
+    let mut id = [0; 16];
+    hex::decode_to_slice(game_id, &mut id).map_err(|_| Unproven("the game's id cannot be read"))?;
+    let plan = SeedPlan::Committed { server_seed, nonce };
+    if plan.commitment(&id).as_ref().map(<[u8; 32]>::as_slice) != Some(commitment) {
+        return Err(Unproven("the revealed seed is not the one committed to"));
+    }
+    let entropy = &reveal.seat_entropy;
+    if entropy.iter().any(|bytes| bytes.len() > MAX_ENTROPY) {
+        return Err(short);
+    }
+    let counted = |outcome: &Outcome| {
+        let seat = usize::try_from(outcome.seat).unwrap_or(usize::MAX);
+        entropy.get(seat) == Some(&outcome.entropy)
+    };
+    if !outcomes.iter().all(counted) {
+        return Err(Unproven("an agent's own bytes are not in the seed"));
+    }
+    if plan.game_seed(entropy).0 != seed {
+        return Err(Unproven("the game seed does not follow from its parts"));
+    }
+    Ok(())
+}
+
+/// Whether the hands of a Shift are those that the seed deals.
+fn check_deal(rules: &RuleSet, seed: Seed, start: &v1::ShiftStarted) -> Result<(), Unproven> {
+    let deal = Deal::new(rules, seed, start.shift);
+    let hands: Vec<v1::SeatCards> = deal
+        .hands()
+        .iter()
+        .map(|(seat, cards)| seat_cards(seat, *cards, rules.faces()))
+        .collect();
+    if hands == start.hands {
+        Ok(())
+    } else {
+        Err(Unproven("a hand does not follow from the seed"))
+    }
+}
+
+fn exactly(bytes: &[u8]) -> Option<[u8; 32]> {
+    bytes.try_into().ok()
+}

@@ -1,0 +1,287 @@
+//! `chefshat room create`: a room as the flags describe it, and the secrets it comes with.
+
+use std::io::Write as _;
+use std::os::unix::fs::OpenOptionsExt as _;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use chefshat_arena::AgentKind;
+use chefshat_client::v1::{self, seat_config::FilledBy};
+use chefshat_engine::RewardScheme;
+use clap::Args;
+use clap::builder::PossibleValuesParser;
+
+use super::super::CommandError;
+use super::super::connect::ServerArg;
+use super::super::rules_args::RulesArgs;
+
+/// Names of the reward schemes, in the order of the protocol's numbers from 1.
+const REWARDS: [&str; 5] = ["validity", "paper", "paper_intended", "winning", "points"];
+
+/// Make a room and say how to join it.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  chefshat room create --name friday --seat greedy --seat random\n  \
+                  chefshat room create --preset rulebook --target-shifts 10 --decision-time-ms 60000\n  \
+                  chefshat room create --code-file ./join-code"
+)]
+pub(super) struct Create {
+    /// Name to show.
+    #[arg(long, default_value = "")]
+    name: String,
+    #[command(flatten)]
+    server: ServerArg,
+    /// How the next seat is filled: random, random_unmasked or greedy (played by the server), or open, agent, human or robot (for whom
+    /// it is free). Repeatable; seats not named are open.
+    #[arg(long = "seat", value_name = "SEAT", value_parser = seat)]
+    seats: Vec<FilledBy>,
+    #[command(flatten)]
+    rules: RulesArgs,
+    #[command(flatten)]
+    policy: PolicyArgs,
+    /// The game seed, 64 hexadecimal digits, for experiments; such a game has no seed commitment.
+    #[arg(long, value_name = "HEX", value_parser = game_seed)]
+    game_seed: Option<[u8; 32]>,
+    /// Leave the join code in this file, readable to its owner alone; waits for the server if it is not there yet.
+    #[arg(long, value_name = "FILE")]
+    code_file: Option<PathBuf>,
+    /// Print the room with its secrets as a JSON line.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Times and limits of a room.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Times and limits")]
+struct PolicyArgs {
+    /// Milliseconds for a decision; standard 10000.
+    #[arg(long, value_name = "MS")]
+    decision_time_ms: Option<u32>,
+    /// Milliseconds each seat may use beyond that over the whole game; standard 60000.
+    #[arg(long, value_name = "MS")]
+    bank_ms: Option<u32>,
+    /// Invalid attempts at one decision before the default is taken, 0 for no limit; standard 10.
+    #[arg(long, value_name = "N")]
+    max_invalid_attempts: Option<u32>,
+    /// Decisions in a row lost to the clock before a seat is substituted; standard 3.
+    #[arg(long, value_name = "N")]
+    max_timeouts: Option<u32>,
+    /// Milliseconds that the server's own agents wait before they decide; standard 0.
+    #[arg(long, value_name = "MS")]
+    pace_ms: Option<u32>,
+    /// Milliseconds to wait for the seats to be filled; standard 3600000.
+    #[arg(long, value_name = "MS")]
+    waiting_time_ms: Option<u32>,
+    /// Rewards told to the seats.
+    #[arg(long, value_name = "SCHEME", value_parser = PossibleValuesParser::new(REWARDS))]
+    reward: Option<String>,
+    /// Decisions by which spectators are behind; standard 0.
+    #[arg(long, value_name = "N")]
+    spectator_delay: Option<u32>,
+}
+
+impl Create {
+    pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
+        let request = self.request()?;
+        let client = match &self.code_file {
+            Some(_) => self.server.connect_patiently().await?,
+            None => self.server.connect().await?,
+        };
+        let made = client.create_room(request).await?;
+        let room = made
+            .room
+            .ok_or("the server did not say which room it made")?;
+        if let Some(file) = &self.code_file {
+            write_code(file, &made.join_code)?;
+        }
+        let (code, owner) = (made.join_code, made.owner_token);
+        if self.json {
+            let line = serde_json::json!({
+                "event": "created", "room": room, "join_code": code, "owner_token": owner,
+            });
+            println!("{line}");
+        } else {
+            println!("room         {}", room.room_id);
+            println!("game         {}", room.game_id);
+            println!("join code    {code}");
+            println!("owner token  {owner}");
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+
+    fn request(&self) -> Result<v1::CreateRoomRequest, CommandError> {
+        let players = usize::from(self.rules.rules()?.players());
+        if self.seats.len() > players {
+            let described = self.seats.len();
+            return Err(
+                format!("--seat: {described} seats are described, but {players} play").into(),
+            );
+        }
+        let open = FilledBy::ReservedFor(v1::ParticipantKind::Unspecified.into());
+        let all = self.seats.iter().cloned().chain(std::iter::repeat(open));
+        Ok(v1::CreateRoomRequest {
+            name: self.name.clone(),
+            rules: Some(self.rules.message()),
+            seats: all
+                .take(players)
+                .map(|filled_by| v1::SeatConfig {
+                    filled_by: Some(filled_by),
+                })
+                .collect(),
+            policy: Some(self.policy.message()),
+            game_seed: self.game_seed.map_or_else(Vec::new, |seed| seed.to_vec()),
+        })
+    }
+}
+
+impl PolicyArgs {
+    fn message(&self) -> v1::RoomPolicy {
+        let scheme = self.reward.as_deref().and_then(RewardScheme::from_name);
+        v1::RoomPolicy {
+            decision_time_ms: self.decision_time_ms,
+            bank_ms: self.bank_ms,
+            max_invalid_attempts: self.max_invalid_attempts,
+            max_timeouts: self.max_timeouts,
+            pace_ms: self.pace_ms,
+            waiting_time_ms: self.waiting_time_ms,
+            reward_scheme: match scheme {
+                None => v1::RewardScheme::Unspecified,
+                Some(RewardScheme::Validity) => v1::RewardScheme::Validity,
+                Some(RewardScheme::Paper) => v1::RewardScheme::Paper,
+                Some(RewardScheme::PaperIntended) => v1::RewardScheme::PaperIntended,
+                Some(RewardScheme::Winning) => v1::RewardScheme::Winning,
+                Some(RewardScheme::Points) => v1::RewardScheme::Points,
+            }
+            .into(),
+            spectator_delay_decisions: self.spectator_delay,
+            ..v1::RoomPolicy::default()
+        }
+    }
+}
+
+fn seat(word: &str) -> Result<FilledBy, String> {
+    let reserved = match word {
+        "open" => v1::ParticipantKind::Unspecified,
+        "agent" => v1::ParticipantKind::Agent,
+        "human" => v1::ParticipantKind::Human,
+        "robot" => v1::ParticipantKind::Robot,
+        _ => {
+            return AgentKind::from_name(word)
+                .map(|kind| FilledBy::BuiltInAgent(kind.name().to_owned()))
+                .ok_or_else(|| {
+                    let known = AgentKind::ALL.map(AgentKind::name).join(", ");
+                    format!("use one of {known}, open, agent, human, robot")
+                });
+        }
+    };
+    Ok(FilledBy::ReservedFor(reserved.into()))
+}
+
+fn game_seed(digits: &str) -> Result<[u8; 32], String> {
+    let mut seed = [0; 32];
+    hex::decode_to_slice(digits, &mut seed)
+        .map(|()| seed)
+        .map_err(|_| "a game seed is 64 hexadecimal digits".to_owned())
+}
+
+/// Leaves a join code in a file: whole or not at all, and for its owner alone.
+fn write_code(file: &Path, code: &str) -> Result<(), CommandError> {
+    let mut part = file.as_os_str().to_owned();
+    part.push(".part");
+    let write = || {
+        // One left behind by a process that was stopped may have been made otherwise.
+        match std::fs::remove_file(&part) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(error),
+            _ => {}
+        }
+        let mut options = std::fs::OpenOptions::new();
+        let mut whole = options
+            .write(true)
+            .create_new(true)
+            .mode(0o600)
+            .open(&part)?;
+        writeln!(whole, "{code}")?;
+        std::fs::rename(&part, file)
+    };
+    write().map_err(|error| {
+        format!(
+            "the join code is {code}, but it cannot be left in {}: {error}",
+            file.display()
+        )
+        .into()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Only {
+        #[command(flatten)]
+        create: Create,
+    }
+
+    fn request(flags: &str) -> Result<v1::CreateRoomRequest, CommandError> {
+        let words = std::iter::once("test").chain(flags.split_whitespace());
+        let only = Only::try_parse_from(words).expect("the flags are known");
+        only.create.request()
+    }
+
+    #[test]
+    fn seats_not_named_are_open() {
+        let request = request("--seat greedy --seat human").expect("a room");
+        let seats: Vec<FilledBy> = request
+            .seats
+            .into_iter()
+            .filter_map(|seat| seat.filled_by)
+            .collect();
+        let open = FilledBy::ReservedFor(0);
+        let human = FilledBy::ReservedFor(v1::ParticipantKind::Human.into());
+        assert_eq!(
+            seats,
+            [
+                FilledBy::BuiltInAgent("greedy".into()),
+                human,
+                open.clone(),
+                open
+            ]
+        );
+    }
+
+    #[test]
+    fn too_many_seats_are_refused() {
+        let error = request("--players 2 --seat open --seat open --seat open")
+            .expect_err("three seats for two");
+        assert!(error.to_string().contains("3 seats"), "{error}");
+    }
+
+    #[test]
+    fn every_reward_has_its_scheme() {
+        for name in REWARDS {
+            let policy = request(&format!("--reward {name}"))
+                .expect("a room")
+                .policy
+                .expect("a policy");
+            let wire = policy.reward_scheme().as_str_name();
+            assert_eq!(wire, format!("REWARD_SCHEME_{}", name.to_uppercase()));
+        }
+    }
+
+    #[test]
+    fn a_code_is_left_for_its_owner_alone() {
+        use std::os::unix::fs::PermissionsExt as _;
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("code");
+        write_code(&file, "BCDF2345").expect("written");
+        write_code(&file, "BCDF2346").expect("written again");
+        assert_eq!(std::fs::read_to_string(&file).expect("read"), "BCDF2346\n");
+        let mode = std::fs::metadata(&file)
+            .expect("it is there")
+            .permissions()
+            .mode();
+        assert_eq!(mode & 0o777, 0o600);
+    }
+}

@@ -1,0 +1,77 @@
+//! `chefshat room`: rooms of a server, made, listed, shown, watched and closed from the command line.
+
+mod create;
+mod show;
+mod watch;
+
+use std::process::ExitCode;
+
+use clap::{Args, Subcommand};
+
+use super::CommandError;
+use super::connect::ServerArg;
+
+/// Make, list, watch and close rooms of a server.
+#[derive(Debug, Args)]
+pub(super) struct RoomCommand {
+    #[command(subcommand)]
+    action: RoomAction,
+}
+
+#[derive(Debug, Subcommand)]
+enum RoomAction {
+    /// Make a room and say how to join it.
+    Create(create::Create),
+    /// List the rooms of a server.
+    List(show::List),
+    /// Show one room.
+    Show(show::Show),
+    /// Follow the game of a room.
+    Watch(watch::Watch),
+    /// Close a room; a running game is aborted.
+    Close(Close),
+}
+
+/// Close a room; a running game is aborted.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  chefshat room close 5f0c6a4de2b14b7f8a3d9c1e7b60425d --owner-token TOKEN"
+)]
+struct Close {
+    /// Which room.
+    #[arg(value_name = "ROOM-ID")]
+    room_id: String,
+    /// The secret that `room create` gave.
+    #[arg(long, env = "CHEFSHAT_OWNER_TOKEN", hide_env_values = true)]
+    owner_token: String,
+    #[command(flatten)]
+    server: ServerArg,
+    /// Print the room as a JSON line.
+    #[arg(long)]
+    json: bool,
+}
+
+impl RoomCommand {
+    pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
+        match self.action {
+            RoomAction::Create(command) => command.run().await,
+            RoomAction::List(command) => command.run().await,
+            RoomAction::Show(command) => command.run().await,
+            RoomAction::Watch(command) => command.run().await,
+            RoomAction::Close(command) => command.run().await,
+        }
+    }
+}
+
+impl Close {
+    async fn run(self) -> Result<ExitCode, CommandError> {
+        let client = self.server.connect().await?;
+        let room = client.close_room(self.room_id, self.owner_token).await?;
+        if self.json {
+            println!("{}", serde_json::json!({"event": "closed", "room": room}));
+        } else {
+            println!("room {} is {}", room.room_id, show::state(room.state()));
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+}

@@ -1,0 +1,168 @@
+//! `chefshat room list` and `chefshat room show`.
+
+use std::process::ExitCode;
+
+use chefshat_client::v1;
+use clap::{Args, ValueEnum};
+
+use super::super::CommandError;
+use super::super::connect::ServerArg;
+use super::super::narrator::clean;
+
+/// Rooms asked for at a time.
+const PAGE: u32 = 100;
+
+/// List the rooms of a server.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  chefshat room list --state playing")]
+pub(super) struct List {
+    #[command(flatten)]
+    server: ServerArg,
+    /// Rooms in this state alone.
+    #[arg(long)]
+    state: Option<StateArg>,
+    /// Print each room as a JSON line.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Show one room.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  chefshat room show 5f0c6a4de2b14b7f8a3d9c1e7b60425d")]
+pub(super) struct Show {
+    /// Which room.
+    #[arg(value_name = "ROOM-ID")]
+    room_id: String,
+    #[command(flatten)]
+    server: ServerArg,
+    /// Print the room as a JSON line.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum StateArg {
+    Waiting,
+    Playing,
+    Finished,
+    Aborted,
+}
+
+impl List {
+    pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
+        let client = self.server.connect().await?;
+        let state = match self.state {
+            None => v1::RoomState::Unspecified,
+            Some(StateArg::Waiting) => v1::RoomState::Waiting,
+            Some(StateArg::Playing) => v1::RoomState::Playing,
+            Some(StateArg::Finished) => v1::RoomState::Finished,
+            Some(StateArg::Aborted) => v1::RoomState::Aborted,
+        };
+        let mut request = v1::ListRoomsRequest {
+            state: state.into(),
+            page_size: PAGE,
+            page_token: String::new(),
+        };
+        let mut count = 0;
+        loop {
+            let page = client.list_rooms(request.clone()).await?;
+            for room in &page.rooms {
+                if self.json {
+                    println!("{}", serde_json::to_string(room)?);
+                } else {
+                    println!("{}", in_a_line(room));
+                }
+                count += 1;
+            }
+            if page.next_page_token.is_empty() {
+                break;
+            }
+            request.page_token = page.next_page_token;
+        }
+        if count == 0 && !self.json {
+            println!("no rooms");
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+impl Show {
+    pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
+        let client = self.server.connect().await?;
+        let room = client.get_room(self.room_id).await?;
+        if self.json {
+            println!("{}", serde_json::to_string(&room)?);
+        } else {
+            print!("{}", in_full(&room));
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+/// Where a room stands, in a word.
+pub(super) fn state(state: v1::RoomState) -> &'static str {
+    match state {
+        v1::RoomState::Unspecified => "in a state this program does not know",
+        v1::RoomState::Waiting => "waiting",
+        v1::RoomState::Playing => "playing",
+        v1::RoomState::Finished => "finished",
+        v1::RoomState::Aborted => "aborted",
+    }
+}
+
+fn in_a_line(room: &v1::Room) -> String {
+    let taken = room
+        .seats
+        .iter()
+        .filter(|seat| !seat.name.is_empty())
+        .count();
+    let seats = room.seats.len();
+    let state = state(room.state());
+    let name = clean(&room.name, 30);
+    format!(
+        "{}  {state:<8}  {taken}/{seats} seats  {name}",
+        room.room_id
+    )
+}
+
+fn in_full(room: &v1::Room) -> String {
+    let mut out = format!("room  {}\ngame  {}\n", room.room_id, room.game_id);
+    if !room.name.is_empty() {
+        out.push_str(&format!("name  {}\n", clean(&room.name, 64)));
+    }
+    out.push_str(&format!("state {}\n", state(room.state())));
+    if room.seed_fixed {
+        out.push_str("deal  from a seed its creator fixed\n");
+    } else {
+        out.push_str(&format!(
+            "deal  committed to as {}\n",
+            hex::encode(&room.seed_commitment)
+        ));
+    }
+    for seat in &room.seats {
+        out.push_str(&format!("seat {} {}\n", seat.seat, seat_in_words(seat)));
+    }
+    out
+}
+
+fn seat_in_words(seat: &v1::Participant) -> String {
+    let kind = |kind| match kind {
+        v1::ParticipantKind::Unspecified => "anybody",
+        v1::ParticipantKind::Agent => "agent",
+        v1::ParticipantKind::Human => "human",
+        v1::ParticipantKind::Robot => "robot",
+    };
+    if seat.name.is_empty() {
+        return format!("free for {}", kind(seat.reserved_for()));
+    }
+    let name = clean(&seat.name, 30);
+    if !seat.built_in_agent.is_empty() {
+        return format!("{name}, played by the server");
+    }
+    let there = match (seat.substituted, seat.connected) {
+        (true, _) => "substituted",
+        (false, true) => "connected",
+        (false, false) => "not connected",
+    };
+    format!("{name}, {}, {there}", kind(seat.kind()))
+}

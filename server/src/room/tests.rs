@@ -1,0 +1,199 @@
+//! The shell of a room under tokio's paused clock: streams that do not read, and what they find when they do.
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicU64;
+use std::time::Duration;
+
+use chefshat_engine::{RuleSetSpec, Seat, Stop};
+use chefshat_proto::v1::{self, SeatUpdate, seat_update::Update};
+use chefshat_records::seeds::SeedPlan;
+use futures::StreamExt as _;
+use tokio::time::Instant;
+use tokio_util::task::TaskTracker;
+
+use super::core::ConnectionId;
+use super::delivery::Wishes;
+use super::policy::{AbortPolicy, Policy};
+use super::{AttachRequest, Handle, JoinRequest, RoomWatcher, SeatAction, TaskContext, start};
+use crate::ids::{Id, SecretHash, Token};
+use crate::outbox::{Outbox, OutboxStream};
+use crate::store::journal::{Fill, GameHeader, ParticipantKind};
+use crate::store::{MemoryStore, Store as _};
+
+struct Nobody;
+
+impl RoomWatcher for Nobody {
+    fn game_over(&self, _room: Id) {}
+    fn gone(&self, _room: Id) {}
+}
+
+async fn room(policy: Policy, shifts: u32) -> Handle {
+    let header = Arc::new(GameHeader {
+        room_id: Id([1; 16]),
+        game_id: Id([2; 16]),
+        name: String::new(),
+        rules: RuleSetSpec {
+            stop: Stop::Shifts(shifts),
+            ..RuleSetSpec::default()
+        }
+        .validate()
+        .expect("the rule set makes sense"),
+        policy,
+        fills: vec![Fill::Open { reserved_for: None }; 4],
+        seed: SeedPlan::Fixed { game_seed: [3; 32] },
+        created_at_ms: 0,
+        join_code: "CODE".into(),
+        owner: SecretHash::of(b"owner"),
+    });
+    let store = Arc::new(MemoryStore::default());
+    store
+        .create(Arc::clone(&header))
+        .await
+        .expect("memory keeps it");
+    start(
+        header,
+        TaskContext {
+            store,
+            data_dir: None,
+            retention: Duration::from_secs(1_000_000),
+            connections: Arc::new(AtomicU64::new(1)),
+            tracker: TaskTracker::new(),
+            watcher: Arc::new(Nobody),
+        },
+    )
+}
+
+struct AttachedSeat {
+    seat: Seat,
+    connection: ConnectionId,
+    ticket: Token,
+    updates: OutboxStream<SeatUpdate>,
+}
+
+async fn take_seat(room: &Handle) -> AttachedSeat {
+    let joined = room
+        .join(JoinRequest {
+            name: "somebody".into(),
+            kind: ParticipantKind::Agent,
+            seat: None,
+        })
+        .await
+        .expect("the room is there")
+        .expect("there is space");
+    attach(room, joined.ticket).await
+}
+
+async fn attach(room: &Handle, ticket: Token) -> AttachedSeat {
+    let (outbox, updates) = Outbox::new();
+    let (seat, connection) = room
+        .attach(AttachRequest {
+            secret: ticket.secret,
+            request_id: 0,
+            outbox,
+            handle: 0,
+            wishes: Wishes {
+                at_once: true,
+                no_mask: false,
+                snapshot: false,
+                from: 0,
+            },
+            entropy: Vec::new(),
+        })
+        .await
+        .expect("the room is there")
+        .expect("the ticket is good");
+    AttachedSeat {
+        seat,
+        connection,
+        ticket,
+        updates,
+    }
+}
+
+/// Reads until the end of the game; answers decisions with their first legal action if `answering`. Gives the numbers of all events.
+async fn read(room: &Handle, seat: &mut AttachedSeat, answering: bool) -> Vec<u64> {
+    let mut numbers = Vec::new();
+    while let Some(updates) = seat.updates.next().await {
+        for update in updates.expect("no error") {
+            match update.update.expect("it says something") {
+                Update::Events(batch) => {
+                    numbers.extend(batch.events.iter().map(|event| event.sequence));
+                }
+                Update::Decision(decision) if answering => {
+                    let action = SeatAction::Answer {
+                        decision_id: decision.decision_id,
+                        action: first_legal(&decision),
+                        annotations: None,
+                    };
+                    room.perform(seat.seat, seat.connection, action, Instant::now())
+                        .await
+                        .expect("the room is there");
+                }
+                Update::Detached(detached) => {
+                    assert_eq!(detached.reason(), v1::DetachReason::GameOver);
+                    return numbers;
+                }
+                _ => {}
+            }
+        }
+    }
+    panic!("the stream ended before the game")
+}
+
+fn first_legal(decision: &v1::DecisionRequest) -> u32 {
+    (0..)
+        .find(|action: &u32| {
+            let byte = decision.action_mask[usize::try_from(action / 8).expect("small")];
+            byte & (1 << (action % 8)) != 0
+        })
+        .expect("something is legal")
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_stream_that_is_not_read_is_not_waited_for_and_finds_everything_later() {
+    // Long enough that what happens does not fit an outbox.
+    let policy = Policy {
+        abort: AbortPolicy::Never,
+        ..Policy::default()
+    };
+    let room = room(policy, 120).await;
+    let mut seats = Vec::new();
+    for _ in 0..4 {
+        seats.push(take_seat(&room).await);
+    }
+    let mut deaf = seats.pop().expect("there are four");
+    let played = futures::future::join_all(seats.iter_mut().map(|seat| read(&room, seat, true)));
+    let played = played.await;
+    let expected: Vec<u64> = (1..).take(played[0].len()).collect();
+    assert!(expected.len() > crate::outbox::OUTBOX_CAPACITY);
+    for numbers in &played {
+        assert_eq!(*numbers, expected);
+    }
+    // The deaf one reads at last: what had been put aside for it, then the rest, in order and once.
+    assert_eq!(read(&room, &mut deaf, false).await, expected);
+    // And one that attaches only now.
+    let mut late = attach(&room, deaf.ticket).await;
+    assert_eq!(read(&room, &mut late, false).await, expected);
+}
+
+#[tokio::test(start_paused = true)]
+async fn deadlines_ring_without_anybody_saying_anything() {
+    let policy = Policy {
+        abort: AbortPolicy::Never,
+        ..Policy::default()
+    };
+    let begun = Instant::now();
+    let room = room(policy, 1).await;
+    let mut seats = Vec::new();
+    for _ in 0..4 {
+        seats.push(take_seat(&room).await);
+    }
+    // Nobody answers: every seat loses its bank and three decisions, then substitutes end the game.
+    let read = futures::future::join_all(seats.iter_mut().map(|seat| read(&room, seat, false)));
+    let numbers = read.await;
+    assert!(numbers[0].len() > 12);
+    let patience = Policy::default();
+    let longest = 4 * (patience.bank + 3 * patience.decision_time);
+    assert!(begun.elapsed() <= longest + Duration::from_secs(1));
+    assert!(begun.elapsed() >= patience.bank + patience.decision_time);
+}

@@ -1,0 +1,14 @@
+//! The tests of the command line of `chefshat`, one binary: each runs the program as a person or a script would. A module for each command.
+
+#![allow(
+    clippy::unwrap_used,
+    reason = "a test fails by it, in its helpers as well"
+)]
+
+mod cli {
+    mod conformance;
+    mod demo;
+    mod room;
+    mod run;
+    mod simulate;
+}

@@ -1,0 +1,244 @@
+//! `chefshat serve`, `room` and `agent` as processes of their own: a room is made, four agents join it with the code from a file, a
+//! spectator watches, and everybody agrees how it ended.
+
+use std::io::{BufRead as _, BufReader};
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+/// Runs with the program, and not longer than the test.
+struct Running(Child);
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        // It may have ended already.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+fn program() -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_chefshat"));
+    for (name, _) in std::env::vars_os() {
+        if name.to_string_lossy().starts_with("CHEFSHAT_") {
+            command.env_remove(name);
+        }
+    }
+    command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    command
+}
+
+/// A server, and its address.
+fn serve(data_dir: &Path) -> (Running, String) {
+    let mut command = program();
+    command.args(["serve", "--listen", "127.0.0.1:0", "--json", "--data-dir"]);
+    let mut child = command
+        .arg(data_dir)
+        .stderr(Stdio::inherit())
+        .spawn()
+        .unwrap();
+    let mut line = String::new();
+    BufReader::new(child.stdout.take().unwrap())
+        .read_line(&mut line)
+        .unwrap();
+    let listening: Value = serde_json::from_str(&line).unwrap();
+    let address = listening["address"].as_str().unwrap();
+    let url = format!("http://{address}");
+    (Running(child), url)
+}
+
+fn json(output: &Output) -> Value {
+    let text = std::str::from_utf8(&output.stdout).unwrap();
+    serde_json::from_str(text).unwrap_or_else(|error| {
+        let errors = String::from_utf8_lossy(&output.stderr);
+        panic!("{error}: {text:?}, {errors}")
+    })
+}
+
+fn run(server: &str, arguments: &[&str]) -> Output {
+    let mut command = program();
+    command.args(arguments).args(["--server", server]);
+    command.output().unwrap()
+}
+
+#[test]
+fn four_processes_play_a_game_that_a_fifth_watches() {
+    let folder = TempDir::new().unwrap();
+    let (_server, url) = serve(folder.path());
+    let code_file = folder.path().join("code");
+    let code_file = code_file.to_str().unwrap();
+
+    // The agents may be there before the code is.
+    let agents: Vec<Running> = ["greedy", "random", "random_unmasked", "greedy"]
+        .iter()
+        .zip(["Ada", "Ben", "Cleo", "Dan"])
+        .map(|(kind, name)| {
+            let mut command = program();
+            command.args(["agent", kind, "--name", name, "--seed", "7", "--json"]);
+            command.args(["--server", &url, "--code-file", code_file]);
+            Running(command.spawn().unwrap())
+        })
+        .collect();
+    let create = [
+        "room",
+        "create",
+        "--name",
+        "friday",
+        "--target-shifts",
+        "2",
+        "--code-file",
+        code_file,
+        "--json",
+    ];
+    let made = json(&run(&url, &create));
+    let room_id = made["room"]["roomId"].as_str().unwrap();
+    let watched = run(&url, &["room", "watch", room_id]);
+    assert_eq!(watched.status.code(), Some(0), "{watched:?}");
+    let watched = String::from_utf8(watched.stdout).unwrap();
+    for words in [
+        "friday",
+        "Ada",
+        "Dan",
+        "Shift 1",
+        "Shift 2",
+        "Standings",
+        "wins the game",
+    ] {
+        assert!(watched.contains(words), "{words} is not in {watched}");
+    }
+
+    let mut results = Vec::new();
+    for mut agent in agents {
+        let stdout = agent.0.stdout.take().unwrap();
+        let lines: Vec<String> = BufReader::new(stdout).lines().map(Result::unwrap).collect();
+        assert_eq!(agent.0.wait().unwrap().code(), Some(0));
+        let [line] = lines.as_slice() else {
+            panic!("one line was expected: {lines:?}");
+        };
+        let result: Value = serde_json::from_str(line).unwrap();
+        assert_eq!(result["event"], "result");
+        assert_eq!(result["game_id"], made["room"]["gameId"]);
+        results.push((
+            result["place"].as_u64().unwrap(),
+            result["points"].as_u64().unwrap(),
+        ));
+    }
+    results.sort_unstable();
+    let places: Vec<u64> = results.iter().map(|(place, _)| *place).collect();
+    assert_eq!(places, [1, 2, 3, 4]);
+    let points: u64 = results.iter().map(|(_, points)| points).sum();
+    assert_eq!(points, 2 * (5 + 3 + 1), "two Shifts give all their points");
+}
+
+#[test]
+fn rooms_are_listed_shown_and_closed() {
+    let folder = TempDir::new().unwrap();
+    let (_server, url) = serve(folder.path());
+    let none = run(&url, &["room", "list"]);
+    assert_eq!(String::from_utf8(none.stdout).unwrap(), "no rooms\n");
+
+    let create = [
+        "room", "create", "--name", "quiet", "--seat", "greedy", "--seat", "human", "--json",
+    ];
+    let made = json(&run(&url, &create));
+    let room_id = made["room"]["roomId"].as_str().unwrap();
+    let listed = json(&run(
+        &url,
+        &["room", "list", "--json", "--state", "waiting"],
+    ));
+    assert_eq!(listed["roomId"], room_id);
+    let shown = String::from_utf8(run(&url, &["room", "show", room_id]).stdout).unwrap();
+    for words in [
+        "quiet",
+        "waiting",
+        "greedy, played by the server",
+        "free for human",
+        "free for anybody",
+    ] {
+        assert!(shown.contains(words), "{words} is not in {shown}");
+    }
+
+    let wrong = run(
+        &url,
+        &["room", "close", room_id, "--owner-token", "nonsense"],
+    );
+    assert_eq!(wrong.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&wrong.stderr).contains("OWNER_TOKEN_WRONG"));
+    let token = made["owner_token"].as_str().unwrap();
+    let closed = json(&run(
+        &url,
+        &["room", "close", room_id, "--owner-token", token, "--json"],
+    ));
+    assert_eq!(closed["room"]["state"], "ROOM_STATE_ABORTED");
+
+    let watched = run(&url, &["room", "watch", room_id]);
+    assert_eq!(
+        watched.status.code(),
+        Some(1),
+        "an aborted game has no result"
+    );
+    let code = made["join_code"].as_str().unwrap();
+    let late = run(&url, &["agent", "greedy", "--code", code]);
+    assert_eq!(late.status.code(), Some(1));
+}
+
+#[test]
+fn an_aborted_game_is_told_to_its_agent() {
+    let folder = TempDir::new().unwrap();
+    let (_server, url) = serve(folder.path());
+    let made = json(&run(&url, &["room", "create", "--json"]));
+    let (room_id, token) = (
+        made["room"]["roomId"].as_str(),
+        made["owner_token"].as_str(),
+    );
+    let mut command = program();
+    command.args(["agent", "random", "--json", "--server", &url, "--code"]);
+    let mut agent = Running(
+        command
+            .arg(made["join_code"].as_str().unwrap())
+            .spawn()
+            .unwrap(),
+    );
+    // It says so when it has its seat.
+    let mut line = String::new();
+    let mut stderr = BufReader::new(agent.0.stderr.take().unwrap());
+    stderr.read_line(&mut line).unwrap();
+    assert!(line.contains("seat 0"), "{line}");
+
+    let close = [
+        "room",
+        "close",
+        room_id.unwrap(),
+        "--owner-token",
+        token.unwrap(),
+    ];
+    assert_eq!(run(&url, &close).status.code(), Some(0));
+    let stdout = agent.0.stdout.take().unwrap();
+    let lines: Vec<String> = BufReader::new(stdout).lines().map(Result::unwrap).collect();
+    assert_eq!(agent.0.wait().unwrap().code(), Some(1));
+    let [line] = lines.as_slice() else {
+        panic!("one line was expected: {lines:?}");
+    };
+    let result: Value = serde_json::from_str(line).unwrap();
+    assert!(
+        ["aborted", "lost"].contains(&result["event"].as_str().unwrap()),
+        "{line}"
+    );
+}
+
+#[test]
+fn a_missing_server_is_named() {
+    // A port that was free a moment ago; nothing that listens there speaks this protocol.
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let url = format!("http://{}", listener.local_addr().unwrap());
+    drop(listener);
+    let ended = run(&url, &["room", "list"]);
+    assert_eq!(ended.status.code(), Some(1));
+    let words = String::from_utf8(ended.stderr).unwrap();
+    assert!(
+        words.contains(&url) && words.contains("chefshat serve"),
+        "{words}"
+    );
+}
