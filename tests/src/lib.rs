@@ -1,6 +1,11 @@
 //! What the whole-system tests share: a server on a free port, rooms on it, and seats that do exactly what a test tells them, over real
 //! sockets. Agents that play by themselves come from the SDKs.
 
+/// The samples of the README, compiled.
+#[doc = include_str!("../../README.md")]
+#[cfg(doctest)]
+pub struct Readme;
+
 mod seat;
 mod server;
 

@@ -43,7 +43,7 @@ impl RemoteAgent {
         };
         let seat = usize::try_from(seat)
             .ok()
-            .filter(|seat| *seat < usize::from(rules.players()))
+            .filter(|seat| *seat < rules.players())
             .map(Seat::new)
             .ok_or("the server told a seat that the game does not have")?;
         let observation = observation_from_proto(request, seat, &rules)

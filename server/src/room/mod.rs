@@ -3,6 +3,7 @@
 
 pub mod core;
 pub mod delivery;
+mod handle;
 pub mod log;
 pub mod policy;
 mod spectators;
@@ -11,7 +12,8 @@ mod task;
 mod tests;
 
 pub use spectators::{MAX_SPECTATOR_LAG, MAX_SPECTATORS};
-pub use task::{
-    Acted, AttachRequest, Handle, JoinRequest, Joined, RoomGone, RoomWatcher, SeatAction,
-    SpectateError, SpectateRequest, TaskContext, start,
+pub use handle::{
+    Acted, AttachRequest, Handle, JoinRequest, Joined, RoomGone, SeatAction, SpectateError,
+    SpectateRequest,
 };
+pub use task::{RoomWatcher, TaskContext, start};

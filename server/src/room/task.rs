@@ -7,134 +7,28 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use chefshat_engine::Seat;
-use chefshat_proto::v1::{self, SeatUpdate, SpectatorServiceWatchResponse};
+use chefshat_proto::v1;
 use tokio::sync::{mpsc, oneshot};
 use tokio::time::{Instant, Sleep};
 use tokio_util::task::TaskTracker;
 use tracing::{debug, error, info};
 
-use super::core::{AnswerInput, Answered, ConnectionId, Core, ExpressError, JoinError, State};
-use super::delivery::{Attachment, Wishes, is_urgent};
+use super::core::{AnswerInput, Answered, ConnectionId, Core, JoinError, State};
+use super::delivery::{Attachment, is_urgent};
+use super::handle::{
+    Acted, AttachRequest, Handle, JoinRequest, Joined, Message, SeatAction, SpectateError,
+    SpectateRequest, TellSpace,
+};
 use super::spectators::{MAX_SPECTATORS, Spectator};
 use crate::config::ROOM_MAILBOX;
 use crate::convert;
 use crate::ids::{Id, Token};
-use crate::outbox::{HandStamp, OnSpace, Outbox};
+use crate::outbox::{HandStamp, OnSpace};
 use crate::store::Store;
-use crate::store::journal::{AbortReason, GameHeader, ParticipantKind, SeatedParticipant};
+use crate::store::journal::{AbortReason, GameHeader, SeatedParticipant};
 
 /// Inputs that are applied before the store is asked once for all of them.
 const INPUTS_PER_COMMIT: usize = 64;
-
-/// The room is gone: closed, ended long ago, or stopped because its store failed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("the room is gone")]
-pub struct RoomGone;
-
-/// Asks for a seat.
-#[derive(Debug)]
-pub struct JoinRequest {
-    /// Name to show.
-    pub name: String,
-    /// What joins.
-    pub kind: ParticipantKind,
-    /// A certain seat.
-    pub seat: Option<u32>,
-}
-
-/// A seat that was taken.
-#[derive(Debug)]
-pub struct Joined {
-    /// The seat.
-    pub seat: Seat,
-    /// Its ticket.
-    pub ticket: Token,
-    /// The room with it.
-    pub room: Box<v1::Room>,
-}
-
-/// Asks to attach a stream to a seat.
-#[derive(Debug)]
-pub struct AttachRequest {
-    /// The ticket's secret.
-    pub secret: [u8; 32],
-    /// Chosen by the client.
-    pub request_id: u32,
-    /// The stream.
-    pub outbox: Arc<Outbox<SeatUpdate>>,
-    /// Number of the seat on the stream.
-    pub handle: u32,
-    /// How it wants to be told.
-    pub wishes: Wishes,
-    /// The seat's part of the game seed.
-    pub entropy: Vec<u8>,
-}
-
-/// Asks to watch.
-#[derive(Debug)]
-pub struct SpectateRequest {
-    /// The stream.
-    pub outbox: Arc<Outbox<SpectatorServiceWatchResponse>>,
-    /// Position in the log from which events are wanted.
-    pub from: usize,
-    /// Start with a snapshot.
-    pub snapshot: bool,
-}
-
-/// Why a room cannot be watched.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum SpectateError {
-    /// The policy does not admit spectators.
-    NotAdmitted,
-    /// There are too many.
-    Full,
-    /// A snapshot of a delayed room would tell what is not to be known yet.
-    SnapshotDelayed,
-}
-
-/// What a seat does.
-#[derive(Debug)]
-pub enum SeatAction {
-    /// Answers a decision.
-    Answer {
-        /// The decision.
-        decision_id: u64,
-        /// The action.
-        action: u32,
-        /// Annotations, encoded.
-        annotations: Option<Box<[u8]>>,
-    },
-    /// Expresses something.
-    Express {
-        /// For the record only.
-        record_only: bool,
-        /// The expression, encoded.
-        expression: Box<[u8]>,
-    },
-    /// Plays itself again.
-    Resume,
-}
-
-/// What became of an action that was sent without a stream.
-pub type Acted = Result<Option<v1::AnswerResult>, ExpressError>;
-
-enum Message {
-    Join(JoinRequest, oneshot::Sender<Result<Joined, JoinError>>),
-    Attach(AttachRequest, oneshot::Sender<Option<(Seat, ConnectionId)>>),
-    Lost(Seat, ConnectionId, Option<v1::DetachReason>),
-    Do(Seat, ConnectionId, SeatAction, Instant),
-    Act(
-        [u8; 32],
-        SeatAction,
-        Instant,
-        oneshot::Sender<Option<Acted>>,
-    ),
-    Spectate(SpectateRequest, oneshot::Sender<Result<(), SpectateError>>),
-    Describe(oneshot::Sender<v1::Room>),
-    Close([u8; 32], oneshot::Sender<Option<v1::Room>>),
-    Abort(AbortReason),
-    Space,
-}
 
 /// What is told once the changes are kept.
 enum Release {
@@ -152,146 +46,6 @@ enum Release {
     Refuse(Seat, ConnectionId, v1::Refused),
     Acted(oneshot::Sender<Option<Acted>>, Acted),
     Closed(oneshot::Sender<Option<v1::Room>>),
-}
-
-/// How others reach a room.
-#[derive(Clone)]
-pub struct Handle {
-    id: Id,
-    mailbox: mpsc::Sender<Message>,
-}
-
-impl std::fmt::Debug for Handle {
-    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(formatter, "Handle({})", self.id)
-    }
-}
-
-impl Handle {
-    /// Which room.
-    pub fn id(&self) -> Id {
-        self.id
-    }
-
-    /// Takes a seat.
-    ///
-    /// # Errors
-    /// The room is gone, or (inside) why no seat can be taken.
-    pub async fn join(&self, request: JoinRequest) -> Result<Result<Joined, JoinError>, RoomGone> {
-        self.ask(|reply| Message::Join(request, reply)).await
-    }
-
-    /// Attaches a stream to a seat; `None` if the ticket is not of this room.
-    ///
-    /// # Errors
-    /// The room is gone.
-    pub async fn attach(
-        &self,
-        request: AttachRequest,
-    ) -> Result<Option<(Seat, ConnectionId)>, RoomGone> {
-        self.ask(|reply| Message::Attach(request, reply)).await
-    }
-
-    /// The connection of a seat has gone, or leaves (`reason` is told to it).
-    pub async fn lost(
-        &self,
-        seat: Seat,
-        connection: ConnectionId,
-        reason: Option<v1::DetachReason>,
-    ) {
-        // A room that is gone has nobody to miss.
-        let _ = self
-            .mailbox
-            .send(Message::Lost(seat, connection, reason))
-            .await;
-    }
-
-    /// A seat does something over its stream, where it hears what became of it.
-    ///
-    /// # Errors
-    /// The room is gone.
-    pub async fn perform(
-        &self,
-        seat: Seat,
-        connection: ConnectionId,
-        action: SeatAction,
-        arrived: Instant,
-    ) -> Result<(), RoomGone> {
-        self.mailbox
-            .send(Message::Do(seat, connection, action, arrived))
-            .await
-            .map_err(|_| RoomGone)
-    }
-
-    /// A seat does something without a stream; `None` if the ticket is not of this room.
-    ///
-    /// # Errors
-    /// The room is gone.
-    pub async fn act(
-        &self,
-        secret: [u8; 32],
-        action: SeatAction,
-        arrived: Instant,
-    ) -> Result<Option<Acted>, RoomGone> {
-        self.ask(|reply| Message::Act(secret, action, arrived, reply))
-            .await
-    }
-
-    /// Watches.
-    ///
-    /// # Errors
-    /// The room is gone, or (inside) why it cannot be watched.
-    pub async fn spectate(
-        &self,
-        request: SpectateRequest,
-    ) -> Result<Result<(), SpectateError>, RoomGone> {
-        self.ask(|reply| Message::Spectate(request, reply)).await
-    }
-
-    /// The room as everybody sees it.
-    ///
-    /// # Errors
-    /// The room is gone.
-    pub async fn describe(&self) -> Result<v1::Room, RoomGone> {
-        self.ask(Message::Describe).await
-    }
-
-    /// Closes the room; `None` if the token is not its owner's.
-    ///
-    /// # Errors
-    /// The room is gone.
-    pub async fn close(&self, secret: [u8; 32]) -> Result<Option<v1::Room>, RoomGone> {
-        self.ask(|reply| Message::Close(secret, reply)).await
-    }
-
-    /// Ends the game without a result, if it has not ended.
-    pub async fn abort(&self, reason: AbortReason) {
-        // A room that is gone has nothing left to end.
-        let _ = self.mailbox.send(Message::Abort(reason)).await;
-    }
-
-    async fn ask<T>(
-        &self,
-        message: impl FnOnce(oneshot::Sender<T>) -> Message,
-    ) -> Result<T, RoomGone> {
-        let (reply, answer) = oneshot::channel();
-        self.mailbox
-            .send(message(reply))
-            .await
-            .map_err(|_| RoomGone)?;
-        answer.await.map_err(|_| RoomGone)
-    }
-}
-
-struct TellSpace(mpsc::WeakSender<Message>);
-
-impl OnSpace for TellSpace {
-    fn space(&self) {
-        if let Some(mailbox) = self.0.upgrade() {
-            // A full mailbox means that the room is about to deliver anyway.
-            let _ = mailbox.try_send(Message::Space);
-        }
-    }
 }
 
 /// What a room needs from its server.

@@ -53,11 +53,11 @@ pub(super) struct Demo {
     /// Folder for the record (records/GAME-ID.jsonl). Standard: chefshat in the user's data folder.
     #[arg(long, env = "CHEFSHAT_DATA_DIR")]
     data_dir: Option<PathBuf>,
-    #[command(flatten)]
-    rules: RulesArgs,
     /// Print JSON lines: where the server listens, every event, the result.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    rules: RulesArgs,
 }
 
 impl Demo {
@@ -111,7 +111,7 @@ impl Demo {
             message.players = u32::try_from(self.agents.len()).ok();
         }
         let rules = chefshat_records::convert::rules_from_proto(&message)?;
-        let players = usize::from(rules.players());
+        let players = rules.players();
         if self.agents.is_empty() {
             let agents = STANDARD_AGENTS.iter().copied().cycle().take(players);
             return Ok((agents.collect(), message));

@@ -140,3 +140,141 @@ fn check_deal(rules: &RuleSet, seed: Seed, start: &v1::ShiftStarted) -> Result<(
 fn exactly(bytes: &[u8]) -> Option<[u8; 32]> {
     bytes.try_into().ok()
 }
+
+#[cfg(test)]
+mod tests {
+    use chefshat_client::Ending;
+    use chefshat_engine::RuleSetSpec;
+    use chefshat_records::convert::rules_to_proto;
+
+    use super::*;
+
+    /// A game as it was promised and as it was played.
+    #[derive(Clone)]
+    struct Game {
+        commitment: Vec<u8>,
+        asked: Option<[u8; 32]>,
+        outcomes: Vec<Outcome>,
+        reveal: v1::SeedReveal,
+        hands: Vec<v1::SeatCards>,
+    }
+
+    const ID: [u8; 16] = [0xab; 16];
+
+    fn dealt(seed: Seed) -> Vec<v1::SeatCards> {
+        let rules = RuleSetSpec::default().validate().expect("the standard");
+        let hands = Deal::new(&rules, seed, 1).hands();
+        let cards = |(seat, cards): (_, &_)| seat_cards(seat, *cards, rules.faces());
+        hands.iter().map(cards).collect()
+    }
+
+    fn committed() -> Game {
+        let entropy: Vec<Vec<u8>> = vec![vec![1; 32], vec![], vec![3], vec![4; 7]];
+        let plan = SeedPlan::Committed {
+            server_seed: [7; 32],
+            nonce: [8; 32],
+        };
+        let seed = plan.game_seed(&entropy);
+        let outcome = |(seat, entropy): (u32, &Vec<u8>)| Outcome {
+            room_id: String::new(),
+            game_id: String::new(),
+            seat,
+            ending: Ending::Finished(v1::GameEnded::default()),
+            entropy: entropy.clone(),
+            answers: 0,
+        };
+        Game {
+            commitment: plan.commitment(&ID).expect("a commitment").to_vec(),
+            asked: None,
+            outcomes: (0..).zip(&entropy).map(outcome).collect(),
+            reveal: v1::SeedReveal {
+                server_seed: vec![7; 32],
+                nonce: vec![8; 32],
+                seat_entropy: entropy,
+                game_seed: seed.0.to_vec(),
+            },
+            hands: dealt(seed),
+        }
+    }
+
+    fn fixed() -> Game {
+        Game {
+            commitment: Vec::new(),
+            asked: Some([9; 32]),
+            reveal: v1::SeedReveal {
+                game_seed: vec![9; 32],
+                ..v1::SeedReveal::default()
+            },
+            hands: dealt(Seed([9; 32])),
+            ..committed()
+        }
+    }
+
+    fn checked(game: &Game) -> Result<Checked, Unproven> {
+        let rules = RuleSetSpec::default().validate().expect("the standard");
+        let event = |kind| {
+            Line::Event(v1::GameEvent {
+                kind: Some(kind),
+                ..v1::GameEvent::default()
+            })
+        };
+        let record = [
+            Line::Header(v1::RecordHeader {
+                game_id: hex::encode(ID),
+                rules: Some(rules_to_proto(&rules)),
+                ..v1::RecordHeader::default()
+            }),
+            event(Kind::ShiftStarted(v1::ShiftStarted {
+                shift: 1,
+                hands: game.hands.clone(),
+            })),
+            event(Kind::GameEnded(v1::GameEnded {
+                standings: Vec::new(),
+                reveal: Some(game.reveal.clone()),
+            })),
+        ]
+        .map(|line| v1::RecordLine { line: Some(line) });
+        check(&record, &game.commitment, game.asked, &game.outcomes)
+    }
+
+    #[test]
+    fn what_was_promised_checks_out() {
+        for (game, committed) in [(committed(), true), (fixed(), false)] {
+            assert_eq!(
+                checked(&game),
+                Ok(Checked {
+                    deals: 1,
+                    committed
+                })
+            );
+        }
+    }
+
+    #[test]
+    fn every_change_is_noticed() {
+        type Change = fn(&mut Game);
+        let changes: [(&str, Change); 8] = [
+            ("commitment", |game| game.commitment[0] ^= 1),
+            ("server seed", |game| game.reveal.server_seed[0] ^= 1),
+            ("nonce", |game| game.reveal.nonce[31] ^= 1),
+            ("game seed", |game| game.reveal.game_seed[5] ^= 1),
+            ("entropy", |game| game.reveal.seat_entropy[2] = vec![4]),
+            ("long entropy", |game| {
+                game.reveal.seat_entropy[2] = vec![4; 33]
+            }),
+            ("entropy told", |game| game.outcomes[0].entropy[0] ^= 1),
+            ("hands", |game| game.hands.swap(0, 1)),
+        ];
+        for (what, change) in changes {
+            let mut game = committed();
+            change(&mut game);
+            assert!(checked(&game).is_err(), "{what}");
+        }
+        let mut other = fixed();
+        other.asked = Some([1; 32]);
+        assert!(checked(&other).is_err());
+        let mut hands = fixed();
+        hands.hands.pop();
+        assert!(checked(&hands).is_err());
+    }
+}

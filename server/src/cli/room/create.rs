@@ -35,10 +35,6 @@ pub(super) struct Create {
     /// it is free). Repeatable; seats not named are open.
     #[arg(long = "seat", value_name = "SEAT", value_parser = seat)]
     seats: Vec<FilledBy>,
-    #[command(flatten)]
-    rules: RulesArgs,
-    #[command(flatten)]
-    policy: PolicyArgs,
     /// The game seed, 64 hexadecimal digits, for experiments; such a game has no seed commitment.
     #[arg(long, value_name = "HEX", value_parser = game_seed)]
     game_seed: Option<[u8; 32]>,
@@ -48,6 +44,10 @@ pub(super) struct Create {
     /// Print the room with its secrets as a JSON line.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    rules: RulesArgs,
+    #[command(flatten)]
+    policy: PolicyArgs,
 }
 
 /// Times and limits of a room.
@@ -110,7 +110,7 @@ impl Create {
     }
 
     fn request(&self) -> Result<v1::CreateRoomRequest, CommandError> {
-        let players = usize::from(self.rules.rules()?.players());
+        let players = self.rules.rules()?.players();
         if self.seats.len() > players {
             let described = self.seats.len();
             return Err(

@@ -13,6 +13,10 @@ use super::connect::ServerArg;
 
 /// Make, list, watch and close rooms of a server.
 #[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  chefshat room create --name friday --seat greedy --seat random\n  \
+                  chefshat room list\n  chefshat room watch ROOM-ID"
+)]
 pub(super) struct RoomCommand {
     #[command(subcommand)]
     action: RoomAction,
@@ -21,7 +25,7 @@ pub(super) struct RoomCommand {
 #[derive(Debug, Subcommand)]
 enum RoomAction {
     /// Make a room and say how to join it.
-    Create(create::Create),
+    Create(Box<create::Create>),
     /// List the rooms of a server.
     List(show::List),
     /// Show one room.
