@@ -9,7 +9,7 @@ import threading
 from collections.abc import Callable, Iterator
 from concurrent import futures
 from dataclasses import dataclass, field
-from typing import Any, NoReturn, Self
+from typing import Any, NoReturn, Self, TypeAlias
 
 import grpc
 from google.protobuf import any_pb2
@@ -203,6 +203,10 @@ class FakeGame:
             self.tell(seat, detached=pb.Detached(reason=pb.DETACH_REASON_GAME_OVER))
 
 
+# The seats of a stream by handle: every Attach has a number, a refused one too.
+Handles: TypeAlias = list[tuple[FakeGame, FakeSeat] | None]
+
+
 class FakeServer(
     play_grpc.PlayServiceServicer,
     room_grpc.RoomServiceServicer,
@@ -349,7 +353,7 @@ class FakeServer(
 
     def _read(self, requests: Iterator[pb.PlayRequest], outbox: Outbox, broken: threading.Event) -> None:
         """Reads a stream's commands until it ends, or until a fault breaks it."""
-        handles: list[tuple[FakeGame, FakeSeat]] = []
+        handles: Handles = []
         try:
             for request in requests:
                 for command in request.commands:
@@ -361,26 +365,28 @@ class FakeServer(
         except grpc.RpcError:
             pass  # The client has cancelled.
         finally:
-            for game, seat in handles:
+            for game, seat in filter(None, handles):
                 with game.lock:
                     if seat.outbox is outbox:
                         seat.outbox = None
             outbox.put(None)
 
-    def _attach(self, attach: pb.Attach, outbox: Outbox, handles: list[tuple[FakeGame, FakeSeat]]) -> None:
+    def _attach(self, attach: pb.Attach, outbox: Outbox, handles: Handles) -> None:
         found = self.find(attach.ticket)
+        handles.append(found)
         if found is None:
             refused = pb.Refused(request_id=attach.request_id, reason="TICKET_UNKNOWN", message="no seat has this ticket")
-            outbox.put(pb.SeatUpdate(refused=refused))
+            outbox.put(pb.SeatUpdate(handle=len(handles) - 1, refused=refused))
             return
-        handles.append(found)
         game, seat = found
         with game.lock:
             game.attach(seat, attach, outbox, len(handles) - 1)
 
-    def _answer(self, command: pb.SeatCommand, outbox: Outbox, handles: list[tuple[FakeGame, FakeSeat]]) -> bool:
+    def _answer(self, command: pb.SeatCommand, outbox: Outbox, handles: Handles) -> bool:
         """Takes an answer; returns whether the stream goes on."""
-        game, seat = handles[command.handle]
+        found = handles[command.handle]
+        assert found is not None
+        game, seat = found
         with game.lock:
             fault = self.fault(game, seat, command.answer)
             if fault == "before":

@@ -34,6 +34,7 @@ class Proxy:
         with self._lock:
             self.cuts += 1
             for end in self._sockets:
+                # Whoever forwards from it wakes up and closes it.
                 with contextlib.suppress(OSError):
                     end.shutdown(socket.SHUT_RDWR)
             self._sockets.clear()
@@ -47,14 +48,22 @@ class Proxy:
                 return
             with self._lock:
                 self._sockets += [near, far]
-            for source, sink in ((near, far), (far, near)):
-                source.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-                threading.Thread(target=_forward, args=(source, sink), daemon=True).start()
+            threading.Thread(target=_serve, args=(near, far), daemon=True).start()
+
+
+def _serve(near: socket.socket, far: socket.socket) -> None:
+    """Forwards one connection both ways until it ends."""
+    with near, far:
+        back = threading.Thread(target=_forward, args=(far, near), daemon=True)
+        back.start()
+        _forward(near, far)
+        back.join()
 
 
 def _forward(source: socket.socket, sink: socket.socket) -> None:
     """Copies until one side ends, and then ends the other."""
     with contextlib.suppress(OSError):
+        source.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         while data := source.recv(65536):
             sink.sendall(data)
     for end in (source, sink):

@@ -269,11 +269,13 @@ def test_a_refused_ticket_stops_that_seat_alone() -> None:
     stage = Stage("t", "u")
     stage.connect()
     refused = pb.Refused(request_id=1, reason="TICKET_UNKNOWN", message="no", metadata={"field": "ticket"})
-    stage.say(pb.SeatUpdate(refused=refused), pb.SeatUpdate(handle=0, attached=pb.Attached(request_id=2, seat=1)))
+    # A refused attachment has a handle too.
+    stage.say(pb.SeatUpdate(handle=0, refused=refused), attached(2, seat=1))
     over = stage.session.results()["t"]
     assert over.error is not None
     assert (over.error.reason, over.error.metadata, over.seat) == ("TICKET_UNKNOWN", {"field": "ticket"}, -1)
-    (ask,) = stage.say(decision(1, handle=0))
+    assert stage.say(decision(1, handle=0)) == []
+    (ask,) = stage.say(decision(1, handle=1))
     assert ask.agent is stage.scribes["u"]
 
 

@@ -8,9 +8,9 @@ use chefshat_arena::AgentKind;
 use chefshat_client::{Client, Outcome, PlayError, v1};
 use clap::Args;
 
-use super::CommandError;
 use super::connect::{KindArg, ServerArg, code_in};
 use super::remote::{MAX_PACE_MS, RemoteAgent, agent_kind, seed_for};
+use super::{CommandError, say};
 
 /// Play as a built-in agent on a server.
 #[derive(Debug, Args)]
@@ -78,9 +78,9 @@ impl AgentCommand {
             let played = client.play(ticket, &mut agent).await;
             all_finished &= matches!(&played, Ok(outcome) if outcome.standing().is_some());
             if self.json {
-                println!("{}", as_json(&played));
+                say(as_json(&played))?;
             } else {
-                println!("{}", in_words(&played));
+                say(in_words(&played))?;
             }
         }
         Ok(if all_finished {

@@ -3,6 +3,7 @@
 mod agent;
 mod conformance;
 mod connect;
+mod data_dir;
 mod demo;
 mod narrator;
 mod remote;
@@ -11,6 +12,8 @@ mod rules_args;
 mod serve;
 mod simulate;
 
+use std::fmt::Display;
+use std::io::{self, Write as _};
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -62,11 +65,24 @@ pub fn main() -> ExitCode {
     });
     match result {
         Ok(code) => code,
+        // Whoever reads the output has had enough of it, as `head` does.
+        Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
             anstream::eprintln!("chefshat: {error}");
             ExitCode::FAILURE
         }
     }
+}
+
+fn is_broken_pipe(error: &CommandError) -> bool {
+    error
+        .downcast_ref::<io::Error>()
+        .is_some_and(|error| error.kind() == io::ErrorKind::BrokenPipe)
+}
+
+/// Writes a line to standard output.
+fn say(line: impl Display) -> Result<(), CommandError> {
+    Ok(writeln!(io::stdout().lock(), "{line}")?)
 }
 
 fn in_runtime(

@@ -10,7 +10,7 @@ use clap::Args;
 use tokio::net::TcpListener;
 use tokio::signal::unix::{SignalKind, signal};
 
-use super::CommandError;
+use super::{CommandError, data_dir, say};
 use crate::config::ServerConfig;
 use crate::serve::serve;
 use crate::store::MemoryStore;
@@ -50,19 +50,10 @@ pub(super) struct Serve {
 
 impl Serve {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
-        let data_dir = match (self.no_records, self.data_dir) {
-            (true, _) => None,
-            (false, Some(folder)) => Some(folder),
-            (false, None) => Some(standard_data_dir()?),
+        let data_dir = match self.no_records {
+            true => None,
+            false => Some(data_dir::prepare(self.data_dir)?),
         };
-        if let Some(folder) = &data_dir {
-            std::fs::create_dir_all(folder.join("records")).map_err(|error| {
-                format!(
-                    "the data folder {} cannot be used: {error}; choose another with --data-dir, or --no-records",
-                    folder.display()
-                )
-            })?;
-        }
         let listener = TcpListener::bind(self.listen).await.map_err(|error| {
             format!(
                 "cannot listen on {}: {error}; choose another address with --listen",
@@ -74,10 +65,7 @@ impl Serve {
         let mut terminate = signal(SignalKind::terminate())?;
         let mut interrupt = signal(SignalKind::interrupt())?;
         if self.json {
-            println!(
-                "{}",
-                serde_json::json!({"event": "listening", "address": address.to_string()})
-            );
+            say(serde_json::json!({"event": "listening", "address": address.to_string()}))?;
         }
         eprintln!("listening on http://{address}");
         if let Some(folder) = &data_dir {
@@ -100,17 +88,4 @@ impl Serve {
         serve(listener, config, Arc::new(MemoryStore::default()), stop).await?;
         Ok(ExitCode::SUCCESS)
     }
-}
-
-/// `chefshat` in the user's data folder, as the XDG base directory specification has it.
-fn standard_data_dir() -> Result<PathBuf, CommandError> {
-    let absolute = |name| {
-        std::env::var_os(name)
-            .map(PathBuf::from)
-            .filter(|path| path.is_absolute())
-    };
-    absolute("XDG_DATA_HOME")
-        .or_else(|| absolute("HOME").map(|home| home.join(".local/share")))
-        .map(|folder| folder.join("chefshat"))
-        .ok_or_else(|| "there is no home folder for records; name one with --data-dir".into())
 }

@@ -11,9 +11,9 @@ mod task;
 #[cfg(test)]
 mod tests;
 
-pub use spectators::{MAX_SPECTATOR_LAG, MAX_SPECTATORS};
 pub use handle::{
     Acted, AttachRequest, Handle, JoinRequest, Joined, RoomGone, SeatAction, SpectateError,
     SpectateRequest,
 };
+pub use spectators::{MAX_SPECTATOR_LAG, MAX_SPECTATORS};
 pub use task::{RoomWatcher, TaskContext, start};

@@ -104,7 +104,7 @@ fn four_processes_play_a_game_that_a_fifth_watches() {
         "Shift 1",
         "Shift 2",
         "Standings",
-        "wins the game",
+        "★ wins",
     ] {
         assert!(watched.contains(words), "{words} is not in {watched}");
     }

@@ -83,6 +83,9 @@ enum ToRoom {
         seat: u32,
         body: Vec<u8>,
     },
+    Leave {
+        seat: u32,
+    },
 }
 
 #[tonic::async_trait]
@@ -125,6 +128,11 @@ async fn read(rooms: Arc<Rooms>, mut requests: Streaming<Batch>, outbox: mpsc::S
             }
         }
     }
+    // The responses end when nobody holds the outbox any more.
+    for (seat, mailbox) in mailboxes {
+        // A room that is gone holds nothing.
+        let _ = mailbox.send(ToRoom::Leave { seat }).await;
+    }
 }
 
 /// A room: as soon as its seats are there, it asks one after the other.
@@ -153,6 +161,10 @@ async fn room(mut inbox: mpsc::Receiver<ToRoom>) {
                     })
                 }
                 ToRoom::Answer { .. } => None,
+                ToRoom::Leave { seat } => {
+                    seats[seat as usize % SEATS] = None;
+                    None
+                }
             };
             if let Some(next) = next
                 && let Some((outbox, bytes)) = &seats[next as usize % SEATS]

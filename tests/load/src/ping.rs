@@ -107,12 +107,18 @@ pub(crate) async fn segment(
     }
     drop(senders);
     let (mut received, mut answers, mut client_ns) = (0, 0, latencies());
-    while let Some(stream) = streams.join_next().await {
-        let stream = stream.expect("a stream's task does not panic")?;
-        received += stream.received;
-        answers += stream.answers;
-        client_ns += stream.client_ns;
-    }
+    let closing = async {
+        while let Some(stream) = streams.join_next().await {
+            let stream = stream.expect("a stream's task does not panic")?;
+            received += stream.received;
+            answers += stream.answers;
+            client_ns += stream.client_ns;
+        }
+        Ok::<_, LoadError>(())
+    };
+    tokio::time::timeout(END_LIMIT, closing)
+        .await
+        .map_err(|_| LoadError::Stuck("the bare streams"))??;
     // Each room's last observation is the one that is not answered.
     let expected = answers + plan.rooms as u64;
     if received != expected || answers != pulse.decisions() || window.decisions == 0 {

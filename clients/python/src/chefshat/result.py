@@ -28,7 +28,7 @@ class SeatResult:
         decisions: answers the server said it accepted.
         invalid: answers that were not legal.
         late: answers that came when the decision was closed already.
-        reconnects: how often the connection was made anew.
+        reconnects: how often the seat was attached anew after its connection was lost.
         error: why the seat left before its game was over (reason "SUPERSEDED": a newer connection took it); None otherwise.
     """
 

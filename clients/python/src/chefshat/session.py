@@ -68,6 +68,7 @@ class SeatPlace:
         self.answered: Decision | None = None
         self.standings: tuple[Standing, ...] = ()
         self.abort_reason = ""
+        self.attachments = 0
         self.decisions = 0
         self.invalid = 0
         self.late = 0
@@ -98,7 +99,6 @@ class PlaySession:
         self._by_handle: dict[int, SeatPlace] = {}
         self._outbox: list[pb.SeatCommand] = []
         self._open = len(self._places)
-        self._connections = 0
         #: Grows whenever the game has moved on for a seat. A connection that brought none was of no use.
         self.progress = 0
 
@@ -113,7 +113,6 @@ class PlaySession:
 
     def connected(self) -> None:
         """A new connection stands: attaches every seat that is not done, from the event after the last one seen."""
-        self._connections += 1
         self._by_handle.clear()
         self._outbox.clear()
         for place in self._places:
@@ -209,6 +208,7 @@ class PlaySession:
         if place is None:
             return
         place.handle = handle
+        place.attachments += 1
         self._by_handle[handle] = place
         if place.info is None:
             place.info = SeatInfo(attached.room_id, attached.game_id, attached.seat)
@@ -318,7 +318,7 @@ class PlaySession:
             decisions=place.decisions,
             invalid=place.invalid,
             late=place.late,
-            reconnects=max(self._connections - 1, 0),
+            reconnects=max(place.attachments - 1, 0),
             error=error,
         )
         self._open -= 1

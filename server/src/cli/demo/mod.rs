@@ -21,10 +21,10 @@ use tokio::net::TcpListener;
 use tokio::task::JoinHandle;
 use tokio_util::sync::CancellationToken;
 
-use super::CommandError;
 use super::narrator::{Narrator, abort_reason, clean, heading, row};
 use super::remote::{MAX_PACE_MS, agent_kind};
 use super::rules_args::RulesArgs;
+use super::{CommandError, data_dir};
 use crate::config::ServerConfig;
 use crate::serve::{ServeError, serve};
 use crate::store::MemoryStore;
@@ -63,11 +63,7 @@ pub(super) struct Demo {
 impl Demo {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
         let (agents, rules) = self.agents_and_rules()?;
-        let data_dir = match &self.data_dir {
-            Some(folder) => folder.clone(),
-            None => standard_data_dir()?,
-        };
-        make_records_folder(&data_dir)?;
+        let data_dir = data_dir::prepare(self.data_dir.clone())?;
         let host = Host::start(data_dir.clone()).await?;
         let mut out = anstream::stdout();
         if self.json {
@@ -245,27 +241,4 @@ fn result(
         "seed_committed": checked.committed,
         "record": record,
     })
-}
-
-fn make_records_folder(data_dir: &Path) -> Result<(), CommandError> {
-    std::fs::create_dir_all(data_dir.join("records")).map_err(|error| {
-        format!(
-            "the data folder {} cannot be used: {error}; choose another with --data-dir",
-            data_dir.display()
-        )
-        .into()
-    })
-}
-
-/// Where `serve` keeps its records too: `chefshat` in the user's data folder.
-fn standard_data_dir() -> Result<PathBuf, CommandError> {
-    let absolute = |name| {
-        std::env::var_os(name)
-            .map(PathBuf::from)
-            .filter(|path| path.is_absolute())
-    };
-    absolute("XDG_DATA_HOME")
-        .or_else(|| absolute("HOME").map(|home| home.join(".local/share")))
-        .map(|folder| folder.join("chefshat"))
-        .ok_or_else(|| "there is no home folder for records; name one with --data-dir".into())
 }

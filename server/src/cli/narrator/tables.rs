@@ -3,11 +3,13 @@
 use chefshat_client::v1;
 use chefshat_engine::Stop;
 
-use super::text::{BOLD, DIM, GOLD, MAX_NAME, PLAIN, Piece, clean, heading, seat_style};
+use super::text::{BOLD, DIM, GOLD, PLAIN, Piece, clean, columns, heading, seat_style};
 use super::{INDENT, Narrator, name_of};
 
 /// Columns of the bar that shows how far a seat is.
 const BAR: u64 = 45;
+/// Least width of a column of names.
+const MIN_NAME_COLUMN: usize = 12;
 
 impl Narrator {
     /// The end of a Shift: places, points, totals.
@@ -20,6 +22,7 @@ impl Narrator {
         }
         out.push_str(&format!("\n{INDENT}{}\n", Piece::new(DIM, &words).as_str()));
         let full = self.full(end);
+        let column = self.name_column();
         for (place, seat) in (1u32..).zip(&end.order) {
             let score = of(&end.scores, *seat);
             let points = of(&end.points, *seat);
@@ -32,7 +35,7 @@ impl Narrator {
             let line = Piece::new(PLAIN, INDENT)
                 .and(PLAIN, &ordinal(place))
                 .and(PLAIN, "  ")
-                .join(&self.name(*seat).padded(MAX_NAME))
+                .join(&self.name(*seat).padded(column))
                 .join(&Piece::new(PLAIN, &format!("+{points}")).right(5))
                 .join(&Piece::new(BOLD, &score.to_string()).right(6))
                 .and(PLAIN, "  ")
@@ -46,11 +49,19 @@ impl Narrator {
     pub(super) fn game_ended(&mut self, end: &v1::GameEnded) -> String {
         let mut out = self.chain.close(&self.names);
         out.push_str(&heading("Standings"));
+        let column = self.name_column();
+        let tied = |points| {
+            end.standings
+                .iter()
+                .filter(|line| line.points == points)
+                .count()
+                > 1
+        };
         for line in &end.standings {
             let first = line.place == 1;
             let style = seat_style(line.seat);
             let style = if first { style.bold() } else { style };
-            let name = Piece::new(style, &name_of(&self.names, line.seat)).padded(MAX_NAME + 2);
+            let name = Piece::new(style, &name_of(&self.names, line.seat)).padded(column + 2);
             let label = usize::try_from(line.seat)
                 .ok()
                 .and_then(|seat| self.labels.get(seat))
@@ -68,11 +79,22 @@ impl Narrator {
                 .join(&Piece::new(DIM, &clean(label, 16)).padded(16))
                 .join(&points);
             if first {
-                row = row.and(GOLD, "   ★ wins the game");
+                let words = if tied(line.points) {
+                    "   ★ wins by its place in the last Shift"
+                } else {
+                    "   ★ wins the game"
+                };
+                row = row.and(GOLD, words);
             }
             out.push_str(&format!("{}\n", row.as_str()));
         }
         out
+    }
+
+    /// Width of a column of names.
+    fn name_column(&self) -> usize {
+        let widths = self.names.iter().map(|name| columns(name));
+        widths.max().unwrap_or(0).max(MIN_NAME_COLUMN)
     }
 
     /// Points that fill a bar: those that end the game, or the most that anybody has or may get.

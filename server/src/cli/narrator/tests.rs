@@ -271,6 +271,25 @@ fn standings_name_the_winner() {
 }
 
 #[test]
+fn a_tie_is_explained() {
+    let standing = |seat, place| v1::Standing {
+        seat,
+        points: 16,
+        place,
+    };
+    let ended = Kind::GameEnded(v1::GameEnded {
+        standings: vec![standing(2, 1), standing(0, 2)],
+        reveal: None,
+    });
+    let told = told(&mut Narrator::new(), [ended]);
+    assert!(told.contains("seat 2"), "{told}");
+    assert_eq!(
+        told.matches("wins by its place in the last Shift").count(),
+        1
+    );
+}
+
+#[test]
 fn strangers_and_namesakes_are_told_apart() {
     let told = told(
         &mut Narrator::new(),

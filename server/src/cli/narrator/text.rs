@@ -6,7 +6,7 @@ use unicode_width::{UnicodeWidthChar as _, UnicodeWidthStr as _};
 /// Columns that no line goes beyond.
 pub(super) const WIDTH: usize = 98;
 /// Most columns of a name.
-pub(super) const MAX_NAME: usize = 12;
+pub(super) const MAX_NAME: usize = 15;
 
 /// Columns of the label of a line outside of Shifts.
 const LABEL: usize = 17;
@@ -180,11 +180,11 @@ mod tests {
     fn names_are_safe_and_short() {
         let table = [
             ("Greta", "Greta"),
-            ("Wilhelmina the Great", "Wilhelmina …"),
+            ("Wilhelmina the Great", "Wilhelmina the…"),
             ("a\u{1b}[31mb\u{7}", "a[31mb"),
             ("\u{202e}drow", "drow"),
-            ("料理長のとても長い名前", "料理長のと…"),
-            ("exactly12chr", "exactly12chr"),
+            ("料理長のとても長い名前", "料理長のとても…"),
+            ("random_unmasked", "random_unmasked"),
         ];
         for (name, expected) in table {
             assert_eq!(clean(name, MAX_NAME), expected);

@@ -11,9 +11,9 @@ use chefshat_engine::RewardScheme;
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 
-use super::super::CommandError;
 use super::super::connect::ServerArg;
 use super::super::rules_args::RulesArgs;
+use super::super::{CommandError, say};
 
 /// Names of the reward schemes, in the order of the protocol's numbers from 1.
 const REWARDS: [&str; 5] = ["validity", "paper", "paper_intended", "winning", "points"];
@@ -99,12 +99,12 @@ impl Create {
             let line = serde_json::json!({
                 "event": "created", "room": room, "join_code": code, "owner_token": owner,
             });
-            println!("{line}");
+            say(format_args!("{line}"))?;
         } else {
-            println!("room         {}", room.room_id);
-            println!("game         {}", room.game_id);
-            println!("join code    {code}");
-            println!("owner token  {owner}");
+            say(format_args!("room         {}", room.room_id))?;
+            say(format_args!("game         {}", room.game_id))?;
+            say(format_args!("join code    {code}"))?;
+            say(format_args!("owner token  {owner}"))?;
         }
         Ok(ExitCode::SUCCESS)
     }

@@ -8,8 +8,8 @@ use std::process::ExitCode;
 
 use clap::{Args, Subcommand};
 
-use super::CommandError;
 use super::connect::ServerArg;
+use super::{CommandError, say};
 
 /// Make, list, watch and close rooms of a server.
 #[derive(Debug, Args)]
@@ -72,9 +72,13 @@ impl Close {
         let client = self.server.connect().await?;
         let room = client.close_room(self.room_id, self.owner_token).await?;
         if self.json {
-            println!("{}", serde_json::json!({"event": "closed", "room": room}));
+            say(serde_json::json!({"event": "closed", "room": room}))?;
         } else {
-            println!("room {} is {}", room.room_id, show::state(room.state()));
+            say(format_args!(
+                "room {} is {}",
+                room.room_id,
+                show::state(room.state())
+            ))?;
         }
         Ok(ExitCode::SUCCESS)
     }

@@ -5,9 +5,9 @@ use std::process::ExitCode;
 use chefshat_client::v1;
 use clap::{Args, ValueEnum};
 
-use super::super::CommandError;
 use super::super::connect::ServerArg;
 use super::super::narrator::clean;
+use super::super::{CommandError, say};
 
 /// Rooms asked for at a time.
 const PAGE: u32 = 100;
@@ -68,9 +68,9 @@ impl List {
             let page = client.list_rooms(request.clone()).await?;
             for room in &page.rooms {
                 if self.json {
-                    println!("{}", serde_json::to_string(room)?);
+                    say(serde_json::to_string(room)?)?;
                 } else {
-                    println!("{}", in_a_line(room));
+                    say(in_a_line(room))?;
                 }
                 count += 1;
             }
@@ -80,7 +80,7 @@ impl List {
             request.page_token = page.next_page_token;
         }
         if count == 0 && !self.json {
-            println!("no rooms");
+            say("no rooms")?;
         }
         Ok(ExitCode::SUCCESS)
     }
@@ -91,7 +91,7 @@ impl Show {
         let client = self.server.connect().await?;
         let room = client.get_room(self.room_id).await?;
         if self.json {
-            println!("{}", serde_json::to_string(&room)?);
+            say(serde_json::to_string(&room)?)?;
         } else {
             print!("{}", in_full(&room));
         }
@@ -119,10 +119,11 @@ fn in_a_line(room: &v1::Room) -> String {
     let seats = room.seats.len();
     let state = state(room.state());
     let name = clean(&room.name, 30);
-    format!(
+    let line = format!(
         "{}  {state:<8}  {taken}/{seats} seats  {name}",
         room.room_id
-    )
+    );
+    line.trim_end().to_owned()
 }
 
 fn in_full(room: &v1::Room) -> String {

@@ -59,7 +59,9 @@ class _AnswerStatusEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_AnswerSt
     ANSWER_STATUS_ACCEPTED: _AnswerStatus.ValueType  # 1
     """The action was taken."""
     ANSWER_STATUS_INVALID: _AnswerStatus.ValueType  # 2
-    """The action is not legal; the decision stays open, or the default was taken if attempts are exhausted."""
+    """The action is not legal. The decision stays open and is not put again: answer it anew. When no attempts are left, the default has
+    been taken.
+    """
     ANSWER_STATUS_CLOSED: _AnswerStatus.ValueType  # 3
     """The decision is closed already (answered, timed out or decided by a substitute). No strike."""
     ANSWER_STATUS_UNKNOWN_DECISION: _AnswerStatus.ValueType  # 4
@@ -73,7 +75,9 @@ ANSWER_STATUS_UNSPECIFIED: AnswerStatus.ValueType  # 0
 ANSWER_STATUS_ACCEPTED: AnswerStatus.ValueType  # 1
 """The action was taken."""
 ANSWER_STATUS_INVALID: AnswerStatus.ValueType  # 2
-"""The action is not legal; the decision stays open, or the default was taken if attempts are exhausted."""
+"""The action is not legal. The decision stays open and is not put again: answer it anew. When no attempts are left, the default has
+been taken.
+"""
 ANSWER_STATUS_CLOSED: AnswerStatus.ValueType  # 3
 """The decision is closed already (answered, timed out or decided by a substitute). No strike."""
 ANSWER_STATUS_UNKNOWN_DECISION: AnswerStatus.ValueType  # 4

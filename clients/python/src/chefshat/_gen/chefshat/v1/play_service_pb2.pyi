@@ -83,7 +83,9 @@ Global___DetachReason: _TypeAlias = DetachReason  # noqa: Y015
 
 @_typing.final
 class Attach(_message.Message):
-    """Attaches the stream to a seat. The newest attachment of a seat wins; the older is told so."""
+    """Attaches the stream to a seat. The newest attachment of a seat wins; the older is told so. What follows: Attached (or Refused), the
+    events asked for, and the decision that is open for the seat, if any, with the time really left for it.
+    """
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -428,7 +430,7 @@ class SeatUpdate(_message.Message):
     DETACHED_FIELD_NUMBER: _builtins.int
     REFUSED_FIELD_NUMBER: _builtins.int
     handle: _builtins.int
-    """Handle of the seat on this stream, from 0 in the order of attaching."""
+    """Handle of the seat on this stream: the number of its Attach on the stream, from 0 (a refused Attach has a number too)."""
     @_builtins.property
     def attached(self) -> Global___Attached:
         """The seat is attached."""

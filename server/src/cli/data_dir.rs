@@ -1,0 +1,33 @@
+//! The folder in which a server keeps its records.
+
+use std::path::PathBuf;
+
+use super::CommandError;
+
+/// The folder asked for, or the standard one, made ready for records.
+pub(super) fn prepare(wanted: Option<PathBuf>) -> Result<PathBuf, CommandError> {
+    let folder = match wanted {
+        Some(folder) => folder,
+        None => standard()?,
+    };
+    std::fs::create_dir_all(folder.join("records")).map_err(|error| {
+        format!(
+            "the data folder {} cannot be used: {error}; choose another with --data-dir",
+            folder.display()
+        )
+    })?;
+    Ok(folder)
+}
+
+/// `chefshat` in the user's data folder, as the XDG base directory specification has it.
+fn standard() -> Result<PathBuf, CommandError> {
+    let absolute = |name| {
+        std::env::var_os(name)
+            .map(PathBuf::from)
+            .filter(|path| path.is_absolute())
+    };
+    absolute("XDG_DATA_HOME")
+        .or_else(|| absolute("HOME").map(|home| home.join(".local/share")))
+        .map(|folder| folder.join("chefshat"))
+        .ok_or_else(|| "there is no home folder for records; name one with --data-dir".into())
+}

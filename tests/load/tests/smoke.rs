@@ -1,0 +1,53 @@
+//! The load program works: a moment of one room, with everything it checks about itself, and a report that can be read. Nothing here
+//! depends on how fast the machine is.
+
+use std::process::Command;
+
+use serde_json::Value;
+
+fn run(arguments: &[&str]) -> std::process::Output {
+    Command::new(env!("CARGO_BIN_EXE_chefshat-load"))
+        .args(arguments)
+        .output()
+        .expect("the load program can be started")
+}
+
+#[test]
+fn a_moment_of_load_is_counted_on_both_sides() {
+    let output = run(&["--smoke", "--json"]);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{errors}");
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let scenario = &report["scenarios"][0];
+    assert_eq!(scenario["seats"], 4, "{report:#}");
+    for path in [
+        "/server/decisions_per_second",
+        "/server/decisions_in_windows",
+        "/bare/decisions_per_second",
+        "/bare/decisions_in_windows",
+        "/throughput_ratio/median",
+        "/bytes_per_decision/request",
+        "/bytes_per_decision/response",
+        "/checked/games",
+        "/checked/shifts",
+        "/bare_answers",
+    ] {
+        let figure = scenario.pointer(path).and_then(Value::as_f64);
+        assert!(
+            figure.is_some_and(|figure| figure > 0.0),
+            "{path}: {report:#}"
+        );
+    }
+    let checked = &scenario["checked"];
+    assert_eq!(checked["answers"], checked["accepted"]);
+    assert_eq!(checked["turn_answers"], checked["turn_events"]);
+}
+
+#[test]
+fn a_server_that_is_not_there_is_an_error() {
+    // Port 1 of the loopback needs privileges to listen on, and nobody does.
+    let output = run(&["--server", "http://127.0.0.1:1", "--smoke"]);
+    assert!(!output.status.success());
+    assert!(output.stdout.is_empty());
+    assert!(String::from_utf8_lossy(&output.stderr).contains("connection failed"));
+}
