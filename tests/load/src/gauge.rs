@@ -5,22 +5,22 @@ use std::time::Duration;
 
 use rustix::thread::{CpuSet, sched_setaffinity};
 
-/// Fields of `/proc/PID/stat` from the state on that come before the CPU times (proc(5): state is field 3, utime is field 14).
-const FIELDS_BEFORE_CPU: usize = 11;
-
-/// CPU time of a process so far, its own and the kernel's for it, in steps of the kernel's tick (10 ms as a rule).
+/// CPU time of a process so far, its own and the kernel's for it: of the threads that live now, as runtimes keep theirs.
 pub(crate) fn cpu_time(pid: u32) -> io::Result<Duration> {
-    let stat = std::fs::read_to_string(format!("/proc/{pid}/stat"))?;
-    // The name of the process comes in parentheses and may hold anything, spaces and parentheses included.
-    let ticks: Option<u64> = stat.rsplit_once(')').and_then(|(_, fields)| {
-        let mut fields = fields.split_ascii_whitespace().skip(FIELDS_BEFORE_CPU);
-        let user: u64 = fields.next()?.parse().ok()?;
-        let system: u64 = fields.next()?.parse().ok()?;
-        Some(user + system)
-    });
-    let ticks = ticks.ok_or_else(|| unreadable("stat"))?;
-    let per_second = rustix::param::clock_ticks_per_second();
-    Ok(Duration::from_secs_f64(ticks as f64 / per_second as f64))
+    let mut total = Duration::ZERO;
+    for thread in std::fs::read_dir(format!("/proc/{pid}/task"))? {
+        // A thread may end between being listed and being read.
+        let Ok(times) = std::fs::read_to_string(thread?.path().join("schedstat")) else {
+            continue;
+        };
+        let on_cpu_ns = times
+            .split_ascii_whitespace()
+            .next()
+            .and_then(|number| number.parse().ok())
+            .ok_or_else(|| unreadable("schedstat"))?;
+        total += Duration::from_nanos(on_cpu_ns);
+    }
+    Ok(total)
 }
 
 /// Memory of a process that is in RAM now, bytes.
@@ -55,6 +55,6 @@ pub(crate) fn bind_to_core(core: usize) -> io::Result<()> {
 fn unreadable(file: &str) -> io::Error {
     io::Error::new(
         io::ErrorKind::InvalidData,
-        format!("/proc/PID/{file} does not read as proc(5) says"),
+        format!("the kernel's {file} does not read as its documentation says"),
     )
 }

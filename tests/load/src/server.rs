@@ -20,6 +20,9 @@ use crate::options::{Place, Serve};
 /// How long a child may take to listen.
 const START_LIMIT: Duration = Duration::from_secs(30);
 
+/// How long a child may take to end by itself.
+const STOP_LIMIT: Duration = Duration::from_secs(10);
+
 /// Ended rooms are forgotten soon: a run plays more of them than a day of people does.
 const RETENTION: Duration = Duration::from_secs(1);
 
@@ -118,11 +121,13 @@ impl ServerProcess {
         format!("http://{}", self.address)
     }
 
-    /// Ends it.
+    /// Ends it: by the end of its standard input, or else by force.
     pub(crate) async fn stop(mut self) -> Result<(), LoadError> {
-        self.child
-            .kill()
-            .await
-            .map_err(LoadError::io("ending a server"))
+        drop(self.child.stdin.take());
+        match tokio::time::timeout(STOP_LIMIT, self.child.wait()).await {
+            Ok(ended) => ended.map(drop),
+            Err(_) => self.child.kill().await,
+        }
+        .map_err(LoadError::io("ending a server"))
     }
 }

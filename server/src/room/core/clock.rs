@@ -6,7 +6,7 @@ use std::time::Duration;
 use chefshat_arena::BuiltInAgent;
 use chefshat_engine::{Game, Seat, Viewer};
 
-use super::{BUILT_IN_BUDGET, Core, JOIN_HOLD, MAX_HANDOVER, State};
+use super::{BUILT_IN_BUDGET, Core, JOIN_HOLD, LOOK_AGAIN, MAX_HANDOVER, State};
 use crate::room::policy::AbortPolicy;
 use crate::store::journal::{AbortReason, Change, Fill, Source};
 
@@ -28,7 +28,8 @@ impl Core {
                 Some(if self.is_automatic(seat) {
                     open.released + self.header.policy.pace
                 } else {
-                    open.start.unwrap_or(open.released) + self.time_allowed(seat)
+                    let deadline = open.start.unwrap_or(open.released) + self.time_allowed(seat);
+                    deadline.max(open.look_again)
                 })
             }
             State::Finished | State::Aborted(_) => None,
@@ -104,6 +105,10 @@ impl Core {
             Some(handed) => Some(handed.clamp(open.released, latest)),
             None if !connected => Some(open.released),
             None => (now >= latest).then_some(latest),
+        };
+        open.look_again = match open.start {
+            Some(_) => Duration::ZERO,
+            None => now + LOOK_AGAIN,
         };
     }
 

@@ -217,6 +217,7 @@ impl Core {
                     id: seat.decisions,
                     released: at,
                     start: None,
+                    look_again: Duration::ZERO,
                     attempts: 0,
                 }
             });

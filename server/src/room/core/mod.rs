@@ -25,6 +25,8 @@ use crate::store::journal::{AbortReason, Change, Entry, Fill, GameHeader, Seated
 pub const JOIN_HOLD: Duration = Duration::from_secs(120);
 /// The clock of a decision starts at the latest this long after the decision was released, even if the transport has not taken it.
 pub const MAX_HANDOVER: Duration = Duration::from_secs(5);
+/// How often to ask whether the transport has taken a request whose deadline would have passed.
+const LOOK_AGAIN: Duration = Duration::from_millis(20);
 /// Most annotations recorded per seat and game, bytes.
 pub const MAX_ANNOTATION_BYTES_PER_GAME: usize = 256 * 1024;
 /// Most annotations recorded per decision, bytes.
@@ -118,6 +120,8 @@ pub struct OpenDecision {
     released: Duration,
     /// When its clock began, once that is settled.
     start: Option<Duration>,
+    /// When to ask again whether the transport has taken the request; zero before it was asked.
+    look_again: Duration,
     /// Actions refused so far.
     attempts: u32,
 }

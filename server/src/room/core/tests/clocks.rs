@@ -99,6 +99,28 @@ fn the_clock_begins_when_the_transport_takes_the_request_but_not_for_ever_later(
 }
 
 #[test]
+fn a_room_does_not_spin_while_a_transport_takes_nothing() {
+    let mut table = Table::playing(Policy {
+        decision_time: ms(10),
+        bank: ms(0),
+        ..Policy::default()
+    });
+    let mut rings = 0;
+    while table.core.decisions() == 0 {
+        let deadline = table.core.deadline().expect("a decision is open");
+        assert!(
+            deadline > table.now,
+            "a deadline that has passed rings at once, again and again"
+        );
+        table.now = deadline;
+        table.core.tick(table.now, None);
+        rings += 1;
+    }
+    assert!(rings < 300, "{rings} rings");
+    assert_eq!(table.now, super::super::MAX_HANDOVER + ms(10));
+}
+
+#[test]
 fn invalid_answers_do_not_move_the_deadline_and_end_in_the_default() {
     let mut table = Table::playing(Policy {
         max_invalid_attempts: Some(3),
