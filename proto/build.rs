@@ -19,6 +19,16 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     tonic_prost_build::configure()
         .compile_well_known_types(true)
         .extern_path(".google.protobuf", "::pbjson_types")
+        // Rare and large: boxed, so that the frequent variants beside them stay small.
+        .boxed(".chefshat.v1.GameEvent.kind.game_started")
+        .boxed(".chefshat.v1.GameEvent.kind.game_ended")
+        .boxed(".chefshat.v1.GameEvent.kind.game_aborted")
+        .boxed(".chefshat.v1.GameEvent.kind.shift_ended")
+        .boxed(".chefshat.v1.GameEvent.kind.expression_shown")
+        .boxed(".chefshat.v1.GameEvent.kind.special_action_declared")
+        .boxed(".chefshat.v1.GameEvent.kind.cards_exchanged")
+        .boxed(".chefshat.v1.GameEvent.kind.seated")
+        .boxed(".chefshat.v1.SeatUpdate.update.snapshot")
         .compile_fds(descriptors)?;
     pbjson_build::Builder::new()
         .register_descriptors(&encoded)?

@@ -132,8 +132,8 @@ impl<A: Agent> SeatSession<A> {
             Some(game_event::Kind::Returned(it)) if it.seat == self.seat => {
                 self.substituted = false;
             }
-            Some(game_event::Kind::GameEnded(end)) => self.ending = Some(Ending::Finished(end)),
-            Some(game_event::Kind::GameAborted(end)) => self.ending = Some(Ending::Aborted(end)),
+            Some(game_event::Kind::GameEnded(end)) => self.ending = Some(Ending::Finished(*end)),
+            Some(game_event::Kind::GameAborted(end)) => self.ending = Some(Ending::Aborted(*end)),
             _ => {}
         }
     }

@@ -193,10 +193,10 @@ fn ended() -> Option<Kind> {
         place,
         points: 15,
     };
-    Some(Kind::GameEnded(v1::GameEnded {
+    Some(Kind::GameEnded(Box::new(v1::GameEnded {
         standings: vec![line(1, 1), line(0, 2)],
         reveal: None,
-    }))
+    })))
 }
 
 fn substituted(seat: u32) -> Option<Kind> {
@@ -324,10 +324,10 @@ fn handles_are_those_of_the_present_stream() {
 #[test]
 fn seats_leave_each_for_its_own_reason() {
     use v1::DetachReason::{GameOver, Requested, Superseded};
-    let aborted = Kind::GameAborted(v1::GameAborted {
+    let aborted = Kind::GameAborted(Box::new(v1::GameAborted {
         reason: v1::AbortReason::Closed.into(),
         reveal: None,
-    });
+    }));
     let mut table = Table::new(&[&[], &[], &[], &[], &[], &[]]);
     table.connect(&[(0, 1, 1), (1, 2, 1), (2, 3, 1), (3, 4, 1), (4, 5, 1)]);
     table.hear(vec![(0, events(&[(1, ended())])), (0, detached(GameOver))]);

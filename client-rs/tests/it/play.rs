@@ -70,10 +70,10 @@ async fn ends(mut line: Line, handles: &[u32], sequence: u64) {
         place: seat + 1,
     };
     let mut end = event(sequence);
-    end.kind = Some(Kind::GameEnded(v1::GameEnded {
+    end.kind = Some(Kind::GameEnded(Box::new(v1::GameEnded {
         standings: handles.iter().map(standing).collect(),
         reveal: None,
-    }));
+    })));
     let mut updates = Vec::new();
     for &handle in handles {
         let events = vec![end.clone()];

@@ -128,10 +128,12 @@ mod tests {
 
     fn started(game: &Game) -> v1::GameEvent {
         v1::GameEvent {
-            kind: Some(v1::game_event::Kind::GameStarted(v1::GameStarted {
-                rules: Some(rules_to_proto(game.rules())),
-                ..v1::GameStarted::default()
-            })),
+            kind: Some(v1::game_event::Kind::GameStarted(Box::new(
+                v1::GameStarted {
+                    rules: Some(rules_to_proto(game.rules())),
+                    ..v1::GameStarted::default()
+                },
+            ))),
             ..v1::GameEvent::default()
         }
     }

@@ -32,12 +32,12 @@ fn kind(core: &Core, happening: &Happening, viewer: Viewer) -> Kind {
             .expect("a room tells the end of its game itself")
     };
     match happening {
-        Happening::Seated(seat, participant) => Kind::Seated(v1::Seated {
+        Happening::Seated(seat, participant) => Kind::Seated(Box::new(v1::Seated {
             seat: number(*seat),
             name: participant.name.clone(),
             kind: kind_to_proto(Some(participant.kind)),
             built_in_agent: String::new(),
-        }),
+        })),
         Happening::Vacated(seat) => Kind::Vacated(v1::Vacated {
             seat: number(*seat),
         }),
@@ -51,7 +51,7 @@ fn kind(core: &Core, happening: &Happening, viewer: Viewer) -> Kind {
             seat: number(*seat),
             agent: core.header().policy.substitute.name().into(),
         }),
-        Happening::GameStarted => Kind::GameStarted(game_started(core)),
+        Happening::GameStarted => Kind::GameStarted(Box::new(game_started(core))),
         Happening::Game(game) => engine_event(game.event, &game.by),
         Happening::Played {
             seat,
@@ -102,11 +102,11 @@ fn kind(core: &Core, happening: &Happening, viewer: Viewer) -> Kind {
             },
             &UNDECIDED,
         ),
-        Happening::GameEnded => Kind::GameEnded(v1::GameEnded {
+        Happening::GameEnded => Kind::GameEnded(Box::new(v1::GameEnded {
             standings: standings(core),
             reveal: reveal(core),
-        }),
-        Happening::GameAborted(reason) => Kind::GameAborted(v1::GameAborted {
+        })),
+        Happening::GameAborted(reason) => Kind::GameAborted(Box::new(v1::GameAborted {
             reason: match reason {
                 AbortReason::Closed => v1::AbortReason::Closed,
                 AbortReason::Shutdown => v1::AbortReason::Shutdown,
@@ -116,11 +116,13 @@ fn kind(core: &Core, happening: &Happening, viewer: Viewer) -> Kind {
             }
             .into(),
             reveal: reveal(core),
-        }),
-        Happening::Expressed(seat, expression) => Kind::ExpressionShown(v1::ExpressionShown {
-            seat: number(*seat),
-            expression: v1::Expression::decode(expression.as_ref()).ok(),
-        }),
+        })),
+        Happening::Expressed(seat, expression) => {
+            Kind::ExpressionShown(Box::new(v1::ExpressionShown {
+                seat: number(*seat),
+                expression: v1::Expression::decode(expression.as_ref()).ok(),
+            }))
+        }
     }
 }
 

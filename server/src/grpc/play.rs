@@ -155,11 +155,19 @@ impl Reader {
     }
 
     async fn read(mut self, mut requests: Streaming<v1::PlayRequest>, closing: CancellationToken) {
+        let outbox = Arc::clone(&self.outbox);
+        let ending = async {
+            tokio::select! {
+                () = closing.cancelled() => {}
+                () = outbox.abandoned() => {}
+            }
+        };
+        tokio::pin!(ending);
         let end = loop {
             let message = tokio::select! {
+                biased;
+                () = &mut ending => break Ok(()),
                 message = requests.message() => message,
-                () = closing.cancelled() => break Ok(()),
-                () = self.outbox.abandoned() => break Ok(()),
             };
             let arrived = Instant::now();
             match message {

@@ -100,7 +100,10 @@ impl Attachment {
         }));
         if self.wishes.snapshot {
             self.position = core.log().len();
-            self.hold(Update::Snapshot(snapshot(core, Viewer::Seat(seat))));
+            self.hold(Update::Snapshot(Box::new(snapshot(
+                core,
+                Viewer::Seat(seat),
+            ))));
         }
         self.position = self.position.min(core.log().len());
     }

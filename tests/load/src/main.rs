@@ -13,6 +13,7 @@ mod report;
 mod scenario;
 mod server;
 mod tally;
+mod wire;
 
 use std::process::ExitCode;
 

@@ -1,27 +1,31 @@
-//! The load on the game server: a client of its own, as small as one can be. Each stream is a task that decodes what comes, picks a
-//! random set bit of each mask, and answers all updates of one response in one request. `host` makes the rooms.
+//! The load on the game server: a client of its own, as small as one can be. Each stream is a task that decodes what it needs of what
+//! comes, picks a random set bit of each mask, and answers all updates of one response in one request. `host` makes the rooms.
 
 use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_proto::v1::{
-    self, game_event::Kind, play_service_client::PlayServiceClient, seat_command::Command,
-    seat_update::Update,
-};
+use chefshat_proto::v1::{self, seat_command::Command};
 use prost::Message as _;
 use rand::rngs::SmallRng;
 use rand::{RngExt as _, SeedableRng as _};
 use tokio::sync::{mpsc, oneshot};
 use tokio::task::JoinSet;
 use tokio_stream::wrappers::ReceiverStream;
-use tonic::Streaming;
-use tonic::transport::Endpoint;
+use tonic::codegen::http::uri::PathAndQuery;
+use tonic::transport::{Channel, Endpoint};
+use tonic::{Request, Streaming};
 
 use crate::error::LoadError;
 use crate::host::Host;
 use crate::options::SEATS;
 use crate::pulse::{Latencies, Plan, Pulse, Window, latencies};
 use crate::tally::{Counts, Traffic};
+use crate::wire::{
+    AnswerResult, DecisionRequest, EventBatch, Kind, PlayCodec, PlayResponse, Update,
+};
+
+/// A response and how many bytes it had.
+type Weighed = (usize, PlayResponse);
 
 /// Requests that wait for one stream.
 const REQUESTS: usize = 1_024;
@@ -39,7 +43,7 @@ pub(crate) struct Played {
     pub(crate) client_ns: Latencies,
     /// What all of the segment amounted to, checked.
     pub(crate) counts: Counts,
-    /// The weight of messages, if it was asked for.
+    /// The weight of its messages.
     pub(crate) traffic: Traffic,
 }
 
@@ -56,18 +60,13 @@ pub(crate) async fn segment(
     let mut streams = JoinSet::new();
     for number in 0..plan.streams {
         let (requests, waiting) = mpsc::channel(REQUESTS);
-        let mut client = PlayServiceClient::new(endpoint.connect().await?);
-        let inbound = client
-            .play(ReceiverStream::new(waiting))
-            .await?
-            .into_inner();
+        let inbound = open(endpoint.connect().await?, waiting).await?;
         let stream = Stream {
             requests: requests.downgrade(),
             over: over.clone(),
             pulse: Arc::clone(&pulse),
             slots: Vec::new(),
             random: SmallRng::seed_from_u64(plan.seed.wrapping_add(number as u64)),
-            weigh: plan.weigh,
             tally: Tally::default(),
         };
         senders.push(requests);
@@ -116,6 +115,21 @@ pub(crate) async fn segment(
         counts: sum.counts,
         traffic: sum.traffic,
     })
+}
+
+/// Opens a stream, as a generated client does, but for messages with the fields alone that are needed.
+async fn open(
+    channel: Channel,
+    requests: mpsc::Receiver<v1::PlayRequest>,
+) -> Result<Streaming<Weighed>, LoadError> {
+    let mut client = tonic::client::Grpc::new(channel);
+    client.ready().await?;
+    let path = PathAndQuery::from_static("/chefshat.v1.PlayService/Play");
+    let requests = Request::new(ReceiverStream::new(requests));
+    Ok(client
+        .streaming(requests, path, PlayCodec)
+        .await?
+        .into_inner())
 }
 
 /// Why a task ended before its time.
@@ -190,16 +204,13 @@ struct Stream {
     /// Index = handle.
     slots: Vec<Option<Slot>>,
     random: SmallRng,
-    weigh: bool,
     tally: Tally,
 }
 
 impl Stream {
-    async fn run(mut self, mut inbound: Streaming<v1::PlayResponse>) -> Result<Tally, LoadError> {
-        while let Some(response) = inbound.message().await? {
-            if self.weigh {
-                self.tally.traffic.received(response.encoded_len());
-            }
+    async fn run(mut self, mut inbound: Streaming<Weighed>) -> Result<Tally, LoadError> {
+        while let Some((bytes, response)) = inbound.message().await? {
+            self.tally.traffic.received(bytes);
             let mut commands = Vec::with_capacity(response.updates.len());
             for update in response.updates {
                 let handle = update.handle;
@@ -214,9 +225,7 @@ impl Stream {
                 continue;
             }
             let request = v1::PlayRequest { commands };
-            if self.weigh {
-                self.tally.traffic.sent(request.encoded_len());
-            }
+            self.tally.traffic.sent(request.encoded_len());
             let requests = self
                 .requests
                 .upgrade()
@@ -273,11 +282,7 @@ impl Stream {
         Ok(None)
     }
 
-    fn decide(
-        &mut self,
-        slot: Slot,
-        decision: &v1::DecisionRequest,
-    ) -> Result<v1::Answer, LoadError> {
+    fn decide(&mut self, slot: Slot, decision: &DecisionRequest) -> Result<v1::Answer, LoadError> {
         self.pulse.asked(slot.room, &mut self.tally.client_ns);
         let action = self
             .pick(&decision.action_mask)
@@ -312,7 +317,7 @@ impl Stream {
         None
     }
 
-    fn acknowledge(&mut self, result: &v1::AnswerResult) -> Result<(), LoadError> {
+    fn acknowledge(&mut self, result: &AnswerResult) -> Result<(), LoadError> {
         if result.status() != v1::AnswerStatus::Accepted {
             return Err(LoadError::Protocol(format!(
                 "a legal answer met {result:?}"
@@ -328,7 +333,7 @@ impl Stream {
     }
 
     /// Counts what happened in a room: its first seat for all of them, the end of the game each for itself.
-    fn follow(&mut self, slot: Slot, batch: &v1::EventBatch) -> Result<(), LoadError> {
+    fn follow(&mut self, slot: Slot, batch: &EventBatch) -> Result<(), LoadError> {
         let first = slot.seat == 0;
         for event in &batch.events {
             let source = match &event.kind {

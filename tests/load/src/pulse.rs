@@ -31,8 +31,6 @@ pub(crate) struct Plan {
     pub(crate) decisions: Option<u64>,
     /// Seed of the agents.
     pub(crate) seed: u64,
-    /// Weigh messages. Costs the client time, so it is not done where anything else is measured.
-    pub(crate) weigh: bool,
 }
 
 /// What a window showed.

@@ -143,7 +143,7 @@ impl Figures {
                 Some(of(&round.server)? / bare).filter(|ratio| ratio.is_finite())
             }))
         };
-        let weighed = outcome.weighed_decisions as f64;
+        let decisions = outcome.counts.answers as f64;
         Self {
             name: scenario.name(),
             rooms: scenario.rooms,
@@ -163,9 +163,9 @@ impl Figures {
             )
             .map(|bytes| bytes / 1024.0),
             bytes_per_decision: PerDecision {
-                request: outcome.traffic.request_bytes as f64 / weighed,
-                response: outcome.traffic.response_bytes as f64 / weighed,
-                response_messages: outcome.traffic.responses as f64 / weighed,
+                request: outcome.traffic.request_bytes as f64 / decisions,
+                response: outcome.traffic.response_bytes as f64 / decisions,
+                response_messages: outcome.traffic.responses as f64 / decisions,
             },
             messages: outcome.traffic,
             checked: outcome.counts.clone(),

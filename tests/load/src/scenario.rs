@@ -11,9 +11,6 @@ use crate::pulse::{Latencies, Plan, Window, latencies};
 use crate::server::ServerProcess;
 use crate::tally::{Counts, Traffic};
 
-/// Longest window of the segment in which messages are weighed.
-const WEIGHING: Duration = Duration::from_millis(500);
-
 /// What a scenario is for, which decides the goals it is held to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Purpose {
@@ -125,17 +122,15 @@ pub(crate) struct Outcome {
     pub(crate) counts: Counts,
     /// Answers in the measured segments of the bare room.
     pub(crate) bare_answers: u64,
-    /// The messages of the segment in which they were weighed.
+    /// The messages of the segments on the server.
     pub(crate) traffic: Traffic,
-    /// Decisions in that segment.
-    pub(crate) weighed_decisions: u64,
 }
 
 impl Outcome {
-    /// Mean bytes of a decision's messages.
+    /// Mean bytes of a decision's messages so far.
     fn sizes(&self) -> Sizes {
         let mean = |bytes: u64| {
-            usize::try_from(bytes.div_ceil(self.weighed_decisions.max(1)))
+            usize::try_from(bytes.div_ceil(self.counts.answers.max(1)))
                 .expect("a mean size fits memory")
         };
         Sizes {
@@ -155,17 +150,11 @@ pub(crate) async fn run(load: &Load, scenario: Scenario) -> Result<Outcome, Load
         window: load.seconds,
         decisions: load.decisions,
         seed: load.seed,
-        weigh: true,
     };
     if load.smoke {
         plan.warmup = Duration::from_millis(50);
         plan.window = Duration::from_millis(200);
     }
-    let measured = plan.window;
-    plan.window = measured.min(WEIGHING);
-    let (weighed, _) = on_server(load, &plan).await?;
-    plan.window = measured;
-    plan.weigh = false;
     let mut outcome = Outcome {
         scenario,
         rounds: Vec::new(),
@@ -174,18 +163,17 @@ pub(crate) async fn run(load: &Load, scenario: Scenario) -> Result<Outcome, Load
         bare_ns: latencies(),
         counts: Counts::default(),
         bare_answers: 0,
-        traffic: weighed.traffic,
-        weighed_decisions: weighed.counts.answers,
+        traffic: Traffic::default(),
     };
-    let sizes = outcome.sizes();
     for _ in 0..outcome.scenario.rounds {
         plan.seed = plan.seed.wrapping_add(plan.streams as u64);
         let (played, idle_bytes) = on_server(load, &plan).await?;
         outcome.server_us += &played.server_us;
         outcome.client_ns += &played.client_ns;
         outcome.counts.add(&played.counts);
+        outcome.traffic.add(&played.traffic);
         let bare = if load.server.is_none() {
-            let pinged = on_bare_room(load.place, &plan, sizes).await?;
+            let pinged = on_bare_room(load.place, &plan, outcome.sizes()).await?;
             outcome.bare_ns += &pinged.client_ns;
             outcome.bare_answers += pinged.answers;
             Some(pinged.window)

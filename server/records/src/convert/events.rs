@@ -28,24 +28,24 @@ pub fn event_kind(event: &Event, space: ActionSpace, by: By) -> Option<Kind> {
             roles: roles_to_proto(roles),
         }),
         Event::SpecialActionDeclared { seat, special } => {
-            Kind::SpecialActionDeclared(v1::SpecialActionDeclared {
+            Kind::SpecialActionDeclared(Box::new(v1::SpecialActionDeclared {
                 seat: number(seat),
                 action: special_to_proto(special).into(),
                 source: by.source.into(),
                 decision_time_us: by.decision_time_us,
-            })
+            }))
         }
         Event::CardsExchanged {
             giver,
             receiver,
             count,
             cards,
-        } => Kind::CardsExchanged(v1::CardsExchanged {
+        } => Kind::CardsExchanged(Box::new(v1::CardsExchanged {
             giver: number(giver),
             receiver: number(receiver),
             count: count.into(),
             cards: cards.map_or_else(Vec::new, |cards| ascending(cards, faces)),
-        }),
+        })),
         Event::Played {
             seat,
             action,
@@ -92,7 +92,7 @@ pub fn event_kind(event: &Event, space: ActionSpace, by: By) -> Option<Kind> {
             turns,
             adjudicated,
             ..
-        } => Kind::ShiftEnded(v1::ShiftEnded {
+        } => Kind::ShiftEnded(Box::new(v1::ShiftEnded {
             shift,
             order: order.as_slice().iter().copied().map(number).collect(),
             points: points.values().copied().collect(),
@@ -102,7 +102,7 @@ pub fn event_kind(event: &Event, space: ActionSpace, by: By) -> Option<Kind> {
             laps,
             turns,
             adjudicated,
-        }),
+        })),
         Event::GameEnded { .. } => return None,
     })
 }

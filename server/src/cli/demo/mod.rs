@@ -159,7 +159,7 @@ impl Demo {
                 out.flush()?;
             }
             match event.kind {
-                Some(Kind::GameEnded(ended)) => end = Ending::Finished(ended),
+                Some(Kind::GameEnded(ended)) => end = Ending::Finished(*ended),
                 Some(Kind::GameAborted(aborted)) => {
                     end = Ending::Aborted(abort_reason(aborted.reason()));
                 }

@@ -228,10 +228,10 @@ mod tests {
                 shift: 1,
                 hands: game.hands.clone(),
             })),
-            event(Kind::GameEnded(v1::GameEnded {
+            event(Kind::GameEnded(Box::new(v1::GameEnded {
                 standings: Vec::new(),
                 reveal: Some(game.reveal.clone()),
-            })),
+            }))),
         ]
         .map(|line| v1::RecordLine { line: Some(line) });
         check(&record, &game.commitment, game.asked, &game.outcomes)

@@ -31,7 +31,7 @@ fn standard() -> RuleSet {
 }
 
 fn game_started(rules: &RuleSet, names: &[&str]) -> Kind {
-    Kind::GameStarted(v1::GameStarted {
+    Kind::GameStarted(Box::new(v1::GameStarted {
         rules: Some(rules_to_proto(rules)),
         hand_size: rules.hand_size().into(),
         seats: names
@@ -43,7 +43,7 @@ fn game_started(rules: &RuleSet, names: &[&str]) -> Kind {
             })
             .collect(),
         ..v1::GameStarted::default()
-    })
+    }))
 }
 
 fn shift_started(shift: u32) -> Kind {
@@ -60,12 +60,12 @@ fn roles(roles: [v1::Role; 4]) -> Kind {
 }
 
 fn gives(giver: u32, count: u32, receiver: u32) -> Kind {
-    Kind::CardsExchanged(v1::CardsExchanged {
+    Kind::CardsExchanged(Box::new(v1::CardsExchanged {
         giver,
         receiver,
         count,
         cards: Vec::new(),
-    })
+    }))
 }
 
 /// `seat` plays `quantity` cards of `face` with `jokers` and has `cards_left`.
@@ -102,14 +102,14 @@ fn finished(seat: u32, place: u32) -> Kind {
 }
 
 fn shift_ended(order: [u32; 4], points: [u32; 4], scores: [u64; 4]) -> Kind {
-    Kind::ShiftEnded(v1::ShiftEnded {
+    Kind::ShiftEnded(Box::new(v1::ShiftEnded {
         order: order.to_vec(),
         points: points.to_vec(),
         scores: scores.to_vec(),
         pizzas: 4,
         turns: 16,
         ..v1::ShiftEnded::default()
-    })
+    }))
 }
 
 #[test]
@@ -180,11 +180,11 @@ fn roles_special_actions_and_incidents_are_told() {
         shift_ended([0, 1, 2, 3], [5, 3, 1, 0], [5, 3, 1, 0]),
         shift_started(2),
         roles([Chef, SousChef, Waiter, Dishwasher]),
-        Kind::SpecialActionDeclared(v1::SpecialActionDeclared {
+        Kind::SpecialActionDeclared(Box::new(v1::SpecialActionDeclared {
             seat: 3,
             action: v1::SpecialAction::FoodFight.into(),
             ..v1::SpecialActionDeclared::default()
-        }),
+        })),
         roles([Dishwasher, Waiter, SousChef, Chef]),
         gives(0, 2, 3),
         gives(3, 2, 0),
@@ -201,10 +201,10 @@ fn roles_special_actions_and_incidents_are_told() {
         Kind::Returned(v1::Returned { seat: 0 }),
         pass(0, Agent),
         play(1, (1, 8, 0), 16),
-        Kind::GameAborted(v1::GameAborted {
+        Kind::GameAborted(Box::new(v1::GameAborted {
             reason: v1::AbortReason::Closed.into(),
             reveal: None,
-        }),
+        })),
     ];
     check(
         events,
@@ -253,10 +253,10 @@ fn standings_name_the_winner() {
         &mut narrator,
         [
             game_started(&rules, &["Greta", "Rolf"]),
-            Kind::GameEnded(v1::GameEnded {
+            Kind::GameEnded(Box::new(v1::GameEnded {
                 standings: vec![standing(1, 15, 1), standing(0, 1, 2)],
                 reveal: None,
-            }),
+            })),
         ],
     );
     let lines: Vec<&str> = told.lines().collect();
@@ -277,10 +277,10 @@ fn a_tie_is_explained() {
         points: 16,
         place,
     };
-    let ended = Kind::GameEnded(v1::GameEnded {
+    let ended = Kind::GameEnded(Box::new(v1::GameEnded {
         standings: vec![standing(2, 1), standing(0, 2)],
         reveal: None,
-    });
+    }));
     let told = told(&mut Narrator::new(), [ended]);
     assert!(told.contains("seat 2"), "{told}");
     assert_eq!(
