@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::task::{Context, Poll};
 
-use chefshat_proto::v1::{SeatUpdate, SpectatorServiceWatchResponse, seat_update::Update};
+use chefshat_proto::v1::SpectatorServiceWatchResponse;
 use futures::Stream;
 use futures::task::AtomicWaker;
 use tokio::sync::Notify;
@@ -62,24 +62,44 @@ pub trait OnSpace: Send + Sync {
     fn space(&self);
 }
 
-/// Something that can wait in an outbox.
-pub trait Weigh {
-    /// What it counts for: one, and one for each event in it.
+/// What waits in an outbox: put together piece by piece, taken out as one message.
+pub trait Pile: Default {
+    /// Whether there is nothing.
+    fn is_empty(&self) -> bool;
+    /// What it counts for, in updates and events.
     fn weight(&self) -> usize;
+    /// Moves everything from `other` to the end of this.
+    fn append(&mut self, other: &mut Self);
+    /// Takes from the beginning what counts for at most `most`, but at least one piece.
+    fn take(&mut self, most: usize) -> Self;
 }
 
-impl Weigh for SeatUpdate {
-    fn weight(&self) -> usize {
-        match &self.update {
-            Some(Update::Events(batch)) => 1 + batch.events.len(),
-            _ => 1,
-        }
+impl Pile for Vec<SpectatorServiceWatchResponse> {
+    fn is_empty(&self) -> bool {
+        Vec::is_empty(self)
     }
-}
 
-impl Weigh for SpectatorServiceWatchResponse {
     fn weight(&self) -> usize {
-        1 + self.events.len()
+        self.iter().map(|piece| 1 + piece.events.len()).sum()
+    }
+
+    fn append(&mut self, other: &mut Self) {
+        Vec::append(self, other);
+    }
+
+    fn take(&mut self, most: usize) -> Self {
+        let mut weight = 0;
+        let count = self
+            .iter()
+            .take_while(|piece| {
+                weight += 1 + piece.events.len();
+                weight <= most
+            })
+            .count()
+            .max(1)
+            .min(self.len());
+        let rest = self.split_off(count);
+        std::mem::replace(self, rest)
     }
 }
 
@@ -92,7 +112,7 @@ pub struct Outbox<T> {
 }
 
 struct Waiting<T> {
-    updates: Vec<T>,
+    pile: T,
     weight: usize,
     stamps: Vec<Arc<HandStamp>>,
     wanting_space: Vec<Arc<dyn OnSpace>>,
@@ -100,12 +120,12 @@ struct Waiting<T> {
     abandoned: bool,
 }
 
-impl<T: Weigh> Outbox<T> {
+impl<T: Pile> Outbox<T> {
     /// An empty outbox and the stream that empties it.
     pub fn new() -> (Arc<Self>, OutboxStream<T>) {
         let outbox = Arc::new(Self {
             waiting: Mutex::new(Waiting {
-                updates: Vec::new(),
+                pile: T::default(),
                 weight: 0,
                 stamps: Vec::new(),
                 wanting_space: Vec::new(),
@@ -118,18 +138,18 @@ impl<T: Weigh> Outbox<T> {
         (Arc::clone(&outbox), OutboxStream { outbox })
     }
 
-    /// Puts updates in, in order; `stamp` is set when they are handed over. If the outbox is full, or would be, nothing is put in and
-    /// `updates` is left as it was; `on_space` is called when it has space again.
+    /// Puts a pile in; `stamp` is set when it is handed over. If the outbox is full, or would be, nothing is put in and `pile` is left as
+    /// it was; `on_space` is called when there is space again.
     pub fn push(
         &self,
-        updates: &mut Vec<T>,
+        pile: &mut T,
         stamp: Option<&Arc<HandStamp>>,
         on_space: Option<&Arc<dyn OnSpace>>,
     ) -> bool {
-        let weight = updates.iter().map(Weigh::weight).sum::<usize>();
+        let weight = pile.weight();
         let mut waiting = self.lock();
         if waiting.abandoned {
-            updates.clear();
+            *pile = T::default();
             return true;
         }
         if waiting.weight > 0 && waiting.weight + weight > OUTBOX_CAPACITY {
@@ -139,7 +159,7 @@ impl<T: Weigh> Outbox<T> {
             return false;
         }
         waiting.weight += weight;
-        waiting.updates.append(updates);
+        waiting.pile.append(pile);
         waiting.stamps.extend(stamp.cloned());
         drop(waiting);
         self.waker.wake();
@@ -155,7 +175,7 @@ impl<T: Weigh> Outbox<T> {
     /// Ends the stream now, with nothing more than this.
     pub fn cut(&self, status: Status) {
         let mut waiting = self.lock();
-        waiting.updates = Vec::new();
+        waiting.pile = T::default();
         waiting.weight = 0;
         waiting.end = Some(Err(status));
         drop(waiting);
@@ -193,17 +213,17 @@ impl<T> std::fmt::Debug for Outbox<T> {
 
 /// The stream that empties an outbox: all that is ready, at each poll.
 #[derive(Debug)]
-pub struct OutboxStream<T: Weigh> {
+pub struct OutboxStream<T: Pile> {
     outbox: Arc<Outbox<T>>,
 }
 
-impl<T: Weigh> Stream for OutboxStream<T> {
-    type Item = Result<Vec<T>, Status>;
+impl<T: Pile> Stream for OutboxStream<T> {
+    type Item = Result<T, Status>;
 
     fn poll_next(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Option<Self::Item>> {
         self.outbox.waker.register(context.waker());
         let mut waiting = self.outbox.lock();
-        if waiting.updates.is_empty() {
+        if waiting.pile.is_empty() {
             return match waiting.end.take() {
                 None => Poll::Pending,
                 Some(Ok(())) => {
@@ -216,24 +236,13 @@ impl<T: Weigh> Stream for OutboxStream<T> {
                 }
             };
         }
-        let updates = if waiting.weight <= MESSAGE_CAPACITY {
+        let pile = if waiting.weight <= MESSAGE_CAPACITY {
             waiting.weight = 0;
-            std::mem::take(&mut waiting.updates)
+            std::mem::take(&mut waiting.pile)
         } else {
-            let mut taken = 0;
-            let count = waiting
-                .updates
-                .iter()
-                .take_while(|update| {
-                    taken += update.weight();
-                    taken <= MESSAGE_CAPACITY
-                })
-                .count()
-                .max(1);
-            let rest = waiting.updates.split_off(count);
-            let updates = std::mem::replace(&mut waiting.updates, rest);
-            waiting.weight -= updates.iter().map(Weigh::weight).sum::<usize>();
-            updates
+            let pile = waiting.pile.take(MESSAGE_CAPACITY);
+            waiting.weight -= pile.weight();
+            pile
         };
         // A decision that stays behind for the next message is stamped a little early; its agent has that much more time.
         if !waiting.stamps.is_empty() {
@@ -247,15 +256,15 @@ impl<T: Weigh> Stream for OutboxStream<T> {
         for wanting in wanting_space {
             wanting.space();
         }
-        Poll::Ready(Some(Ok(updates)))
+        Poll::Ready(Some(Ok(pile)))
     }
 }
 
-impl<T: Weigh> Drop for OutboxStream<T> {
+impl<T: Pile> Drop for OutboxStream<T> {
     fn drop(&mut self) {
         let mut waiting = self.outbox.lock();
         waiting.abandoned = true;
-        waiting.updates = Vec::new();
+        waiting.pile = T::default();
         waiting.weight = 0;
         waiting.stamps = Vec::new();
         waiting.wanting_space = Vec::new();
@@ -268,18 +277,30 @@ impl<T: Weigh> Drop for OutboxStream<T> {
 mod tests {
     use std::sync::atomic::AtomicUsize;
 
-    use chefshat_proto::v1;
+    use chefshat_proto::v1::GameEvent;
     use futures::{FutureExt as _, StreamExt as _};
 
     use super::*;
 
-    fn update(handle: u32, events: usize) -> SeatUpdate {
-        SeatUpdate {
-            handle,
-            update: Some(Update::Events(v1::EventBatch {
-                events: vec![v1::GameEvent::default(); events],
-            })),
-        }
+    type Pieces = Vec<SpectatorServiceWatchResponse>;
+
+    /// One piece with so many events, all of this number.
+    fn piece(number: u64, events: usize) -> Pieces {
+        let event = GameEvent {
+            sequence: number,
+            ..GameEvent::default()
+        };
+        vec![SpectatorServiceWatchResponse {
+            events: vec![event; events],
+            ..SpectatorServiceWatchResponse::default()
+        }]
+    }
+
+    fn numbers(message: &Pieces) -> Vec<u64> {
+        message
+            .iter()
+            .map(|piece| piece.events[0].sequence)
+            .collect()
     }
 
     #[derive(Default)]
@@ -293,37 +314,32 @@ mod tests {
 
     #[test]
     fn what_is_ready_goes_out_as_one_message() {
-        let (outbox, mut stream) = Outbox::new();
+        let (outbox, mut stream) = Outbox::<Pieces>::new();
         assert!(stream.next().now_or_never().is_none());
-        for handle in 0..5 {
-            assert!(outbox.push(&mut vec![update(handle, 2)], None, None));
+        for number in 0..5 {
+            assert!(outbox.push(&mut piece(number, 2), None, None));
         }
         let message = stream.next().now_or_never().flatten();
-        let handles: Vec<u32> = message
-            .expect("something is ready")
-            .expect("no error")
-            .iter()
-            .map(|update| update.handle)
-            .collect();
-        assert_eq!(handles, [0, 1, 2, 3, 4]);
+        let message = message.expect("something is ready").expect("no error");
+        assert_eq!(numbers(&message), [0, 1, 2, 3, 4]);
         outbox.end(Ok(()));
         assert!(stream.next().now_or_never().expect("ended").is_none());
     }
 
     #[test]
     fn a_full_outbox_refuses_and_says_when_it_has_space() {
-        let (outbox, mut stream) = Outbox::new();
+        let (outbox, mut stream) = Outbox::<Pieces>::new();
         let count = Arc::new(Count::default());
         let on_space: Arc<dyn OnSpace> = Arc::clone(&count) as _;
         let mut pushed = 0;
         let mut refused = loop {
-            let mut updates = vec![update(pushed, 255)];
-            if !outbox.push(&mut updates, None, Some(&on_space)) {
-                break updates;
+            let mut pile = piece(pushed, 255);
+            if !outbox.push(&mut pile, None, Some(&on_space)) {
+                break pile;
             }
             pushed += 1;
         };
-        assert_eq!(refused.len(), 1, "nothing is lost");
+        assert_eq!(numbers(&refused), [pushed], "nothing is lost");
         assert_eq!(usize::try_from(pushed), Ok(OUTBOX_CAPACITY / 256));
         let message = stream
             .next()
@@ -334,26 +350,25 @@ mod tests {
         assert_eq!(message.len(), MESSAGE_CAPACITY / 256);
         assert_eq!(count.0.load(Ordering::Relaxed), 1);
         assert!(outbox.push(&mut refused, None, Some(&on_space)));
-        let rest: Vec<u32> = std::iter::from_fn(|| stream.next().now_or_never().flatten())
-            .flat_map(|message| message.expect("no error"))
-            .map(|update| update.handle)
+        let rest: Vec<u64> = std::iter::from_fn(|| stream.next().now_or_never().flatten())
+            .flat_map(|message| numbers(&message.expect("no error")))
             .collect();
-        let expected: Vec<u32> = (u32::try_from(message.len()).expect("small")..=pushed).collect();
+        let expected: Vec<u64> = (u64::try_from(message.len()).expect("small")..=pushed).collect();
         assert_eq!(rest, expected, "in order, once");
     }
 
     #[test]
     fn a_cut_drops_what_waits_and_a_dropped_stream_takes_nothing_more() {
-        let (outbox, mut stream) = Outbox::new();
-        outbox.push(&mut vec![update(0, 1)], None, None);
+        let (outbox, mut stream) = Outbox::<Pieces>::new();
+        outbox.push(&mut piece(0, 1), None, None);
         outbox.cut(Status::resource_exhausted("too slow"));
         let end = stream.next().now_or_never().flatten().expect("an end");
         assert_eq!(end.expect_err("cut").code(), tonic::Code::ResourceExhausted);
         drop(stream);
         assert!(outbox.is_abandoned());
         assert!(outbox.abandoned().now_or_never().is_some());
-        let mut updates = vec![update(0, 1)];
-        assert!(outbox.push(&mut updates, None, None));
-        assert!(updates.is_empty());
+        let mut pile = piece(0, 1);
+        assert!(outbox.push(&mut pile, None, None));
+        assert!(pile.is_empty());
     }
 }

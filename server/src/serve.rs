@@ -120,7 +120,7 @@ where
 }
 
 fn routes(rooms: &Arc<Rooms>, config: &ServerConfig, closing: &CancellationToken) -> Routes {
-    use v1::play_service_server::PlayServiceServer;
+    use crate::wire::service::play_service_server::PlayServiceServer;
     use v1::record_service_server::RecordServiceServer;
     use v1::room_service_server::RoomServiceServer;
     use v1::server_service_server::ServerServiceServer;

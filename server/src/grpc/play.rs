@@ -4,10 +4,7 @@
 use std::pin::Pin;
 use std::sync::Arc;
 
-use chefshat_proto::v1::{
-    self, SeatUpdate, act_request, play_service_server::PlayService, seat_command::Command,
-    seat_update::Update,
-};
+use chefshat_proto::v1::{self, act_request, seat_command::Command, seat_update::Update};
 use chefshat_records::convert::FieldProblem;
 use chefshat_records::seeds::MAX_ENTROPY;
 use futures::{Stream, StreamExt as _};
@@ -26,6 +23,8 @@ use crate::room::core::ConnectionId;
 use crate::room::delivery::Wishes;
 use crate::room::{AttachRequest, Handle, SeatAction};
 use crate::rooms::Rooms;
+use crate::wire::Updates;
+use crate::wire::service::play_service_server::PlayService;
 
 /// The service.
 #[derive(Debug, Clone)]
@@ -44,9 +43,8 @@ impl Play {
 
 #[tonic::async_trait]
 impl PlayService for Play {
-    type PlayStream = Pin<Box<dyn Stream<Item = Result<v1::PlayResponse, Status>> + Send>>;
-    type WatchStream =
-        Pin<Box<dyn Stream<Item = Result<v1::PlayServiceWatchResponse, Status>> + Send>>;
+    type PlayStream = OutboxStream<Updates>;
+    type WatchStream = Pin<Box<dyn Stream<Item = Result<Updates, Status>> + Send>>;
 
     async fn play(
         &self,
@@ -55,9 +53,7 @@ impl PlayService for Play {
         let (outbox, updates) = Outbox::new();
         let reader = Reader::new(Arc::clone(&self.rooms), outbox, true);
         tokio::spawn(reader.read(request.into_inner(), self.closing.clone()));
-        Ok(Response::new(Box::pin(updates.map(|updates| {
-            updates.map(|updates| v1::PlayResponse { updates })
-        }))))
+        Ok(Response::new(updates))
     }
 
     async fn watch(
@@ -119,12 +115,9 @@ impl PlayService for Play {
 }
 
 /// Updates as Watch sends them, with heartbeats when nothing happens.
-fn with_heartbeats(
-    updates: OutboxStream<SeatUpdate>,
-) -> impl Stream<Item = Result<v1::PlayServiceWatchResponse, Status>> {
+fn with_heartbeats(updates: OutboxStream<Updates>) -> impl Stream<Item = Result<Updates, Status>> {
     tokio_stream::StreamExt::timeout_repeating(updates, tokio::time::interval(HEARTBEAT))
-        .map(|message| message.unwrap_or_else(|_| Ok(Vec::new())))
-        .map(|updates| updates.map(|updates| v1::PlayServiceWatchResponse { updates }))
+        .map(|message| message.unwrap_or_else(|_| Ok(Updates::default())))
 }
 
 /// A seat that is attached to a stream.
@@ -137,7 +130,7 @@ struct BoundSeat {
 /// Reads the requests of one stream.
 struct Reader {
     rooms: Arc<Rooms>,
-    outbox: Arc<Outbox<SeatUpdate>>,
+    outbox: Arc<Outbox<Updates>>,
     /// Index = handle; `None` where an attachment was refused or has been left.
     seats: Vec<Option<BoundSeat>>,
     /// What unspecified delivery means: on Play with decisions, on Watch at once.
@@ -145,7 +138,7 @@ struct Reader {
 }
 
 impl Reader {
-    fn new(rooms: Arc<Rooms>, outbox: Arc<Outbox<SeatUpdate>>, with_decisions: bool) -> Self {
+    fn new(rooms: Arc<Rooms>, outbox: Arc<Outbox<Updates>>, with_decisions: bool) -> Self {
         Self {
             rooms,
             outbox,
@@ -321,15 +314,16 @@ impl Reader {
             .get_details_error_info()
             .map(|info| (info.reason, info.metadata))
             .unwrap_or_default();
-        let mut updates = vec![SeatUpdate {
+        let mut updates = Updates::default();
+        updates.add(
             handle,
-            update: Some(Update::Refused(v1::Refused {
+            Update::Refused(v1::Refused {
                 request_id,
                 reason,
                 message: refusal.message().to_owned(),
                 metadata,
-            })),
-        }];
+            }),
+        );
         // A client that does not read its refusals does not get more of them.
         self.outbox.push(&mut updates, None, None);
     }

@@ -5,12 +5,13 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use chefshat_engine::{Event, Seat, Viewer};
-use chefshat_proto::v1::{self, SeatUpdate, seat_update::Update};
+use chefshat_proto::v1::{self, seat_update::Update};
 
 use super::core::{ConnectionId, Core};
 use super::log::Happening;
 use crate::convert;
-use crate::outbox::{HandStamp, OnSpace, Outbox};
+use crate::outbox::{HandStamp, OnSpace, Outbox, Pile as _};
+use crate::wire::{Events, Updates, put_event};
 
 /// Events that gather for a seat before they are sent without a decision.
 pub const MAX_HELD_EVENTS: usize = 128;
@@ -35,7 +36,7 @@ pub struct Wishes {
 /// A seat's place on a stream.
 pub struct Attachment {
     connection: ConnectionId,
-    outbox: Arc<Outbox<SeatUpdate>>,
+    outbox: Arc<Outbox<Updates>>,
     handle: u32,
     wishes: Wishes,
     position: usize,
@@ -44,7 +45,7 @@ pub struct Attachment {
     stamp: Arc<HandStamp>,
     on_space: Arc<dyn OnSpace>,
     /// Updates that go out with the next flush.
-    held: Vec<SeatUpdate>,
+    held: Updates,
     /// Whether a decision request is among them.
     decision_held: bool,
     stalled: bool,
@@ -55,7 +56,7 @@ impl Attachment {
     /// Attaches a seat. Its stream is told by [`Attachment::greet`].
     pub fn new(
         connection: ConnectionId,
-        outbox: Arc<Outbox<SeatUpdate>>,
+        outbox: Arc<Outbox<Updates>>,
         handle: u32,
         wishes: Wishes,
         stamp: Arc<HandStamp>,
@@ -70,7 +71,7 @@ impl Attachment {
             sent: 0,
             stamp,
             on_space,
-            held: Vec::new(),
+            held: Updates::default(),
             decision_held: false,
             stalled: false,
             done: false,
@@ -142,7 +143,14 @@ impl Attachment {
     }
 
     /// Sends what is due. `urgent`: something happened that the seat is told of at once in any case.
-    pub fn deliver(&mut self, core: &Core, seat: Seat, now: Duration, urgent: bool) {
+    pub fn deliver(
+        &mut self,
+        core: &Core,
+        public: &PublicLog,
+        seat: Seat,
+        now: Duration,
+        urgent: bool,
+    ) {
         if self.done {
             return;
         }
@@ -165,10 +173,10 @@ impl Attachment {
         }
         while self.position < core.log().len() {
             let end = (self.position + EVENTS_PER_BATCH).min(core.log().len());
-            let events = (self.position..end)
-                .filter_map(|position| convert::view(core, position, Viewer::Seat(seat)))
-                .collect();
-            self.hold(Update::Events(v1::EventBatch { events }));
+            let mut batch = Vec::new();
+            public.put(core, self.position, end, seat, &mut batch);
+            self.held
+                .add_events(self.handle, &batch, end - self.position);
             self.position = end;
             if end < core.log().len() && !self.push() {
                 return;
@@ -177,7 +185,7 @@ impl Attachment {
         if let Some(open) = decision {
             let request = convert::decision_request(core, open, now, !self.wishes.no_mask);
             self.sent = open.id;
-            self.hold(Update::Decision(request));
+            self.held.add_decision(self.handle, &request);
             self.stamp.clear();
             self.decision_held = true;
         }
@@ -190,10 +198,7 @@ impl Attachment {
     }
 
     fn hold(&mut self, update: Update) {
-        self.held.push(SeatUpdate {
-            handle: self.handle,
-            update: Some(update),
-        });
+        self.held.add(self.handle, update);
     }
 
     /// Moves what is held to the outbox; if that is full, it stays held, and the room hears when there is space.
@@ -220,6 +225,38 @@ impl std::fmt::Debug for Attachment {
             .field("connection", &self.connection)
             .field("position", &self.position)
             .finish_non_exhaustive()
+    }
+}
+
+/// The events of a room as those see them who are told nothing private, encoded once for all of them.
+#[derive(Debug, Default)]
+pub struct PublicLog {
+    events: Events,
+}
+
+impl PublicLog {
+    /// Takes in what has been added to the log.
+    pub fn follow(&mut self, core: &Core) {
+        for position in self.events.len()..core.log().len() {
+            let event = convert::view(core, position, Viewer::Spectator);
+            self.events
+                .add(&event.expect("the position is within the log"));
+        }
+    }
+
+    /// Encodes the events from one position to another as a seat may see them.
+    fn put(&self, core: &Core, from: usize, to: usize, seat: Seat, batch: &mut Vec<u8>) {
+        let mut shared = from;
+        for (position, entry) in (from..to).zip(core.log().since(from)) {
+            if entry.happening.tells_more_to(seat) {
+                batch.extend_from_slice(self.events.range(shared, position));
+                if let Some(event) = convert::view(core, position, Viewer::Seat(seat)) {
+                    put_event(batch, &event);
+                }
+                shared = position + 1;
+            }
+        }
+        batch.extend_from_slice(self.events.range(shared, to));
     }
 }
 

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use chefshat_engine::Seat;
-use chefshat_proto::v1::{self, SeatUpdate, SpectatorServiceWatchResponse};
+use chefshat_proto::v1::{self, SpectatorServiceWatchResponse};
 use tokio::sync::{mpsc, oneshot};
 use tokio::time::Instant;
 
@@ -13,6 +13,7 @@ use super::delivery::Wishes;
 use crate::ids::{Id, Token};
 use crate::outbox::{OnSpace, Outbox};
 use crate::store::journal::{AbortReason, ParticipantKind};
+use crate::wire::Updates;
 
 /// The room is gone: closed, ended long ago, or stopped because its store failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -49,7 +50,7 @@ pub struct AttachRequest {
     /// Chosen by the client.
     pub request_id: u32,
     /// The stream.
-    pub outbox: Arc<Outbox<SeatUpdate>>,
+    pub outbox: Arc<Outbox<Updates>>,
     /// Number of the seat on the stream.
     pub handle: u32,
     /// How it wants to be told.
@@ -62,7 +63,7 @@ pub struct AttachRequest {
 #[derive(Debug)]
 pub struct SpectateRequest {
     /// The stream.
-    pub outbox: Arc<Outbox<SpectatorServiceWatchResponse>>,
+    pub outbox: Arc<Outbox<Vec<SpectatorServiceWatchResponse>>>,
     /// Position in the log from which events are wanted.
     pub from: usize,
     /// Start with a snapshot.

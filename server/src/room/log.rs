@@ -80,6 +80,23 @@ pub enum Happening {
     Expressed(Seat, Box<[u8]>),
 }
 
+impl Happening {
+    /// Whether a seat is told more of this than everybody is. When in doubt, it is: what more there is, if anything, is then decided event
+    /// by event.
+    pub fn tells_more_to(&self, seat: Seat) -> bool {
+        match self {
+            Self::Played {
+                seat: actor, by, ..
+            }
+            | Self::Passed {
+                seat: actor, by, ..
+            } => *actor == seat && by.reward.is_some(),
+            Self::Game(_) => true,
+            _ => false,
+        }
+    }
+}
+
 /// A rare event of the engine.
 #[derive(Debug, Clone)]
 pub struct GameHappening {

@@ -21,7 +21,7 @@ const EVENTS_PER_MESSAGE: usize = 256;
 /// One spectator.
 #[derive(Debug)]
 pub(super) struct Spectator {
-    outbox: Arc<Outbox<SpectatorServiceWatchResponse>>,
+    outbox: Arc<Outbox<Vec<SpectatorServiceWatchResponse>>>,
     position: usize,
     /// What a viewer like this may see.
     viewer: Viewer,
@@ -33,7 +33,7 @@ impl Spectator {
     /// A spectator from an event on (position from 0). The first message is in its outbox.
     pub(super) fn new(
         core: &Core,
-        outbox: Arc<Outbox<SpectatorServiceWatchResponse>>,
+        outbox: Arc<Outbox<Vec<SpectatorServiceWatchResponse>>>,
         from: usize,
         with_snapshot: bool,
     ) -> Self {

@@ -14,7 +14,7 @@ use tokio_util::task::TaskTracker;
 use tracing::{debug, error, info};
 
 use super::core::{AnswerInput, Answered, ConnectionId, Core, JoinError, State};
-use super::delivery::{Attachment, is_urgent};
+use super::delivery::{Attachment, PublicLog, is_urgent};
 use super::handle::{
     Acted, AttachRequest, Handle, JoinRequest, Joined, Message, SeatAction, SpectateError,
     SpectateRequest, TellSpace,
@@ -88,6 +88,7 @@ pub fn start(header: Arc<GameHeader>, context: TaskContext) -> Handle {
         spectators: Vec::new(),
         on_space: Arc::new(TellSpace(mailbox.downgrade())),
         releases: Vec::new(),
+        public: PublicLog::default(),
         delivered: 0,
         over_since: None,
         context: context.clone(),
@@ -103,6 +104,7 @@ struct Task {
     spectators: Vec<Spectator>,
     on_space: Arc<dyn OnSpace>,
     releases: Vec<Release>,
+    public: PublicLog,
     /// Length of the log when everybody had last been looked after.
     delivered: usize,
     over_since: Option<Duration>,
@@ -360,6 +362,7 @@ impl Task {
         if self.core.state().is_over() && self.over_since.is_none() && !self.conclude().await {
             return false;
         }
+        self.public.follow(&self.core);
         for release in std::mem::take(&mut self.releases) {
             self.release(release);
         }
@@ -410,7 +413,7 @@ impl Task {
         }
         let now = self.now();
         if let Some(attachment) = &mut self.attachments[seat.index()] {
-            attachment.deliver(&self.core, seat, now, true);
+            attachment.deliver(&self.core, &self.public, seat, now, true);
         }
         answer(reply, Some((seat, connection)));
     }
@@ -427,7 +430,7 @@ impl Task {
         for seat in self.core.all_seats() {
             if let Some(attachment) = &mut self.attachments[seat.index()] {
                 let urgent = news.iter().any(|entry| is_urgent(&entry.happening, seat));
-                attachment.deliver(&self.core, seat, now, urgent);
+                attachment.deliver(&self.core, &self.public, seat, now, urgent);
             }
         }
         self.delivered = self.core.log().len();

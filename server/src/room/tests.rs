@@ -5,9 +5,10 @@ use std::sync::atomic::AtomicU64;
 use std::time::Duration;
 
 use chefshat_engine::{RuleSetSpec, Seat, Stop};
-use chefshat_proto::v1::{self, SeatUpdate, seat_update::Update};
+use chefshat_proto::v1::{self, seat_update::Update};
 use chefshat_records::seeds::SeedPlan;
 use futures::StreamExt as _;
+use prost::Message as _;
 use tokio::time::Instant;
 use tokio_util::task::TaskTracker;
 
@@ -19,6 +20,7 @@ use crate::ids::{Id, SecretHash, Token};
 use crate::outbox::{Outbox, OutboxStream};
 use crate::store::journal::{Fill, GameHeader, ParticipantKind};
 use crate::store::{MemoryStore, Store as _};
+use crate::wire::Updates;
 
 struct Nobody;
 
@@ -67,7 +69,7 @@ struct AttachedSeat {
     seat: Seat,
     connection: ConnectionId,
     ticket: Token,
-    updates: OutboxStream<SeatUpdate>,
+    updates: OutboxStream<Updates>,
 }
 
 async fn take_seat(room: &Handle) -> AttachedSeat {
@@ -114,7 +116,9 @@ async fn attach(room: &Handle, ticket: Token) -> AttachedSeat {
 async fn read(room: &Handle, seat: &mut AttachedSeat, answering: bool) -> Vec<u64> {
     let mut numbers = Vec::new();
     while let Some(updates) = seat.updates.next().await {
-        for update in updates.expect("no error") {
+        let written = updates.expect("no error").encode_to_vec();
+        let response = v1::PlayResponse::decode(written.as_slice()).expect("it is a response");
+        for update in response.updates {
             match update.update.expect("it says something") {
                 Update::Events(batch) => {
                     numbers.extend(batch.events.iter().map(|event| event.sequence));

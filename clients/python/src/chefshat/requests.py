@@ -5,11 +5,11 @@ from typing import NamedTuple, TypeAlias
 
 from chefshat import pb
 
-# Times in milliseconds. Waits between attempts to connect are `Backoff`'s business, so the channel's own are kept short; pings
-# notice a peer that is gone without having said so.
+# Times in milliseconds. Waits between attempts to connect are `Backoff`'s business, so the channel's own are kept short. (But not
+# "grpc.min_reconnect_backoff_ms", which despite its name bounds how long one attempt may take.) Pings notice a peer that is gone
+# without having said so.
 CHANNEL_OPTIONS: list[tuple[str, int]] = [
     ("grpc.initial_reconnect_backoff_ms", 100),
-    ("grpc.min_reconnect_backoff_ms", 100),
     ("grpc.max_reconnect_backoff_ms", 1000),
     ("grpc.keepalive_time_ms", 30_000),
     ("grpc.keepalive_timeout_ms", 10_000),

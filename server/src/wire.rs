@@ -1,0 +1,311 @@
+//! Updates for a stream of seats, encoded when they happen. Events that look the same to everybody are encoded once for all who are told
+//! of them; what is ready for a stream is one run of bytes, which is the body of a `PlayResponse` (or of a `PlayServiceWatchResponse`:
+//! both have their updates in field 1). What stands in an update is said elsewhere: here is only how it lies on the wire.
+
+use chefshat_proto::v1::{self, seat_update::Update};
+use prost::Message;
+use prost::bytes::{Buf, BufMut};
+use prost::encoding::{
+    DecodeContext, WireType, encode_key, encode_varint, encoded_len_varint, key_len, skip_field,
+};
+
+/// The service, with [`Updates`] as its streamed response.
+pub mod service {
+    #![allow(missing_docs, unreachable_pub, clippy::all, reason = "generated code")]
+    tonic::include_proto!("chefshat.v1");
+}
+
+/// Field of the updates in a response.
+const RESPONSE_UPDATES: u32 = 1;
+/// Fields of `SeatUpdate`.
+const UPDATE_HANDLE: u32 = 1;
+const UPDATE_EVENTS: u32 = 3;
+const UPDATE_DECISION: u32 = 4;
+/// Field of the events in an `EventBatch`.
+const BATCH_EVENTS: u32 = 1;
+
+/// Encoded updates, in order: the body of a response.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Updates {
+    bytes: Vec<u8>,
+    /// Where each update ends, and what it counts for.
+    parts: Vec<Part>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Part {
+    end: usize,
+    weight: usize,
+}
+
+impl Updates {
+    /// Adds an update of any kind.
+    pub fn add(&mut self, handle: u32, update: Update) {
+        let weight = match &update {
+            Update::Events(batch) => 1 + batch.events.len(),
+            _ => 1,
+        };
+        let update = v1::SeatUpdate {
+            handle,
+            update: Some(update),
+        };
+        prost::encoding::message::encode(RESPONSE_UPDATES, &update, &mut self.bytes);
+        self.end_part(weight);
+    }
+
+    /// Adds a batch of `count` events, encoded as [`Events`] holds them.
+    pub fn add_events(&mut self, handle: u32, events: &[u8], count: usize) {
+        self.add_encoded(handle, UPDATE_EVENTS, events.len(), |bytes| {
+            bytes.put_slice(events);
+        });
+        self.end_part(1 + count);
+    }
+
+    /// Adds a decision request.
+    pub fn add_decision(&mut self, handle: u32, decision: &v1::DecisionRequest) {
+        self.add_encoded(handle, UPDATE_DECISION, decision.encoded_len(), |bytes| {
+            decision.encode_raw(bytes);
+        });
+        self.end_part(1);
+    }
+
+    fn add_encoded(
+        &mut self,
+        handle: u32,
+        field: u32,
+        length: usize,
+        write: impl FnOnce(&mut Vec<u8>),
+    ) {
+        let handle_length = if handle == 0 {
+            0
+        } else {
+            prost::encoding::uint32::encoded_len(UPDATE_HANDLE, &handle)
+        };
+        let update_length = handle_length + delimited_length(field, length);
+        self.bytes
+            .reserve(delimited_length(RESPONSE_UPDATES, update_length));
+        start_delimited(&mut self.bytes, RESPONSE_UPDATES, update_length);
+        if handle != 0 {
+            prost::encoding::uint32::encode(UPDATE_HANDLE, &handle, &mut self.bytes);
+        }
+        start_delimited(&mut self.bytes, field, length);
+        write(&mut self.bytes);
+    }
+
+    fn end_part(&mut self, weight: usize) {
+        self.parts.push(Part {
+            end: self.bytes.len(),
+            weight,
+        });
+    }
+
+}
+
+impl crate::outbox::Pile for Updates {
+    fn is_empty(&self) -> bool {
+        self.parts.is_empty()
+    }
+
+    fn weight(&self) -> usize {
+        self.parts.iter().map(|part| part.weight).sum()
+    }
+
+    fn append(&mut self, other: &mut Self) {
+        if self.is_empty() {
+            std::mem::swap(self, other);
+            return;
+        }
+        let before = self.bytes.len();
+        self.bytes.append(&mut other.bytes);
+        self.parts.extend(other.parts.drain(..).map(|part| Part {
+            end: before + part.end,
+            ..part
+        }));
+    }
+
+    fn take(&mut self, most: usize) -> Self {
+        let mut weight = 0;
+        let count = self
+            .parts
+            .iter()
+            .take_while(|part| {
+                weight += part.weight;
+                weight <= most
+            })
+            .count()
+            .max(1)
+            .min(self.parts.len());
+        let mut rest = self.parts.split_off(count);
+        let end = self.parts.last().map_or(0, |part| part.end);
+        for part in &mut rest {
+            part.end -= end;
+        }
+        let rest = Self {
+            bytes: self.bytes.split_off(end),
+            parts: rest,
+        };
+        std::mem::replace(self, rest)
+    }
+}
+
+/// A response is written as it stands; a server never reads one.
+impl Message for Updates {
+    fn encode_raw(&self, buffer: &mut impl BufMut) {
+        buffer.put_slice(&self.bytes);
+    }
+
+    fn merge_field(
+        &mut self,
+        tag: u32,
+        wire_type: WireType,
+        buffer: &mut impl Buf,
+        context: DecodeContext,
+    ) -> Result<(), prost::DecodeError> {
+        skip_field(wire_type, tag, buffer, context)
+    }
+
+    fn encoded_len(&self) -> usize {
+        self.bytes.len()
+    }
+
+    fn clear(&mut self) {
+        *self = Self::default();
+    }
+}
+
+/// Encoded events, in order: the body of an `EventBatch`.
+#[derive(Debug, Default)]
+pub struct Events {
+    bytes: Vec<u8>,
+    ends: Vec<u32>,
+}
+
+impl Events {
+    /// Adds an event.
+    pub fn add(&mut self, event: &v1::GameEvent) {
+        put_event(&mut self.bytes, event);
+        let end =
+            u32::try_from(self.bytes.len()).expect("the events of a game are far below 4 GiB");
+        self.ends.push(end);
+    }
+
+    /// The events from one position to another.
+    pub fn range(&self, from: usize, to: usize) -> &[u8] {
+        let start = |position: usize| {
+            let end = position
+                .checked_sub(1)
+                .and_then(|before| self.ends.get(before));
+            end.map_or(0, |end| usize::try_from(*end).expect("memory holds it"))
+        };
+        &self.bytes[start(from)..start(to)]
+    }
+
+    /// Number of events.
+    pub fn len(&self) -> usize {
+        self.ends.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.ends.is_empty()
+    }
+}
+
+/// Encodes one event into a batch that is being put together.
+pub fn put_event(batch: &mut Vec<u8>, event: &v1::GameEvent) {
+    prost::encoding::message::encode(BATCH_EVENTS, event, batch);
+}
+
+fn delimited_length(field: u32, length: usize) -> usize {
+    key_len(field) + encoded_len_varint(u64::try_from(length).expect("memory holds it")) + length
+}
+
+fn start_delimited(bytes: &mut Vec<u8>, field: u32, length: usize) {
+    encode_key(field, WireType::LengthDelimited, bytes);
+    encode_varint(u64::try_from(length).expect("memory holds it"), bytes);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::outbox::Pile as _;
+
+    fn event(sequence: u64) -> v1::GameEvent {
+        v1::GameEvent {
+            sequence,
+            elapsed_ms: 5,
+            kind: Some(v1::game_event::Kind::Pass(v1::Pass {
+                seat: 3,
+                ..v1::Pass::default()
+            })),
+            ..v1::GameEvent::default()
+        }
+    }
+
+    fn decoded(updates: &Updates) -> Vec<v1::SeatUpdate> {
+        let response = v1::PlayResponse::decode(updates.encode_to_vec().as_slice());
+        response.expect("it is a response").updates
+    }
+
+    #[test]
+    fn what_is_encoded_piece_by_piece_is_what_the_protocol_says() {
+        let decision = v1::DecisionRequest {
+            decision_id: 7,
+            observation: Some(v1::Observation {
+                hand: vec![1; 12],
+                ..v1::Observation::default()
+            }),
+            action_mask: vec![255; 27],
+            ..v1::DecisionRequest::default()
+        };
+        let mut events = Events::default();
+        (1..=300).for_each(|number| events.add(&event(number)));
+        for handle in [0, 1, 127, 128, 5000] {
+            let mut updates = Updates::default();
+            updates.add(handle, Update::Result(v1::AnswerResult::default()));
+            updates.add_events(handle, events.range(10, 300), 290);
+            updates.add_decision(handle, &decision);
+            let expected = [
+                Update::Result(v1::AnswerResult::default()),
+                Update::Events(v1::EventBatch {
+                    events: (11..=300).map(event).collect(),
+                }),
+                Update::Decision(decision.clone()),
+            ]
+            .map(|update| v1::SeatUpdate {
+                handle,
+                update: Some(update),
+            });
+            assert_eq!(decoded(&updates), expected);
+            assert_eq!(updates.weight(), 1 + 291 + 1);
+            assert_eq!(decoded(&updates).len(), 3);
+        }
+        let watch =
+            v1::PlayServiceWatchResponse::decode(Updates::default().encode_to_vec().as_slice());
+        assert!(watch.expect("an empty response").updates.is_empty());
+    }
+
+    #[test]
+    fn piles_are_appended_and_taken_in_order() {
+        let one = |handle| {
+            let mut updates = Updates::default();
+            updates.add_events(handle, &[], 9);
+            updates
+        };
+        let mut pile = Updates::default();
+        for handle in 0..6 {
+            pile.append(&mut one(handle));
+        }
+        assert_eq!(pile.weight(), 60);
+        let first = pile.take(35);
+        assert_eq!((decoded(&first).len(), decoded(&pile).len()), (3, 3));
+        let second = pile.take(1);
+        assert_eq!(decoded(&second).len(), 1, "at least one, however heavy");
+        let handles: Vec<u32> = [first, second, pile]
+            .iter()
+            .flat_map(decoded)
+            .map(|update| update.handle)
+            .collect();
+        assert_eq!(handles, [0, 1, 2, 3, 4, 5]);
+    }
+}
