@@ -15,8 +15,8 @@ use crate::wire::{Events, Updates, put_event};
 
 /// Events that gather for a seat before they are sent without a decision.
 pub const MAX_HELD_EVENTS: usize = 128;
-/// Updates held for a stream that is full; answers to commands beyond it are dropped.
-const MAX_HELD_UPDATES: usize = 256;
+/// Updates and events held for a stream that is full; answers to commands beyond it are dropped.
+const MAX_HELD_UPDATES: usize = 1_024;
 /// Most events in one batch.
 const EVENTS_PER_BATCH: usize = 256;
 
@@ -214,7 +214,7 @@ impl Attachment {
 
     /// Whether the client does not read and has had its share of answers held for it.
     fn is_deaf(&self) -> bool {
-        self.stalled && self.held.len() >= MAX_HELD_UPDATES
+        self.stalled && self.held.weight() >= MAX_HELD_UPDATES
     }
 }
 
