@@ -2,7 +2,7 @@
 //! that a client with many seats gets its batches by being busy. Bounded: a room is told when there is no more space, and goes on.
 
 use std::pin::Pin;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::task::{Context, Poll};
 
@@ -109,6 +109,8 @@ pub struct Outbox<T> {
     waker: AtomicWaker,
     /// Notified when the client has gone away.
     gone: Notify,
+    hung_up: AtomicBool,
+    reader: AtomicWaker,
 }
 
 struct Waiting<T> {
@@ -134,6 +136,8 @@ impl<T: Pile> Outbox<T> {
             }),
             waker: AtomicWaker::new(),
             gone: Notify::new(),
+            hung_up: AtomicBool::new(false),
+            reader: AtomicWaker::new(),
         });
         (Arc::clone(&outbox), OutboxStream { outbox })
     }
@@ -180,6 +184,21 @@ impl<T: Pile> Outbox<T> {
         waiting.end = Some(Err(status));
         drop(waiting);
         self.waker.wake();
+    }
+
+    /// Asks the reader of the stream's requests to stop.
+    pub fn hang_up(&self) {
+        self.hung_up.store(true, Ordering::Release);
+        self.reader.wake();
+    }
+
+    /// Whether the reader of the stream's requests is to stop: it was asked to, or the client has gone away. If not, it is woken when it is.
+    /// Costs no lock, because it is asked with every message.
+    pub fn poll_hung_up(&self, context: &Context<'_>) -> bool {
+        if !self.hung_up.load(Ordering::Acquire) {
+            self.reader.register(context.waker());
+        }
+        self.hung_up.load(Ordering::Acquire)
     }
 
     /// Waits until the client has gone away.
@@ -269,6 +288,7 @@ impl<T: Pile> Drop for OutboxStream<T> {
         waiting.stamps = Vec::new();
         waiting.wanting_space = Vec::new();
         drop(waiting);
+        self.outbox.hang_up();
         self.outbox.gone.notify_waiters();
     }
 }

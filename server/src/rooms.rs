@@ -127,14 +127,14 @@ impl Rooms {
             join_code: join_code(),
             owner: owner.hash(),
         });
-        self.context.store.create(Arc::clone(&header)).await?;
+        let journal = self.context.store.create(Arc::clone(&header)).await?;
         let join_code = header.join_code.clone();
         // Checked and entered under one lock, so that a shutdown cannot slip in between and miss the room.
         let mut table = self.lock();
         if table.shutting_down {
             return Err(CreateError::ShuttingDown);
         }
-        let handle = start(header, self.context.clone());
+        let handle = start(header, journal, self.context.clone());
         let number = table.next_number;
         table.next_number += 1;
         table.numbers.insert(room_id, number);

@@ -3,13 +3,15 @@
 import contextlib
 import socket
 import threading
+import time
 from typing import Self
 
 
 class Proxy:
-    """Forwards from a free port to `address`; a context manager."""
+    """Forwards from a free port to `address`, each connection only after `delay_s` seconds; a context manager."""
 
-    def __init__(self, address: str) -> None:
+    def __init__(self, address: str, delay_s: float = 0.0) -> None:
+        self._delay_s = delay_s
         host, _, port = address.rpartition(":")
         self._server = (host, int(port))
         self._listener = socket.create_server(("127.0.0.1", 0))
@@ -43,6 +45,7 @@ class Proxy:
         while True:
             try:
                 near, _ = self._listener.accept()
+                time.sleep(self._delay_s)
                 far = socket.create_connection(self._server)
             except OSError:
                 return

@@ -36,9 +36,10 @@ class RealServer:
                     return self
         finally:
             watchdog.cancel()
-        self.stop()
         self._log.seek(0)
-        raise AssertionError(f"the server named by CHEFSHAT_BIN did not start listening; it said:\n{self._log.read()}")
+        said_instead = self._log.read()
+        self.stop()
+        raise AssertionError(f"the server named by CHEFSHAT_BIN did not start listening; it said:\n{said_instead}")
 
     def __exit__(self, *_: object) -> None:
         self.stop()
@@ -53,3 +54,4 @@ class RealServer:
             self._process.wait()
         if self._process.stdout is not None:
             self._process.stdout.close()
+        self._log.close()

@@ -5,6 +5,7 @@ import random
 import grpc
 import pytest
 from fake_server import FakeServer
+from proxy import Proxy
 
 import chefshat
 from chefshat import Backoff, ChefsHatError, aio
@@ -53,6 +54,11 @@ def test_without_details_the_code_is_the_reason() -> None:
         assert caught.value.retryable
         with pytest.raises(ChefsHatError, match="UNAVAILABLE"):
             client.play(chefshat.RandomAgent(), "ticket")
+
+
+def test_a_server_may_take_its_time_to_answer_a_connection(fake: FakeServer) -> None:
+    with Proxy(fake.address, delay_s=0.5) as proxy, chefshat.Client(proxy.address) as client:
+        assert client.server_info().server_version == "fake"
 
 
 def test_addresses() -> None:

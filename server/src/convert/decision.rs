@@ -5,7 +5,7 @@ use chefshat_proto::v1;
 use chefshat_records::convert::{FieldProblem, role_from_number};
 use prost::Message as _;
 
-use super::policy::to_millis;
+use super::policy::millis;
 use crate::room::core::{Answered, Core, OpenDecision, Verdict};
 use crate::store::journal::Source;
 
@@ -27,15 +27,15 @@ pub fn decision_request(
     let (time_left, bank_left) = core.time_left(now);
     v1::DecisionRequest {
         decision_id: open.id,
-        kind: kind_to_proto(open.decision.kind).into(),
+        kind: decision_kind(open.decision.kind).into(),
         observation: Some(observation_to_proto(&observation)),
         action_mask: if with_mask {
             mask_bytes(&core.legal_actions(), &core.header().rules)
         } else {
             Vec::new()
         },
-        time_left_ms: to_millis(time_left),
-        bank_left_ms: to_millis(bank_left),
+        time_left_ms: millis(time_left),
+        bank_left_ms: millis(bank_left),
         invalid_attempts_left: core.attempts_left(),
     }
 }
@@ -46,7 +46,7 @@ pub(super) fn mask_bytes(mask: &Mask, rules: &RuleSet) -> Vec<u8> {
 }
 
 /// The protocol's name for a kind of decision.
-pub(super) fn kind_to_proto(kind: DecisionKind) -> v1::DecisionKind {
+pub fn decision_kind(kind: DecisionKind) -> v1::DecisionKind {
     match kind {
         DecisionKind::Turn => v1::DecisionKind::Turn,
         DecisionKind::Exchange => v1::DecisionKind::Exchange,

@@ -8,10 +8,10 @@ mod record;
 mod room;
 
 pub use decision::{
-    annotations_from_proto, answer_result, decision_request, expression_from_proto,
+    annotations_from_proto, answer_result, decision_kind, decision_request, expression_from_proto,
     observation_from_proto, observation_to_proto,
 };
 pub use log::{game_started, view};
-pub use policy::{policy_from_proto, policy_to_proto};
+pub use policy::{millis, policy_from_proto, policy_to_proto};
 pub use record::record_lines;
 pub use room::{describe, fills_from_proto, kind_from_proto, participants};

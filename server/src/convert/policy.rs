@@ -26,9 +26,9 @@ pub fn policy_from_proto(message: &v1::RoomPolicy) -> Result<Policy, FieldProble
     )?
     .unwrap_or(0);
     let policy = Policy {
-        decision_time: millis("decision_time_ms", message.decision_time_ms, 10..=DAY_MS)?
+        decision_time: time("decision_time_ms", message.decision_time_ms, 10..=DAY_MS)?
             .unwrap_or(standard.decision_time),
-        bank: millis("bank_ms", message.bank_ms, 0..=DAY_MS)?.unwrap_or(standard.bank),
+        bank: time("bank_ms", message.bank_ms, 0..=DAY_MS)?.unwrap_or(standard.bank),
         max_invalid_attempts: match in_range(
             "max_invalid_attempts",
             message.max_invalid_attempts,
@@ -50,8 +50,8 @@ pub fn policy_from_proto(message: &v1::RoomPolicy) -> Result<Policy, FieldProble
         reward_scheme: v1::RewardScheme::try_from(message.reward_scheme)
             .map(reward_scheme_from_proto)
             .map_err(|_| unknown("reward_scheme", message.reward_scheme))?,
-        pace: millis("pace_ms", message.pace_ms, 0..=60_000)?.unwrap_or(standard.pace),
-        waiting_time: millis("waiting_time_ms", message.waiting_time_ms, 1_000..=DAY_MS)?
+        pace: time("pace_ms", message.pace_ms, 0..=60_000)?.unwrap_or(standard.pace),
+        waiting_time: time("waiting_time_ms", message.waiting_time_ms, 1_000..=DAY_MS)?
             .unwrap_or(standard.waiting_time),
         spectators: message.spectators.unwrap_or(standard.spectators),
         spectator_delay_decisions: usize::try_from(spectator_delay).unwrap_or(usize::MAX),
@@ -71,8 +71,8 @@ pub fn policy_from_proto(message: &v1::RoomPolicy) -> Result<Policy, FieldProble
 /// A policy with every field set.
 pub fn policy_to_proto(policy: &Policy) -> v1::RoomPolicy {
     v1::RoomPolicy {
-        decision_time_ms: Some(to_millis(policy.decision_time)),
-        bank_ms: Some(to_millis(policy.bank)),
+        decision_time_ms: Some(millis(policy.decision_time)),
+        bank_ms: Some(millis(policy.bank)),
         max_invalid_attempts: Some(policy.max_invalid_attempts.unwrap_or(0)),
         max_timeouts: Some(policy.max_timeouts),
         substitute: policy.substitute.name().into(),
@@ -91,8 +91,8 @@ pub fn policy_to_proto(policy: &Policy) -> v1::RoomPolicy {
             Some(RewardScheme::Points) => v1::RewardScheme::Points,
         }
         .into(),
-        pace_ms: Some(to_millis(policy.pace)),
-        waiting_time_ms: Some(to_millis(policy.waiting_time)),
+        pace_ms: Some(millis(policy.pace)),
+        waiting_time_ms: Some(millis(policy.waiting_time)),
         spectators: Some(policy.spectators),
         spectator_delay_decisions: Some(
             u32::try_from(policy.spectator_delay_decisions).unwrap_or(u32::MAX),
@@ -116,11 +116,11 @@ pub(super) fn agent(field: &'static str, name: &str) -> Result<Option<AgentKind>
 }
 
 /// Whole milliseconds, as messages count time.
-pub(super) fn to_millis(time: Duration) -> u32 {
+pub fn millis(time: Duration) -> u32 {
     u32::try_from(time.as_millis()).unwrap_or(u32::MAX)
 }
 
-fn millis(
+fn time(
     field: &'static str,
     value: Option<u32>,
     range: RangeInclusive<u32>,

@@ -8,7 +8,7 @@ use chefshat_records::convert::{action_space, rules_to_proto};
 use chefshat_records::jsonl::FORMAT_VERSION;
 use prost::Message as _;
 
-use super::decision::{kind_to_proto, mask_bytes, source_to_proto};
+use super::decision::{decision_kind, mask_bytes, source_to_proto};
 use super::log::view;
 use super::policy::policy_to_proto;
 use super::room::{participants, state_to_proto};
@@ -104,7 +104,7 @@ fn decision(
         decision_id: open.map_or(0, |open| open.id),
         kind: open
             .map_or(v1::DecisionKind::Unspecified, |open| {
-                kind_to_proto(open.decision.kind)
+                decision_kind(open.decision.kind)
             })
             .into(),
         action: decided.action.index().into(),

@@ -1,8 +1,10 @@
 //! `PlayService`: streams of seats, and single commands without a stream. A stream's requests are read by a task of their own; its
 //! responses come from its outbox, which rooms fill.
 
+use std::future::poll_fn;
 use std::pin::Pin;
 use std::sync::Arc;
+use std::task::Poll;
 
 use chefshat_proto::v1::{self, act_request, seat_command::Command, seat_update::Update};
 use chefshat_records::convert::FieldProblem;
@@ -51,8 +53,15 @@ impl PlayService for Play {
         request: Request<Streaming<v1::PlayRequest>>,
     ) -> Result<Response<Self::PlayStream>, Status> {
         let (outbox, updates) = Outbox::new();
-        let reader = Reader::new(Arc::clone(&self.rooms), outbox, true);
-        tokio::spawn(reader.read(request.into_inner(), self.closing.clone()));
+        let reader = Reader::new(Arc::clone(&self.rooms), Arc::clone(&outbox), true);
+        tokio::spawn(reader.read(request.into_inner()));
+        let closing = self.closing.clone();
+        tokio::spawn(async move {
+            tokio::select! {
+                () = closing.cancelled() => outbox.hang_up(),
+                () = outbox.abandoned() => {}
+            }
+        });
         Ok(Response::new(updates))
     }
 
@@ -147,21 +156,16 @@ impl Reader {
         }
     }
 
-    async fn read(mut self, mut requests: Streaming<v1::PlayRequest>, closing: CancellationToken) {
+    async fn read(mut self, mut requests: Streaming<v1::PlayRequest>) {
         let outbox = Arc::clone(&self.outbox);
-        let ending = async {
-            tokio::select! {
-                () = closing.cancelled() => {}
-                () = outbox.abandoned() => {}
-            }
-        };
-        tokio::pin!(ending);
         let end = loop {
-            let message = tokio::select! {
-                biased;
-                () = &mut ending => break Ok(()),
-                message = requests.message() => message,
-            };
+            let message = poll_fn(|context| {
+                if outbox.poll_hung_up(context) {
+                    return Poll::Ready(None);
+                }
+                requests.poll_next_unpin(context)
+            });
+            let message = message.await.transpose();
             let arrived = Instant::now();
             match message {
                 Ok(Some(request)) if request.commands.len() > MAX_COMMANDS_PER_MESSAGE => {

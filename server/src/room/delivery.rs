@@ -11,12 +11,14 @@ use super::core::{ConnectionId, Core};
 use super::log::Happening;
 use crate::convert;
 use crate::outbox::{HandStamp, OnSpace, Outbox, Pile as _};
-use crate::wire::{Events, Updates, put_event};
+use crate::wire::{Events, Updates, encode_decision, put_event};
 
 /// Events that gather for a seat before they are sent without a decision.
 pub const MAX_HELD_EVENTS: usize = 128;
 /// Updates and events held for a stream that is full; answers to commands beyond it are dropped.
 const MAX_HELD_UPDATES: usize = 1_024;
+/// Bytes that a decision request takes at most as a rule.
+const DECISION_CAPACITY: usize = 256;
 /// Most events in one batch.
 const EVENTS_PER_BATCH: usize = 256;
 
@@ -183,7 +185,8 @@ impl Attachment {
             }
         }
         if let Some(open) = decision {
-            let request = convert::decision_request(core, open, now, !self.wishes.no_mask);
+            let mut request = Vec::with_capacity(DECISION_CAPACITY);
+            encode_decision(core, open, now, !self.wishes.no_mask, &mut request);
             self.sent = open.id;
             self.held.add_decision(self.handle, &request);
             self.stamp.clear();

@@ -24,8 +24,8 @@ use crate::config::ROOM_MAILBOX;
 use crate::convert;
 use crate::ids::{Id, Token};
 use crate::outbox::{HandStamp, OnSpace};
-use crate::store::Store;
 use crate::store::journal::{AbortReason, GameHeader, SeatedParticipant};
+use crate::store::{Journal, Store};
 
 /// Inputs that are applied before the store is asked once for all of them.
 const INPUTS_PER_COMMIT: usize = 64;
@@ -74,7 +74,7 @@ pub trait RoomWatcher: Send + Sync {
 }
 
 /// Starts a room.
-pub fn start(header: Arc<GameHeader>, context: TaskContext) -> Handle {
+pub fn start(header: Arc<GameHeader>, journal: Box<dyn Journal>, context: TaskContext) -> Handle {
     let (mailbox, inbox) = mpsc::channel(ROOM_MAILBOX);
     let handle = Handle {
         id: header.room_id,
@@ -83,7 +83,9 @@ pub fn start(header: Arc<GameHeader>, context: TaskContext) -> Handle {
     let seats = header.fills.len();
     let task = Task {
         core: Core::new(header),
+        journal,
         epoch: Instant::now(),
+        now: Duration::ZERO,
         attachments: (0..seats).map(|_| None).collect(),
         spectators: Vec::new(),
         on_space: Arc::new(TellSpace(mailbox.downgrade())),
@@ -99,7 +101,10 @@ pub fn start(header: Arc<GameHeader>, context: TaskContext) -> Handle {
 
 struct Task {
     core: Core,
+    journal: Box<dyn Journal>,
     epoch: Instant,
+    /// The time of the inputs in hand, since `epoch`.
+    now: Duration,
     attachments: Vec<Option<Attachment>>,
     spectators: Vec<Spectator>,
     on_space: Arc<dyn OnSpace>,
@@ -130,17 +135,19 @@ impl Task {
                     if received == 0 {
                         break;
                     }
+                    self.now = self.epoch.elapsed();
                     for message in messages.drain(..) {
                         self.receive(message);
                     }
                 }
                 () = alarm.as_mut(), if armed => {
                     armed = false;
+                    self.now = self.epoch.elapsed();
                     if self.is_expired() {
                         break;
                     }
                     let handed = self.handed();
-                    self.core.tick(self.now(), handed);
+                    self.core.tick(self.now, handed);
                 }
             }
         }
@@ -167,11 +174,7 @@ impl Task {
 
     fn is_expired(&self) -> bool {
         self.over_since
-            .is_some_and(|since| since + self.context.retention <= self.now())
-    }
-
-    fn now(&self) -> Duration {
-        self.epoch.elapsed()
+            .is_some_and(|since| since + self.context.retention <= self.now)
     }
 
     /// When the open decision was handed to its seat's transport.
@@ -181,7 +184,7 @@ impl Task {
     }
 
     fn receive(&mut self, message: Message) {
-        let now = self.now();
+        let now = self.now;
         match message {
             Message::Join(request, reply) => {
                 let joined = self.join(now, request);
@@ -351,21 +354,21 @@ impl Task {
 
     /// Hands new changes to the store, awaits it, then tells everybody what they may know. `false` when the room must stop.
     async fn keep_and_tell(&mut self) -> bool {
-        let entries = self.core.take_unkept();
-        if !entries.is_empty() {
-            let game = self.core.header().game_id;
-            if let Err(error) = self.context.store.append(game, entries).await {
-                self.fail(&error.to_string());
-                return false;
-            }
+        if !self.core.unkept().is_empty()
+            && let Err(error) = self.journal.append(self.core.unkept()).await
+        {
+            self.fail(&error.to_string());
+            return false;
         }
         if self.core.state().is_over() && self.over_since.is_none() && !self.conclude().await {
             return false;
         }
         self.public.follow(&self.core);
-        for release in std::mem::take(&mut self.releases) {
+        let mut releases = std::mem::take(&mut self.releases);
+        for release in releases.drain(..) {
             self.release(release);
         }
+        self.releases = releases;
         self.deliver();
         true
     }
@@ -411,7 +414,7 @@ impl Task {
         if let Some(mut older) = older {
             older.detach(v1::DetachReason::Superseded);
         }
-        let now = self.now();
+        let now = self.now;
         if let Some(attachment) = &mut self.attachments[seat.index()] {
             attachment.deliver(&self.core, &self.public, seat, now, true);
         }
@@ -425,7 +428,7 @@ impl Task {
     }
 
     fn deliver(&mut self) {
-        let now = self.now();
+        let now = self.now;
         let news = self.core.log().since(self.delivered);
         for seat in self.core.all_seats() {
             if let Some(attachment) = &mut self.attachments[seat.index()] {
@@ -441,9 +444,9 @@ impl Task {
 
     /// The game has ended: the store is told, the record is written.
     async fn conclude(&mut self) -> bool {
-        self.over_since = Some(self.now());
+        self.over_since = Some(self.now);
         let header = Arc::clone(self.core.header());
-        if let Err(error) = self.context.store.finish(header.game_id).await {
+        if let Err(error) = self.journal.finish().await {
             self.fail(&error.to_string());
             return false;
         }

@@ -48,12 +48,13 @@ async fn room(policy: Policy, shifts: u32) -> Handle {
         owner: SecretHash::of(b"owner"),
     });
     let store = Arc::new(MemoryStore::default());
-    store
+    let journal = store
         .create(Arc::clone(&header))
         .await
         .expect("memory keeps it");
     start(
         header,
+        journal,
         TaskContext {
             store,
             data_dir: None,

@@ -2,13 +2,13 @@
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, MutexGuard};
 
 use futures::FutureExt as _;
 use futures::future::{BoxFuture, ready};
 
 use super::journal::{Entry, GameHeader};
-use super::{KeptGame, Store, StoreError};
+use super::{Journal, KeptGame, Store, StoreError};
 use crate::ids::Id;
 
 /// Finished games that are kept; older ones are forgotten.
@@ -17,75 +17,78 @@ pub const MAX_FINISHED_GAMES: usize = 1_000;
 /// Keeps running games and the last [`MAX_FINISHED_GAMES`] finished ones in memory.
 #[derive(Debug, Default)]
 pub struct MemoryStore {
-    games: Mutex<Games>,
+    finished: Arc<Mutex<Finished>>,
 }
 
 #[derive(Debug, Default)]
-struct Games {
-    kept: BTreeMap<Id, KeptGame>,
-    finished: VecDeque<Id>,
-}
-
-impl MemoryStore {
-    fn with<T: Send + 'static>(
-        &self,
-        action: impl FnOnce(&mut Games) -> Result<T, StoreError>,
-    ) -> BoxFuture<'_, Result<T, StoreError>> {
-        let mut games = self
-            .games
-            .lock()
-            .expect("nothing that holds this lock can panic");
-        ready(action(&mut games)).boxed()
-    }
+struct Finished {
+    games: BTreeMap<Id, KeptGame>,
+    /// Oldest first.
+    order: VecDeque<Id>,
 }
 
 impl Store for MemoryStore {
-    fn create(&self, header: Arc<GameHeader>) -> BoxFuture<'_, Result<(), StoreError>> {
-        self.with(|games| {
-            games.kept.insert(header.game_id, (header, Vec::new()));
-            Ok(())
-        })
-    }
-
-    fn append(&self, game: Id, mut entries: Vec<Entry>) -> BoxFuture<'_, Result<(), StoreError>> {
-        self.with(|games| {
-            let (_, journal) = games
-                .kept
-                .get_mut(&game)
-                .ok_or_else(|| StoreError(format!("game {game} was never created")))?;
-            journal.append(&mut entries);
-            Ok(())
-        })
-    }
-
-    fn finish(&self, game: Id) -> BoxFuture<'_, Result<(), StoreError>> {
-        self.with(|games| {
-            games.finished.push_back(game);
-            if games.finished.len() > MAX_FINISHED_GAMES
-                && let Some(oldest) = games.finished.pop_front()
-            {
-                games.kept.remove(&oldest);
-            }
-            Ok(())
-        })
+    fn create(
+        &self,
+        header: Arc<GameHeader>,
+    ) -> BoxFuture<'_, Result<Box<dyn Journal>, StoreError>> {
+        let journal = MemoryJournal {
+            header,
+            entries: Vec::new(),
+            finished: Arc::clone(&self.finished),
+        };
+        ready(Ok(Box::new(journal) as Box<dyn Journal>)).boxed()
     }
 
     fn finished(&self, game: Id) -> BoxFuture<'_, Result<Option<KeptGame>, StoreError>> {
-        self.with(|games| {
-            Ok(if games.finished.contains(&game) {
-                games.kept.get(&game).cloned()
-            } else {
-                None
-            })
-        })
+        ready(Ok(lock(&self.finished).games.get(&game).cloned())).boxed()
     }
+}
+
+struct MemoryJournal {
+    header: Arc<GameHeader>,
+    entries: Vec<Entry>,
+    finished: Arc<Mutex<Finished>>,
+}
+
+impl Journal for MemoryJournal {
+    fn append<'a>(
+        &'a mut self,
+        entries: &'a mut Vec<Entry>,
+    ) -> BoxFuture<'a, Result<(), StoreError>> {
+        self.entries.append(entries);
+        ready(Ok(())).boxed()
+    }
+
+    fn finish(&mut self) -> BoxFuture<'_, Result<(), StoreError>> {
+        let id = self.header.game_id;
+        let entries = std::mem::take(&mut self.entries).into();
+        let mut finished = lock(&self.finished);
+        finished
+            .games
+            .insert(id, (Arc::clone(&self.header), entries));
+        finished.order.push_back(id);
+        if finished.order.len() > MAX_FINISHED_GAMES
+            && let Some(oldest) = finished.order.pop_front()
+        {
+            finished.games.remove(&oldest);
+        }
+        drop(finished);
+        ready(Ok(())).boxed()
+    }
+}
+
+fn lock(finished: &Mutex<Finished>) -> MutexGuard<'_, Finished> {
+    finished
+        .lock()
+        .expect("nothing that holds this lock can panic")
 }
 
 /// A memory store whose appends fail from a certain one on: what a full disk would do.
 #[derive(Debug)]
 pub struct FailingStore {
     inner: MemoryStore,
-    appends_left: AtomicU64,
+    appends_left: Arc<AtomicU64>,
 }
 
 impl FailingStore {
@@ -93,17 +96,44 @@ impl FailingStore {
     pub fn after(appends: u64) -> Self {
         Self {
             inner: MemoryStore::default(),
-            appends_left: AtomicU64::new(appends),
+            appends_left: Arc::new(AtomicU64::new(appends)),
         }
     }
 }
 
 impl Store for FailingStore {
-    fn create(&self, header: Arc<GameHeader>) -> BoxFuture<'_, Result<(), StoreError>> {
-        self.inner.create(header)
+    fn create(
+        &self,
+        header: Arc<GameHeader>,
+    ) -> BoxFuture<'_, Result<Box<dyn Journal>, StoreError>> {
+        let appends_left = Arc::clone(&self.appends_left);
+        self.inner
+            .create(header)
+            .map(|inner| {
+                let inner = inner?;
+                Ok(Box::new(FailingJournal {
+                    inner,
+                    appends_left,
+                }) as Box<dyn Journal>)
+            })
+            .boxed()
     }
 
-    fn append(&self, game: Id, entries: Vec<Entry>) -> BoxFuture<'_, Result<(), StoreError>> {
+    fn finished(&self, game: Id) -> BoxFuture<'_, Result<Option<KeptGame>, StoreError>> {
+        self.inner.finished(game)
+    }
+}
+
+struct FailingJournal {
+    inner: Box<dyn Journal>,
+    appends_left: Arc<AtomicU64>,
+}
+
+impl Journal for FailingJournal {
+    fn append<'a>(
+        &'a mut self,
+        entries: &'a mut Vec<Entry>,
+    ) -> BoxFuture<'a, Result<(), StoreError>> {
         let allowed = self
             .appends_left
             .fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| {
@@ -111,17 +141,13 @@ impl Store for FailingStore {
             })
             .is_ok();
         if allowed {
-            self.inner.append(game, entries)
+            self.inner.append(entries)
         } else {
             ready(Err(StoreError("told to fail".into()))).boxed()
         }
     }
 
-    fn finish(&self, game: Id) -> BoxFuture<'_, Result<(), StoreError>> {
-        self.inner.finish(game)
-    }
-
-    fn finished(&self, game: Id) -> BoxFuture<'_, Result<Option<KeptGame>, StoreError>> {
-        self.inner.finished(game)
+    fn finish(&mut self) -> BoxFuture<'_, Result<(), StoreError>> {
+        self.inner.finish()
     }
 }

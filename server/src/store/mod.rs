@@ -19,16 +19,26 @@ use journal::{Entry, GameHeader};
 pub struct StoreError(pub String);
 
 /// A game as it was kept: its header and its journal.
-pub type KeptGame = (Arc<GameHeader>, Vec<Entry>);
+pub type KeptGame = (Arc<GameHeader>, Arc<[Entry]>);
 
 /// Keeps games.
 pub trait Store: Send + Sync + 'static {
-    /// Begins a game.
-    fn create(&self, header: Arc<GameHeader>) -> BoxFuture<'_, Result<(), StoreError>>;
-    /// Adds to a game's journal. When this has returned `Ok`, the entries are kept; after an error their fate is unknown.
-    fn append(&self, game: Id, entries: Vec<Entry>) -> BoxFuture<'_, Result<(), StoreError>>;
-    /// Says that nothing more will be added to a game.
-    fn finish(&self, game: Id) -> BoxFuture<'_, Result<(), StoreError>>;
+    /// Begins a game; its journal is written through what is returned.
+    fn create(
+        &self,
+        header: Arc<GameHeader>,
+    ) -> BoxFuture<'_, Result<Box<dyn Journal>, StoreError>>;
     /// A game that is finished, or `None`.
     fn finished(&self, game: Id) -> BoxFuture<'_, Result<Option<KeptGame>, StoreError>>;
+}
+
+/// The journal of one game that goes on.
+pub trait Journal: Send + 'static {
+    /// Adds entries, and leaves `entries` empty. When this has returned `Ok`, they are kept; after an error their fate is unknown.
+    fn append<'a>(
+        &'a mut self,
+        entries: &'a mut Vec<Entry>,
+    ) -> BoxFuture<'a, Result<(), StoreError>>;
+    /// Says that nothing more will be added.
+    fn finish(&mut self) -> BoxFuture<'_, Result<(), StoreError>>;
 }

@@ -303,9 +303,10 @@ impl Core {
         state.substituted || matches!(state.fill, Fill::BuiltIn(_))
     }
 
-    /// Changes that were made since the last call, for the store. They have been folded already; nobody may be told before they are kept.
-    pub fn take_unkept(&mut self) -> Vec<Entry> {
-        std::mem::take(&mut self.unkept)
+    /// Changes that have been made and are not kept yet, for the store, which empties this. They have been folded already; nobody may be
+    /// told before they are kept.
+    pub fn unkept(&mut self) -> &mut Vec<Entry> {
+        &mut self.unkept
     }
 
     fn commit(&mut self, now: Duration, change: Change) {

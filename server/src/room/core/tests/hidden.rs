@@ -129,6 +129,45 @@ fn hidden_cards_change_nothing_that_is_told() {
 }
 
 #[test]
+fn a_decision_written_straight_is_the_message_that_is_said() {
+    let sizes = [(4, 11, 2), (2, 4, 0), (6, 15, 2), (3, 5, 1)];
+    for (players, faces, jokers) in sizes {
+        let rules = chefshat_engine::RuleSetSpec {
+            players,
+            faces,
+            jokers,
+            stop: Stop::Shifts(4),
+            ..chefshat_engine::RuleSetSpec::default()
+        };
+        let policy = Policy {
+            max_invalid_attempts: (players != 2).then_some(10),
+            ..Policy::default()
+        };
+        let mut table = Table::with_rules(policy, vec![OPEN; usize::from(players)], rules);
+        table.fill();
+        let mut decisions = 0;
+        while let Some(open) = table.core.open().cloned() {
+            for with_mask in [true, false] {
+                let message = convert::decision_request(&table.core, &open, table.now, with_mask);
+                let mut written = Vec::new();
+                crate::wire::encode_decision(
+                    &table.core,
+                    &open,
+                    table.now,
+                    with_mask,
+                    &mut written,
+                );
+                assert_eq!(written, message.encode_to_vec());
+            }
+            decisions += 1;
+            table.now += ms(7);
+            table.play_one();
+        }
+        assert!(decisions > 30);
+    }
+}
+
+#[test]
 fn a_planted_leak_is_caught() {
     let [viewer, one, other] = [0, 1, 2].map(Seat::new);
     let (plain, swapped) = (0..40)

@@ -164,7 +164,7 @@ impl Table {
     }
 
     fn keep(&mut self) {
-        self.journal.append(&mut self.core.take_unkept());
+        self.journal.append(self.core.unkept());
     }
 
     fn last_decision(&self) -> &Decided {

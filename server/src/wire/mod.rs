@@ -2,12 +2,16 @@
 //! of them; what is ready for a stream is one run of bytes, which is the body of a `PlayResponse` (or of a `PlayServiceWatchResponse`:
 //! both have their updates in field 1). What stands in an update is said elsewhere: here is only how it lies on the wire.
 
+mod decision;
+
 use chefshat_proto::v1::{self, seat_update::Update};
 use prost::Message;
 use prost::bytes::{Buf, BufMut};
 use prost::encoding::{
     DecodeContext, WireType, encode_key, encode_varint, encoded_len_varint, key_len, skip_field,
 };
+
+pub use decision::encode_decision;
 
 /// The service, with [`Updates`] as its streamed response.
 pub mod service {
@@ -55,41 +59,31 @@ impl Updates {
 
     /// Adds a batch of `count` events, encoded as [`Events`] holds them.
     pub fn add_events(&mut self, handle: u32, events: &[u8], count: usize) {
-        self.add_encoded(handle, UPDATE_EVENTS, events.len(), |bytes| {
-            bytes.put_slice(events);
-        });
+        self.add_encoded(handle, UPDATE_EVENTS, events);
         self.end_part(1 + count);
     }
 
-    /// Adds a decision request.
-    pub fn add_decision(&mut self, handle: u32, decision: &v1::DecisionRequest) {
-        self.add_encoded(handle, UPDATE_DECISION, decision.encoded_len(), |bytes| {
-            decision.encode_raw(bytes);
-        });
+    /// Adds a decision request, as [`encode_decision`] writes it.
+    pub fn add_decision(&mut self, handle: u32, decision: &[u8]) {
+        self.add_encoded(handle, UPDATE_DECISION, decision);
         self.end_part(1);
     }
 
-    fn add_encoded(
-        &mut self,
-        handle: u32,
-        field: u32,
-        length: usize,
-        write: impl FnOnce(&mut Vec<u8>),
-    ) {
+    fn add_encoded(&mut self, handle: u32, field: u32, content: &[u8]) {
         let handle_length = if handle == 0 {
             0
         } else {
             prost::encoding::uint32::encoded_len(UPDATE_HANDLE, &handle)
         };
-        let update_length = handle_length + delimited_length(field, length);
+        let update_length = handle_length + delimited_length(field, content.len());
         self.bytes
             .reserve(delimited_length(RESPONSE_UPDATES, update_length));
         start_delimited(&mut self.bytes, RESPONSE_UPDATES, update_length);
         if handle != 0 {
             prost::encoding::uint32::encode(UPDATE_HANDLE, &handle, &mut self.bytes);
         }
-        start_delimited(&mut self.bytes, field, length);
-        write(&mut self.bytes);
+        start_delimited(&mut self.bytes, field, content.len());
+        self.bytes.put_slice(content);
     }
 
     fn end_part(&mut self, weight: usize) {
@@ -98,7 +92,6 @@ impl Updates {
             weight,
         });
     }
-
 }
 
 impl crate::outbox::Pile for Updates {
@@ -264,7 +257,7 @@ mod tests {
             let mut updates = Updates::default();
             updates.add(handle, Update::Result(v1::AnswerResult::default()));
             updates.add_events(handle, events.range(10, 300), 290);
-            updates.add_decision(handle, &decision);
+            updates.add_decision(handle, &decision.encode_to_vec());
             let expected = [
                 Update::Result(v1::AnswerResult::default()),
                 Update::Events(v1::EventBatch {
