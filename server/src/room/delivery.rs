@@ -1,6 +1,7 @@
 //! How what happened reaches the seats of a room. Each attached seat has a position in the room's log; what lies beyond it is sent when
 //! it is due. A stream that is full is not waited for: the position stays, and the rest follows when there is space.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -175,8 +176,7 @@ impl Attachment {
         }
         while self.position < core.log().len() {
             let end = (self.position + EVENTS_PER_BATCH).min(core.log().len());
-            let mut batch = Vec::new();
-            public.put(core, self.position, end, seat, &mut batch);
+            let batch = public.batch(core, self.position, end, seat);
             self.held
                 .add_events(self.handle, &batch, end - self.position);
             self.position = end;
@@ -247,19 +247,24 @@ impl PublicLog {
         }
     }
 
-    /// Encodes the events from one position to another as a seat may see them.
-    fn put(&self, core: &Core, from: usize, to: usize, seat: Seat, batch: &mut Vec<u8>) {
+    /// The events from one position to another, encoded as a seat may see them.
+    fn batch(&self, core: &Core, from: usize, to: usize, seat: Seat) -> Cow<'_, [u8]> {
+        let mut own = Vec::new();
         let mut shared = from;
         for (position, entry) in (from..to).zip(core.log().since(from)) {
             if entry.happening.tells_more_to(seat) {
-                batch.extend_from_slice(self.events.range(shared, position));
+                own.extend_from_slice(self.events.range(shared, position));
                 if let Some(event) = convert::view(core, position, Viewer::Seat(seat)) {
-                    put_event(batch, &event);
+                    put_event(&mut own, &event);
                 }
                 shared = position + 1;
             }
         }
-        batch.extend_from_slice(self.events.range(shared, to));
+        if shared == from {
+            return Cow::Borrowed(self.events.range(from, to));
+        }
+        own.extend_from_slice(self.events.range(shared, to));
+        Cow::Owned(own)
     }
 }
 

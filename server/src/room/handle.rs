@@ -109,8 +109,11 @@ pub type Acted = Result<Option<v1::AnswerResult>, ExpressError>;
 
 /// What is put into a room's mailbox.
 pub(super) enum Message {
-    Join(JoinRequest, oneshot::Sender<Result<Joined, JoinError>>),
-    Attach(AttachRequest, oneshot::Sender<Option<(Seat, ConnectionId)>>),
+    Join(Box<JoinRequest>, oneshot::Sender<Result<Joined, JoinError>>),
+    Attach(
+        Box<AttachRequest>,
+        oneshot::Sender<Option<(Seat, ConnectionId)>>,
+    ),
     Lost(Seat, ConnectionId, Option<v1::DetachReason>),
     Do(Seat, ConnectionId, SeatAction, Instant),
     Act(
@@ -119,7 +122,10 @@ pub(super) enum Message {
         Instant,
         oneshot::Sender<Option<Acted>>,
     ),
-    Spectate(SpectateRequest, oneshot::Sender<Result<(), SpectateError>>),
+    Spectate(
+        Box<SpectateRequest>,
+        oneshot::Sender<Result<(), SpectateError>>,
+    ),
     Describe(oneshot::Sender<v1::Room>),
     Close([u8; 32], oneshot::Sender<Option<v1::Room>>),
     Abort(AbortReason),
@@ -150,7 +156,8 @@ impl Handle {
     /// # Errors
     /// The room is gone, or (inside) why no seat can be taken.
     pub async fn join(&self, request: JoinRequest) -> Result<Result<Joined, JoinError>, RoomGone> {
-        self.ask(|reply| Message::Join(request, reply)).await
+        self.ask(|reply| Message::Join(Box::new(request), reply))
+            .await
     }
 
     /// Attaches a stream to a seat; `None` if the ticket is not of this room.
@@ -161,7 +168,8 @@ impl Handle {
         &self,
         request: AttachRequest,
     ) -> Result<Option<(Seat, ConnectionId)>, RoomGone> {
-        self.ask(|reply| Message::Attach(request, reply)).await
+        self.ask(|reply| Message::Attach(Box::new(request), reply))
+            .await
     }
 
     /// The connection of a seat has gone, or leaves (`reason` is told to it).
@@ -217,7 +225,8 @@ impl Handle {
         &self,
         request: SpectateRequest,
     ) -> Result<Result<(), SpectateError>, RoomGone> {
-        self.ask(|reply| Message::Spectate(request, reply)).await
+        self.ask(|reply| Message::Spectate(Box::new(request), reply))
+            .await
     }
 
     /// The room as everybody sees it.

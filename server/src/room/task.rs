@@ -37,7 +37,7 @@ enum Release {
         Result<Joined, JoinError>,
     ),
     Attach(
-        AttachRequest,
+        Box<AttachRequest>,
         Seat,
         ConnectionId,
         oneshot::Sender<Option<(Seat, ConnectionId)>>,
@@ -46,6 +46,11 @@ enum Release {
     Refuse(Seat, ConnectionId, v1::Refused),
     Acted(oneshot::Sender<Option<Acted>>, Acted),
     Closed(oneshot::Sender<Option<v1::Room>>),
+    Describe(oneshot::Sender<v1::Room>),
+    Spectate(
+        Box<SpectateRequest>,
+        oneshot::Sender<Result<(), SpectateError>>,
+    ),
 }
 
 /// What a room needs from its server.
@@ -187,7 +192,7 @@ impl Task {
         let now = self.now;
         match message {
             Message::Join(request, reply) => {
-                let joined = self.join(now, request);
+                let joined = self.join(now, *request);
                 self.releases.push(Release::Join(reply, joined));
             }
             Message::Attach(request, reply) => self.attach(now, request, reply),
@@ -217,8 +222,10 @@ impl Task {
                     None => answer(reply, None),
                 }
             }
-            Message::Spectate(request, reply) => answer(reply, self.spectate(request)),
-            Message::Describe(reply) => answer(reply, convert::describe(&self.core)),
+            Message::Spectate(request, reply) => {
+                self.releases.push(Release::Spectate(request, reply));
+            }
+            Message::Describe(reply) => self.releases.push(Release::Describe(reply)),
             Message::Close(secret, reply) => {
                 if self.core.header().owner.matches(&secret) {
                     self.core.abort(now, AbortReason::Closed);
@@ -253,7 +260,7 @@ impl Task {
     fn attach(
         &mut self,
         now: Duration,
-        request: AttachRequest,
+        request: Box<AttachRequest>,
         reply: oneshot::Sender<Option<(Seat, ConnectionId)>>,
     ) {
         let Some(seat) = self.core.seat_of_ticket(&request.secret) else {
@@ -377,7 +384,7 @@ impl Task {
         match release {
             Release::Join(reply, joined) => answer(reply, joined),
             Release::Attach(request, seat, connection, reply) => {
-                self.release_attach(request, seat, connection, reply);
+                self.release_attach(*request, seat, connection, reply);
             }
             Release::Result(seat, connection, result) => {
                 if let Some(attachment) = self.current(seat, connection) {
@@ -391,6 +398,8 @@ impl Task {
             }
             Release::Acted(reply, acted) => answer(reply, Some(acted)),
             Release::Closed(reply) => answer(reply, Some(convert::describe(&self.core))),
+            Release::Describe(reply) => answer(reply, convert::describe(&self.core)),
+            Release::Spectate(request, reply) => answer(reply, self.spectate(*request)),
         }
     }
 

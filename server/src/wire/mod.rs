@@ -21,6 +21,8 @@ pub mod service {
 
 /// Field of the updates in a response.
 const RESPONSE_UPDATES: u32 = 1;
+/// Space made at once for what is usually told of at a time: a few events and a decision request.
+const USUAL_LENGTH: usize = 384;
 /// Fields of `SeatUpdate`.
 const UPDATE_HANDLE: u32 = 1;
 const UPDATE_EVENTS: u32 = 3;
@@ -76,8 +78,10 @@ impl Updates {
             prost::encoding::uint32::encoded_len(UPDATE_HANDLE, &handle)
         };
         let update_length = handle_length + delimited_length(field, content.len());
-        self.bytes
-            .reserve(delimited_length(RESPONSE_UPDATES, update_length));
+        let length = delimited_length(RESPONSE_UPDATES, update_length);
+        if self.bytes.capacity() - self.bytes.len() < length {
+            self.bytes.reserve(length.max(USUAL_LENGTH));
+        }
         start_delimited(&mut self.bytes, RESPONSE_UPDATES, update_length);
         if handle != 0 {
             prost::encoding::uint32::encode(UPDATE_HANDLE, &handle, &mut self.bytes);
