@@ -3,8 +3,6 @@
 
 use std::fmt;
 
-use base64::Engine as _;
-use base64::engine::general_purpose::URL_SAFE_NO_PAD;
 use rand::TryRng as _;
 use sha2::{Digest as _, Sha256};
 use subtle::ConstantTimeEq as _;
@@ -71,7 +69,8 @@ impl SecretHash {
     }
 }
 
-/// A secret that belongs to a room: the room's id and 256 random bits, written as one word. A ticket or an owner token.
+/// A secret that belongs to a room: the room's id and 256 random bits, written as 96 hexadecimal
+/// digits: a word that no command line takes for an option. A ticket or an owner token.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Token {
     /// The room it belongs to.
@@ -91,7 +90,8 @@ impl Token {
 
     /// Reads a token; `None` if the word is none.
     pub fn parse(word: &str) -> Option<Self> {
-        let bytes: [u8; 48] = URL_SAFE_NO_PAD.decode(word).ok()?.try_into().ok()?;
+        let mut bytes = [0; 48];
+        hex::decode_to_slice(word, &mut bytes).ok()?;
         let (room, secret) = bytes.split_at(16);
         Some(Self {
             room: Id(room.try_into().ok()?),
@@ -101,7 +101,7 @@ impl Token {
 
     /// The word that is given to the client.
     pub fn word(&self) -> String {
-        URL_SAFE_NO_PAD.encode([self.room.0.as_slice(), &self.secret].concat())
+        hex::encode([self.room.0.as_slice(), &self.secret].concat())
     }
 
     /// The hash to keep.
