@@ -26,7 +26,7 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
                 format!("seat {seat} plays {}, {left} cards left", text(play.action))
             }
             Some(Kind::Pass(pass)) => format!("seat {} passes", pass.seat),
-            Some(Kind::ShiftEnded(end)) => format!("the Shift ends, points {:?}", end.scores),
+            Some(Kind::ShiftEnded(end)) => format!("the Shift ends, points {:?}", end.points),
             other => format!("{other:?}"),
         };
         println!(

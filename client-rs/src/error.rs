@@ -78,7 +78,7 @@ impl Error {
 
     pub(crate) fn refused(refused: v1::Refused) -> Self {
         Self {
-            code: Code::FailedPrecondition,
+            code: i32::try_from(refused.code).map_or(Code::Unknown, Code::from),
             reason: Some(refused.reason).filter(|reason| !reason.is_empty()),
             message: refused.message,
             metadata: refused.metadata.into_iter().collect(),

@@ -201,7 +201,10 @@ fn ended() -> Option<Kind> {
 
 fn substituted(seat: u32) -> Option<Kind> {
     let agent = "random".to_owned();
-    Some(Kind::Substituted(v1::Substituted { seat, agent }))
+    Some(Kind::Substituted(v1::Substituted {
+        seat,
+        built_in_agent: agent,
+    }))
 }
 
 #[test]
@@ -342,6 +345,7 @@ fn seats_leave_each_for_its_own_reason() {
     ]);
     assert!(!table.session.is_over());
     let refused = v1::Refused {
+        code: 16,
         request_id: 6,
         reason: "TICKET_UNKNOWN".to_owned(),
         message: "no such ticket".to_owned(),

@@ -7,7 +7,7 @@ use std::time::Duration;
 pub const MAX_MESSAGE_BYTES: usize = 64 * 1024;
 /// Most streams of one connection.
 pub const MAX_STREAMS_PER_CONNECTION: u32 = 1_024;
-/// Most seats attached to one stream.
+/// Most seats attached to one stream at a time.
 pub const MAX_SEATS_PER_STREAM: usize = 4_096;
 /// Most seats named in one Watch.
 pub const MAX_SEATS_PER_WATCH: usize = 64;
@@ -15,10 +15,14 @@ pub const MAX_SEATS_PER_WATCH: usize = 64;
 pub const MAX_COMMANDS_PER_MESSAGE: usize = 1_024;
 /// Messages that wait for one room.
 pub const ROOM_MAILBOX: usize = 256;
+/// Records that are put together at a time.
+pub const MAX_RECORDS_IN_HAND: usize = 2;
+/// How long streams and connections that do not close may hold up a shutdown.
+pub const DRAIN_LIMIT: Duration = Duration::from_secs(5);
 /// Longest name of a room or participant, characters.
 pub const MAX_NAME_CHARS: usize = 64;
 /// Most Shifts of a hosted game, and most points it may be played to.
-pub const MAX_HOSTED_SHIFTS: u32 = 10_000;
+pub const MAX_HOSTED_SHIFTS: u32 = 1_000;
 /// How often an idle Watch stream says that it is alive.
 pub const HEARTBEAT: Duration = Duration::from_secs(15);
 

@@ -170,6 +170,17 @@ impl<T: Pile> Outbox<T> {
         true
     }
 
+    /// Puts in the last word of somebody, whether or not there is space.
+    pub fn push_last(&self, pile: &mut T) {
+        let mut waiting = self.lock();
+        if !waiting.abandoned {
+            waiting.weight += pile.weight();
+            waiting.pile.append(pile);
+        }
+        drop(waiting);
+        self.waker.wake();
+    }
+
     /// Ends the stream once everything that waits has been taken.
     pub fn end(&self, end: Result<(), Status>) {
         self.lock().end.get_or_insert(end);

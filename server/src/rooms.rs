@@ -79,6 +79,7 @@ struct Table {
 
 struct Entry {
     handle: Handle,
+    game_id: Id,
     join_code: String,
     over: bool,
 }
@@ -106,7 +107,7 @@ impl Rooms {
     /// # Errors
     /// The limit of rooms, a shutdown, or the store.
     pub async fn create(&self, new: NewRoom) -> Result<Created, CreateError> {
-        self.check_may_create()?;
+        self.lock().check_may_create(self.max_rooms)?;
         let room_id = Id::random();
         let owner = Token::random(room_id);
         let header = Arc::new(GameHeader {
@@ -131,9 +132,9 @@ impl Rooms {
         let join_code = header.join_code.clone();
         // Checked and entered under one lock, so that a shutdown cannot slip in between and miss the room.
         let mut table = self.lock();
-        if table.shutting_down {
-            return Err(CreateError::ShuttingDown);
-        }
+        table.check_may_create(self.max_rooms)?;
+        table.make_space(self.max_rooms);
+        let game_id = header.game_id;
         let handle = start(header, journal, self.context.clone());
         let number = table.next_number;
         table.next_number += 1;
@@ -143,6 +144,7 @@ impl Rooms {
             number,
             Entry {
                 handle: handle.clone(),
+                game_id,
                 join_code: join_code.clone(),
                 over: false,
             },
@@ -152,24 +154,6 @@ impl Rooms {
             join_code,
             owner,
         })
-    }
-
-    fn check_may_create(&self) -> Result<(), CreateError> {
-        let mut table = self.lock();
-        if table.shutting_down {
-            return Err(CreateError::ShuttingDown);
-        }
-        if table.by_number.len() >= self.max_rooms {
-            // Ended rooms are shown only as long as there is space for them.
-            let oldest = table
-                .by_number
-                .iter()
-                .find(|(_, entry)| entry.over)
-                .map(|(number, _)| *number)
-                .ok_or(CreateError::TooMany(self.max_rooms))?;
-            table.remove(oldest);
-        }
-        Ok(())
     }
 
     /// A room by its id.
@@ -206,6 +190,14 @@ impl Rooms {
             .take(count)
             .map(|(number, entry)| (*number, entry.handle.clone()))
             .collect()
+    }
+
+    /// Whether a game is being played or awaited here.
+    pub fn is_running(&self, game: Id) -> bool {
+        self.lock()
+            .by_number
+            .values()
+            .any(|entry| entry.game_id == game && !entry.over)
     }
 
     /// Rooms in which a game is being played or awaited.
@@ -299,6 +291,30 @@ impl std::fmt::Debug for Rooms {
 }
 
 impl Table {
+    fn check_may_create(&self, max_rooms: usize) -> Result<(), CreateError> {
+        if self.shutting_down {
+            return Err(CreateError::ShuttingDown);
+        }
+        let full = self.by_number.len() >= max_rooms;
+        if full && !self.by_number.values().any(|entry| entry.over) {
+            return Err(CreateError::TooMany(max_rooms));
+        }
+        Ok(())
+    }
+
+    /// Ended rooms are shown only as long as there is space for them.
+    fn make_space(&mut self, max_rooms: usize) {
+        while self.by_number.len() >= max_rooms
+            && let Some(number) = self
+                .by_number
+                .iter()
+                .find(|(_, entry)| entry.over)
+                .map(|(number, _)| *number)
+        {
+            self.remove(number);
+        }
+    }
+
     fn remove(&mut self, number: u64) {
         if let Some(entry) = self.by_number.remove(&number) {
             self.numbers.remove(&entry.handle.id());

@@ -16,9 +16,9 @@ use tonic::service::Routes;
 use tonic::transport::Server;
 use tonic::transport::server::Connected;
 use tower_http::cors::{AllowOrigin, Any, CorsLayer};
-use tracing::info;
+use tracing::{info, warn};
 
-use crate::config::{MAX_MESSAGE_BYTES, MAX_STREAMS_PER_CONNECTION, ServerConfig};
+use crate::config::{DRAIN_LIMIT, MAX_MESSAGE_BYTES, MAX_STREAMS_PER_CONNECTION, ServerConfig};
 use crate::connections::{self, Limits};
 use crate::grpc;
 use crate::rooms::Rooms;
@@ -111,8 +111,14 @@ where
         rooms.shut_down(config.grace).await;
         closing.cancel();
     };
-    let (served, ()) = tokio::join!(serving, ending);
-    served?;
+    let ended_or_drained = async {
+        ending.await;
+        tokio::time::sleep(DRAIN_LIMIT).await;
+    };
+    tokio::select! {
+        served = serving => served?,
+        () = ended_or_drained => warn!("connections that would not close are dropped"),
+    }
     drop(rooms);
     tracker.close();
     tracker.wait().await;

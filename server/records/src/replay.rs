@@ -3,10 +3,12 @@
 
 use std::collections::VecDeque;
 
-use chefshat_engine::{Action, BySeat, Event, Game, RewardScheme, RuleSet, Seat, Standings};
+use chefshat_engine::{Action, BySeat, Event, Game, RewardScheme, RuleSet, Standings};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 
-use crate::convert::{By, action_space, event_kind, reward_scheme_from_proto, rules_from_proto};
+use crate::convert::{
+    By, action_space, event_kind, reward_scheme_from_proto, rules_from_proto, seat_number,
+};
 use crate::jsonl::FORMAT_VERSION;
 use crate::seeds::{MAX_ENTROPY, SeedPlan};
 
@@ -149,7 +151,7 @@ impl Replay {
             .as_mut()
             .ok_or("a decision before the game began")?;
         let open = game.decision().ok_or("a decision after the game ended")?;
-        if index(open.seat) != record.seat {
+        if seat_number(open.seat) != record.seat {
             return Err(format!(
                 "seat {} decides, but it is seat {}'s decision",
                 record.seat, open.seat
@@ -203,7 +205,7 @@ impl Replay {
                 scheme.of_events(&self.rules, events, |seat, value, bringer| {
                     if bringer == position {
                         rewards.push(v1::SeatReward {
-                            seat: index(seat),
+                            seat: seat_number(seat),
                             value,
                         });
                     }
@@ -367,13 +369,9 @@ fn final_table(standings: &Standings) -> Vec<v1::Standing> {
     standings
         .iter()
         .map(|(place, seat, points)| v1::Standing {
-            seat: index(seat),
+            seat: seat_number(seat),
             points,
             place: place.into(),
         })
         .collect()
-}
-
-fn index(seat: Seat) -> u32 {
-    u32::try_from(seat.index()).expect("a seat is below six")
 }

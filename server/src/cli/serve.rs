@@ -83,7 +83,17 @@ impl Serve {
                 _ = terminate.recv() => {}
                 _ = interrupt.recv() => {}
             }
-            eprintln!("stopping: no new rooms; running games may end within the grace");
+            eprintln!(
+                "stopping: no new rooms; running games may end within the grace; stop again to end at once"
+            );
+            tokio::spawn(async move {
+                tokio::select! {
+                    _ = terminate.recv() => {}
+                    _ = interrupt.recv() => {}
+                }
+                eprintln!("stopped at once: running games are lost");
+                std::process::exit(1);
+            });
         };
         serve(listener, config, Arc::new(MemoryStore::default()), stop).await?;
         Ok(ExitCode::SUCCESS)

@@ -11,6 +11,9 @@ use crate::store::journal::Source;
 
 /// Longest label of an expression, bytes.
 const MAX_LABEL: usize = 64;
+/// The years 1 to 9999, which alone a timestamp can be written for, in seconds since the Unix epoch.
+const FIRST_SECOND: i64 = -62_135_596_800;
+const LAST_SECOND: i64 = 253_402_300_799;
 /// Longest reference to recorded media, bytes.
 const MAX_MEDIA: usize = 256;
 
@@ -193,11 +196,29 @@ pub fn answer_result(decision_id: u64, action: u32, answered: Answered) -> v1::A
     result
 }
 
+/// Annotations hold a number that is not finite, which no record could hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct NotFinite;
+
 /// Annotations as they are kept: encoded.
-pub fn annotations_from_proto(annotations: Option<v1::Annotations>) -> Option<Box<[u8]>> {
-    annotations
-        .map(|annotations| annotations.encode_to_vec().into_boxed_slice())
-        .filter(|bytes| !bytes.is_empty())
+///
+/// # Errors
+/// A number in them is not finite.
+pub fn annotations_from_proto(
+    annotations: Option<v1::Annotations>,
+) -> Result<Option<Box<[u8]>>, NotFinite> {
+    let Some(annotations) = annotations else {
+        return Ok(None);
+    };
+    let mut numbers = annotations
+        .action_scores
+        .iter()
+        .chain(&annotations.value_estimate);
+    if !numbers.all(|number| number.is_finite()) {
+        return Err(NotFinite);
+    }
+    let bytes = annotations.encode_to_vec().into_boxed_slice();
+    Ok(Some(bytes).filter(|bytes| !bytes.is_empty()))
 }
 
 /// An expression as it is kept: checked and encoded.
@@ -228,6 +249,15 @@ pub fn expression_from_proto(expression: &v1::Expression) -> Result<Box<[u8]>, F
     number("arousal", expression.arousal, -1.0)?;
     number("dominance", expression.dominance, -1.0)?;
     number("confidence", expression.confidence, 0.0)?;
+    if let Some(time) = &expression.taken_at
+        && !(FIRST_SECOND..=LAST_SECOND).contains(&time.seconds)
+            | !(0..1_000_000_000).contains(&time.nanos)
+    {
+        return Err(FieldProblem::new(
+            "taken_at",
+            "not a time of the years 1 to 9999",
+        ));
+    }
     if v1::ExpressionSource::try_from(expression.source).is_err() {
         return Err(FieldProblem::new("source", "not a value of this enum"));
     }

@@ -3,7 +3,7 @@
 
 use chefshat_engine::{Event, Seat, Viewer};
 use chefshat_proto::v1::{self, game_event::Kind};
-use chefshat_records::convert::{By, action_space, event_kind, rules_to_proto};
+use chefshat_records::convert::{By, action_space, event_kind, rules_to_proto, seat_number};
 use chefshat_records::seeds::SeedPlan;
 use prost::Message as _;
 
@@ -33,25 +33,32 @@ fn kind(core: &Core, happening: &Happening, viewer: Viewer) -> Kind {
     };
     match happening {
         Happening::Seated(seat, participant) => Kind::Seated(Box::new(v1::Seated {
-            seat: number(*seat),
+            seat: seat_number(*seat),
             name: participant.name.clone(),
             kind: kind_to_proto(Some(participant.kind)),
-            built_in_agent: String::new(),
         })),
         Happening::Vacated(seat) => Kind::Vacated(v1::Vacated {
-            seat: number(*seat),
+            seat: seat_number(*seat),
         }),
         Happening::Disconnected(seat) => Kind::Disconnected(v1::Disconnected {
-            seat: number(*seat),
+            seat: seat_number(*seat),
         }),
         Happening::Returned(seat) => Kind::Returned(v1::Returned {
-            seat: number(*seat),
+            seat: seat_number(*seat),
         }),
         Happening::Substituted(seat) => Kind::Substituted(v1::Substituted {
-            seat: number(*seat),
-            agent: core.header().policy.substitute.name().into(),
+            seat: seat_number(*seat),
+            built_in_agent: core.header().policy.substitute.name().into(),
         }),
-        Happening::GameStarted => Kind::GameStarted(Box::new(game_started(core))),
+        Happening::GameStarted => {
+            let mut started = game_started(core);
+            for seat in &mut started.seats {
+                // The same for everybody who reads the log, whenever: what changes later has events of its own.
+                seat.connected = true;
+                seat.substituted = false;
+            }
+            Kind::GameStarted(Box::new(started))
+        }
         Happening::Game(game) => engine_event(game.event, &game.by),
         Happening::Played {
             seat,
@@ -119,7 +126,7 @@ fn kind(core: &Core, happening: &Happening, viewer: Viewer) -> Kind {
         })),
         Happening::Expressed(seat, expression) => {
             Kind::ExpressionShown(Box::new(v1::ExpressionShown {
-                seat: number(*seat),
+                seat: seat_number(*seat),
                 expression: v1::Expression::decode(expression.as_ref()).ok(),
             }))
         }
@@ -133,7 +140,7 @@ const UNDECIDED: ByWhom = ByWhom {
     reward: None,
 };
 
-/// The start of a game, as the rooms of the server stand now.
+/// The start of a game, with its seats as they stand now.
 pub fn game_started(core: &Core) -> v1::GameStarted {
     let header = core.header();
     v1::GameStarted {
@@ -141,15 +148,7 @@ pub fn game_started(core: &Core) -> v1::GameStarted {
         rules: Some(rules_to_proto(&header.rules)),
         rules_version: chefshat_engine::RULES_VERSION,
         policy: Some(policy_to_proto(&header.policy)),
-        seats: participants(core)
-            .into_iter()
-            .map(|seat| v1::Participant {
-                // The same for everybody who reads the log, whenever: what changes later has events of its own.
-                connected: true,
-                substituted: false,
-                ..seat
-            })
-            .collect(),
+        seats: participants(core),
         action_space: Some(action_space(&header.rules.actions())),
         hand_size: header.rules.hand_size().into(),
         seed_commitment: header
@@ -171,7 +170,7 @@ fn standings(core: &Core) -> Vec<v1::Standing> {
         .iter()
         .zip(1..)
         .map(|(seat, place)| v1::Standing {
-            seat: number(*seat),
+            seat: seat_number(*seat),
             points: game.scores()[*seat],
             place,
         })
@@ -204,7 +203,7 @@ fn rewards(entry: &LogEntry, viewer: Viewer) -> Vec<v1::SeatReward> {
         Viewer::Everything => true,
     };
     let one = |seat: Seat, value: f32| v1::SeatReward {
-        seat: number(seat),
+        seat: seat_number(seat),
         value,
     };
     match &entry.happening {
@@ -245,8 +244,4 @@ fn by_to_proto(by: &ByWhom) -> By {
         source: source_to_proto(by.source),
         decision_time_us: by.time_us,
     }
-}
-
-fn number(seat: Seat) -> u32 {
-    u32::try_from(seat.index()).expect("a seat is below six")
 }

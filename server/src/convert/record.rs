@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use chefshat_engine::{Action, Seat, Viewer};
+use chefshat_engine::Viewer;
 use chefshat_proto::v1::{self, record_line::Line};
-use chefshat_records::convert::{action_space, rules_to_proto};
+use chefshat_records::convert::{action_space, rules_to_proto, seat_number};
 use chefshat_records::jsonl::FORMAT_VERSION;
 use prost::Message as _;
 
@@ -19,7 +19,7 @@ use crate::store::journal::{Change, Decided, Entry, GameHeader};
 pub fn record_lines(header: &Arc<GameHeader>, journal: &[Entry]) -> Vec<v1::RecordLine> {
     let mut core = Core::new(Arc::clone(header));
     let mut body = Vec::with_capacity(journal.len() * 2);
-    let mut attempts: Vec<Action> = Vec::new();
+    let mut attempts: Vec<u32> = Vec::new();
     let mut decisions = 0;
     for entry in journal {
         match &entry.change {
@@ -34,7 +34,7 @@ pub fn record_lines(header: &Arc<GameHeader>, journal: &[Entry]) -> Vec<v1::Reco
                 record_only: true,
                 expression,
             } => body.push(Line::PrivateExpression(v1::PrivateExpression {
-                seat: number(*seat),
+                seat: seat_number(*seat),
                 elapsed_ms: elapsed_ms(entry),
                 expression: v1::Expression::decode(expression.as_ref()).ok(),
             })),
@@ -85,12 +85,7 @@ fn record_header(core: &Core) -> v1::RecordHeader {
 }
 
 /// A decision, as the game stood before it.
-fn decision(
-    core: &Core,
-    entry: &Entry,
-    decided: &Decided,
-    attempts: &[Action],
-) -> v1::DecisionRecord {
+fn decision(core: &Core, entry: &Entry, decided: &Decided, attempts: &[u32]) -> v1::DecisionRecord {
     let rules = &core.header().rules;
     let open = core.open();
     let invalid_reward = core
@@ -100,7 +95,7 @@ fn decision(
         .filter(|_| core.open_is_turn() && !attempts.is_empty())
         .map(|scheme| attempts.iter().map(|_| scheme.invalid()).sum());
     v1::DecisionRecord {
-        seat: number(decided.seat),
+        seat: seat_number(decided.seat),
         decision_id: open.map_or(0, |open| open.id),
         kind: open
             .map_or(v1::DecisionKind::Unspecified, |open| {
@@ -112,10 +107,7 @@ fn decision(
         source: source_to_proto(decided.source).into(),
         decision_time_us: decided.time_us,
         bank_left_ms: decided.bank_left_ms,
-        invalid_attempts: attempts
-            .iter()
-            .map(|action| action.index().into())
-            .collect(),
+        invalid_attempts: attempts.to_vec(),
         annotations: decided
             .annotations
             .as_ref()
@@ -128,8 +120,4 @@ fn decision(
 
 fn elapsed_ms(entry: &Entry) -> u64 {
     u64::try_from(entry.at.as_millis()).unwrap_or(u64::MAX)
-}
-
-fn number(seat: Seat) -> u32 {
-    u32::try_from(seat.index()).expect("a seat is below six")
 }

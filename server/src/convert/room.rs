@@ -2,7 +2,7 @@
 
 use chefshat_engine::RuleSet;
 use chefshat_proto::v1::{self, seat_config::FilledBy};
-use chefshat_records::convert::{FieldProblem, rules_to_proto};
+use chefshat_records::convert::{FieldProblem, rules_to_proto, seat_number};
 
 use super::policy::{agent, policy_to_proto};
 use crate::room::core::{Core, State};
@@ -113,7 +113,7 @@ pub fn participants(core: &Core) -> Vec<v1::Participant> {
             };
             let participant = standing.participant;
             v1::Participant {
-                seat: u32::try_from(seat.index()).expect("a seat is below six"),
+                seat: seat_number(seat),
                 name: participant.map_or_else(
                     || built_in.unwrap_or_default().to_owned(),
                     |participant| participant.name.clone(),
@@ -125,7 +125,7 @@ pub fn participants(core: &Core) -> Vec<v1::Participant> {
                 ),
                 reserved_for: kind_to_proto(reserved_for),
                 built_in_agent: built_in.unwrap_or_default().to_owned(),
-                connected: standing.connected,
+                connected: standing.connected || built_in.is_some(),
                 substituted: standing.substituted,
             }
         })

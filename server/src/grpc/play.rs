@@ -1,9 +1,11 @@
 //! `PlayService`: streams of seats, and single commands without a stream. A stream's requests are read by a task of their own; its
 //! responses come from its outbox, which rooms fill.
 
+use std::collections::BTreeMap;
 use std::future::poll_fn;
 use std::pin::Pin;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::task::Poll;
 
 use chefshat_proto::v1::{self, act_request, seat_command::Command, seat_update::Update};
@@ -14,7 +16,7 @@ use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 use tonic::{Code, Request, Response, Status, Streaming};
 
-use super::status::{Refusal, field, status, ticket_unknown};
+use super::status::{Refusal, field, refused, status, ticket_unknown};
 use crate::config::{
     HEARTBEAT, MAX_COMMANDS_PER_MESSAGE, MAX_SEATS_PER_STREAM, MAX_SEATS_PER_WATCH,
 };
@@ -134,14 +136,17 @@ struct BoundSeat {
     room: Handle,
     seat: chefshat_engine::Seat,
     connection: ConnectionId,
+    /// Set when the room has told the seat that it has left the stream.
+    ended: Arc<AtomicBool>,
 }
 
 /// Reads the requests of one stream.
 struct Reader {
     rooms: Arc<Rooms>,
     outbox: Arc<Outbox<Updates>>,
-    /// Index = handle; `None` where an attachment was refused or has been left.
-    seats: Vec<Option<BoundSeat>>,
+    /// Those attached, by handle.
+    seats: BTreeMap<u32, BoundSeat>,
+    next_handle: u32,
     /// What unspecified delivery means: on Play with decisions, on Watch at once.
     with_decisions: bool,
 }
@@ -151,7 +156,8 @@ impl Reader {
         Self {
             rooms,
             outbox,
-            seats: Vec::new(),
+            seats: BTreeMap::new(),
+            next_handle: 0,
             with_decisions,
         }
     }
@@ -225,28 +231,31 @@ impl Reader {
     }
 
     async fn attach(&mut self, attach: v1::Attach) {
-        let handle = u32::try_from(self.seats.len()).unwrap_or(u32::MAX);
+        let handle = self.next_handle;
+        self.next_handle = self.next_handle.wrapping_add(1);
         let request_id = attach.request_id;
+        if self.seats.len() >= MAX_SEATS_PER_STREAM {
+            self.seats
+                .retain(|_, bound| !bound.ended.load(Ordering::Relaxed));
+        }
         if self.seats.len() >= MAX_SEATS_PER_STREAM {
             let refusal = status(
                 Code::ResourceExhausted,
                 "TOO_MANY_SEATS",
-                format!("a stream takes at most {MAX_SEATS_PER_STREAM} attachments; open another"),
+                format!(
+                    "a stream takes at most {MAX_SEATS_PER_STREAM} seats at a time; detach those that are over, or open another"
+                ),
                 [("max_seats_per_stream", &MAX_SEATS_PER_STREAM.to_string())],
             );
             return self.refuse(handle, request_id, &refusal);
         }
-        self.seats.push(None);
         if attach.entropy.len() > MAX_ENTROPY {
             let problem = FieldProblem::new("entropy", format!("at most {MAX_ENTROPY} bytes"));
             return self.refuse_field(handle, request_id, "ENTROPY_REFUSED", &problem);
         }
-        let bound = self.bind(attach, handle).await;
-        match bound {
+        match self.bind(attach, handle).await {
             Some(bound) => {
-                if let Some(place) = self.seats.last_mut() {
-                    *place = Some(bound);
-                }
+                self.seats.insert(handle, bound);
             }
             None => self.refuse(handle, request_id, &ticket_unknown()),
         }
@@ -260,6 +269,7 @@ impl Reader {
             v1::EventDelivery::WithDecisions => false,
             v1::EventDelivery::AtOnce => true,
         };
+        let ended = Arc::new(AtomicBool::new(false));
         let from = attach.from_sequence.saturating_sub(1);
         let request = AttachRequest {
             secret: token.secret,
@@ -273,20 +283,19 @@ impl Reader {
                 from: usize::try_from(from).unwrap_or(usize::MAX),
             },
             entropy: attach.entropy,
+            ended: Arc::clone(&ended),
         };
         let (seat, connection) = room.attach(request).await.ok()??;
         Some(BoundSeat {
             room,
             seat,
             connection,
+            ended,
         })
     }
 
     async fn detach(&mut self, handle: u32) {
-        let place = usize::try_from(handle)
-            .ok()
-            .and_then(|index| self.seats.get_mut(index));
-        if let Some(bound) = place.and_then(Option::take) {
+        if let Some(bound) = self.seats.remove(&handle) {
             bound
                 .room
                 .lost(
@@ -299,13 +308,13 @@ impl Reader {
     }
 
     async fn leave_all(&mut self) {
-        for bound in self.seats.drain(..).flatten() {
+        for bound in std::mem::take(&mut self.seats).into_values() {
             bound.room.lost(bound.seat, bound.connection, None).await;
         }
     }
 
     fn bound(&self, handle: u32) -> Option<&BoundSeat> {
-        self.seats.get(usize::try_from(handle).ok()?)?.as_ref()
+        self.seats.get(&handle)
     }
 
     fn refuse_field(&self, handle: u32, request_id: u32, reason: &str, problem: &FieldProblem) {
@@ -313,31 +322,20 @@ impl Reader {
     }
 
     fn refuse(&self, handle: u32, request_id: u32, refusal: &Status) {
-        use tonic_types::StatusExt as _;
-        let (reason, metadata) = refusal
-            .get_details_error_info()
-            .map(|info| (info.reason, info.metadata))
-            .unwrap_or_default();
         let mut updates = Updates::default();
-        updates.add(
-            handle,
-            Update::Refused(v1::Refused {
-                request_id,
-                reason,
-                message: refusal.message().to_owned(),
-                metadata,
-            }),
-        );
+        updates.add(handle, Update::Refused(refused(request_id, refusal)));
         // A client that does not read its refusals does not get more of them.
         self.outbox.push(&mut updates, None, None);
     }
 }
 
 fn answer_action(answer: v1::Answer) -> SeatAction {
+    let annotations = convert::annotations_from_proto(answer.annotations);
     SeatAction::Answer {
         decision_id: answer.decision_id,
         action: answer.action,
-        annotations: convert::annotations_from_proto(answer.annotations),
+        annotations_refused: annotations.is_err(),
+        annotations: annotations.unwrap_or_default(),
     }
 }
 

@@ -5,9 +5,11 @@ use std::sync::Arc;
 
 use chefshat_proto::v1::{self, record_service_server::RecordService};
 use futures::{Stream, StreamExt as _, stream};
+use tokio::sync::Semaphore;
 use tonic::{Code, Request, Response, Status};
 
 use super::status::{room_failed, status};
+use crate::config::MAX_RECORDS_IN_HAND;
 use crate::convert::record_lines;
 use crate::ids::Id;
 use crate::rooms::Rooms;
@@ -19,12 +21,17 @@ const LINES_PER_MESSAGE: usize = 512;
 #[derive(Debug, Clone)]
 pub struct Records {
     rooms: Arc<Rooms>,
+    /// Records are large while they are put together: only so many at a time.
+    turns: Arc<Semaphore>,
 }
 
 impl Records {
     /// The service for these rooms.
     pub fn new(rooms: Arc<Rooms>) -> Self {
-        Self { rooms }
+        Self {
+            rooms,
+            turns: Arc::new(Semaphore::new(MAX_RECORDS_IN_HAND)),
+        }
     }
 }
 
@@ -41,11 +48,21 @@ impl RecordService for Records {
             status(
                 Code::NotFound,
                 "GAME_UNKNOWN",
-                "the server holds no ended game of this id; a game that is being played has no record yet",
+                "the server holds no game of this id",
                 [("field", "game_id")],
             )
         };
         let game = Id::parse(&request.into_inner().game_id).ok_or_else(unknown)?;
+        if self.rooms.is_running(game) {
+            return Err(status(
+                Code::FailedPrecondition,
+                "GAME_RUNNING",
+                "this game has not ended; its record can be had when it has",
+                [("field", "game_id")],
+            ));
+        }
+        // Nobody closes it; if somebody did, the request would merely not wait.
+        let _turn = self.turns.acquire().await.ok();
         let (header, journal) = self
             .rooms
             .finished(game)

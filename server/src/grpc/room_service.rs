@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use chefshat_engine::Stop;
 use chefshat_proto::v1::{self, room_service_server::RoomService};
-use chefshat_records::convert::{FieldProblem, rules_from_proto};
+use chefshat_records::convert::{FieldProblem, rules_from_proto, seat_number};
 use tonic::{Code, Request, Response, Status};
 
 use super::status::{self, Refusal, field, room_unknown};
@@ -17,6 +17,8 @@ use crate::store::journal::ParticipantKind;
 
 const STANDARD_PAGE: u32 = 50;
 const MAX_PAGE: u32 = 100;
+/// Rooms looked at for one page.
+const ROOMS_LOOKED_AT: usize = 200;
 
 /// The service.
 #[derive(Debug, Clone)]
@@ -76,7 +78,7 @@ impl RoomService for RoomCalls {
             0 => STANDARD_PAGE,
             size => size.min(MAX_PAGE),
         };
-        let mut after = match request.page_token.as_str() {
+        let after = match request.page_token.as_str() {
             "" => None,
             token => Some(token.parse().map_err(|_| {
                 field(
@@ -85,29 +87,32 @@ impl RoomService for RoomCalls {
                 )
             })?),
         };
+        if v1::RoomState::try_from(request.state).is_err() {
+            let problem = FieldProblem::new("state", "not a value of this enum");
+            return Err(field("STATE_REFUSED", &problem));
+        }
         let mut response = v1::ListRoomsResponse::default();
-        // Each round looks at a page of rooms; those in other states are passed over.
-        loop {
-            let page = self.rooms.list(after, to_usize(MAX_PAGE));
-            let last_page = page.len() < to_usize(MAX_PAGE);
-            for (number, handle) in page {
-                if response.rooms.len() == to_usize(page_size) {
-                    response.next_page_token =
-                        after.map_or_else(String::new, |after: u64| after.to_string());
-                    return Ok(Response::new(response));
-                }
-                after = Some(number);
-                // A room that has just gone is no longer listed.
-                if let Ok(room) = handle.describe().await
-                    && (request.state == 0 || request.state == room.state)
-                {
-                    response.rooms.push(room);
-                }
+        // Rooms in other states are passed over, but only so many for one page.
+        let looked_at = self.rooms.list(after, ROOMS_LOOKED_AT);
+        let mut rest = looked_at.len() == ROOMS_LOOKED_AT;
+        let mut last = after;
+        for (number, handle) in looked_at {
+            if response.rooms.len() == to_usize(page_size) {
+                rest = true;
+                break;
             }
-            if last_page {
-                return Ok(Response::new(response));
+            last = Some(number);
+            // A room that has just gone is no longer listed.
+            if let Ok(room) = handle.describe().await
+                && (request.state == 0 || request.state == room.state)
+            {
+                response.rooms.push(room);
             }
         }
+        if let (true, Some(last)) = (rest, last) {
+            response.next_page_token = last.to_string();
+        }
+        Ok(Response::new(response))
     }
 
     async fn join_room(
@@ -145,7 +150,7 @@ impl RoomService for RoomCalls {
             .map_err(Refusal::from)?;
         Ok(Response::new(v1::JoinRoomResponse {
             room: Some(*joined.room),
-            seat: u32::try_from(joined.seat.index()).expect("a seat is below six"),
+            seat: seat_number(joined.seat),
             ticket: joined.ticket.word(),
         }))
     }
@@ -181,7 +186,10 @@ fn new_room(request: v1::CreateRoomRequest) -> Result<NewRoom, Status> {
     check_name(&name, 0).map_err(|problem| field("NAME_REFUSED", &problem))?;
     let rules = rules_from_proto(&request.rules.unwrap_or_default())
         .map_err(|problem| field("RULE_SET_REFUSED", &problem))?;
-    let (Stop::Points(length) | Stop::Shifts(length)) = rules.stop();
+    let (stop_field, length) = match rules.stop() {
+        Stop::Points(points) => ("target_points", points),
+        Stop::Shifts(shifts) => ("target_shifts", shifts),
+    };
     if length > MAX_HOSTED_SHIFTS {
         return Err(status::status(
             Code::InvalidArgument,
@@ -190,7 +198,7 @@ fn new_room(request: v1::CreateRoomRequest) -> Result<NewRoom, Status> {
                 "a hosted game ends after at most {MAX_HOSTED_SHIFTS} points or Shifts, not {length}"
             ),
             [
-                ("field", "stop"),
+                ("field", stop_field),
                 ("max_shifts", &MAX_HOSTED_SHIFTS.to_string()),
             ],
         ));

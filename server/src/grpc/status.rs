@@ -3,6 +3,7 @@
 
 use std::collections::HashMap;
 
+use chefshat_proto::v1;
 use chefshat_records::convert::FieldProblem;
 use tonic::{Code, Status};
 use tonic_types::{ErrorDetails, StatusExt as _};
@@ -30,6 +31,21 @@ pub fn status<const N: usize>(
         message,
         ErrorDetails::with_error_info(reason, DOMAIN, metadata),
     )
+}
+
+/// A status as the message that refuses a command on a stream.
+pub fn refused(request_id: u32, status: &Status) -> v1::Refused {
+    let (reason, metadata) = status
+        .get_details_error_info()
+        .map(|info| (info.reason, info.metadata))
+        .unwrap_or_default();
+    v1::Refused {
+        request_id,
+        reason,
+        message: status.message().to_owned(),
+        metadata,
+        code: u32::try_from(i32::from(status.code())).unwrap_or_default(),
+    }
 }
 
 /// A field that cannot be accepted.
@@ -125,7 +141,7 @@ impl From<ExpressError> for Refusal {
     fn from(error: ExpressError) -> Self {
         let (code, reason) = match error {
             ExpressError::GameOver => (Code::FailedPrecondition, "GAME_OVER"),
-            ExpressError::TooMany => (Code::ResourceExhausted, "EXPRESSION_REFUSED"),
+            ExpressError::TooMany => (Code::ResourceExhausted, "TOO_MANY_EXPRESSIONS"),
         };
         Self(status(code, reason, error.to_string(), []))
     }

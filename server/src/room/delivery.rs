@@ -3,10 +3,13 @@
 
 use std::borrow::Cow;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use chefshat_engine::{Event, Seat, Viewer};
 use chefshat_proto::v1::{self, seat_update::Update};
+
+use chefshat_records::convert::seat_number;
 
 use super::core::{ConnectionId, Core};
 use super::log::Happening;
@@ -45,7 +48,11 @@ pub struct Attachment {
     position: usize,
     /// Decision that has been sent, or 0.
     sent: u64,
+    /// Newest decision whose answer has been acknowledged, or 0.
+    acknowledged: u64,
     stamp: Arc<HandStamp>,
+    /// Set with the last word to the seat on this stream.
+    ended: Arc<AtomicBool>,
     on_space: Arc<dyn OnSpace>,
     /// Updates that go out with the next flush.
     held: Updates,
@@ -63,6 +70,7 @@ impl Attachment {
         handle: u32,
         wishes: Wishes,
         stamp: Arc<HandStamp>,
+        ended: Arc<AtomicBool>,
         on_space: Arc<dyn OnSpace>,
     ) -> Self {
         Self {
@@ -72,7 +80,9 @@ impl Attachment {
             wishes,
             position: wishes.from,
             sent: 0,
+            acknowledged: 0,
             stamp,
+            ended,
             on_space,
             held: Updates::default(),
             decision_held: false,
@@ -86,9 +96,11 @@ impl Attachment {
         self.connection
     }
 
-    /// When the decision that was sent last was handed to the transport.
-    pub fn handed(&self) -> Option<Duration> {
-        self.stamp.get()
+    /// When a decision was handed to the transport; `None` while it was not.
+    pub fn handed(&self, decision_id: u64) -> Option<Duration> {
+        self.stamp
+            .get()
+            .filter(|_| self.sent == decision_id && !self.decision_held)
     }
 
     /// Says that the seat is attached, with a snapshot if one was wished for.
@@ -99,7 +111,7 @@ impl Attachment {
             request_id,
             room_id: header.room_id.to_string(),
             game_id: header.game_id.to_string(),
-            seat: u32::try_from(seat.index()).expect("a seat is below six"),
+            seat: seat_number(seat),
             next_sequence,
         }));
         if self.wishes.snapshot {
@@ -114,11 +126,14 @@ impl Attachment {
 
     /// Tells what became of an answer: with the next flush if it was taken and the seat is told with its decisions, else now.
     pub fn tell_result(&mut self, result: v1::AnswerResult) {
-        if self.is_deaf() {
+        if self.done || self.is_deaf() {
             return;
         }
-        let may_wait =
-            !self.wishes.at_once && result.status() == v1::AnswerStatus::Accepted && !self.stalled;
+        // A client that says the same again has not heard the first word: it is told at once.
+        let may_wait = !self.wishes.at_once
+            && result.status() == v1::AnswerStatus::Accepted
+            && result.decision_id > self.acknowledged;
+        self.acknowledged = self.acknowledged.max(result.decision_id);
         self.hold(Update::Result(result));
         if !may_wait {
             self.push();
@@ -127,7 +142,7 @@ impl Attachment {
 
     /// Tells that a command was refused.
     pub fn refuse(&mut self, refused: v1::Refused) {
-        if self.is_deaf() {
+        if self.done || self.is_deaf() {
             return;
         }
         self.hold(Update::Refused(refused));
@@ -141,7 +156,9 @@ impl Attachment {
             self.hold(Update::Detached(v1::Detached {
                 reason: reason.into(),
             }));
-            self.push();
+            // The last word, with what was held before it, has its place even in an outbox that is full: there is one for each seat.
+            self.outbox.push_last(&mut self.held);
+            self.ended.store(true, Ordering::Relaxed);
         }
     }
 
@@ -279,10 +296,13 @@ pub fn snapshot(core: &Core, viewer: Viewer) -> v1::Snapshot {
     }
 }
 
-/// Whether an event is told to a seat at once in any case: its own finishing, the end of a Shift, the end of the game.
+/// Whether an event is told to a seat at once in any case: its own finishing, its own substitution and return, the end of a Shift, the end
+/// of the game.
 pub fn is_urgent(happening: &Happening, seat: Seat) -> bool {
     match happening {
-        Happening::SeatFinished { seat: finished, .. } => *finished == seat,
+        Happening::SeatFinished { seat: own, .. }
+        | Happening::Substituted(own)
+        | Happening::Returned(own) => *own == seat,
         Happening::Game(game) => matches!(game.event, Event::ShiftEnded { .. }),
         Happening::GameEnded | Happening::GameAborted(_) => true,
         _ => false,

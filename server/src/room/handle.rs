@@ -2,6 +2,7 @@
 //! them is the task's.
 
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use chefshat_engine::Seat;
 use chefshat_proto::v1::{self, SpectatorServiceWatchResponse};
@@ -57,6 +58,8 @@ pub struct AttachRequest {
     pub wishes: Wishes,
     /// The seat's part of the game seed.
     pub entropy: Vec<u8>,
+    /// Set when the seat has left the stream.
+    pub ended: Arc<AtomicBool>,
 }
 
 /// Asks to watch.
@@ -92,6 +95,8 @@ pub enum SeatAction {
         action: u32,
         /// Annotations, encoded.
         annotations: Option<Box<[u8]>>,
+        /// Annotations were sent that cannot be recorded.
+        annotations_refused: bool,
     },
     /// Expresses something.
     Express {

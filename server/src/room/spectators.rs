@@ -23,8 +23,6 @@ const EVENTS_PER_MESSAGE: usize = 256;
 pub(super) struct Spectator {
     outbox: Arc<Outbox<Vec<SpectatorServiceWatchResponse>>>,
     position: usize,
-    /// What a viewer like this may see.
-    viewer: Viewer,
     /// Length of what it may see when its stream last had space.
     kept_up_at: usize,
 }
@@ -50,11 +48,6 @@ impl Spectator {
                 visible
             } else {
                 from.min(visible)
-            },
-            viewer: if core.header().policy.spectators_see_hands {
-                Viewer::Everything
-            } else {
-                Viewer::Spectator
             },
             kept_up_at: visible,
         }
@@ -95,7 +88,13 @@ impl Spectator {
     }
 
     fn event(&self, core: &Core, position: usize) -> Option<v1::GameEvent> {
-        let mut event = convert::view(core, position, self.viewer)?;
+        let sees_hands = core.header().policy.spectators_see_hands || core.state().is_over();
+        let viewer = if sees_hands {
+            Viewer::Everything
+        } else {
+            Viewer::Spectator
+        };
+        let mut event = convert::view(core, position, viewer)?;
         // Rewards are told to their own seats alone, even where all hands are shown.
         event.rewards.clear();
         Some(event)

@@ -22,6 +22,7 @@ use super::handle::{
 use super::spectators::{MAX_SPECTATORS, Spectator};
 use crate::config::ROOM_MAILBOX;
 use crate::convert;
+use crate::grpc::status::{Refusal, refused};
 use crate::ids::{Id, Token};
 use crate::outbox::{HandStamp, OnSpace};
 use crate::store::journal::{AbortReason, GameHeader, SeatedParticipant};
@@ -104,6 +105,18 @@ pub fn start(header: Arc<GameHeader>, journal: Box<dyn Journal>, context: TaskCo
     handle
 }
 
+/// Says that a room is gone, however it went.
+struct TellGone {
+    room: Id,
+    watcher: Arc<dyn RoomWatcher>,
+}
+
+impl Drop for TellGone {
+    fn drop(&mut self) {
+        self.watcher.gone(self.room);
+    }
+}
+
 struct Task {
     core: Core,
     journal: Box<dyn Journal>,
@@ -123,7 +136,10 @@ struct Task {
 
 impl Task {
     async fn run(mut self, mut inbox: mpsc::Receiver<Message>) {
-        let id = self.core.header().room_id;
+        let _gone = TellGone {
+            room: self.core.header().room_id,
+            watcher: Arc::clone(&self.context.watcher),
+        };
         self.core.begin_if_all_built_in(Duration::ZERO);
         let mut messages = Vec::with_capacity(INPUTS_PER_COMMIT);
         let alarm = tokio::time::sleep_until(self.epoch);
@@ -144,20 +160,32 @@ impl Task {
                     for message in messages.drain(..) {
                         self.receive(message);
                     }
-                }
-                () = alarm.as_mut(), if armed => {
-                    armed = false;
-                    self.now = self.epoch.elapsed();
-                    if self.is_expired() {
+                    // A mailbox that is never empty does not stop the clock.
+                    let due = armed && alarm.deadline() <= self.epoch + self.now;
+                    if due && !self.ring(&mut armed) {
                         break;
                     }
-                    let handed = self.handed();
-                    self.core.tick(self.now, handed);
+                }
+                () = alarm.as_mut(), if armed => {
+                    self.now = self.epoch.elapsed();
+                    if !self.ring(&mut armed) {
+                        break;
+                    }
                 }
             }
         }
-        self.context.watcher.gone(id);
-        debug!(room = %id, "the room is gone");
+        debug!(room = %self.core.header().room_id, "the room is gone");
+    }
+
+    /// The alarm has rung. `false` when the room has been shown long enough.
+    fn ring(&mut self, armed: &mut bool) -> bool {
+        *armed = false;
+        if self.is_expired() {
+            return false;
+        }
+        let handed = self.handed();
+        self.core.tick(self.now, handed);
+        true
     }
 
     /// Arms the alarm for the next deadline. An alarm that rings too early finds nothing to do and is armed again, so that a later
@@ -184,8 +212,10 @@ impl Task {
 
     /// When the open decision was handed to its seat's transport.
     fn handed(&self) -> Option<Duration> {
-        let seat = self.core.awaited()?.decision.seat;
-        self.attachments[seat.index()].as_ref()?.handed()
+        let open = self.core.awaited()?;
+        self.attachments[open.decision.seat.index()]
+            .as_ref()?
+            .handed(open.id)
     }
 
     fn receive(&mut self, message: Message) {
@@ -206,7 +236,7 @@ impl Task {
                         }
                         Ok(None) => {}
                         Err(error) => {
-                            let refused = refused("EXPRESSION_REFUSED", &error.to_string());
+                            let refused = refused(0, &Refusal::from(error).0);
                             self.releases
                                 .push(Release::Refuse(seat, connection, refused));
                         }
@@ -312,10 +342,11 @@ impl Task {
                 decision_id,
                 action,
                 annotations,
+                annotations_refused,
             } => {
                 let handed = self.attachments[seat.index()]
                     .as_ref()
-                    .and_then(Attachment::handed);
+                    .and_then(|attachment| attachment.handed(decision_id));
                 let answered: Answered = self.core.answer(
                     now,
                     AnswerInput {
@@ -323,6 +354,7 @@ impl Task {
                         decision_id,
                         action,
                         annotations,
+                        annotations_refused,
                         arrived: arrived.saturating_duration_since(self.epoch),
                         handed,
                     },
@@ -367,7 +399,8 @@ impl Task {
             self.fail(&error.to_string());
             return false;
         }
-        if self.core.state().is_over() && self.over_since.is_none() && !self.conclude().await {
+        let ends = self.core.state().is_over() && self.over_since.is_none();
+        if ends && !self.conclude().await {
             return false;
         }
         self.public.follow(&self.core);
@@ -377,6 +410,10 @@ impl Task {
         }
         self.releases = releases;
         self.deliver();
+        if ends {
+            // Whoever waits for games to end may close streams at once: everything has been put into them.
+            self.context.watcher.game_over(self.core.header().room_id);
+        }
         true
     }
 
@@ -416,6 +453,7 @@ impl Task {
             request.handle,
             request.wishes,
             HandStamp::new(self.epoch),
+            request.ended,
             Arc::clone(&self.on_space),
         );
         attachment.greet(&self.core, seat, request.request_id);
@@ -466,7 +504,6 @@ impl Task {
             decisions = self.core.decisions(),
             "the game has ended"
         );
-        self.context.watcher.game_over(header.room_id);
         // A room in which nothing was ever dealt leaves no record.
         if let (Some(data_dir), true) = (&self.context.data_dir, self.core.game().is_some()) {
             let write = write_record(
@@ -518,13 +555,4 @@ async fn write_record(store: Arc<dyn Store>, game: Id, data_dir: PathBuf) {
 /// Answers a caller. One that is no longer there does not want to know.
 fn answer<T>(reply: oneshot::Sender<T>, answer: T) {
     let _ = reply.send(answer);
-}
-
-fn refused(reason: &str, message: &str) -> v1::Refused {
-    v1::Refused {
-        request_id: 0,
-        reason: reason.into(),
-        message: message.into(),
-        metadata: std::collections::HashMap::new(),
-    }
 }

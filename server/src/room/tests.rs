@@ -101,6 +101,7 @@ async fn attach(room: &Handle, ticket: Token) -> AttachedSeat {
                 from: 0,
             },
             entropy: Vec::new(),
+            ended: Arc::default(),
         })
         .await
         .expect("the room is there")
@@ -129,6 +130,7 @@ async fn read(room: &Handle, seat: &mut AttachedSeat, answering: bool) -> Vec<u6
                         decision_id: decision.decision_id,
                         action: first_legal(&decision),
                         annotations: None,
+                        annotations_refused: false,
                     };
                     room.perform(seat.seat, seat.connection, action, Instant::now())
                         .await
@@ -201,4 +203,78 @@ async fn deadlines_ring_without_anybody_saying_anything() {
     let longest = 4 * (patience.bank + 3 * patience.decision_time);
     assert!(begun.elapsed() <= longest + Duration::from_secs(1));
     assert!(begun.elapsed() >= patience.bank + patience.decision_time);
+}
+
+#[tokio::test]
+async fn a_flood_does_not_stop_the_clock() {
+    let policy = Policy {
+        decision_time: Duration::from_millis(50),
+        bank: Duration::ZERO,
+        abort: AbortPolicy::Never,
+        max_timeouts: 1,
+        ..Policy::default()
+    };
+    let room = room(policy, 1).await;
+    let mut seats = Vec::new();
+    for _ in 0..4 {
+        seats.push(take_seat(&room).await);
+    }
+    // Nobody answers anything that was asked; several ask and answer without end, so that the mailbox is never empty.
+    let (seat, connection) = (seats[0].seat, seats[0].connection);
+    let flood: Vec<_> = (0..8)
+        .map(|_| {
+            let room = room.clone();
+            tokio::spawn(async move {
+                loop {
+                    let nonsense = SeatAction::Answer {
+                        decision_id: u64::MAX,
+                        action: 0,
+                        annotations: None,
+                        annotations_refused: false,
+                    };
+                    if room
+                        .perform(seat, connection, nonsense, Instant::now())
+                        .await
+                        .is_err()
+                    {
+                        return;
+                    }
+                }
+            })
+        })
+        .collect();
+    let read = futures::future::join_all(seats.iter_mut().map(|seat| read(&room, seat, false)));
+    let numbers = tokio::time::timeout(Duration::from_secs(60), read).await;
+    for flood in flood {
+        flood.abort();
+    }
+    assert!(numbers.expect("the game ends all the same")[0].len() > 12);
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_last_word_finds_its_place_in_a_full_outbox() {
+    let policy = Policy {
+        abort: AbortPolicy::Never,
+        ..Policy::default()
+    };
+    let room = room(policy, 120).await;
+    let mut seats = Vec::new();
+    for _ in 0..4 {
+        seats.push(take_seat(&room).await);
+    }
+    let mut deaf = seats.pop().expect("there are four");
+    let played = futures::future::join_all(seats.iter_mut().map(|seat| read(&room, seat, true)));
+    played.await;
+    let newer = attach(&room, deaf.ticket).await;
+    let mut last = None;
+    while let Some(Some(updates)) = futures::FutureExt::now_or_never(deaf.updates.next()) {
+        let written = updates.expect("no error").encode_to_vec();
+        let response = v1::PlayResponse::decode(written.as_slice()).expect("it is a response");
+        last = response.updates.into_iter().last();
+    }
+    let Some(Update::Detached(detached)) = last.and_then(|update| update.update) else {
+        panic!("it was not told that a newer connection has its seat");
+    };
+    assert_eq!(detached.reason(), v1::DetachReason::Superseded);
+    drop(newer);
 }

@@ -124,8 +124,8 @@ pub enum Change {
     Attempted {
         /// The seat.
         seat: Seat,
-        /// The action.
-        action: Action,
+        /// The action, as it was sent.
+        action: u32,
     },
     /// A decision was taken.
     Decided(Decided),

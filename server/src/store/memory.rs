@@ -13,8 +13,10 @@ use crate::ids::Id;
 
 /// Finished games that are kept; older ones are forgotten.
 pub const MAX_FINISHED_GAMES: usize = 1_000;
+/// Changes of finished games that are kept in all; the oldest games are forgotten for it.
+pub const MAX_FINISHED_ENTRIES: usize = 10_000_000;
 
-/// Keeps running games and the last [`MAX_FINISHED_GAMES`] finished ones in memory.
+/// Keeps running games, and finished ones up to [`MAX_FINISHED_GAMES`] and [`MAX_FINISHED_ENTRIES`], in memory.
 #[derive(Debug, Default)]
 pub struct MemoryStore {
     finished: Arc<Mutex<Finished>>,
@@ -25,6 +27,23 @@ struct Finished {
     games: BTreeMap<Id, KeptGame>,
     /// Oldest first.
     order: VecDeque<Id>,
+    /// Changes of all of them.
+    entries: usize,
+}
+
+impl Finished {
+    fn keep(&mut self, header: Arc<GameHeader>, entries: Arc<[Entry]>) {
+        self.entries += entries.len();
+        self.order.push_back(header.game_id);
+        self.games.insert(header.game_id, (header, entries));
+        while self.order.len() > 1
+            && (self.order.len() > MAX_FINISHED_GAMES || self.entries > MAX_FINISHED_ENTRIES)
+            && let Some(oldest) = self.order.pop_front()
+            && let Some((_, entries)) = self.games.remove(&oldest)
+        {
+            self.entries -= entries.len();
+        }
+    }
 }
 
 impl Store for MemoryStore {
@@ -61,19 +80,8 @@ impl Journal for MemoryJournal {
     }
 
     fn finish(&mut self) -> BoxFuture<'_, Result<(), StoreError>> {
-        let id = self.header.game_id;
         let entries = std::mem::take(&mut self.entries).into();
-        let mut finished = lock(&self.finished);
-        finished
-            .games
-            .insert(id, (Arc::clone(&self.header), entries));
-        finished.order.push_back(id);
-        if finished.order.len() > MAX_FINISHED_GAMES
-            && let Some(oldest) = finished.order.pop_front()
-        {
-            finished.games.remove(&oldest);
-        }
-        drop(finished);
+        lock(&self.finished).keep(Arc::clone(&self.header), entries);
         ready(Ok(())).boxed()
     }
 }

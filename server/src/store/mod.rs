@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use futures::future::BoxFuture;
 
-pub use memory::{FailingStore, MAX_FINISHED_GAMES, MemoryStore};
+pub use memory::{FailingStore, MAX_FINISHED_ENTRIES, MAX_FINISHED_GAMES, MemoryStore};
 
 use crate::ids::Id;
 use journal::{Entry, GameHeader};

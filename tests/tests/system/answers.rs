@@ -1,6 +1,7 @@
 //! Answers that are late, wrong, repeated, or for another decision.
 
-use chefshat_proto::v1::{self, game_event::Kind, seat_update::Update};
+use chefshat_proto::Timestamp;
+use chefshat_proto::v1::{self, game_event::Kind, seat_command::Command, seat_update::Update};
 use chefshat_tests::{
     StreamSeat, TestServer, first_legal, first_to_hear, is_legal, one_shift, play_on, room_of_four,
 };
@@ -134,4 +135,54 @@ async fn an_answer_counts_once_however_often_it_comes() {
             .iter()
             .all(|source| *source == v1::DecisionSource::Agent)
     );
+}
+
+#[tokio::test]
+async fn nothing_said_along_with_an_answer_spoils_the_record() {
+    let server = TestServer::start().await;
+    let client = server.client().await;
+    let (created, tickets) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
+    let mut seats = Vec::new();
+    for ticket in &tickets {
+        seats.push(StreamSeat::attached(server.channel().await, ticket).await);
+    }
+    let (update, index) = first_to_hear(&mut seats).await;
+    let Update::Decision(decision) = update else {
+        panic!("no decision, but {update:?}");
+    };
+    let seat = &mut seats[index];
+    for seconds in [i64::MAX, -70_000_000_000] {
+        seat.send(Command::Express(v1::Expression {
+            label: "joy".into(),
+            taken_at: Some(Timestamp { seconds, nanos: 0 }),
+            ..v1::Expression::default()
+        }))
+        .await;
+        match seat.next().await {
+            Update::Refused(refused) => assert_eq!(refused.reason, "EXPRESSION_REFUSED"),
+            other => panic!("not refused, but {other:?}"),
+        }
+    }
+    seat.send(Command::Answer(v1::Answer {
+        decision_id: decision.decision_id,
+        action: first_legal(&decision),
+        annotations: Some(v1::Annotations {
+            action_scores: vec![f32::NEG_INFINITY, 1.0],
+            ..v1::Annotations::default()
+        }),
+    }))
+    .await;
+    // The same again is acknowledged at once, and the same.
+    seat.answer(decision.decision_id, first_legal(&decision))
+        .await;
+    let first = seat.result().await;
+    assert_eq!(first.status(), v1::AnswerStatus::Accepted);
+    assert!(first.annotations_dropped);
+    assert_eq!(seat.result().await, first);
+    finish(seats).await;
+    let game_id = created.room.expect("a room").game_id;
+    let data = server.stop().await;
+    let path = chefshat_records::jsonl::path_of(data.path(), &game_id);
+    let record = chefshat_records::jsonl::read(&path).expect("it was written and reads back");
+    chefshat_records::replay::replay(&record).expect("it replays");
 }

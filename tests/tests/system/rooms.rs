@@ -69,7 +69,7 @@ async fn what_makes_no_sense_is_refused_with_the_field() {
                 ..v1::RuleSet::default()
             }),
             "RULE_SET_REFUSED",
-            "stop",
+            "target_shifts",
         ),
         (
             policy(v1::RoomPolicy {
@@ -224,7 +224,12 @@ async fn the_record_on_disk_is_the_record_told_and_replays() {
     let room = created.room.expect("a room");
     assert_eq!(room.seed_commitment.len(), 32);
     let early = client.record(&room.game_id).await.expect_err("not yet");
-    assert_eq!(early.reason(), Some("GAME_UNKNOWN"));
+    assert_eq!(early.reason(), Some("GAME_RUNNING"));
+    let unknown = client
+        .record("00".repeat(16))
+        .await
+        .expect_err("no such game");
+    assert_eq!(unknown.reason(), Some("GAME_UNKNOWN"));
     let seats = tickets
         .into_iter()
         .zip(0..)
@@ -272,7 +277,19 @@ async fn rewards_are_told_to_their_own_seat_alone() {
     for ticket in &tickets {
         seats.push(StreamSeat::attached(server.channel().await, ticket).await);
     }
-    let mut watching = client.spectate(&created.room.expect("a room").room_id, 0);
+    let room_id = created.room.expect("a room").room_id;
+    // What it has from the start on it is told while the game goes on: no hands.
+    let mut watching = client.spectate(&room_id, 0);
+    let mut watched = Vec::new();
+    while !matches!(
+        watched.last(),
+        Some(v1::GameEvent {
+            kind: Some(Kind::ShiftStarted(_)),
+            ..
+        })
+    ) {
+        watched.extend(watching.next().await.expect("it can be watched"));
+    }
     futures::future::join_all(seats.iter_mut().map(play_on)).await;
     for (seat, number) in seats.iter().zip(0..) {
         let mut turns = 0;
@@ -283,7 +300,7 @@ async fn rewards_are_told_to_their_own_seat_alone() {
                 Some(Kind::Play(_) | Kind::Pass(_)) => turns += event.rewards.len(),
                 Some(Kind::ShiftEnded(ended)) => {
                     let own = usize::try_from(number).expect("small");
-                    points = Some((event.rewards[0].value, ended.points[own]));
+                    points = Some((event.rewards[0].value, ended.shift_points[own]));
                 }
                 Some(Kind::ShiftStarted(started)) => {
                     assert_eq!(started.hands.len(), 1);
@@ -297,9 +314,23 @@ async fn rewards_are_told_to_their_own_seat_alone() {
         assert!((f64::from(reward) - f64::from(points)).abs() < 1e-6);
     }
     while let Some(event) = watching.next().await.expect("it can be watched") {
-        assert!(event.rewards.is_empty());
-        if let Some(Kind::ShiftStarted(started)) = &event.kind {
-            assert!(started.hands.is_empty());
-        }
+        watched.push(event);
     }
+    let hands = |events: &[v1::GameEvent]| -> usize {
+        let started = events.iter().filter_map(|event| match &event.kind {
+            Some(Kind::ShiftStarted(started)) => Some(started.hands.len()),
+            _ => None,
+        });
+        started.sum()
+    };
+    assert_eq!(hands(&watched), 0);
+    assert!(watched.iter().all(|event| event.rewards.is_empty()));
+    // One that comes when the game has ended sees everybody's.
+    let mut late = client.spectate(&room_id, 0);
+    let mut told = Vec::new();
+    while let Some(event) = late.next().await.expect("it can be watched") {
+        told.push(event);
+    }
+    assert_eq!(hands(&told), 4);
+    assert!(told.iter().all(|event| event.rewards.is_empty()));
 }

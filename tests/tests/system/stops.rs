@@ -4,11 +4,13 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use chefshat_client::RandomAgent;
+use chefshat_proto::v1::spectator_service_client::SpectatorServiceClient;
 use chefshat_proto::v1::{self, game_event::Kind, seat_update::Update};
 use chefshat_server::store::{FailingStore, MemoryStore};
 use chefshat_tests::{
     StreamSeat, TestServer, first_legal, one_shift, patiently, play_on, room_of_four,
 };
+use tonic::transport::Channel;
 use tonic_health::pb::health_client::HealthClient;
 use tonic_health::pb::{HealthCheckRequest, health_check_response::ServingStatus};
 
@@ -105,6 +107,42 @@ async fn a_running_game_gets_its_grace_and_no_new_rooms_are_made() {
         );
     }
     server.stop().await;
+}
+
+#[tokio::test]
+async fn a_client_that_does_not_read_cannot_hold_up_a_shutdown() {
+    let mut server = TestServer::start().await;
+    let client = server.client().await;
+    let rules = v1::RuleSet {
+        stop: Some(v1::rule_set::Stop::TargetShifts(400)),
+        ..v1::RuleSet::default()
+    };
+    let (created, tickets) = room_of_four(&client, rules, v1::RoomPolicy::default()).await;
+    // It answers pings but never reads its stream: what it is told fills its window and then the server's outbox.
+    let channel = Channel::from_shared(server.url())
+        .expect("a URL")
+        .initial_stream_window_size(8 * 1024)
+        .connect()
+        .await
+        .expect("the server listens");
+    let deaf = SpectatorServiceClient::new(channel)
+        .watch(v1::SpectatorServiceWatchRequest {
+            room_id: created.room.expect("a room").room_id,
+            ..v1::SpectatorServiceWatchRequest::default()
+        })
+        .await
+        .expect("it may watch")
+        .into_inner();
+    let seats = tickets
+        .into_iter()
+        .map(|ticket| (ticket, RandomAgent::new(1)))
+        .collect::<Vec<_>>();
+    for outcome in patiently("the game to end", client.play_many(seats)).await {
+        outcome.expect("the game ended");
+    }
+    server.ask_to_stop();
+    server.stop().await;
+    drop(deaf);
 }
 
 #[tokio::test]

@@ -29,7 +29,7 @@ pub fn event_kind(event: &Event, space: ActionSpace, by: By) -> Option<Kind> {
         }),
         Event::SpecialActionDeclared { seat, special } => {
             Kind::SpecialActionDeclared(Box::new(v1::SpecialActionDeclared {
-                seat: number(seat),
+                seat: seat_number(seat),
                 action: special_to_proto(special).into(),
                 source: by.source.into(),
                 decision_time_us: by.decision_time_us,
@@ -41,10 +41,11 @@ pub fn event_kind(event: &Event, space: ActionSpace, by: By) -> Option<Kind> {
             count,
             cards,
         } => Kind::CardsExchanged(Box::new(v1::CardsExchanged {
-            giver: number(giver),
-            receiver: number(receiver),
+            giver: seat_number(giver),
+            receiver: seat_number(receiver),
             count: count.into(),
             cards: cards.map_or_else(Vec::new, |cards| ascending(cards, faces)),
+            golden: cards.is_some_and(|cards| cards.has_golden()),
         })),
         Event::Played {
             seat,
@@ -54,7 +55,7 @@ pub fn event_kind(event: &Event, space: ActionSpace, by: By) -> Option<Kind> {
             jokers,
             cards_left,
         } => Kind::Play(v1::Play {
-            seat: number(seat),
+            seat: seat_number(seat),
             action: action.index().into(),
             face: face.into(),
             quantity: quantity.into(),
@@ -64,12 +65,12 @@ pub fn event_kind(event: &Event, space: ActionSpace, by: By) -> Option<Kind> {
             decision_time_us: by.decision_time_us,
         }),
         Event::Passed { seat, .. } => Kind::Pass(v1::Pass {
-            seat: number(seat),
+            seat: seat_number(seat),
             source: by.source.into(),
             decision_time_us: by.decision_time_us,
         }),
         Event::SeatFinished { seat, place } => Kind::SeatFinished(v1::SeatFinished {
-            seat: number(seat),
+            seat: seat_number(seat),
             place: place.into(),
         }),
         Event::PizzaDone {
@@ -78,8 +79,8 @@ pub fn event_kind(event: &Event, space: ActionSpace, by: By) -> Option<Kind> {
             next_leader,
         } => Kind::PizzaDone(v1::PizzaDone {
             pizza,
-            last_to_play: last_to_play.map(number),
-            next_leader: number(next_leader),
+            last_to_play: last_to_play.map(seat_number),
+            next_leader: seat_number(next_leader),
         }),
         Event::ShiftEnded {
             shift,
@@ -94,10 +95,10 @@ pub fn event_kind(event: &Event, space: ActionSpace, by: By) -> Option<Kind> {
             ..
         } => Kind::ShiftEnded(Box::new(v1::ShiftEnded {
             shift,
-            order: order.as_slice().iter().copied().map(number).collect(),
-            points: points.values().copied().collect(),
-            scores: scores.values().copied().collect(),
-            starter: number(starter),
+            order: order.as_slice().iter().copied().map(seat_number).collect(),
+            shift_points: points.values().copied().collect(),
+            points: scores.values().copied().collect(),
+            starter: seat_number(starter),
             pizzas,
             laps,
             turns,
@@ -110,7 +111,7 @@ pub fn event_kind(event: &Event, space: ActionSpace, by: By) -> Option<Kind> {
 /// One seat's cards as a message.
 pub fn seat_cards(seat: Seat, cards: Cards, faces: u8) -> v1::SeatCards {
     v1::SeatCards {
-        seat: number(seat),
+        seat: seat_number(seat),
         cards: ascending(cards, faces),
         golden: cards.has_golden(),
     }
@@ -134,6 +135,7 @@ fn ascending(cards: Cards, faces: u8) -> Vec<u32> {
     cards.ascending(faces).map(u32::from).collect()
 }
 
-fn number(seat: Seat) -> u32 {
+/// The number of a seat as messages write it.
+pub fn seat_number(seat: Seat) -> u32 {
     u32::try_from(seat.index()).expect("a seat is below six")
 }

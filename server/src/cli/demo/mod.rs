@@ -151,7 +151,9 @@ impl Demo {
         let mut end = Ending::Aborted("the spectator was not told why");
         while let Some(event) = spectator.next().await? {
             if self.json {
-                let line = serde_json::json!({"event": "game", "game_event": event});
+                // What came over the wire may be more than JSON can say; that is an error, not a panic.
+                let game_event = serde_json::to_value(&event)?;
+                let line = serde_json::json!({"event": "game", "game_event": game_event});
                 writeln!(out, "{line}")?;
             } else if !matches!(event.kind, Some(Kind::Seated(_))) {
                 // Who sits where is said when the game begins.

@@ -82,7 +82,7 @@ impl Narrator {
                 out
             }
             Kind::Seated(seated) => {
-                let label = participant_label(seated.kind(), &seated.built_in_agent);
+                let label = participant_label(seated.kind(), "");
                 let name = clean(&seated.name, MAX_NAME);
                 self.remark(
                     seated.seat,
@@ -96,7 +96,7 @@ impl Narrator {
             Kind::Disconnected(seat) => self.remark(seat.seat, None, " has lost the connection"),
             Kind::Returned(seat) => self.remark(seat.seat, None, " is back"),
             Kind::Substituted(seat) => {
-                let agent = clean(&seat.agent, MAX_NAME);
+                let agent = clean(&seat.built_in_agent, MAX_NAME);
                 let words = format!(" is played by the built-in agent {agent} from here on");
                 self.remark(seat.seat, None, &words)
             }

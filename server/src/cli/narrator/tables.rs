@@ -15,7 +15,7 @@ impl Narrator {
     /// The end of a Shift: places, points, totals.
     pub(super) fn shift_ended(&mut self, end: &v1::ShiftEnded) -> String {
         let mut out = self.chain.close(&self.names);
-        let before = std::mem::replace(&mut self.scores, end.scores.clone());
+        let before = std::mem::replace(&mut self.scores, end.points.clone());
         let mut words = format!("{} pizzas, {} turns", end.pizzas, end.turns);
         if end.adjudicated {
             words.push_str("; stopped at the limit of turns: fewest cards first");
@@ -24,8 +24,8 @@ impl Narrator {
         let full = self.full(end);
         let column = self.name_column();
         for (place, seat) in (1u32..).zip(&end.order) {
-            let score = of(&end.scores, *seat);
-            let points = of(&end.points, *seat);
+            let score = of(&end.points, *seat);
+            let points = of(&end.shift_points, *seat);
             let old = of(&before, *seat).min(score);
             let cells = |points: u64| points.saturating_mul(BAR).saturating_add(full / 2) / full;
             let style = seat_style(*seat);
@@ -99,7 +99,7 @@ impl Narrator {
 
     /// Points that fill a bar: those that end the game, or the most that anybody has or may get.
     fn full(&self, end: &v1::ShiftEnded) -> u64 {
-        let most = end.scores.iter().copied().max().unwrap_or(0);
+        let most = end.points.iter().copied().max().unwrap_or(0);
         let goal = self.rules.map_or(0, |rules| match rules.stop() {
             Stop::Points(points) => u64::from(points),
             Stop::Shifts(shifts) => {

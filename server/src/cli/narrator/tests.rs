@@ -65,6 +65,7 @@ fn gives(giver: u32, count: u32, receiver: u32) -> Kind {
         receiver,
         count,
         cards: Vec::new(),
+        golden: false,
     }))
 }
 
@@ -104,8 +105,8 @@ fn finished(seat: u32, place: u32) -> Kind {
 fn shift_ended(order: [u32; 4], points: [u32; 4], scores: [u64; 4]) -> Kind {
     Kind::ShiftEnded(Box::new(v1::ShiftEnded {
         order: order.to_vec(),
-        points: points.to_vec(),
-        scores: scores.to_vec(),
+        shift_points: points.to_vec(),
+        points: scores.to_vec(),
         pizzas: 4,
         turns: 16,
         ..v1::ShiftEnded::default()
@@ -194,7 +195,7 @@ fn roles_special_actions_and_incidents_are_told() {
         Kind::Disconnected(v1::Disconnected { seat: 0 }),
         Kind::Substituted(v1::Substituted {
             seat: 0,
-            agent: "random".into(),
+            built_in_agent: "random".into(),
         }),
         play(0, (2, 6, 0), 15),
         done(1, Some(0), 0),

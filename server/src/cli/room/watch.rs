@@ -49,7 +49,9 @@ impl Watch {
         while let Some(event) = spectator.next().await? {
             finished |= matches!(event.kind, Some(Kind::GameEnded(_)));
             if self.json {
-                let line = serde_json::json!({"event": "game", "game_event": event});
+                // What came over the wire may be more than JSON can say; that is an error, not a panic.
+                let game_event = serde_json::to_value(&event)?;
+                let line = serde_json::json!({"event": "game", "game_event": game_event});
                 writeln!(out, "{line}")?;
             } else {
                 write!(out, "{}", narrator.tell(&event))?;

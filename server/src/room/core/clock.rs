@@ -235,8 +235,14 @@ impl Core {
             let decided = self.decided(seat, action, source, Duration::ZERO, bank_left);
             self.commit(now, Change::Decided(decided));
         } else {
-            self.commit(now, Change::Attempted { seat, action });
-            if self.header.policy.max_invalid_attempts == Some(attempts + 1) {
+            self.commit(
+                now,
+                Change::Attempted {
+                    seat,
+                    action: action.index().into(),
+                },
+            );
+            if attempts + 1 >= self.attempts_limit() {
                 self.take_default(now, seat, Source::Invalid, Duration::ZERO);
             }
         }

@@ -5,12 +5,13 @@ use std::time::Duration;
 
 use chefshat_engine::{Action, DecisionKind, Event, Game, Seat};
 
-use super::{Answered, Core, LastAnswer, OpenDecision, State, Verdict};
+use super::{Answered, Core, LastAnswer, MAX_GAME_CHANGES, OpenDecision, State, Verdict};
 use crate::room::log::{ByWhom, GameHappening, Happening, MAX_GAME_EVENTS};
 use crate::store::journal::{Change, Decided, Source};
 
 impl Core {
     pub(super) fn fold(&mut self, at: Duration, change: &Change) {
+        self.changes += 1;
         match change {
             Change::Seated { seat, participant } => {
                 let state = &mut self.seats[seat.index()];
@@ -75,6 +76,7 @@ impl Core {
         self.entropy = entropy.to_vec();
         self.state = State::Playing;
         self.log.push(at, Happening::GameStarted);
+        self.log_before_deal = self.log.len();
         let seed = self.header.seed.game_seed(entropy);
         let mut events = std::mem::take(&mut self.events);
         self.game = Some(Box::new(Game::new(self.header.rules, seed, |event| {
@@ -223,9 +225,9 @@ impl Core {
             });
     }
 
-    /// Whether the log has reached its bound.
+    /// Whether the log or the journal has reached its bound.
     pub(super) fn is_too_long(&self) -> bool {
-        self.log.len() >= MAX_GAME_EVENTS
+        self.log.len() >= MAX_GAME_EVENTS || self.changes >= MAX_GAME_CHANGES
     }
 
     /// The change by which a decision is taken.

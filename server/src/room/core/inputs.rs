@@ -66,6 +66,8 @@ pub struct AnswerInput {
     pub action: u32,
     /// Annotations, encoded.
     pub annotations: Option<Box<[u8]>>,
+    /// Annotations were sent that cannot be recorded.
+    pub annotations_refused: bool,
     /// When the answer was read.
     pub arrived: Duration,
     /// When the decision was handed to the transport, if it was.
@@ -273,7 +275,10 @@ impl Core {
         if time >= self.header.policy.decision_time + self.seats[seat.index()].bank_left {
             // It arrived after the deadline, before the room was told that the time was up.
             self.tick(now, input.handed);
-            return Answered::closed(Verdict::Closed);
+            return Answered {
+                time,
+                ..Answered::closed(Verdict::Closed)
+            };
         }
         let answered = match self.refusal(input.action) {
             Some(error) => self.invalid(now, &input, time, open.attempts + 1, &error),
@@ -293,7 +298,7 @@ impl Core {
             {
                 (None, true)
             }
-            annotations => (annotations, false),
+            annotations => (annotations, input.annotations_refused),
         };
         let bank_left = self.bank_after(seat, time);
         let mut decided = self.decided(
@@ -332,10 +337,10 @@ impl Core {
             now,
             Change::Attempted {
                 seat: input.seat,
-                action: Self::action_from(input.action),
+                action: input.action,
             },
         );
-        if limit.is_some_and(|limit| attempts >= limit) {
+        if attempts >= self.attempts_limit() {
             self.take_default(now, input.seat, Source::Invalid, time);
         }
         Answered {

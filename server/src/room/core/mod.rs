@@ -35,6 +35,10 @@ pub const MAX_ANNOTATION_BYTES: usize = 4 * 1024;
 pub const MAX_EXPRESSIONS_PER_SEAT: u32 = 10_000;
 /// Most events of lost and new connections of one seat in one game; later ones are not told.
 pub const MAX_CONNECTION_EVENTS: u32 = 1_000;
+/// Invalid attempts at one decision after which the default is taken even where they are unlimited: a record must hold them.
+pub const MAX_ATTEMPTS: u32 = 10_000;
+/// Most changes of one game; beyond it the game is aborted.
+pub const MAX_GAME_CHANGES: u64 = 2_000_000;
 /// Decisions a room's built-in agents take before it looks at its mailbox again.
 pub const BUILT_IN_BUDGET: usize = 256;
 
@@ -72,8 +76,11 @@ pub struct Core {
     entropy: Vec<Vec<u8>>,
     open: Option<OpenDecision>,
     log: Log,
-    /// Length of the log when each decision had been taken; kept where spectators are delayed.
+    /// Length of the log when the game had begun and nothing was dealt yet.
+    log_before_deal: usize,
+    /// Length of the log after the deal and after each decision; kept where spectators are delayed.
     log_after_decision: Vec<u32>,
+    changes: u64,
     decisions: u64,
     /// Changes that have been folded and not yet been handed to the store.
     unkept: Vec<Entry>,
@@ -166,7 +173,9 @@ impl Core {
             entropy: Vec::new(),
             open: None,
             log: Log::default(),
+            log_before_deal: 0,
             log_after_decision: Vec::new(),
+            changes: 0,
             decisions: 0,
             unkept: Vec::new(),
             events: Vec::new(),
@@ -232,6 +241,14 @@ impl Core {
             .map(|limit| limit.saturating_sub(made))
     }
 
+    /// Invalid attempts after which the default decision is taken.
+    fn attempts_limit(&self) -> u32 {
+        self.header
+            .policy
+            .max_invalid_attempts
+            .unwrap_or(MAX_ATTEMPTS)
+    }
+
     /// Number of decisions taken.
     pub fn decisions(&self) -> u64 {
         self.decisions
@@ -284,17 +301,15 @@ impl Core {
         if delay == 0 || self.state.is_over() {
             return self.log.len();
         }
-        let begun = self.log_after_decision.first().copied().unwrap_or(0);
-        let visible = self
-            .log_after_decision
+        if self.state == State::Waiting {
+            return self.log.len();
+        }
+        self.log_after_decision
             .len()
             .checked_sub(delay + 1)
-            .map_or(begun, |index| self.log_after_decision[index]);
-        if self.state == State::Waiting {
-            self.log.len()
-        } else {
-            usize::try_from(visible).unwrap_or(usize::MAX)
-        }
+            .map_or(self.log_before_deal, |index| {
+                usize::try_from(self.log_after_decision[index]).unwrap_or(usize::MAX)
+            })
     }
 
     /// Whether a built-in agent decides for the seat, its own or a substitute.

@@ -61,6 +61,7 @@ fn an_answer_that_arrived_in_time_counts_even_if_it_waited_in_a_queue() {
         decision_id: id,
         action,
         annotations: None,
+        annotations_refused: false,
         arrived,
         handed: Some(ms(0)),
     };
@@ -164,7 +165,7 @@ fn without_a_limit_of_attempts_a_decision_stays_open() {
         ..Policy::default()
     });
     let (seat, id) = table.open();
-    for _ in 0..1000 {
+    for _ in 1..super::super::MAX_ATTEMPTS {
         let wrong = table.illegal();
         assert!(matches!(
             table.answer(seat, id, wrong).verdict,
@@ -175,6 +176,10 @@ fn without_a_limit_of_attempts_a_decision_stays_open() {
         ));
     }
     assert_eq!(table.open(), (seat, id));
+    // But a record must hold them.
+    let wrong = table.illegal();
+    table.answer(seat, id, wrong);
+    assert_eq!(table.last_decision().source, Source::Invalid);
 }
 
 #[test]

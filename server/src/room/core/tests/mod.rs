@@ -147,6 +147,7 @@ impl Table {
                 decision_id,
                 action,
                 annotations: None,
+                annotations_refused: false,
                 arrived: self.now,
                 handed,
             },
