@@ -18,7 +18,7 @@ def tell(event: pb.GameEvent) -> str | None:
     if event.HasField("seat_finished"):
         return f"seat {event.seat_finished.seat} finishes at place {event.seat_finished.place}"
     if event.HasField("shift_ended"):
-        return f"Shift {event.shift_ended.shift} is over, points so far {list(event.shift_ended.scores)}"
+        return f"Shift {event.shift_ended.shift} is over, points so far {list(event.shift_ended.points)}"
     if event.HasField("game_ended"):
         return f"seat {event.game_ended.standings[0].seat} has won"
     if event.HasField("game_aborted"):

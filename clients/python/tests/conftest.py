@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from fake_server import FakeServer
 from real_server import RealServer
+from stage import Stage, attached
 
 BINARY = "CHEFSHAT_BIN"
 
@@ -46,3 +47,12 @@ def processes() -> Iterator[list[subprocess.Popen[str]]]:
         if process.poll() is None:
             process.kill()
         process.communicate()
+
+
+@pytest.fixture
+def stage() -> Stage:
+    """A session of one seat, attached."""
+    stage = Stage()
+    stage.connect()
+    stage.say(attached())
+    return stage

@@ -5,7 +5,8 @@ import threading
 from collections.abc import Callable, Mapping
 
 import pytest
-from fake_server import QUESTIONS, FakeGame, FakeSeat, FakeServer
+from fake_game import QUESTIONS, FakeGame, FakeSeat
+from fake_server import FakeServer
 
 import chefshat
 from chefshat import Agent, Backoff, ChefsHatError, Decision, RandomAgent, SeatResult, aio, pb
@@ -138,6 +139,26 @@ def test_connecting_that_leads_nowhere_is_given_up(fake: FakeServer, play: Playe
     assert result.error.reason == "UNAVAILABLE"
     # The first stream brought the start of the game, which is progress; the ten attempts that may follow brought nothing.
     assert fake.streams == 1 + QUICK.attempts
+
+
+class Talkative(Listener):
+    """Says more about each answer than a message may hold, or than a record may."""
+
+    def decide(self, request: Decision) -> int:
+        if request.decision_id % 2:
+            request.annotate(extra={"why": "because " * 10_000})
+        else:
+            request.annotate(value_estimate=float("nan"))
+        return super().decide(request)
+
+
+def test_annotations_that_are_too_much_cost_neither_the_answer_nor_the_stream(fake: FakeServer, play: Player) -> None:
+    agents = {ticket: Talkative() for ticket in seats(fake)}
+    results = play(fake.address, agents)
+    assert fake.streams == 1
+    for result in results.values():
+        assert (result.finished, result.decisions, result.annotations_dropped) == (True, QUESTIONS, QUESTIONS)
+    assert not any(answer.HasField("annotations") for seat in fake.games[0].seats.values() for answer in seat.answers)
 
 
 class Stubborn(Agent):

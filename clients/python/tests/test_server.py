@@ -62,6 +62,10 @@ def check(agents: dict[str, Checking], results: dict[str, chefshat.SeatResult]) 
     """The four seats of one game agree about it."""
     assert sorted(result.seat for result in results.values()) == [0, 1, 2, 3]
     assert len({result.standings for result in results.values()}) == 1
+    for result in results.values():
+        assert len(result.entropy) == 32
+        assert result.reveal is not None
+        assert result.reveal.seat_entropy[result.seat] == result.entropy
     assert sorted(result.place or 0 for result in results.values()) == [1, 2, 3, 4]
     for ticket, agent in agents.items():
         assert results[ticket].finished

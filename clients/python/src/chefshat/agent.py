@@ -89,7 +89,9 @@ def as_json(result: SeatResult) -> dict[str, object]:
         "decisions": result.decisions,
         "invalid": result.invalid,
         "late": result.late,
+        "annotations_dropped": result.annotations_dropped,
         "reconnects": result.reconnects,
+        "entropy": result.entropy.hex(),
     }
 
 

@@ -21,8 +21,9 @@ from chefshat._gen.chefshat.v1.spectator_service_pb2_grpc import SpectatorServic
 from chefshat.agents import Agent
 from chefshat.backoff import Backoff
 from chefshat.errors import ChefsHatError, connection_lost, from_rpc_error
+from chefshat.place import Ask
 from chefshat.result import SeatResult
-from chefshat.session import Ask, PlayOptions, PlaySession
+from chefshat.session import PlayOptions, PlaySession
 
 # Seconds an answer waits for those of the stream's other seats before it is sent.
 FLUSH_AFTER_S = 0.002

@@ -71,7 +71,10 @@ class Decision:
         Args:
             value_estimate: how good the agent thinks its position is, in its own unit.
             action_scores: a score per action in the agent's own unit, index = action.
-            extra: free keys and values. All together at most 4 KiB a decision and 256 KiB a game, or it is not recorded.
+            extra: free keys and values.
+
+        All together at most 4 KiB encoded for a decision and 256 KiB for a seat in a game, numbers finite. What is not so is not
+        recorded, which costs the answer nothing: it is logged once and counted in the result's `annotations_dropped`.
         """
         self.annotations = pb.Annotations(value_estimate=value_estimate, action_scores=action_scores, extra=extra or {})
 

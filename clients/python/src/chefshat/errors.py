@@ -8,7 +8,12 @@ from collections.abc import Iterable, Mapping
 import grpc
 from google.rpc import error_details_pb2, status_pb2
 
+from chefshat import pb
+
 DETAILS_KEY = "grpc-status-details-bin"
+
+# The codes by their numbers on the wire.
+_CODES: dict[int, grpc.StatusCode] = {code.value[0]: code for code in grpc.StatusCode}
 
 # Codes after which trying again with the same arguments cannot help.
 _FINAL_CODES = frozenset(
@@ -33,7 +38,8 @@ class ChefsHatError(Exception):
             is the name of the gRPC code, for instance "UNAVAILABLE".
         message: the same in words, for people.
         metadata: names the offending field or limit; may be empty.
-        code: the gRPC status code, or None if the refusal came inside a stream.
+        code: the gRPC status code; where the refusal came inside a stream, the one a call of its own would have ended with. None if
+            there is none.
     """
 
     def __init__(
@@ -58,6 +64,13 @@ class ChefsHatError(Exception):
 def connection_lost(message: str = "the server ended the stream before the game was over") -> ChefsHatError:
     """The error of a stream that ended without a status that says why."""
     return ChefsHatError("CONNECTION_LOST", message, code=grpc.StatusCode.UNAVAILABLE)
+
+
+def from_refused(refused: pb.Refused) -> ChefsHatError:
+    """Reads a refusal that came inside a stream."""
+    # 0 is both "OK" and "not set", and no refusal is OK.
+    code = _CODES.get(refused.code) if refused.code else None
+    return ChefsHatError(refused.reason, refused.message, refused.metadata, code)
 
 
 def from_rpc_error(error: grpc.RpcError) -> ChefsHatError:

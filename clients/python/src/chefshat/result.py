@@ -24,11 +24,15 @@ class SeatResult:
         game_id: the game; empty if the seat was never attached.
         seat: number of the seat, from 0; -1 if the seat was never attached.
         standings: the final table, best first; empty unless the game finished.
+        reveal: what makes the deals checkable, if the server revealed it: `reveal.seat_entropy[seat]` is then this seat's `entropy`
+            (where the game's seed was not fixed).
         abort_reason: why the game was aborted, for instance "SHUTDOWN"; empty unless it was.
         decisions: answers the server said it accepted.
         invalid: answers that were not legal.
         late: answers that came when the decision was closed already.
+        annotations_dropped: annotations that were not recorded, being too large or not finite.
         reconnects: how often the seat was attached anew after its connection was lost.
+        entropy: the seat's own part of the game seed, as it was sent.
         error: why the seat left before its game was over (reason "SUPERSEDED": a newer connection took it); None otherwise.
     """
 
@@ -36,11 +40,14 @@ class SeatResult:
     game_id: str
     seat: int
     standings: tuple[Standing, ...] = ()
+    reveal: pb.SeedReveal | None = None
     abort_reason: str = ""
     decisions: int = 0
     invalid: int = 0
     late: int = 0
+    annotations_dropped: int = 0
     reconnects: int = 0
+    entropy: bytes = b""
     error: ChefsHatError | None = None
 
     @property

@@ -8,32 +8,20 @@ what it returns, `answer(...)` each, send `take_requests()`; stop when `done`. W
 """
 
 import logging
+import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple, SupportsIndex
+from typing import SupportsIndex
 
 from chefshat import pb
 from chefshat.agents import Agent
 from chefshat.decision import Decision, SeatInfo
-from chefshat.errors import ChefsHatError
-from chefshat.result import SeatResult, Standing, abort_reason_of, standings_of
+from chefshat.errors import ChefsHatError, from_refused
+from chefshat.limits import MAX_ENTROPY_BYTES, pack, why_not_recorded
+from chefshat.place import Ask, SeatPlace
+from chefshat.result import SeatResult, abort_reason_of, standings_of
 
 LOG = logging.getLogger("chefshat")
-
-# The protocol's bound on commands in one request.
-MAX_COMMANDS = 1024
-
-
-class Ask(NamedTuple):
-    """A decision to be put to an agent."""
-
-    place: "SeatPlace"
-    decision: Decision
-
-    @property
-    def agent(self) -> Agent:
-        """Who is asked."""
-        return self.place.agent
 
 
 @dataclass(frozen=True)
@@ -41,46 +29,24 @@ class PlayOptions:
     """How seats attach.
 
     Attributes:
-        entropy: the seats' own part of the game seed, 0..=32 bytes; counts when given before the game starts.
+        entropy: every seat's own part of the game seed, 0..=32 bytes; None: 32 fresh random bytes for each seat, so that nobody
+            alone chose the deals. Counts where it is given before the game starts. The result says what it was.
         delivery: how events reach the seats; unspecified means together with the next decision.
+
+    Raises:
+        ValueError: the entropy is too long.
     """
 
-    entropy: bytes = b""
+    entropy: bytes | None = None
     delivery: pb.EventDelivery.ValueType = pb.EVENT_DELIVERY_UNSPECIFIED
 
+    def __post_init__(self) -> None:
+        if self.entropy is not None and len(self.entropy) > MAX_ENTROPY_BYTES:
+            raise ValueError(f"entropy is {len(self.entropy)} bytes long, and {MAX_ENTROPY_BYTES} are allowed")
 
-class SeatPlace:
-    """One seat's part of a session; it outlives connections."""
-
-    def __init__(self, ticket: str, request_id: int, agent: Agent) -> None:
-        self.ticket = ticket
-        self.request_id = request_id
-        self.agent = agent
-        self.info: SeatInfo | None = None
-        # Handle on the present connection; None while not attached.
-        self.handle: int | None = None
-        # Number of the last event seen; 0 before any.
-        self.last_sequence = 0
-        # The decision the agent has been asked and has not answered yet.
-        self.asked: Decision | None = None
-        # The answer the server has not acknowledged yet, and the decision it answers.
-        self.unacknowledged: pb.Answer | None = None
-        self.answered: Decision | None = None
-        self.standings: tuple[Standing, ...] = ()
-        self.abort_reason = ""
-        self.attachments = 0
-        self.decisions = 0
-        self.invalid = 0
-        self.late = 0
-        self.result: SeatResult | None = None
-        # Agents that do not listen cost no call per event.
-        self.hears_events = type(agent).on_event is not Agent.on_event
-        self.hears_results = type(agent).on_result is not Agent.on_result
-
-    @property
-    def game_is_over(self) -> bool:
-        """Whether the event that ends the game has been seen."""
-        return bool(self.standings or self.abort_reason)
+    def draw_entropy(self) -> bytes:
+        """The bytes for one seat."""
+        return os.urandom(MAX_ENTROPY_BYTES) if self.entropy is None else self.entropy
 
 
 class PlaySession:
@@ -95,7 +61,9 @@ class PlaySession:
         """
         self._options = options or PlayOptions()
         # Request ids count from 1, so that 0 (not set) is no seat's.
-        self._places = [SeatPlace(ticket, index, agent) for index, (ticket, agent) in enumerate(agents.items(), 1)]
+        self._places = [
+            SeatPlace(ticket, index, agent, self._options.draw_entropy()) for index, (ticket, agent) in enumerate(agents.items(), 1)
+        ]
         self._by_handle: dict[int, SeatPlace] = {}
         self._outbox: list[pb.SeatCommand] = []
         self._open = len(self._places)
@@ -117,6 +85,7 @@ class PlaySession:
         self._outbox.clear()
         for place in self._places:
             place.handle = None
+            place.substituted = False
             if place.result is not None:
                 continue
             command = pb.SeatCommand()
@@ -124,7 +93,7 @@ class PlaySession:
             command.attach.request_id = place.request_id
             command.attach.from_sequence = place.last_sequence + 1 if place.last_sequence else 0
             command.attach.delivery = self._options.delivery
-            command.attach.entropy = self._options.entropy
+            command.attach.entropy = place.entropy
             self._outbox.append(command)
 
     def lost(self, unasked: Iterable[Ask] = ()) -> None:
@@ -155,7 +124,7 @@ class PlaySession:
         if not outbox:
             return []
         self._outbox = []
-        return [pb.PlayRequest(commands=outbox[at : at + MAX_COMMANDS]) for at in range(0, len(outbox), MAX_COMMANDS)]
+        return pack(outbox)
 
     def receive(self, response: pb.PlayResponse) -> list[Ask]:
         """Takes in what the server said and calls the agents' hooks, in the order in which it was said.
@@ -164,6 +133,8 @@ class PlaySession:
             The decisions now to be made. Answer each with `answer`, in any order, at any time.
         """
         asks: list[Ask] = []
+        # Seats that may have to say that they are here. What follows in the same response may say that this is known already.
+        away: list[SeatPlace] = []
         by_handle = self._by_handle
         for update in response.updates:
             what = update.WhichOneof("update")
@@ -186,6 +157,10 @@ class PlaySession:
                 self._snapshot(place, update.snapshot)
             elif what == "detached":
                 self._detached(place, update.handle, update.detached)
+            if place.substituted:
+                away.append(place)
+        for place in away:
+            self._resume(place)
         return asks
 
     def answer(self, ask: Ask, action: SupportsIndex) -> None:
@@ -193,11 +168,37 @@ class PlaySession:
         place, decision = ask
         if place.asked is not decision:
             return  # The server has closed the decision in the meantime.
-        answer = pb.Answer(decision_id=decision.decision_id, action=action.__index__(), annotations=decision.annotations)
+        answer = pb.Answer(decision_id=decision.decision_id, action=action.__index__(), annotations=self._annotations(ask))
         place.asked = None
         place.unacknowledged = answer
         place.answered = decision
         self._send_answer(place)
+
+    def _annotations(self, ask: Ask) -> pb.Annotations | None:
+        """The decision's annotations, unless the server would not record them."""
+        place, decision = ask
+        annotations = decision.annotations
+        if annotations is not None and (why := why_not_recorded(annotations)):
+            self._note_dropped(place, decision.decision_id, why)
+            return None
+        return annotations
+
+    def _note_dropped(self, place: SeatPlace, decision_id: int, why: str) -> None:
+        """Counts annotations that are not recorded. An agent that does it once does it often, so only the first is logged."""
+        place.annotations_dropped += 1
+        if place.annotations_dropped == 1:
+            LOG.warning(
+                "the annotations of decision %d of seat %d are not recorded: %s; further ones are counted in the result",
+                decision_id,
+                place.info.seat if place.info else -1,
+                why,
+            )
+
+    def _resume(self, place: SeatPlace) -> None:
+        """Says that the seat's agent plays itself again, if a substitute plays for it."""
+        if place.substituted and place.handle is not None and not place.game_is_over:
+            self._outbox.append(pb.SeatCommand(handle=place.handle, resume=pb.ResumeSeat()))
+        place.substituted = False
 
     def _send_answer(self, place: SeatPlace) -> None:
         if place.handle is not None and place.unacknowledged is not None:
@@ -208,6 +209,7 @@ class PlaySession:
         if place is None:
             return
         place.handle = handle
+        place.live_from = attached.next_sequence
         place.attachments += 1
         self._by_handle[handle] = place
         if place.info is None:
@@ -220,8 +222,7 @@ class PlaySession:
     def _refused(self, handle: int, refused: pb.Refused) -> None:
         place = self._place_of_request(refused.request_id)
         if place is not None and place.handle is None:
-            error = ChefsHatError(refused.reason, refused.message, refused.metadata)
-            self._finish(place, None if place.game_is_over else error)
+            self._finish(place, None if place.game_is_over else from_refused(refused))
             return
         place = self._by_handle.get(handle)
         LOG.warning("the server refused a command: %s: %s", refused.reason, refused.message)
@@ -240,8 +241,14 @@ class PlaySession:
                     place.info.game_started = event.game_started
             elif what == "game_ended":
                 place.standings = standings_of(event.game_ended)
+                place.reveal = event.game_ended.reveal if event.game_ended.HasField("reveal") else None
             elif what == "game_aborted":
                 place.abort_reason = abort_reason_of(event.game_aborted)
+            elif what == "substituted" and place.is_seat(event.substituted.seat):
+                # A substitution of the past is over: attaching ended it.
+                place.substituted = event.sequence >= place.live_from
+            elif what == "returned" and place.is_seat(event.returned.seat):
+                place.substituted = False
             if place.hears_events:
                 place.agent.on_event(event)
 
@@ -274,6 +281,8 @@ class PlaySession:
         if awaited:
             place.unacknowledged = None
             place.answered = None
+            if result.annotations_dropped:
+                self._note_dropped(place, result.decision_id, "the server has dropped them")
         if result.status == pb.ANSWER_STATUS_ACCEPTED:
             if awaited:
                 place.decisions += 1
@@ -296,6 +305,7 @@ class PlaySession:
     def _detached(self, place: SeatPlace, handle: int, detached: pb.Detached) -> None:
         del self._by_handle[handle]
         place.handle = None
+        place.substituted = False
         if detached.reason == pb.DETACH_REASON_GAME_OVER:
             self._finish(place)
         elif detached.reason == pb.DETACH_REASON_SUPERSEDED:
@@ -314,11 +324,14 @@ class PlaySession:
             game_id=info.game_id if info else "",
             seat=info.seat if info else -1,
             standings=place.standings,
+            reveal=place.reveal,
             abort_reason=place.abort_reason,
             decisions=place.decisions,
             invalid=place.invalid,
             late=place.late,
+            annotations_dropped=place.annotations_dropped,
             reconnects=max(place.attachments - 1, 0),
+            entropy=place.entropy,
             error=error,
         )
         self._open -= 1

@@ -4,6 +4,7 @@
 //! An input (`inputs`, `clock`) checks what it is given against the state and states what follows as changes; a change (`fold`) alters the
 //! state and the log, and can be folded again later to the same effect. That is how a game is replayed from its journal.
 
+mod answers;
 mod clock;
 mod fold;
 mod inputs;
@@ -16,7 +17,7 @@ use std::time::Duration;
 use chefshat_arena::BuiltInAgent;
 use chefshat_engine::{Action, Decision, Event, Game, Mask, Observation, Seat, Viewer};
 
-pub use inputs::{AnswerInput, Answered, ExpressError, JoinError, SeatStanding, Verdict};
+pub use answers::{AnswerInput, Answered, ExpressError, JoinError, SeatStanding, Verdict};
 
 use super::log::Log;
 use crate::store::journal::{AbortReason, Change, Entry, Fill, GameHeader, SeatedParticipant};

@@ -285,7 +285,7 @@ Global___Answer: _TypeAlias = Answer  # noqa: Y015
 @_typing.final
 class Annotations(_message.Message):
     """What an agent may say about its own decision. Recorded with it, shown to nobody before the game has ended. At most 4 KiB encoded
-    per decision and 256 KiB per game; what is above is dropped, and AnswerResult says so.
+    per decision and 256 KiB for a seat in a game, numbers finite; what is not so is dropped, and AnswerResult says so.
     """
 
     DESCRIPTOR: _descriptor.Descriptor
@@ -361,7 +361,9 @@ class AnswerResult(_message.Message):
     action: _builtins.int
     """The action answered."""
     decision_time_us: _builtins.int
-    """Microseconds from handing the request to the transport to the arrival of this answer, measured by the server."""
+    """Microseconds from handing the request to the transport to the arrival of this answer, measured by the server; 0 for an answer to a
+    decision that was closed before, or never put.
+    """
     detail: _builtins.str
     """For INVALID: why, in words."""
     invalid_attempts_left: _builtins.int
@@ -369,7 +371,7 @@ class AnswerResult(_message.Message):
     reward: _builtins.float
     """For INVALID at a turn, where the room has a reward scheme: the reward of this attempt."""
     annotations_dropped: _builtins.bool
-    """The annotations were above their limit and were not recorded."""
+    """The annotations were above their limit, or held numbers that are not finite, and were not recorded."""
     def __init__(
         self,
         *,
@@ -430,7 +432,7 @@ class Expression(_message.Message):
     """For the record only: nobody in the room is told."""
     @_builtins.property
     def taken_at(self) -> _timestamp_pb2.Timestamp:
-        """When the sender took it, by its own clock."""
+        """When the sender took it, by its own clock; years 1 to 9999."""
 
     def __init__(
         self,

@@ -261,33 +261,29 @@ Global___SeatReward: _TypeAlias = SeatReward  # noqa: Y015
 
 @_typing.final
 class Seated(_message.Message):
-    """A participant took a seat."""
+    """A participant took a seat. Built-in agents hold theirs from the start and are not announced."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
     SEAT_FIELD_NUMBER: _builtins.int
     NAME_FIELD_NUMBER: _builtins.int
     KIND_FIELD_NUMBER: _builtins.int
-    BUILT_IN_AGENT_FIELD_NUMBER: _builtins.int
     seat: _builtins.int
     """The seat."""
     name: _builtins.str
     """Its name."""
     kind: _room_pb2.ParticipantKind.ValueType
     """What it is."""
-    built_in_agent: _builtins.str
-    """Name of the built-in agent, or empty."""
     def __init__(
         self,
         *,
         seat: _builtins.int = ...,
         name: _builtins.str = ...,
         kind: _room_pb2.ParticipantKind.ValueType = ...,
-        built_in_agent: _builtins.str = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["built_in_agent", b"built_in_agent", "kind", b"kind", "name", b"name", "seat", b"seat"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["kind", b"kind", "name", b"name", "seat", b"seat"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
@@ -366,20 +362,20 @@ class Substituted(_message.Message):
     DESCRIPTOR: _descriptor.Descriptor
 
     SEAT_FIELD_NUMBER: _builtins.int
-    AGENT_FIELD_NUMBER: _builtins.int
+    BUILT_IN_AGENT_FIELD_NUMBER: _builtins.int
     seat: _builtins.int
     """The seat."""
-    agent: _builtins.str
+    built_in_agent: _builtins.str
     """Name of the built-in agent."""
     def __init__(
         self,
         *,
         seat: _builtins.int = ...,
-        agent: _builtins.str = ...,
+        built_in_agent: _builtins.str = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["agent", b"agent", "seat", b"seat"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["built_in_agent", b"built_in_agent", "seat", b"seat"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
@@ -417,7 +413,7 @@ class GameStarted(_message.Message):
 
     @_builtins.property
     def seats(self) -> _containers.RepeatedCompositeFieldContainer[_room_pb2.Participant]:
-        """The seats, index = seat."""
+        """The seats, index = seat: in the event as they were when the game began, all connected; in a Snapshot as they are."""
 
     @_builtins.property
     def action_space(self) -> _rules_pb2.ActionSpace:
@@ -571,12 +567,15 @@ class CardsExchanged(_message.Message):
     RECEIVER_FIELD_NUMBER: _builtins.int
     COUNT_FIELD_NUMBER: _builtins.int
     CARDS_FIELD_NUMBER: _builtins.int
+    GOLDEN_FIELD_NUMBER: _builtins.int
     giver: _builtins.int
     """Who gave."""
     receiver: _builtins.int
     """Who received."""
     count: _builtins.int
     """How many cards."""
+    golden: _builtins.bool
+    """Whether one of them is the Golden card: for giver and receiver alone."""
     @_builtins.property
     def cards(self) -> _containers.RepeatedScalarFieldContainer[_builtins.int]:
         """Which, ascending, F+1 for a joker: for giver and receiver alone."""
@@ -588,10 +587,11 @@ class CardsExchanged(_message.Message):
         receiver: _builtins.int = ...,
         count: _builtins.int = ...,
         cards: _abc.Iterable[_builtins.int] | None = ...,
+        golden: _builtins.bool = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["cards", b"cards", "count", b"count", "giver", b"giver", "receiver", b"receiver"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["cards", b"cards", "count", b"count", "giver", b"giver", "golden", b"golden", "receiver", b"receiver"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
@@ -743,8 +743,8 @@ class ShiftEnded(_message.Message):
 
     SHIFT_FIELD_NUMBER: _builtins.int
     ORDER_FIELD_NUMBER: _builtins.int
+    SHIFT_POINTS_FIELD_NUMBER: _builtins.int
     POINTS_FIELD_NUMBER: _builtins.int
-    SCORES_FIELD_NUMBER: _builtins.int
     STARTER_FIELD_NUMBER: _builtins.int
     PIZZAS_FIELD_NUMBER: _builtins.int
     LAPS_FIELD_NUMBER: _builtins.int
@@ -767,20 +767,20 @@ class ShiftEnded(_message.Message):
         """Seats by place."""
 
     @_builtins.property
-    def points(self) -> _containers.RepeatedScalarFieldContainer[_builtins.int]:
+    def shift_points(self) -> _containers.RepeatedScalarFieldContainer[_builtins.int]:
         """Points of this Shift, index = seat."""
 
     @_builtins.property
-    def scores(self) -> _containers.RepeatedScalarFieldContainer[_builtins.int]:
-        """Points of the game so far, index = seat."""
+    def points(self) -> _containers.RepeatedScalarFieldContainer[_builtins.int]:
+        """Points of the game so far, this Shift's included, index = seat."""
 
     def __init__(
         self,
         *,
         shift: _builtins.int = ...,
         order: _abc.Iterable[_builtins.int] | None = ...,
+        shift_points: _abc.Iterable[_builtins.int] | None = ...,
         points: _abc.Iterable[_builtins.int] | None = ...,
-        scores: _abc.Iterable[_builtins.int] | None = ...,
         starter: _builtins.int = ...,
         pizzas: _builtins.int = ...,
         laps: _builtins.int = ...,
@@ -789,7 +789,7 @@ class ShiftEnded(_message.Message):
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["adjudicated", b"adjudicated", "laps", b"laps", "order", b"order", "pizzas", b"pizzas", "points", b"points", "scores", b"scores", "shift", b"shift", "starter", b"starter", "turns", b"turns"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["adjudicated", b"adjudicated", "laps", b"laps", "order", b"order", "pizzas", b"pizzas", "points", b"points", "shift", b"shift", "shift_points", b"shift_points", "starter", b"starter", "turns", b"turns"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

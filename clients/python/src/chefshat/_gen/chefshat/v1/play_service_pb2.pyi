@@ -389,12 +389,17 @@ class Refused(_message.Message):
     REASON_FIELD_NUMBER: _builtins.int
     MESSAGE_FIELD_NUMBER: _builtins.int
     METADATA_FIELD_NUMBER: _builtins.int
+    CODE_FIELD_NUMBER: _builtins.int
     request_id: _builtins.int
     """For an Attach: echo of its request_id."""
     reason: _builtins.str
-    """Reason in UPPER_SNAKE, for instance TICKET_UNKNOWN."""
+    """Reason in UPPER_SNAKE. For an Attach TICKET_UNKNOWN, ENTROPY_REFUSED or TOO_MANY_SEATS; for other commands HANDLE_UNKNOWN,
+    COMMAND_MISSING, EXPRESSION_REFUSED, TOO_MANY_EXPRESSIONS, GAME_OVER or ROOM_UNKNOWN.
+    """
     message: _builtins.str
     """What is wrong and what to do, in words."""
+    code: _builtins.int
+    """The gRPC status code a call of its own would have ended with."""
     @_builtins.property
     def metadata(self) -> _containers.ScalarMap[_builtins.str, _builtins.str]:
         """The offending field or limit."""
@@ -406,10 +411,11 @@ class Refused(_message.Message):
         reason: _builtins.str = ...,
         message: _builtins.str = ...,
         metadata: _abc.Mapping[_builtins.str, _builtins.str] | None = ...,
+        code: _builtins.int = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["message", b"message", "metadata", b"metadata", "reason", b"reason", "request_id", b"request_id"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["code", b"code", "message", b"message", "metadata", b"metadata", "reason", b"reason", "request_id", b"request_id"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

@@ -58,7 +58,7 @@ class PlayServiceServicer:
 
     def Play(self, request_iterator, context):
         """One stream for an agent process: any number of seats in any number of games. Half-close to leave; the stream then ends. The server's
-        response headers come at once, before the first message.
+        response headers come at once, before the first message. INVALID_ARGUMENT (TOO_MANY_COMMANDS) ends a stream.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -66,7 +66,7 @@ class PlayServiceServicer:
 
     def Watch(self, request, context):
         """The same for clients that cannot stream both ways (browsers): all updates of the seats named, until the client cancels. A message
-        without updates is a heartbeat. Answer with Act.
+        without updates is a heartbeat. Answer with Act. INVALID_ARGUMENT (SEATS_REFUSED).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -74,7 +74,7 @@ class PlayServiceServicer:
 
     def Act(self, request, context):
         """One command for one seat, without a stream of requests. UNAUTHENTICATED (TICKET_UNKNOWN); INVALID_ARGUMENT (COMMAND_MISSING,
-        EXPRESSION_REFUSED); FAILED_PRECONDITION (GAME_OVER).
+        EXPRESSION_REFUSED); FAILED_PRECONDITION (GAME_OVER); RESOURCE_EXHAUSTED (TOO_MANY_EXPRESSIONS).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

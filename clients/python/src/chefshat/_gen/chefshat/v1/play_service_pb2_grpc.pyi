@@ -35,15 +35,15 @@ class PlayServiceStub:
     def __new__(cls, channel: _aio.Channel) -> PlayServiceAsyncStub: ...
     Play: _grpc.StreamStreamMultiCallable[_play_service_pb2.PlayRequest, _play_service_pb2.PlayResponse]
     """One stream for an agent process: any number of seats in any number of games. Half-close to leave; the stream then ends. The server's
-    response headers come at once, before the first message.
+    response headers come at once, before the first message. INVALID_ARGUMENT (TOO_MANY_COMMANDS) ends a stream.
     """
     Watch: _grpc.UnaryStreamMultiCallable[_play_service_pb2.PlayServiceWatchRequest, _play_service_pb2.PlayServiceWatchResponse]
     """The same for clients that cannot stream both ways (browsers): all updates of the seats named, until the client cancels. A message
-    without updates is a heartbeat. Answer with Act.
+    without updates is a heartbeat. Answer with Act. INVALID_ARGUMENT (SEATS_REFUSED).
     """
     Act: _grpc.UnaryUnaryMultiCallable[_play_service_pb2.ActRequest, _play_service_pb2.ActResponse]
     """One command for one seat, without a stream of requests. UNAUTHENTICATED (TICKET_UNKNOWN); INVALID_ARGUMENT (COMMAND_MISSING,
-    EXPRESSION_REFUSED); FAILED_PRECONDITION (GAME_OVER).
+    EXPRESSION_REFUSED); FAILED_PRECONDITION (GAME_OVER); RESOURCE_EXHAUSTED (TOO_MANY_EXPRESSIONS).
     """
 
 @_typing.type_check_only
@@ -53,15 +53,15 @@ class PlayServiceAsyncStub(PlayServiceStub):
     def __init__(self, channel: _aio.Channel) -> None: ...
     Play: _aio.StreamStreamMultiCallable[_play_service_pb2.PlayRequest, _play_service_pb2.PlayResponse]  # type: ignore[assignment]
     """One stream for an agent process: any number of seats in any number of games. Half-close to leave; the stream then ends. The server's
-    response headers come at once, before the first message.
+    response headers come at once, before the first message. INVALID_ARGUMENT (TOO_MANY_COMMANDS) ends a stream.
     """
     Watch: _aio.UnaryStreamMultiCallable[_play_service_pb2.PlayServiceWatchRequest, _play_service_pb2.PlayServiceWatchResponse]  # type: ignore[assignment]
     """The same for clients that cannot stream both ways (browsers): all updates of the seats named, until the client cancels. A message
-    without updates is a heartbeat. Answer with Act.
+    without updates is a heartbeat. Answer with Act. INVALID_ARGUMENT (SEATS_REFUSED).
     """
     Act: _aio.UnaryUnaryMultiCallable[_play_service_pb2.ActRequest, _play_service_pb2.ActResponse]  # type: ignore[assignment]
     """One command for one seat, without a stream of requests. UNAUTHENTICATED (TICKET_UNKNOWN); INVALID_ARGUMENT (COMMAND_MISSING,
-    EXPRESSION_REFUSED); FAILED_PRECONDITION (GAME_OVER).
+    EXPRESSION_REFUSED); FAILED_PRECONDITION (GAME_OVER); RESOURCE_EXHAUSTED (TOO_MANY_EXPRESSIONS).
     """
 
 class PlayServiceServicer(metaclass=_abc_1.ABCMeta):
@@ -74,7 +74,7 @@ class PlayServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_abc.Iterator[_play_service_pb2.PlayResponse], _abc.AsyncIterator[_play_service_pb2.PlayResponse]]:
         """One stream for an agent process: any number of seats in any number of games. Half-close to leave; the stream then ends. The server's
-        response headers come at once, before the first message.
+        response headers come at once, before the first message. INVALID_ARGUMENT (TOO_MANY_COMMANDS) ends a stream.
         """
 
     @_abc_1.abstractmethod
@@ -84,7 +84,7 @@ class PlayServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_abc.Iterator[_play_service_pb2.PlayServiceWatchResponse], _abc.AsyncIterator[_play_service_pb2.PlayServiceWatchResponse]]:
         """The same for clients that cannot stream both ways (browsers): all updates of the seats named, until the client cancels. A message
-        without updates is a heartbeat. Answer with Act.
+        without updates is a heartbeat. Answer with Act. INVALID_ARGUMENT (SEATS_REFUSED).
         """
 
     @_abc_1.abstractmethod
@@ -94,7 +94,7 @@ class PlayServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_play_service_pb2.ActResponse, _abc.Awaitable[_play_service_pb2.ActResponse]]:
         """One command for one seat, without a stream of requests. UNAUTHENTICATED (TICKET_UNKNOWN); INVALID_ARGUMENT (COMMAND_MISSING,
-        EXPRESSION_REFUSED); FAILED_PRECONDITION (GAME_OVER).
+        EXPRESSION_REFUSED); FAILED_PRECONDITION (GAME_OVER); RESOURCE_EXHAUSTED (TOO_MANY_EXPRESSIONS).
         """
 
 def add_PlayServiceServicer_to_server(servicer: PlayServiceServicer, server: _typing.Union[_grpc.Server, _aio.Server]) -> None: ...

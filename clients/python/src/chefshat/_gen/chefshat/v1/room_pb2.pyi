@@ -195,7 +195,9 @@ class RoomPolicy(_message.Message):
     bank_ms: _builtins.int
     """Milliseconds each seat may use beyond that over the whole game, 0..=86400000; standard 60000."""
     max_invalid_attempts: _builtins.int
-    """Invalid attempts at one decision after which the default decision is taken; 0 is unlimited; standard 10, at most 1000."""
+    """Invalid attempts at one decision after which the default decision is taken, at most 1000; 0 is unlimited (but for 10000, which
+    bounds what a record can hold); standard 10.
+    """
     max_timeouts: _builtins.int
     """Decisions in a row that a seat may lose to the clock before it is substituted, 1..=1000; standard 3."""
     substitute: _builtins.str
@@ -299,7 +301,7 @@ class Participant(_message.Message):
     built_in_agent: _builtins.str
     """Name of the built-in agent that fills the seat, or empty."""
     connected: _builtins.bool
-    """Whether an agent is attached to the seat now."""
+    """Whether an agent is attached to the seat now; a built-in agent always is."""
     substituted: _builtins.bool
     """Whether a substitute is playing for the seat now."""
     def __init__(

@@ -82,7 +82,8 @@ class RoomServiceServicer:
         raise NotImplementedError('Method not implemented!')
 
     def ListRooms(self, request, context):
-        """Rooms of the server, newest last.
+        """Rooms of the server, newest last. A page may hold fewer rooms than asked for and still have a next one. INVALID_ARGUMENT
+        (PAGE_TOKEN_REFUSED, STATE_REFUSED).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -90,14 +91,15 @@ class RoomServiceServicer:
 
     def JoinRoom(self, request, context):
         """Takes a seat and gives the ticket for it. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED (ROOM_FULL);
-        FAILED_PRECONDITION (SEAT_TAKEN, KIND_NOT_ADMITTED, GAME_STARTED); NOT_FOUND (ROOM_UNKNOWN).
+        FAILED_PRECONDITION (SEAT_TAKEN, KIND_NOT_ADMITTED, GAME_STARTED); INVALID_ARGUMENT (NO_SUCH_SEAT, NAME_REFUSED, KIND_REFUSED);
+        NOT_FOUND (ROOM_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def CloseRoom(self, request, context):
-        """Closes a room; a running game is aborted. PERMISSION_DENIED (OWNER_TOKEN_WRONG).
+        """Closes a room; a running game is aborted. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND (ROOM_UNKNOWN).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

@@ -40,13 +40,16 @@ class RoomServiceStub:
     GetRoom: _grpc.UnaryUnaryMultiCallable[_room_service_pb2.GetRoomRequest, _room_service_pb2.GetRoomResponse]
     """One room. NOT_FOUND (ROOM_UNKNOWN)."""
     ListRooms: _grpc.UnaryUnaryMultiCallable[_room_service_pb2.ListRoomsRequest, _room_service_pb2.ListRoomsResponse]
-    """Rooms of the server, newest last."""
+    """Rooms of the server, newest last. A page may hold fewer rooms than asked for and still have a next one. INVALID_ARGUMENT
+    (PAGE_TOKEN_REFUSED, STATE_REFUSED).
+    """
     JoinRoom: _grpc.UnaryUnaryMultiCallable[_room_service_pb2.JoinRoomRequest, _room_service_pb2.JoinRoomResponse]
     """Takes a seat and gives the ticket for it. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED (ROOM_FULL);
-    FAILED_PRECONDITION (SEAT_TAKEN, KIND_NOT_ADMITTED, GAME_STARTED); NOT_FOUND (ROOM_UNKNOWN).
+    FAILED_PRECONDITION (SEAT_TAKEN, KIND_NOT_ADMITTED, GAME_STARTED); INVALID_ARGUMENT (NO_SUCH_SEAT, NAME_REFUSED, KIND_REFUSED);
+    NOT_FOUND (ROOM_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
     """
     CloseRoom: _grpc.UnaryUnaryMultiCallable[_room_service_pb2.CloseRoomRequest, _room_service_pb2.CloseRoomResponse]
-    """Closes a room; a running game is aborted. PERMISSION_DENIED (OWNER_TOKEN_WRONG)."""
+    """Closes a room; a running game is aborted. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND (ROOM_UNKNOWN)."""
 
 @_typing.type_check_only
 class RoomServiceAsyncStub(RoomServiceStub):
@@ -60,13 +63,16 @@ class RoomServiceAsyncStub(RoomServiceStub):
     GetRoom: _aio.UnaryUnaryMultiCallable[_room_service_pb2.GetRoomRequest, _room_service_pb2.GetRoomResponse]  # type: ignore[assignment]
     """One room. NOT_FOUND (ROOM_UNKNOWN)."""
     ListRooms: _aio.UnaryUnaryMultiCallable[_room_service_pb2.ListRoomsRequest, _room_service_pb2.ListRoomsResponse]  # type: ignore[assignment]
-    """Rooms of the server, newest last."""
+    """Rooms of the server, newest last. A page may hold fewer rooms than asked for and still have a next one. INVALID_ARGUMENT
+    (PAGE_TOKEN_REFUSED, STATE_REFUSED).
+    """
     JoinRoom: _aio.UnaryUnaryMultiCallable[_room_service_pb2.JoinRoomRequest, _room_service_pb2.JoinRoomResponse]  # type: ignore[assignment]
     """Takes a seat and gives the ticket for it. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED (ROOM_FULL);
-    FAILED_PRECONDITION (SEAT_TAKEN, KIND_NOT_ADMITTED, GAME_STARTED); NOT_FOUND (ROOM_UNKNOWN).
+    FAILED_PRECONDITION (SEAT_TAKEN, KIND_NOT_ADMITTED, GAME_STARTED); INVALID_ARGUMENT (NO_SUCH_SEAT, NAME_REFUSED, KIND_REFUSED);
+    NOT_FOUND (ROOM_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
     """
     CloseRoom: _aio.UnaryUnaryMultiCallable[_room_service_pb2.CloseRoomRequest, _room_service_pb2.CloseRoomResponse]  # type: ignore[assignment]
-    """Closes a room; a running game is aborted. PERMISSION_DENIED (OWNER_TOKEN_WRONG)."""
+    """Closes a room; a running game is aborted. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND (ROOM_UNKNOWN)."""
 
 class RoomServiceServicer(metaclass=_abc_1.ABCMeta):
     """Rooms of a server."""
@@ -95,7 +101,9 @@ class RoomServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _room_service_pb2.ListRoomsRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_room_service_pb2.ListRoomsResponse, _abc.Awaitable[_room_service_pb2.ListRoomsResponse]]:
-        """Rooms of the server, newest last."""
+        """Rooms of the server, newest last. A page may hold fewer rooms than asked for and still have a next one. INVALID_ARGUMENT
+        (PAGE_TOKEN_REFUSED, STATE_REFUSED).
+        """
 
     @_abc_1.abstractmethod
     def JoinRoom(
@@ -104,7 +112,8 @@ class RoomServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_room_service_pb2.JoinRoomResponse, _abc.Awaitable[_room_service_pb2.JoinRoomResponse]]:
         """Takes a seat and gives the ticket for it. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED (ROOM_FULL);
-        FAILED_PRECONDITION (SEAT_TAKEN, KIND_NOT_ADMITTED, GAME_STARTED); NOT_FOUND (ROOM_UNKNOWN).
+        FAILED_PRECONDITION (SEAT_TAKEN, KIND_NOT_ADMITTED, GAME_STARTED); INVALID_ARGUMENT (NO_SUCH_SEAT, NAME_REFUSED, KIND_REFUSED);
+        NOT_FOUND (ROOM_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
         """
 
     @_abc_1.abstractmethod
@@ -113,6 +122,6 @@ class RoomServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _room_service_pb2.CloseRoomRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_room_service_pb2.CloseRoomResponse, _abc.Awaitable[_room_service_pb2.CloseRoomResponse]]:
-        """Closes a room; a running game is aborted. PERMISSION_DENIED (OWNER_TOKEN_WRONG)."""
+        """Closes a room; a running game is aborted. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND (ROOM_UNKNOWN)."""
 
 def add_RoomServiceServicer_to_server(servicer: RoomServiceServicer, server: _typing.Union[_grpc.Server, _aio.Server]) -> None: ...

@@ -129,7 +129,9 @@ Global___SpecialAction: _TypeAlias = SpecialAction  # noqa: Y015
 
 @_typing.final
 class RuleSet(_message.Message):
-    """A rule set. In a request every unset field takes the value of the preset; in a response every field is set."""
+    """A rule set. In a request every unset field takes the value of the preset; in a response every field is set, and the preset is empty
+    except where presets are listed.
+    """
 
     DESCRIPTOR: _descriptor.Descriptor
 

@@ -35,7 +35,7 @@ class SpectatorServiceStub:
     def __new__(cls, channel: _aio.Channel) -> SpectatorServiceAsyncStub: ...
     Watch: _grpc.UnaryStreamMultiCallable[_spectator_service_pb2.SpectatorServiceWatchRequest, _spectator_service_pb2.SpectatorServiceWatchResponse]
     """The public events of a room as its policy allows, until the game is over. A message without events is a heartbeat. NOT_FOUND
-    (ROOM_UNKNOWN); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED); ends with RESOURCE_EXHAUSTED (SPECTATOR_TOO_SLOW) when the
+    (ROOM_UNKNOWN); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED); RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS); ends with RESOURCE_EXHAUSTED (SPECTATOR_TOO_SLOW) when the
     spectator does not keep up: watch again from the number after the last event seen.
     """
 
@@ -46,7 +46,7 @@ class SpectatorServiceAsyncStub(SpectatorServiceStub):
     def __init__(self, channel: _aio.Channel) -> None: ...
     Watch: _aio.UnaryStreamMultiCallable[_spectator_service_pb2.SpectatorServiceWatchRequest, _spectator_service_pb2.SpectatorServiceWatchResponse]  # type: ignore[assignment]
     """The public events of a room as its policy allows, until the game is over. A message without events is a heartbeat. NOT_FOUND
-    (ROOM_UNKNOWN); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED); ends with RESOURCE_EXHAUSTED (SPECTATOR_TOO_SLOW) when the
+    (ROOM_UNKNOWN); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED); RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS); ends with RESOURCE_EXHAUSTED (SPECTATOR_TOO_SLOW) when the
     spectator does not keep up: watch again from the number after the last event seen.
     """
 
@@ -60,7 +60,7 @@ class SpectatorServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_abc.Iterator[_spectator_service_pb2.SpectatorServiceWatchResponse], _abc.AsyncIterator[_spectator_service_pb2.SpectatorServiceWatchResponse]]:
         """The public events of a room as its policy allows, until the game is over. A message without events is a heartbeat. NOT_FOUND
-        (ROOM_UNKNOWN); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED); ends with RESOURCE_EXHAUSTED (SPECTATOR_TOO_SLOW) when the
+        (ROOM_UNKNOWN); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED); RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS); ends with RESOURCE_EXHAUSTED (SPECTATOR_TOO_SLOW) when the
         spectator does not keep up: watch again from the number after the last event seen.
         """
 

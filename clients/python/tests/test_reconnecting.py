@@ -1,0 +1,157 @@
+"""Lost connections and substitutes, without a connection: what is said again on the next one, and what is not."""
+
+from collections.abc import Callable
+
+import pytest
+from stage import Stage, attached, decision, detached, ended, events, result, returned, substituted
+
+from chefshat import ChefsHatError, pb
+
+
+def test_reconnecting_resumes_after_the_last_event(stage: Stage) -> None:
+    stage.say(events(1, 2, 3))
+    stage.session.lost()
+    stage.connect()
+    assert stage.sent[0].attach.from_sequence == 4
+    # An event that comes twice all the same is told once.
+    stage.say(attached(), events(3, 4))
+    assert [line for line in stage.log if line[0] == "event"] == [("event", number) for number in (1, 2, 3, 4)]  # type: ignore[index]
+    stage.say(ended(5), detached("GAME_OVER"))
+    assert stage.session.results()["t"].reconnects == 1
+
+
+def test_an_unacknowledged_answer_is_repeated_once_and_not_thought_over(stage: Stage) -> None:
+    (ask,) = stage.say(decision(1))
+    stage.answer(ask, 2)
+    stage.session.lost()
+    stage.connect()
+    asks = stage.session.receive(pb.PlayResponse(updates=[attached(), decision(1)]))
+    assert asks == []
+    stage.flush()
+    assert stage.answers() == [(0, 1, 2)]
+    # The acknowledgement may come twice: once more for the answer of the lost connection.
+    stage.say(result(1, "ACCEPTED"), result(1, "ACCEPTED"))
+    stage.say(ended(1), detached("GAME_OVER"))
+    assert stage.session.results()["t"].decisions == 1
+
+
+def test_a_decision_put_again_while_the_agent_thinks_is_answered_on_the_new_connection(stage: Stage) -> None:
+    (ask,) = stage.say(decision(1))
+    stage.session.lost()
+    stage.connect()
+    assert stage.say(attached(), decision(1)) == []
+    stage.answer(ask)
+    assert stage.answers() == [(0, 1, 1)]
+
+
+def test_an_answer_given_between_connections_is_sent_on_the_next(stage: Stage) -> None:
+    (ask,) = stage.say(decision(1))
+    stage.session.lost()
+    stage.answer(ask)
+    assert stage.sent == []
+    stage.connect()
+    assert [command.WhichOneof("command") for command in stage.sent] == ["attach"]
+    assert stage.say(attached(), decision(1)) == []
+    assert stage.answers() == [(0, 1, 1)]
+
+
+def test_a_decision_nobody_was_asked_for_is_asked_when_it_is_put_again(stage: Stage) -> None:
+    asks = stage.say(decision(1))
+    stage.session.lost(unasked=asks)
+    stage.connect()
+    (again,) = stage.say(attached(), decision(1))
+    assert again.decision.decision_id == 1
+
+
+def test_handles_of_a_lost_connection_mean_nothing() -> None:
+    stage = Stage("t", "u")
+    stage.connect()
+    stage.say(attached(1, seat=0), attached(2, seat=3))
+    stage.say(detached("GAME_OVER", handle=0))
+    stage.session.lost()
+    stage.connect()
+    assert [(command.attach.ticket, command.attach.request_id) for command in stage.sent] == [("u", 2)]
+    # On this connection the second seat is the first to attach.
+    stage.say(pb.SeatUpdate(handle=0, attached=pb.Attached(request_id=2, seat=3)))
+    (ask,) = stage.say(decision(1, handle=0))
+    assert ask.decision.seat == 3
+    assert stage.say(decision(1, handle=1)) == []
+
+
+def test_a_connection_lost_after_the_games_end_is_not_made_again(stage: Stage) -> None:
+    stage.say(ended(1))
+    stage.session.lost()
+    assert stage.session.done
+    assert stage.session.results()["t"].finished
+
+
+def test_giving_up_ends_what_is_open(stage: Stage) -> None:
+    stage.session.lost()
+    stage.session.give_up(ChefsHatError("UNAVAILABLE"))
+    assert stage.session.done
+    with pytest.raises(ChefsHatError, match="UNAVAILABLE"):
+        stage.session.results()["t"].raise_for_error()
+
+
+def test_progress_is_made_by_events_and_accepted_answers_alone(stage: Stage) -> None:
+    steps: list[tuple[Callable[[], object], bool]] = [
+        (lambda: stage.say(events(1)), True),
+        (lambda: stage.say(events(1)), False),
+        (lambda: stage.say(attached()), False),
+        (lambda: stage.answer(stage.say(decision(1))[0]), False),
+        (lambda: stage.say(result(1, "ACCEPTED")), True),
+        (lambda: stage.say(result(1, "ACCEPTED")), False),
+    ]
+    for number, (step, moves) in enumerate(steps):
+        before = stage.session.progress
+        step()
+        assert (stage.session.progress > before) is moves, number
+
+
+def test_a_substituted_seat_says_once_that_it_is_here(stage: Stage) -> None:
+    stage.say(substituted(1, seat=3))
+    assert stage.said() == []
+    stage.say(substituted(2))
+    assert stage.said() == [(0, "resume")]
+    stage.say(events(3), substituted(2))
+    assert stage.said() == []
+    stage.say(returned(4), decision(1))
+    assert stage.said() == []
+    # The next time is another time.
+    stage.say(substituted(5))
+    assert stage.said() == [(0, "resume")]
+
+
+def test_a_substitution_that_is_over_is_not_answered(stage: Stage) -> None:
+    (ask,) = stage.say(substituted(1), returned(2), decision(1))
+    assert stage.said() == []
+    stage.answer(ask)
+    assert stage.said() == [(0, "answer")]
+    # Attaching ends it, so what happened before is over too.
+    stage.session.lost()
+    stage.connect()
+    stage.say(attached(next_sequence=10), substituted(9))
+    assert stage.said() == [(0, "answer")]
+    stage.say(substituted(10), returned(11, seat=3))
+    assert stage.said() == [(0, "resume")]
+
+
+def test_a_substituted_seat_whose_game_or_connection_is_over_says_nothing(stage: Stage) -> None:
+    stage.say(substituted(1), ended(2))
+    assert stage.said() == []
+    stage.say(detached("GAME_OVER"))
+    assert stage.session.results()["t"].finished
+    other = Stage()
+    other.connect()
+    other.say(attached())
+    other.say(substituted(1), detached("SUPERSEDED"))
+    assert other.said() == []
+
+
+def test_every_substituted_seat_of_a_stream_comes_back_on_its_own_handle() -> None:
+    stage = Stage("t", "u")
+    stage.connect()
+    stage.say(attached(1, seat=2), attached(2, seat=3))
+    both = [pb.GameEvent(sequence=seat, substituted=pb.Substituted(seat=seat)) for seat in (2, 3)]
+    stage.say(*(pb.SeatUpdate(handle=handle, events=pb.EventBatch(events=both)) for handle in (0, 1)))
+    assert stage.said() == [(0, "resume"), (1, "resume")]
