@@ -15,7 +15,13 @@ from chefshat import agent as command
 
 PACKAGE = Path(__file__).resolve().parents[1]
 PRINTED_ADDRESS = "127.0.0.1:50051"
-README = re.findall(r"^```python\n(.*?)^```", (PACKAGE / "README.md").read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+# The package's own README and, in a checkout of the whole project, that one's.
+READMES = [path for path in (PACKAGE / "README.md", PACKAGE.parents[1] / "README.md") if path.is_file()]
+README = [
+    block
+    for path in READMES
+    for block in re.findall(r"^```python\n(.*?)^```", path.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+]
 SAMPLES = sorted(path.name for path in (PACKAGE / "samples").glob("*.py"))
 # Seconds a sample may take before it counts as hanging.
 LIMIT_S = 120
@@ -29,7 +35,8 @@ def run_python(*arguments: str) -> str:
 
 
 def test_there_are_samples() -> None:
-    assert len(README) >= 6
+    assert len(READMES) == 2
+    assert len(README) >= 7
     assert len(SAMPLES) >= 4
 
 
