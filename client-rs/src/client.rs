@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use tonic::transport::{Channel, Endpoint};
 
+use crate::error::with_causes;
 use crate::session::Session;
 use crate::v1::act_request::Command;
 use crate::v1::play_service_client::PlayServiceClient;
@@ -36,7 +37,8 @@ impl Client {
     /// Connects to a server at `http://host:port`, or `host:port`.
     ///
     /// # Errors
-    /// `ADDRESS_REFUSED` if that is no address, `CONNECT_FAILED` if nobody answers there within five seconds.
+    /// `ADDRESS_REFUSED` if that is no address with a port, or one of another scheme (for TLS, make a channel and use
+    /// [`from_channel`](Self::from_channel)); `CONNECT_FAILED` if nobody answers there within five seconds.
     pub async fn connect(url: impl AsRef<str>) -> Result<Self, Error> {
         let url = url.as_ref();
         let address = if url.contains("://") {
@@ -44,8 +46,15 @@ impl Client {
         } else {
             format!("http://{url}")
         };
-        let channel = Endpoint::from_shared(address)
-            .map_err(|cause| Error::address(url, &cause))?
+        let endpoint = Endpoint::from_shared(address)
+            .map_err(|cause| Error::address(url, &with_causes(&cause)))?;
+        if endpoint.uri().scheme_str() != Some("http") {
+            return Err(Error::address(url, "only plain http:// is spoken here"));
+        }
+        if endpoint.uri().port().is_none() {
+            return Err(Error::address(url, "the port is missing"));
+        }
+        let channel = endpoint
             .connect_timeout(CONNECT_TIMEOUT)
             .tcp_nodelay(true)
             .http2_keep_alive_interval(KEEPALIVE_INTERVAL)

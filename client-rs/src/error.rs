@@ -58,11 +58,9 @@ impl Error {
         }
     }
 
-    pub(crate) fn address(url: &str, cause: &tonic::transport::Error) -> Self {
-        let message = format!(
-            "{url:?} is not the address of a server, give http://HOST:PORT: {}",
-            with_causes(cause)
-        );
+    pub(crate) fn address(url: &str, cause: &str) -> Self {
+        let message =
+            format!("{url:?} is not the address of a server, give http://HOST:PORT: {cause}");
         Self::own(Code::InvalidArgument, ADDRESS_REFUSED, message)
     }
 
@@ -121,7 +119,7 @@ impl fmt::Display for Error {
 impl std::error::Error for Error {}
 
 /// An error and all that caused it, each once: transport errors keep what happened in their causes.
-fn with_causes(error: &dyn std::error::Error) -> String {
+pub(crate) fn with_causes(error: &dyn std::error::Error) -> String {
     let mut text = error.to_string();
     let mut next = error.source();
     while let Some(cause) = next {

@@ -266,6 +266,9 @@ async fn addresses_that_lead_nowhere_say_so() {
     };
     let table = [
         ("not an address", "ADDRESS_REFUSED"),
+        ("https://localhost:50051", "ADDRESS_REFUSED"),
+        ("grpc://localhost:50051", "ADDRESS_REFUSED"),
+        ("localhost", "ADDRESS_REFUSED"),
         (closed.as_str(), "CONNECT_FAILED"),
     ];
     for (url, reason) in table {

@@ -8,7 +8,7 @@ use chefshat_arena::AgentKind;
 use chefshat_client::{Client, Outcome, PlayError, v1};
 use clap::Args;
 
-use super::connect::{KindArg, ServerArg, code_in};
+use super::connect::{KindArg, ServerArg, code_in, free_seats};
 use super::remote::{MAX_PACE_MS, RemoteAgent, agent_kind, seed_for};
 use super::{CommandError, say};
 
@@ -114,7 +114,12 @@ impl AgentCommand {
             })
             .await?;
         *last_code = Some(code);
-        anstream::eprintln!("{name} has seat {} and plays to the end", joined.seat);
+        let waits = match joined.room.as_ref().map_or(0, free_seats) {
+            0 => String::new(),
+            1 => "waits for 1 other seat to be taken, then ".to_owned(),
+            free => format!("waits for {free} other seats to be taken, then "),
+        };
+        anstream::eprintln!("{name} has seat {}; {waits}plays to the end", joined.seat);
         Ok(joined.ticket)
     }
 }

@@ -29,6 +29,11 @@ pub(super) struct ServerArg {
 }
 
 impl ServerArg {
+    /// The address as it was given.
+    pub(super) fn url(&self) -> &str {
+        &self.server
+    }
+
     /// Connects at once or not at all.
     ///
     /// # Errors
@@ -110,6 +115,12 @@ pub(super) async fn code_in(file: &Path, last: Option<&str>) -> Result<String, C
         }
         sleep(PAUSE).await;
     }
+}
+
+/// How many seats of a room nobody holds yet.
+pub(super) fn free_seats(room: &v1::Room) -> usize {
+    let free = |seat: &&v1::Participant| seat.name.is_empty();
+    room.seats.iter().filter(free).count()
 }
 
 /// What a participant says it is, on the command line.

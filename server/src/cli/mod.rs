@@ -13,9 +13,10 @@ mod serve;
 mod simulate;
 
 use std::fmt::Display;
-use std::io::{self, Write as _};
+use std::io::{self, IsTerminal as _, Write as _};
 use std::process::ExitCode;
 
+use clap::builder::FalseyValueParser;
 use clap::{Parser, Subcommand};
 use tracing_subscriber::EnvFilter;
 
@@ -32,7 +33,7 @@ struct Cli {
     #[arg(long, env = "CHEFSHAT_LOG", default_value = "warn", global = true)]
     log: String,
     /// Log lines as JSON.
-    #[arg(long, env = "CHEFSHAT_LOG_JSON", global = true)]
+    #[arg(long, env = "CHEFSHAT_LOG_JSON", global = true, value_parser = FalseyValueParser::new())]
     log_json: bool,
 }
 
@@ -97,9 +98,12 @@ fn in_runtime(
 fn start_logging(cli: &Cli) -> Result<(), CommandError> {
     let filter = EnvFilter::try_new(&cli.log)
         .map_err(|error| format!("--log {:?}: {error}; write for instance info", cli.log))?;
+    let colours =
+        io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|set| set.is_empty());
     let logs = tracing_subscriber::fmt()
         .with_env_filter(filter)
-        .with_writer(std::io::stderr);
+        .with_ansi(colours)
+        .with_writer(io::stderr);
     if cli.log_json {
         logs.json().init();
     } else {

@@ -3,41 +3,50 @@
 
 use chefshat_engine::{RuleSet, RuleSetSpec};
 use chefshat_proto::v1;
-use chefshat_records::convert::{FieldProblem, rules_from_proto};
+use chefshat_records::convert::rules_from_proto;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, ValueEnum};
+
+use super::CommandError;
 
 /// A rule set as the command line describes it.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Rules")]
 pub(super) struct RulesArgs {
-    /// Where the rules start from; every other flag overrides one field.
+    /// Where the rules start from; every other flag overrides one field. paper: to 15 points, 5,3,1,0 by place, the Golden 11 opens.
+    /// rulebook: the same with 3,2,1,0. original2020: as paper, but any 11 opens, the opener may pass and a pass binds for one turn.
     #[arg(long, default_value = "paper", value_parser = PossibleValuesParser::new(RuleSetSpec::PRESETS))]
     preset: String,
-    /// Seats, 2 to 6.
+    /// Seats, 2 to 6; standard 4.
     #[arg(long, value_name = "N")]
     players: Option<u32>,
-    /// Faces, 4 to 15; face f is in the deck f times.
+    /// Faces, 4 to 15; face f is in the deck f times; standard 11.
     #[arg(long, value_name = "F")]
     faces: Option<u32>,
-    /// Jokers, 0 to 2.
+    /// Jokers, 0 to 2; standard 2.
     #[arg(long, value_name = "J")]
     jokers: Option<u32>,
-    /// End after the Shift in which somebody reaches this many points.
+    /// End after the Shift in which somebody reaches this many points; standard 15.
     #[arg(long, value_name = "POINTS", conflicts_with = "target_shifts")]
     target_points: Option<u32>,
     /// End after this many Shifts.
     #[arg(long, value_name = "SHIFTS")]
     target_shifts: Option<u32>,
-    /// Points by place, for instance 3,2,1,0.
+    /// Points by place, from the first on, for instance 5,3,1,0.
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     points: Vec<u32>,
     /// Whether cards are exchanged from the second Shift on.
     #[arg(long, value_name = "ON|OFF")]
     exchange: Option<Switch>,
+    /// Short for --exchange off.
+    #[arg(long, conflicts_with = "exchange")]
+    no_exchange: bool,
     /// Whether special actions are offered from the second Shift on.
     #[arg(long, value_name = "ON|OFF")]
     special_actions: Option<Switch>,
+    /// Short for --special-actions off.
+    #[arg(long, conflicts_with = "special_actions")]
+    no_special_actions: bool,
     /// Who opens a Shift.
     #[arg(long)]
     opening: Option<OpeningFlag>,
@@ -97,8 +106,9 @@ impl RulesArgs {
             stop: (self.target_points.map(Stop::TargetPoints))
                 .or(self.target_shifts.map(Stop::TargetShifts)),
             points: self.points.clone(),
-            exchange: self.exchange.map(on),
-            special_actions: self.special_actions.map(on),
+            exchange: (self.exchange.map(on)).or(self.no_exchange.then_some(false)),
+            special_actions: (self.special_actions.map(on))
+                .or(self.no_special_actions.then_some(false)),
             opening: match self.opening {
                 None => v1::Opening::Unspecified,
                 Some(OpeningFlag::Golden) => v1::Opening::Golden,
@@ -120,9 +130,31 @@ impl RulesArgs {
     /// The rule set.
     ///
     /// # Errors
-    /// The first field that makes no sense.
-    pub(super) fn rules(&self) -> Result<RuleSet, FieldProblem> {
-        rules_from_proto(&self.message())
+    /// The first flag that makes no sense.
+    pub(super) fn rules(&self) -> Result<RuleSet, CommandError> {
+        rules_of(&self.message())
+    }
+}
+
+/// The rule set of a message that was made from flags.
+///
+/// # Errors
+/// The first flag that makes no sense.
+pub(super) fn rules_of(message: &v1::RuleSet) -> Result<RuleSet, CommandError> {
+    rules_from_proto(message).map_err(|problem| by_flag(problem.field, &problem.message).into())
+}
+
+/// What is wrong with a field of the protocol, for somebody who typed a flag.
+pub(super) fn by_flag(field: &str, message: &str) -> String {
+    let flag = match field {
+        "reward_scheme" => "reward".to_owned(),
+        "spectator_delay_decisions" => "spectator-delay".to_owned(),
+        _ => field.replace('_', "-"),
+    };
+    // Some messages begin with the field.
+    match message.strip_prefix(field) {
+        Some(rest) if rest.starts_with(' ') => format!("--{flag}{rest}"),
+        _ => format!("--{flag}: {message}"),
     }
 }
 
@@ -183,6 +215,13 @@ mod tests {
     fn nonsense_names_its_field() {
         let only = Only::try_parse_from(["test", "--faces", "3"]).expect("a number");
         let problem = only.rules.rules().expect_err("three faces are too few");
-        assert_eq!(problem.field, "faces");
+        assert!(problem.to_string().starts_with("--faces: "), "{problem}");
+        let only = Only::try_parse_from(["test", "--max-turns", "0"]).expect("a number");
+        let problem = only.rules.rules().expect_err("no turns are too few");
+        assert!(
+            problem.to_string().starts_with("--max-turns is 0"),
+            "{problem}"
+        );
+        assert_eq!(by_flag("reward_scheme", "odd"), "--reward: odd");
     }
 }

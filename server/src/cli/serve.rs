@@ -1,12 +1,12 @@
 //! `chefshat serve`: host rooms until told to stop.
 
-use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Duration;
 
 use clap::Args;
+use clap::builder::{FalseyValueParser, RangedU64ValueParser};
 use tokio::net::TcpListener;
 use tokio::signal::unix::{SignalKind, signal};
 
@@ -21,26 +21,28 @@ use crate::store::MemoryStore;
     after_help = "Example:\n  chefshat serve --listen 127.0.0.1:50051 --data-dir ./chefshat-data"
 )]
 pub(super) struct Serve {
-    /// Address and port to listen on; port 0 takes a free one.
-    #[arg(long, env = "CHEFSHAT_LISTEN", default_value = "127.0.0.1:50051")]
-    listen: SocketAddr,
+    /// Address and port to listen on, such as 0.0.0.0:50051 or localhost:50051; port 0 takes a free one.
+    #[arg(long, env = "CHEFSHAT_LISTEN", value_name = "HOST:PORT", default_value = "127.0.0.1:50051", value_parser = host_and_port)]
+    listen: String,
     /// Folder for records of finished games (records/GAME-ID.jsonl). Standard: chefshat in the user's data folder.
     #[arg(long, env = "CHEFSHAT_DATA_DIR")]
     data_dir: Option<PathBuf>,
     /// Write no records.
-    #[arg(long, env = "CHEFSHAT_NO_RECORDS", conflicts_with = "data_dir")]
+    #[arg(long, env = "CHEFSHAT_NO_RECORDS", value_parser = FalseyValueParser::new())]
     no_records: bool,
     /// Most rooms at a time.
-    #[arg(long, env = "CHEFSHAT_MAX_ROOMS", default_value_t = 10_000)]
+    #[arg(long, env = "CHEFSHAT_MAX_ROOMS", default_value_t = 10_000, value_parser = RangedU64ValueParser::<usize>::new().range(1..))]
     max_rooms: usize,
     /// Seconds that running games may go on after the server was told to stop.
     #[arg(long, env = "CHEFSHAT_GRACE", default_value_t = 30)]
     grace: u64,
-    /// Web origin whose pages may call the server (repeatable); * is all.
+    /// Web origin whose pages may call the server, such as https://example.org (repeatable); * is all.
     #[arg(
         long = "allow-origin",
         env = "CHEFSHAT_ALLOW_ORIGIN",
-        value_delimiter = ','
+        value_name = "ORIGIN",
+        value_delimiter = ',',
+        value_parser = origin
     )]
     allowed_origins: Vec<String>,
     /// Say where the server listens as a JSON line on standard output.
@@ -50,11 +52,15 @@ pub(super) struct Serve {
 
 impl Serve {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
-        let data_dir = match self.no_records {
-            true => None,
-            false => Some(data_dir::prepare(self.data_dir)?),
+        // Not left to clap, for which a variable that says no is there as much as one that says yes.
+        let data_dir = match (self.no_records, self.data_dir) {
+            (true, None) => None,
+            (true, Some(_)) => {
+                return Err("--no-records and --data-dir cannot be used together".into());
+            }
+            (false, data_dir) => Some(data_dir::prepare(data_dir)?),
         };
-        let listener = TcpListener::bind(self.listen).await.map_err(|error| {
+        let listener = TcpListener::bind(&self.listen).await.map_err(|error| {
             format!(
                 "cannot listen on {}: {error}; choose another address with --listen",
                 self.listen
@@ -75,7 +81,9 @@ impl Serve {
             data_dir,
             max_rooms: self.max_rooms,
             grace: Duration::from_secs(self.grace),
-            allowed_origins: self.allowed_origins,
+            allowed_origins: (self.allowed_origins.into_iter())
+                .filter(|origin| !origin.is_empty())
+                .collect(),
             ..ServerConfig::default()
         };
         let stop = async move {
@@ -97,5 +105,70 @@ impl Serve {
         };
         serve(listener, config, Arc::new(MemoryStore::default()), stop).await?;
         Ok(ExitCode::SUCCESS)
+    }
+}
+
+/// Checks the form of an address; whether there is such a host is found out when it is used.
+fn host_and_port(text: &str) -> Result<String, String> {
+    let whole = |(host, port): (&str, &str)| !host.is_empty() && port.parse::<u16>().is_ok();
+    match text.rsplit_once(':').is_some_and(whole) {
+        true => Ok(text.to_owned()),
+        false => Err("give IP:PORT or HOST:PORT, for instance 127.0.0.1:50051".to_owned()),
+    }
+}
+
+/// Checks a web origin as browsers send it: a scheme and a host, without a path. A variable that is empty names none.
+fn origin(text: &str) -> Result<String, String> {
+    if text.is_empty() || text == "*" {
+        return Ok(text.to_owned());
+    }
+    let host = (text.strip_prefix("https://")).or(text.strip_prefix("http://"));
+    let plain =
+        |letter: char| letter.is_ascii_graphic() && !matches!(letter, '/' | '?' | '#' | '@');
+    match host.is_some_and(|host| !host.is_empty() && host.chars().all(plain)) {
+        true => Ok(text.to_owned()),
+        false => Err(
+            "give http://HOST or https://HOST with a port if it has one and no path, for instance https://example.org, or *"
+                .to_owned(),
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{host_and_port, origin};
+
+    #[test]
+    fn addresses_have_a_host_and_a_port() {
+        for good in ["127.0.0.1:0", "localhost:50051", "[::1]:50051"] {
+            assert_eq!(host_and_port(good).as_deref(), Ok(good));
+        }
+        for bad in [
+            "",
+            "50051",
+            ":50051",
+            "localhost",
+            "localhost:http",
+            "localhost:70000",
+        ] {
+            assert!(host_and_port(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn origins_are_as_browsers_send_them() {
+        for good in ["", "*", "http://localhost:8080", "https://example.org"] {
+            assert_eq!(origin(good).as_deref(), Ok(good));
+        }
+        for bad in [
+            "example.org",
+            "https://",
+            "https://example.org/",
+            "https://a b",
+            " *",
+            "ftp://a",
+        ] {
+            assert!(origin(bad).is_err(), "{bad}");
+        }
     }
 }

@@ -4,13 +4,12 @@
 mod report;
 
 use std::io::Write as _;
-use std::num::{NonZeroU32, NonZeroUsize};
+use std::num::NonZeroU32;
 use std::process::ExitCode;
 use std::time::Instant;
 
 use chefshat_arena::{AgentKind, Batch, BatchTable};
-use chefshat_engine::{RewardScheme, RuleSet};
-use chefshat_records::convert::FieldProblem;
+use chefshat_engine::RewardScheme;
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -25,6 +24,9 @@ Examples:
   chefshat simulate --games 10000 --preset original2020 --no-exchange --no-special-actions --json
 
 The same seed gives the same output, on any number of threads.";
+
+/// Most threads; more than any machine has cores for.
+const MAX_THREADS: usize = 256;
 
 /// Play many games offline, on all cores, and print what they add up to.
 #[derive(Debug, Args)]
@@ -45,20 +47,14 @@ pub(super) struct Simulate {
     /// Take the default decision after so many invalid answers to one decision. Standard: ask again without end.
     #[arg(long, value_name = "N")]
     max_invalid_attempts: Option<NonZeroU32>,
-    /// Threads to play on. Standard: one for each core.
-    #[arg(long, value_name = "N")]
-    threads: Option<NonZeroUsize>,
+    /// Threads to play on, at most 256 and one for each game; 0 is one for each core.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    threads: usize,
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
     #[command(flatten)]
     rules: RulesArgs,
-    /// Short for --exchange off.
-    #[arg(long, conflicts_with = "exchange", help_heading = "Rules")]
-    no_exchange: bool,
-    /// Short for --special-actions off.
-    #[arg(long, conflicts_with = "special_actions", help_heading = "Rules")]
-    no_special_actions: bool,
 }
 
 fn agents() -> impl TypedValueParser<Value = AgentKind> {
@@ -74,11 +70,9 @@ fn schemes() -> impl TypedValueParser<Value = RewardScheme> {
 impl Simulate {
     pub(super) fn run(self) -> Result<ExitCode, CommandError> {
         let batch = self.batch()?;
-        let mut pool = rayon::ThreadPoolBuilder::new();
-        if let Some(threads) = self.threads {
-            pool = pool.num_threads(threads.get());
-        }
-        let pool = pool.build()?;
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads_for(self.threads, batch.games()))
+            .build()?;
         let bar = ProgressBar::new(batch.games()).with_style(ProgressStyle::with_template(
             "{bar:40} {human_pos} of {human_len} games, {eta} left",
         )?);
@@ -99,10 +93,7 @@ impl Simulate {
 
     /// What is to be played.
     fn batch(&self) -> Result<Batch, CommandError> {
-        let rules = self.rule_set().map_err(|problem| {
-            let flag = problem.field.replace('_', "-");
-            format!("--{flag}: {}", problem.message)
-        })?;
+        let rules = self.rules.rules()?;
         let players = rules.players();
         let agents = if self.agents.is_empty() {
             let mut agents = vec![AgentKind::Random; players];
@@ -123,14 +114,12 @@ impl Simulate {
         }
         Ok(batch)
     }
+}
 
-    fn rule_set(&self) -> Result<RuleSet, FieldProblem> {
-        let mut spec = self.rules.rules()?.spec();
-        spec.exchange &= !self.no_exchange;
-        spec.special_actions &= !self.no_special_actions;
-        spec.validate()
-            .map_err(|error| FieldProblem::new(error.field(), error.to_string()))
-    }
+/// Threads to start for so many games; 0 leaves it to the number of cores. Threads without a game would only be started and ended.
+fn threads_for(asked: usize, games: u64) -> usize {
+    let games = usize::try_from(games).unwrap_or(usize::MAX);
+    asked.min(MAX_THREADS).min(games)
 }
 
 /// For people who watch: to standard error, because it is never the same twice.
@@ -141,4 +130,17 @@ fn say_speed(table: &BatchTable, seconds: f64) {
         report::grouped(answers),
         answers as f64 / seconds / 1e6
     );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::threads_for;
+
+    #[test]
+    fn threads_are_no_more_than_are_of_use() {
+        assert_eq!(threads_for(0, 1000), 0, "the cores decide");
+        assert_eq!(threads_for(3, 1000), 3);
+        assert_eq!(threads_for(3, 2), 2);
+        assert_eq!(threads_for(20_000, 1_000_000), 256);
+    }
 }

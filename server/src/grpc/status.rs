@@ -132,6 +132,7 @@ impl From<JoinError> for Refusal {
             JoinError::NoSuchSeat => (Code::InvalidArgument, "NO_SUCH_SEAT"),
             JoinError::KindNotAdmitted => (Code::FailedPrecondition, "KIND_NOT_ADMITTED"),
             JoinError::GameStarted => (Code::FailedPrecondition, "GAME_STARTED"),
+            JoinError::GameOver => (Code::FailedPrecondition, "GAME_OVER"),
         };
         Self(status(code, reason, error.to_string(), []))
     }

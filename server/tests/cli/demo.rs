@@ -75,6 +75,7 @@ fn a_game_is_told_to_its_end() {
     let path = only_record(folder.path());
     assert!(ended.stdout.contains(path.to_str().unwrap()));
     assert!(ended.stdout.contains("check out"));
+    assert!(ended.stdout.contains("how to read"));
     let record = record(&path);
     assert_eq!(
         record.last().unwrap()["footer"]["state"],
@@ -198,8 +199,12 @@ fn what_makes_no_sense_is_refused_in_words() {
             vec!["--agents", "greedy,random", "--players", "3"],
             "2 agents",
         ),
-        (vec!["--agents", "greedy"], "players"),
-        (vec!["--faces", "3"], "faces"),
+        (
+            vec!["--agents", "greedy"],
+            "--agents names 1 agent; name 2 to 6",
+        ),
+        (vec!["--faces", "3"], "--faces: "),
+        (vec!["--max-turns", "0"], "--max-turns is 0"),
     ] {
         let ended = demo(folder.path(), &flags);
         assert_eq!(ended.code, Some(1), "{flags:?}");

@@ -34,6 +34,9 @@ fn program() -> Command {
 fn serve(data_dir: &Path) -> (Running, String) {
     let mut command = program();
     command.args(["serve", "--listen", "127.0.0.1:0", "--json", "--data-dir"]);
+    // Both say no, so that the records are written.
+    command.env("CHEFSHAT_NO_RECORDS", "0");
+    command.env("CHEFSHAT_LOG_JSON", "");
     let mut child = command
         .arg(data_dir)
         .stderr(Stdio::inherit())
@@ -205,7 +208,7 @@ fn an_aborted_game_is_told_to_its_agent() {
     let mut line = String::new();
     let mut stderr = BufReader::new(agent.0.stderr.take().unwrap());
     stderr.read_line(&mut line).unwrap();
-    assert!(line.contains("seat 0"), "{line}");
+    assert!(line.contains("seat 0; waits for 3 other seats"), "{line}");
 
     let close = [
         "room",
@@ -226,6 +229,52 @@ fn an_aborted_game_is_told_to_its_agent() {
         ["aborted", "lost"].contains(&result["event"].as_str().unwrap()),
         "{line}"
     );
+}
+
+#[test]
+fn what_a_room_cannot_have_is_said_in_flags_before_there_is_one() {
+    let folder = TempDir::new().unwrap();
+    let (_server, url) = serve(folder.path());
+    let nowhere = folder.path().join("nowhere").join("code");
+    let nowhere = nowhere.to_str().unwrap();
+    for (flags, words) in [
+        (["--code-file", nowhere], "--code-file: "),
+        (["--max-turns", "0"], "--max-turns is 0"),
+        (["--decision-time-ms", "1"], "--decision-time-ms: "),
+        (["--target-shifts", "1000000"], "--target-shifts: "),
+    ] {
+        let mut arguments = vec!["room", "create"];
+        arguments.extend(flags);
+        let refused = run(&url, &arguments);
+        assert_eq!(refused.status.code(), Some(1), "{flags:?}");
+        let stderr = String::from_utf8(refused.stderr).unwrap();
+        assert!(stderr.contains(words), "{stderr}");
+        assert!(refused.stdout.is_empty(), "{flags:?}");
+    }
+    let none = run(&url, &["room", "list"]);
+    assert_eq!(String::from_utf8(none.stdout).unwrap(), "no rooms\n");
+
+    let made = run(&url, &["room", "create", "--seat", "greedy"]);
+    let told = String::from_utf8(made.stdout).unwrap();
+    assert!(told.contains("3 seats are free"), "{told}");
+    assert!(
+        told.contains(&format!("chefshat agent greedy --server {url} --code ")),
+        "{told}"
+    );
+}
+
+#[test]
+fn what_a_server_cannot_be_is_said_at_the_start() {
+    for (flags, words) in [
+        (["--listen", "localhost"], "give IP:PORT"),
+        (["--max-rooms", "0"], "--max-rooms"),
+        (["--allow-origin", "example.org"], "https://example.org"),
+    ] {
+        let ended = program().arg("serve").args(flags).output().unwrap();
+        assert_eq!(ended.status.code(), Some(2), "{flags:?}");
+        let stderr = String::from_utf8(ended.stderr).unwrap();
+        assert!(stderr.contains(words), "{stderr}");
+    }
 }
 
 #[test]

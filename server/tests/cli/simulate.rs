@@ -30,7 +30,14 @@ fn the_same_seed_prints_the_same_on_any_number_of_threads() {
         let first = simulate(&format!("{flags}{form}"));
         assert_eq!(first.code, Some(0), "{}", first.stderr);
         assert_eq!(first.stderr, "", "no progress where there is no terminal");
-        for threads in ["", " --threads 1", " --threads 2", " --threads 3"] {
+        for threads in [
+            "",
+            " --threads 1",
+            " --threads 2",
+            " --threads 3",
+            " --threads 0",
+            " --threads 20000",
+        ] {
             assert_eq!(
                 simulate(&format!("{flags}{form}{threads}")),
                 first,
@@ -150,7 +157,8 @@ fn mistakes_are_explained() {
         ("--target-shifts 3 --target-points 9", "cannot be used with"),
         ("--no-exchange --exchange on", "cannot be used with"),
         ("--games 0", "--games"),
-        ("--threads 0", "--threads"),
+        ("--max-turns 0", "--max-turns is 0"),
+        ("--threads many", "--threads"),
         ("--max-invalid-attempts 0", "--max-invalid-attempts"),
     ];
     for (flags, expected) in table {

@@ -21,15 +21,17 @@ use tokio::net::TcpListener;
 use tokio::task::JoinHandle;
 use tokio_util::sync::CancellationToken;
 
-use super::narrator::{Narrator, abort_reason, clean, heading, row};
+use super::narrator::{Narrator, abort_reason, clean, heading, legend, row};
 use super::remote::{MAX_PACE_MS, agent_kind};
-use super::rules_args::RulesArgs;
+use super::rules_args::{RulesArgs, rules_of};
 use super::{CommandError, data_dir};
 use crate::config::ServerConfig;
 use crate::serve::{ServeError, serve};
 use crate::store::MemoryStore;
 use table::Table;
 
+/// Most agents that can be named: the engine's limit of seats.
+const MAX_PLAYERS: usize = 6;
 /// The agents that take turns in taking seats when none are named.
 const STANDARD_AGENTS: [AgentKind; 2] = [AgentKind::Greedy, AgentKind::Random];
 
@@ -104,9 +106,17 @@ impl Demo {
     fn agents_and_rules(&self) -> Result<(Vec<AgentKind>, v1::RuleSet), CommandError> {
         let mut message = self.rules.message();
         if !self.agents.is_empty() && message.players.is_none() {
-            message.players = u32::try_from(self.agents.len()).ok();
+            let named = self.agents.len();
+            if !(2..=MAX_PLAYERS).contains(&named) {
+                let plural = if named == 1 { "" } else { "s" };
+                return Err(format!(
+                    "--agents names {named} agent{plural}; name 2 to {MAX_PLAYERS}, for instance greedy,random"
+                )
+                .into());
+            }
+            message.players = u32::try_from(named).ok();
         }
-        let rules = chefshat_records::convert::rules_from_proto(&message)?;
+        let rules = rules_of(&message)?;
         let players = rules.players();
         if self.agents.is_empty() {
             let agents = STANDARD_AGENTS.iter().copied().cycle().take(players);
@@ -140,6 +150,7 @@ impl Demo {
             }
         };
         write!(out, "{}", row("the deals", &deals))?;
+        write!(out, "{}", legend())?;
         Ok(())
     }
 

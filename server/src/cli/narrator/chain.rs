@@ -103,6 +103,13 @@ impl Chain {
         out
     }
 
+    /// Ends the line, if one is open, without a word of how the cards stand.
+    pub(super) fn break_off(&mut self) -> &'static str {
+        let open = self.column > 0 && !self.broken;
+        *self = Self::default();
+        if open { "\n" } else { "" }
+    }
+
     /// Ends the line, if one is open.
     pub(super) fn close(&mut self, names: &[String]) -> String {
         // Whoever passed last of all has not much to say, unless the pass was not its own.

@@ -111,6 +111,11 @@ impl Narrator {
         }
     }
 
+    /// Ends the line that is open, if one is, where nothing more will be told.
+    pub(super) fn break_off(&mut self) -> &'static str {
+        self.chain.break_off()
+    }
+
     fn game_started(&mut self, start: &v1::GameStarted) -> String {
         self.rules = start
             .rules
@@ -229,6 +234,18 @@ impl Narrator {
     }
 }
 
+/// How the lines of a pizza are to be read.
+pub(super) fn legend() -> String {
+    let items = [
+        "3×9+J: three 9s and a joker",
+        "(Rosa): a pass, not shown where it closes",
+        "a face must fall, a size may only grow",
+        "at the right: cards left",
+    ]
+    .map(|words| Piece::new(DIM, words));
+    wrapped(&label("how to read"), &items)
+}
+
 /// What a seat is called.
 fn name_of(names: &[String], seat: u32) -> String {
     usize::try_from(seat)
@@ -250,7 +267,7 @@ fn names(seats: &[v1::Participant]) -> Vec<String> {
             if name.is_empty() {
                 format!("seat {seat}")
             } else if alike > 1 {
-                format!("{} {seat}", clean(name, MAX_NAME - 2))
+                format!("{}#{seat}", clean(name, MAX_NAME - 2))
             } else {
                 name.clone()
             }

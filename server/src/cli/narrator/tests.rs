@@ -302,7 +302,7 @@ fn strangers_and_namesakes_are_told_apart() {
     let table = told.lines().next().unwrap_or_default();
     assert_eq!(
         table,
-        "   at the table  bot 0 agent · bot 1 agent · [2Jwipe agent · seat 3 agent"
+        "   at the table  bot#0 agent · bot#1 agent · [2Jwipe agent · seat 3 agent"
     );
 }
 
@@ -368,4 +368,20 @@ fn no_line_is_wider_than_the_page() {
             }
         }
     }
+}
+
+#[test]
+fn an_open_line_can_be_broken_off() {
+    let mut narrator = Narrator::new();
+    assert_eq!(narrator.break_off(), "", "nothing is open");
+    told(
+        &mut narrator,
+        [
+            game_started(&standard(), &["Ada", "Ben", "Cleo", "Dan"]),
+            shift_started(1),
+            play(0, (3, 11, 0), 14),
+        ],
+    );
+    assert_eq!(narrator.break_off(), "\n");
+    assert_eq!(narrator.break_off(), "");
 }

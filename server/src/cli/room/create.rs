@@ -1,6 +1,7 @@
 //! `chefshat room create`: a room as the flags describe it, and the secrets it comes with.
 
-use std::io::Write as _;
+use std::fs::File;
+use std::io::{self, Write as _};
 use std::os::unix::fs::OpenOptionsExt as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -11,8 +12,8 @@ use chefshat_engine::RewardScheme;
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 
-use super::super::connect::ServerArg;
-use super::super::rules_args::RulesArgs;
+use super::super::connect::{ServerArg, free_seats};
+use super::super::rules_args::{RulesArgs, by_flag};
 use super::super::{CommandError, say};
 
 /// Names of the reward schemes, in the order of the protocol's numbers from 1.
@@ -87,13 +88,15 @@ impl Create {
             Some(_) => self.server.connect_patiently().await?,
             None => self.server.connect().await?,
         };
-        let made = client.create_room(request).await?;
+        // Before there is a room: whoever cannot be told its code has no use for it.
+        let code_file = (self.code_file.as_deref())
+            .map(CodeFile::prepare)
+            .transpose()?;
+        let made = client.create_room(request).await.map_err(refused)?;
         let room = made
             .room
             .ok_or("the server did not say which room it made")?;
-        if let Some(file) = &self.code_file {
-            write_code(file, &made.join_code)?;
-        }
+        let left = code_file.map_or(Ok(()), |file| file.leave(&made.join_code));
         let (code, owner) = (made.join_code, made.owner_token);
         if self.json {
             let line = serde_json::json!({
@@ -105,7 +108,12 @@ impl Create {
             say(format_args!("game         {}", room.game_id))?;
             say(format_args!("join code    {code}"))?;
             say(format_args!("owner token  {owner}"))?;
+            if let Some(words) = next_step(&room, self.server.url(), &code) {
+                say(words)?;
+            }
         }
+        // Only now, so that the secrets are told all the same.
+        left?;
         Ok(ExitCode::SUCCESS)
     }
 
@@ -184,32 +192,95 @@ fn game_seed(digits: &str) -> Result<[u8; 32], String> {
         .map_err(|_| "a game seed is 64 hexadecimal digits".to_owned())
 }
 
-/// Leaves a join code in a file: whole or not at all, and for its owner alone.
-fn write_code(file: &Path, code: &str) -> Result<(), CommandError> {
-    let mut part = file.as_os_str().to_owned();
-    part.push(".part");
-    let write = || {
-        // One left behind by a process that was stopped may have been made otherwise.
-        match std::fs::remove_file(&part) {
-            Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(error),
-            _ => {}
+/// A refusal of the server in the words of the command line.
+fn refused(error: chefshat_client::Error) -> CommandError {
+    match (error.reason(), error.metadata().get("field")) {
+        (Some("RULE_SET_REFUSED" | "POLICY_REFUSED" | "NAME_REFUSED"), Some(field)) => {
+            let message = error.message();
+            let said = format!("{field}: ");
+            by_flag(field, message.strip_prefix(&said).unwrap_or(message)).into()
         }
-        let mut options = std::fs::OpenOptions::new();
-        let mut whole = options
-            .write(true)
-            .create_new(true)
-            .mode(0o600)
-            .open(&part)?;
-        writeln!(whole, "{code}")?;
-        std::fs::rename(&part, file)
+        _ => error.into(),
+    }
+}
+
+/// How the seats that are free can be filled.
+fn next_step(room: &v1::Room, server: &str, code: &str) -> Option<String> {
+    let free = free_seats(room);
+    let first = room.seats.iter().find(|seat| seat.name.is_empty())?;
+    let kind = match first.reserved_for() {
+        v1::ParticipantKind::Unspecified | v1::ParticipantKind::Agent => "",
+        v1::ParticipantKind::Human => " --kind-of human",
+        v1::ParticipantKind::Robot => " --kind-of robot",
     };
-    write().map_err(|error| {
-        format!(
-            "the join code is {code}, but it cannot be left in {}: {error}",
-            file.display()
-        )
-        .into()
-    })
+    let free = match free {
+        1 => "1 seat is free; fill it with:".to_owned(),
+        _ => format!("{free} seats are free; fill each with:"),
+    };
+    Some(format!(
+        "{free} chefshat agent greedy --server {server} --code {code}{kind}"
+    ))
+}
+
+/// A file that a join code is going to be left in: whole or not at all, and for its owner alone.
+struct CodeFile<'a> {
+    file: &'a Path,
+    part: PathBuf,
+    whole: File,
+}
+
+impl<'a> CodeFile<'a> {
+    /// Begins it under another name, beside where it is to be.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    fn prepare(file: &'a Path) -> Result<Self, CommandError> {
+        let mut part = file.as_os_str().to_owned();
+        part.push(".part");
+        let part = PathBuf::from(part);
+        let open = || {
+            if file.is_dir() {
+                return Err(io::ErrorKind::IsADirectory.into());
+            }
+            // One left behind by a process that was stopped may have been made otherwise.
+            match std::fs::remove_file(&part) {
+                Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+                _ => {}
+            }
+            let mut options = File::options();
+            options.write(true).create_new(true).mode(0o600).open(&part)
+        };
+        match open() {
+            Ok(whole) => Ok(Self { file, part, whole }),
+            Err(error) => {
+                let file = file.display();
+                Err(format!(
+                    "--code-file: a join code cannot be left in {file}: {error}; no room was made"
+                )
+                .into())
+            }
+        }
+    }
+
+    /// Leaves the code.
+    fn leave(mut self, code: &str) -> Result<(), CommandError> {
+        writeln!(self.whole, "{code}")
+            .and_then(|()| std::fs::rename(&self.part, self.file))
+            .map_err(|error| {
+                format!(
+                    "the room was made, but its join code cannot be left in {}: {error}",
+                    self.file.display()
+                )
+                .into()
+            })
+    }
+}
+
+impl Drop for CodeFile<'_> {
+    fn drop(&mut self) {
+        // Nothing is there any more once the code was left.
+        let _ = std::fs::remove_file(&self.part);
+    }
 }
 
 #[cfg(test)]
@@ -275,13 +346,53 @@ mod tests {
         use std::os::unix::fs::PermissionsExt as _;
         let folder = tempfile::tempdir().expect("a folder");
         let file = folder.path().join("code");
-        write_code(&file, "BCDF2345").expect("written");
-        write_code(&file, "BCDF2346").expect("written again");
+        for code in ["BCDF2345", "BCDF2346"] {
+            let prepared = CodeFile::prepare(&file).expect("it can be written");
+            prepared.leave(code).expect("written");
+        }
         assert_eq!(std::fs::read_to_string(&file).expect("read"), "BCDF2346\n");
         let mode = std::fs::metadata(&file)
             .expect("it is there")
             .permissions()
             .mode();
         assert_eq!(mode & 0o777, 0o600);
+    }
+
+    #[test]
+    fn a_file_that_gets_no_code_leaves_nothing_behind() {
+        let folder = tempfile::tempdir().expect("a folder");
+        drop(CodeFile::prepare(&folder.path().join("code")).expect("it can be written"));
+        let left = std::fs::read_dir(folder.path())
+            .expect("the folder")
+            .count();
+        assert_eq!(left, 0);
+        assert!(CodeFile::prepare(folder.path()).is_err(), "a folder");
+    }
+
+    #[test]
+    fn free_seats_come_with_the_line_that_fills_them() {
+        let seat = |name: &str, kind: v1::ParticipantKind| v1::Participant {
+            name: name.into(),
+            reserved_for: kind.into(),
+            ..v1::Participant::default()
+        };
+        let words = |seats: Vec<v1::Participant>| {
+            let room = v1::Room {
+                seats,
+                ..v1::Room::default()
+            };
+            next_step(&room, "http://[::1]:7", "BCDF2345")
+        };
+        let (any, human) = (v1::ParticipantKind::Unspecified, v1::ParticipantKind::Human);
+        assert_eq!(words(vec![seat("Ada", any)]), None);
+        assert_eq!(
+            words(vec![seat("Ada", any), seat("", human)]).as_deref(),
+            Some(
+                "1 seat is free; fill it with: \
+                 chefshat agent greedy --server http://[::1]:7 --code BCDF2345 --kind-of human"
+            )
+        );
+        let two = words(vec![seat("", any), seat("", any)]).expect("two are free");
+        assert!(two.starts_with("2 seats are free;"), "{two}");
     }
 }

@@ -4,10 +4,11 @@ use std::io::Write as _;
 use std::process::ExitCode;
 
 use chefshat_client::v1::game_event::Kind;
+use chefshat_client::{Backoff, Error};
 use clap::Args;
 
 use super::super::CommandError;
-use super::super::connect::ServerArg;
+use super::super::connect::{PATIENCE, ServerArg};
 use super::super::narrator::{Narrator, clean, heading};
 
 /// Follow the game of a room.
@@ -44,10 +45,28 @@ impl Watch {
             )?;
         }
         let mut narrator = Narrator::new();
-        let mut spectator = client.spectate(self.room_id, 1);
-        let mut finished = false;
-        while let Some(event) = spectator.next().await? {
-            finished |= matches!(event.kind, Some(Kind::GameEnded(_)));
+        let mut spectator = client.spectate(self.room_id, 1).with_backoff(Backoff {
+            give_up_after: PATIENCE,
+            ..Backoff::default()
+        });
+        let mut end = None;
+        loop {
+            let event = match spectator.next().await {
+                Ok(Some(event)) => event,
+                Ok(None) if end.is_some() => break,
+                interrupted => {
+                    if !self.json {
+                        write!(out, "{}", narrator.break_off())?;
+                        out.flush()?;
+                    }
+                    return Err(lost(interrupted.err()));
+                }
+            };
+            match event.kind {
+                Some(Kind::GameEnded(_)) => end = Some(ExitCode::SUCCESS),
+                Some(Kind::GameAborted(_)) => end = Some(ExitCode::FAILURE),
+                _ => {}
+            }
             if self.json {
                 // What came over the wire may be more than JSON can say; that is an error, not a panic.
                 let game_event = serde_json::to_value(&event)?;
@@ -58,10 +77,19 @@ impl Watch {
             }
             out.flush()?;
         }
-        Ok(if finished {
-            ExitCode::SUCCESS
-        } else {
-            ExitCode::FAILURE
-        })
+        Ok(end.unwrap_or(ExitCode::FAILURE))
+    }
+}
+
+/// Why there is nothing more to watch although the game has not ended.
+fn lost(error: Option<Error>) -> CommandError {
+    match error {
+        // The server said why.
+        Some(error) if error.reason().is_some() => error.into(),
+        Some(error) => {
+            let patience = PATIENCE.as_secs();
+            format!("the connection was lost before the game ended, and not made again in {patience} seconds: {error}").into()
+        }
+        None => "the server has nothing more to show, but the game has not ended".into(),
     }
 }

@@ -35,9 +35,14 @@ pub enum JoinError {
     /// The free seats are reserved for other kinds.
     #[error("the free seats of this room are reserved for participants of another kind")]
     KindNotAdmitted,
-    /// The game has begun or ended.
+    /// The game has begun.
     #[error("the game of this room has begun; nobody can join any more")]
     GameStarted,
+    /// The game has ended.
+    #[error(
+        "the game of this room is over; make a new room, or ask its creator for the new join code"
+    )]
+    GameOver,
 }
 
 /// Why an expression is not taken.

@@ -23,8 +23,10 @@ impl Core {
         wanted: Option<u32>,
         participant: SeatedParticipant,
     ) -> Result<Seat, JoinError> {
-        if self.state != State::Waiting {
-            return Err(JoinError::GameStarted);
+        match self.state {
+            State::Waiting => {}
+            State::Playing => return Err(JoinError::GameStarted),
+            State::Finished | State::Aborted(_) => return Err(JoinError::GameOver),
         }
         let seat = match wanted {
             Some(number) => {

@@ -55,10 +55,7 @@ fn a_seat_that_is_never_attached_is_freed() {
         table.core.state(),
         State::Aborted(AbortReason::NeverStarted)
     );
-    assert_eq!(
-        table.join(ParticipantKind::Human),
-        Err(JoinError::GameStarted)
-    );
+    assert_eq!(table.join(ParticipantKind::Human), Err(JoinError::GameOver));
     table.assert_replays();
 }
 

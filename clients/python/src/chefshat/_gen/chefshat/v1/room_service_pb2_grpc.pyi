@@ -45,7 +45,7 @@ class RoomServiceStub:
     """
     JoinRoom: _grpc.UnaryUnaryMultiCallable[_room_service_pb2.JoinRoomRequest, _room_service_pb2.JoinRoomResponse]
     """Takes a seat and gives the ticket for it. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED (ROOM_FULL);
-    FAILED_PRECONDITION (SEAT_TAKEN, KIND_NOT_ADMITTED, GAME_STARTED); INVALID_ARGUMENT (NO_SUCH_SEAT, NAME_REFUSED, KIND_REFUSED);
+    FAILED_PRECONDITION (SEAT_TAKEN, KIND_NOT_ADMITTED, GAME_STARTED, GAME_OVER); INVALID_ARGUMENT (NO_SUCH_SEAT, NAME_REFUSED, KIND_REFUSED);
     NOT_FOUND (ROOM_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
     """
     CloseRoom: _grpc.UnaryUnaryMultiCallable[_room_service_pb2.CloseRoomRequest, _room_service_pb2.CloseRoomResponse]
@@ -68,7 +68,7 @@ class RoomServiceAsyncStub(RoomServiceStub):
     """
     JoinRoom: _aio.UnaryUnaryMultiCallable[_room_service_pb2.JoinRoomRequest, _room_service_pb2.JoinRoomResponse]  # type: ignore[assignment]
     """Takes a seat and gives the ticket for it. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED (ROOM_FULL);
-    FAILED_PRECONDITION (SEAT_TAKEN, KIND_NOT_ADMITTED, GAME_STARTED); INVALID_ARGUMENT (NO_SUCH_SEAT, NAME_REFUSED, KIND_REFUSED);
+    FAILED_PRECONDITION (SEAT_TAKEN, KIND_NOT_ADMITTED, GAME_STARTED, GAME_OVER); INVALID_ARGUMENT (NO_SUCH_SEAT, NAME_REFUSED, KIND_REFUSED);
     NOT_FOUND (ROOM_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
     """
     CloseRoom: _aio.UnaryUnaryMultiCallable[_room_service_pb2.CloseRoomRequest, _room_service_pb2.CloseRoomResponse]  # type: ignore[assignment]
@@ -112,7 +112,7 @@ class RoomServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_room_service_pb2.JoinRoomResponse, _abc.Awaitable[_room_service_pb2.JoinRoomResponse]]:
         """Takes a seat and gives the ticket for it. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED (ROOM_FULL);
-        FAILED_PRECONDITION (SEAT_TAKEN, KIND_NOT_ADMITTED, GAME_STARTED); INVALID_ARGUMENT (NO_SUCH_SEAT, NAME_REFUSED, KIND_REFUSED);
+        FAILED_PRECONDITION (SEAT_TAKEN, KIND_NOT_ADMITTED, GAME_STARTED, GAME_OVER); INVALID_ARGUMENT (NO_SUCH_SEAT, NAME_REFUSED, KIND_REFUSED);
         NOT_FOUND (ROOM_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
         """
 
