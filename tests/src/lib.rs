@@ -15,7 +15,7 @@ pub use server::{TestServer, one_shift, room_of_four};
 use std::time::Duration;
 
 /// How long a test waits for something that must happen before it says that it did not. Never a measure of speed.
-pub const PATIENCE: Duration = Duration::from_secs(60);
+pub const PATIENCE: Duration = Duration::from_secs(300);
 
 /// Waits for something that must happen.
 ///

@@ -27,7 +27,7 @@ async fn a_spectator_that_stops_reading_is_cut_and_the_game_goes_on() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let rules = v1::RuleSet {
-        stop: Some(v1::rule_set::Stop::TargetShifts(400)),
+        stop: Some(v1::rule_set::Stop::TargetShifts(200)),
         ..v1::RuleSet::default()
     };
     let (created, tickets) = room_of_four(&client, rules, v1::RoomPolicy::default()).await;
@@ -47,7 +47,7 @@ async fn a_spectator_that_stops_reading_is_cut_and_the_game_goes_on() {
         .await
         .expect("it may watch")
         .into_inner();
-    // It does not read while four hundred Shifts are played.
+    // It does not read while two hundred Shifts are played.
     play_out(&server, tickets).await;
     let mut events = 0;
     let status = loop {
