@@ -1,7 +1,6 @@
 //! All rooms of a server: making them, finding them, closing them down.
 
 use std::collections::{BTreeMap, HashMap};
-use std::path::PathBuf;
 use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex, MutexGuard, Weak};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
@@ -212,11 +211,6 @@ impl Rooms {
     /// Whether the server takes no new rooms.
     pub fn is_shutting_down(&self) -> bool {
         self.lock().shutting_down
-    }
-
-    /// Where records are written.
-    pub fn data_dir(&self) -> Option<&PathBuf> {
-        self.context.data_dir.as_ref()
     }
 
     /// A finished game from the store.

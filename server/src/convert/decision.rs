@@ -5,8 +5,7 @@ use chefshat_proto::v1;
 use chefshat_records::convert::{FieldProblem, role_from_number};
 use prost::Message as _;
 
-use super::policy::millis;
-use crate::room::core::{Answered, Core, OpenDecision, Verdict};
+use crate::room::core::{Answered, Verdict};
 use crate::store::journal::Source;
 
 /// Longest label of an expression, bytes.
@@ -16,32 +15,6 @@ const FIRST_SECOND: i64 = -62_135_596_800;
 const LAST_SECOND: i64 = 253_402_300_799;
 /// Longest reference to recorded media, bytes.
 const MAX_MEDIA: usize = 256;
-
-/// The open decision as it is put to its seat.
-pub fn decision_request(
-    core: &Core,
-    open: &OpenDecision,
-    now: std::time::Duration,
-    with_mask: bool,
-) -> v1::DecisionRequest {
-    let observation = core
-        .observe(chefshat_engine::Viewer::Seat(open.decision.seat))
-        .expect("a decision is open in a game that has begun");
-    let (time_left, bank_left) = core.time_left(now);
-    v1::DecisionRequest {
-        decision_id: open.id,
-        kind: decision_kind(open.decision.kind).into(),
-        observation: Some(observation_to_proto(&observation)),
-        action_mask: if with_mask {
-            mask_bytes(&core.legal_actions(), &core.header().rules)
-        } else {
-            Vec::new()
-        },
-        time_left_ms: millis(time_left),
-        bank_left_ms: millis(bank_left),
-        invalid_attempts_left: core.attempts_left(),
-    }
-}
 
 /// A mask as the protocol writes it.
 pub(super) fn mask_bytes(mask: &Mask, rules: &RuleSet) -> Vec<u8> {

@@ -8,7 +8,7 @@ mod record;
 mod room;
 
 pub use decision::{
-    annotations_from_proto, answer_result, decision_kind, decision_request, expression_from_proto,
+    annotations_from_proto, answer_result, decision_kind, expression_from_proto,
     observation_from_proto, observation_to_proto,
 };
 pub use log::{game_started, view};

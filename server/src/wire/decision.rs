@@ -1,5 +1,5 @@
 //! A decision request written straight from the engine's values: it is the message that is sent most, and a message tree of it would be
-//! built, walked and thrown away for every decision. `convert::decision_request` says the same as a message; a test holds the two equal.
+//! built, walked and thrown away for every decision. A test holds what is written here equal to that message.
 
 use std::time::Duration;
 

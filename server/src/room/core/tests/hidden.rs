@@ -2,10 +2,12 @@
 //! messages to the byte. A leak planted on purpose is caught by the same comparison.
 
 use chefshat_engine::{BySeat, Cards, Viewer};
+use chefshat_proto::v1;
 use prost::Message as _;
 
 use super::*;
 use crate::convert;
+use crate::room::core::OpenDecision;
 
 /// Two cards of different faces, one in each of two hands, change places.
 fn swapped(hands: &BySeat<Cards>, one: Seat, other: Seat, faces: u8) -> Option<BySeat<Cards>> {
@@ -38,8 +40,9 @@ fn told(table: &Table, viewer: Seat, see: Viewer) -> Vec<Vec<u8>> {
         .open()
         .filter(|open| open.decision.seat == viewer)
     {
-        messages
-            .push(convert::decision_request(&table.core, open, table.now, true).encode_to_vec());
+        let mut written = Vec::new();
+        crate::wire::encode_decision(&table.core, open, table.now, true, &mut written);
+        messages.push(written);
     }
     messages
 }
@@ -128,6 +131,31 @@ fn hidden_cards_change_nothing_that_is_told() {
     assert!(turns > 400, "only {turns} turns were compared");
 }
 
+/// The open decision as a message: what is written straight must be this.
+fn decision_request(
+    core: &Core,
+    open: &OpenDecision,
+    now: Duration,
+    with_mask: bool,
+) -> v1::DecisionRequest {
+    let observation = core.observe(Viewer::Seat(open.decision.seat));
+    let (time_left, bank_left) = core.time_left(now);
+    let size = core.header().rules.actions().size();
+    v1::DecisionRequest {
+        decision_id: open.id,
+        kind: convert::decision_kind(open.decision.kind).into(),
+        observation: observation.map(|seen| convert::observation_to_proto(&seen)),
+        action_mask: if with_mask {
+            core.legal_actions().to_bytes(size)
+        } else {
+            Vec::new()
+        },
+        time_left_ms: convert::millis(time_left),
+        bank_left_ms: convert::millis(bank_left),
+        invalid_attempts_left: core.attempts_left(),
+    }
+}
+
 #[test]
 fn a_decision_written_straight_is_the_message_that_is_said() {
     let sizes = [(4, 11, 2), (2, 4, 0), (6, 15, 2), (3, 5, 1)];
@@ -148,7 +176,7 @@ fn a_decision_written_straight_is_the_message_that_is_said() {
         let mut decisions = 0;
         while let Some(open) = table.core.open().cloned() {
             for with_mask in [true, false] {
-                let message = convert::decision_request(&table.core, &open, table.now, with_mask);
+                let message = decision_request(&table.core, &open, table.now, with_mask);
                 let mut written = Vec::new();
                 crate::wire::encode_decision(
                     &table.core,
