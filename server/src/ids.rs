@@ -65,7 +65,12 @@ impl SecretHash {
 
     /// Whether this is the hash of `secret`, in constant time.
     pub fn matches(&self, secret: &[u8]) -> bool {
-        self.0.ct_eq(&Self::of(secret).0).into()
+        self.is(&Self::of(secret))
+    }
+
+    /// Whether two secrets are the same, in constant time.
+    pub fn is(&self, other: &Self) -> bool {
+        self.0.ct_eq(&other.0).into()
     }
 }
 

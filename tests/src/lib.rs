@@ -9,8 +9,8 @@ pub struct Readme;
 mod seat;
 mod server;
 
-pub use seat::{StreamSeat, first_legal, first_to_hear, is_legal, play_on};
-pub use server::{TestServer, one_shift, room_of_four};
+pub use seat::{StreamSeat, attach_all, first_legal, first_to_hear, is_legal, play_on};
+pub use server::{TestServer, narrow_spectator, one_shift, play_out, random_agents, room_of_four};
 
 use std::time::Duration;
 

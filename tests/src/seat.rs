@@ -10,6 +10,8 @@ use tokio_stream::wrappers::ReceiverStream;
 use tonic::transport::Channel;
 use tonic::{Status, Streaming};
 
+use crate::TestServer;
+
 /// One Play stream with one seat attached, or more if the test attaches more.
 #[derive(Debug)]
 pub struct StreamSeat {
@@ -195,4 +197,13 @@ pub async fn first_to_hear(seats: &mut [StreamSeat]) -> (Update, usize) {
     let listening = seats.iter_mut().map(|seat| Box::pin(seat.next()));
     let (update, index, _) = futures::future::select_all(listening).await;
     (update, index)
+}
+
+/// A stream of its own for each ticket, attached from its seat's first event on.
+pub async fn attach_all(server: &TestServer, tickets: &[String]) -> Vec<StreamSeat> {
+    let mut seats = Vec::new();
+    for ticket in tickets {
+        seats.push(StreamSeat::attached(server.channel().await, ticket).await);
+    }
+    seats
 }

@@ -5,8 +5,8 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_client::Client;
-use chefshat_proto::v1;
+use chefshat_client::{Client, RandomAgent};
+use chefshat_proto::v1::{self, spectator_service_client::SpectatorServiceClient};
 use chefshat_server::config::ServerConfig;
 use chefshat_server::serve::{ServeError, serve};
 use chefshat_server::store::{MemoryStore, Store};
@@ -14,6 +14,7 @@ use tempfile::TempDir;
 use tokio::net::TcpListener;
 use tokio::sync::oneshot;
 use tokio::task::JoinHandle;
+use tonic::Streaming;
 use tonic::transport::Channel;
 
 /// A server that runs until it is stopped or dropped.
@@ -140,4 +141,43 @@ pub async fn room_of_four(
         tickets.push(joined.ticket);
     }
     (created, tickets)
+}
+
+/// A random agent of the SDK for each ticket, each with a seed of its own.
+pub fn random_agents(tickets: Vec<String>) -> Vec<(String, RandomAgent)> {
+    tickets
+        .into_iter()
+        .zip(0..)
+        .map(|(ticket, seed)| (ticket, RandomAgent::new(seed)))
+        .collect()
+}
+
+/// Plays a game to its end with random agents over one connection.
+pub async fn play_out(server: &TestServer, tickets: Vec<String>) {
+    let client = server.client().await;
+    let playing = client.play_many(random_agents(tickets));
+    for outcome in crate::patiently("the game to end", playing).await {
+        outcome.expect("the game ended");
+    }
+}
+
+/// A spectator that need not read: its window is small, so that what it does not read waits at the server, not in this process.
+pub async fn narrow_spectator(
+    server: &TestServer,
+    room_id: String,
+) -> Streaming<v1::SpectatorServiceWatchResponse> {
+    let channel = Channel::from_shared(server.url())
+        .expect("a URL")
+        .initial_stream_window_size(8 * 1024)
+        .connect()
+        .await
+        .expect("the server listens");
+    SpectatorServiceClient::new(channel)
+        .watch(v1::SpectatorServiceWatchRequest {
+            room_id,
+            ..v1::SpectatorServiceWatchRequest::default()
+        })
+        .await
+        .expect("it may watch")
+        .into_inner()
 }

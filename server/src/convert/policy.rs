@@ -4,9 +4,8 @@ use std::ops::RangeInclusive;
 use std::time::Duration;
 
 use chefshat_arena::AgentKind;
-use chefshat_engine::RewardScheme;
 use chefshat_proto::v1;
-use chefshat_records::convert::{FieldProblem, reward_scheme_from_proto};
+use chefshat_records::convert::{FieldProblem, reward_scheme_from_proto, reward_scheme_to_proto};
 
 use crate::room::policy::{AbortPolicy, Policy};
 
@@ -82,15 +81,7 @@ pub fn policy_to_proto(policy: &Policy) -> v1::RoomPolicy {
             AbortPolicy::Never => v1::AbortPolicy::Never,
         }
         .into(),
-        reward_scheme: match policy.reward_scheme {
-            None => v1::RewardScheme::Unspecified,
-            Some(RewardScheme::Validity) => v1::RewardScheme::Validity,
-            Some(RewardScheme::Paper) => v1::RewardScheme::Paper,
-            Some(RewardScheme::PaperIntended) => v1::RewardScheme::PaperIntended,
-            Some(RewardScheme::Winning) => v1::RewardScheme::Winning,
-            Some(RewardScheme::Points) => v1::RewardScheme::Points,
-        }
-        .into(),
+        reward_scheme: reward_scheme_to_proto(policy.reward_scheme).into(),
         pace_ms: Some(millis(policy.pace)),
         waiting_time_ms: Some(millis(policy.waiting_time)),
         spectators: Some(policy.spectators),

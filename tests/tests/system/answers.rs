@@ -3,7 +3,8 @@
 use chefshat_proto::Timestamp;
 use chefshat_proto::v1::{self, game_event::Kind, seat_command::Command, seat_update::Update};
 use chefshat_tests::{
-    StreamSeat, TestServer, first_legal, first_to_hear, is_legal, one_shift, play_on, room_of_four,
+    StreamSeat, TestServer, attach_all, first_legal, first_to_hear, is_legal, one_shift, play_on,
+    room_of_four,
 };
 
 /// The seat whose decision is open first, on a stream of its own, with its decision; and the others.
@@ -13,10 +14,7 @@ async fn first_to_act(
 ) -> (StreamSeat, v1::DecisionRequest, Vec<StreamSeat>) {
     let client = server.client().await;
     let (_, tickets) = room_of_four(&client, one_shift(), policy).await;
-    let mut seats = Vec::new();
-    for ticket in &tickets {
-        seats.push(StreamSeat::attached(server.channel().await, ticket).await);
-    }
+    let mut seats = attach_all(server, &tickets).await;
     // Events come with decisions: only the seat that is asked hears anything.
     let (update, index) = first_to_hear(&mut seats).await;
     let Update::Decision(decision) = update else {
@@ -142,10 +140,7 @@ async fn nothing_said_along_with_an_answer_spoils_the_record() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let (created, tickets) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
-    let mut seats = Vec::new();
-    for ticket in &tickets {
-        seats.push(StreamSeat::attached(server.channel().await, ticket).await);
-    }
+    let mut seats = attach_all(&server, &tickets).await;
     let (update, index) = first_to_hear(&mut seats).await;
     let Update::Decision(decision) = update else {
         panic!("no decision, but {update:?}");

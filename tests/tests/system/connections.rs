@@ -2,16 +2,9 @@
 
 use chefshat_proto::v1::{self, game_event::Kind, seat_command::Command, seat_update::Update};
 use chefshat_tests::{
-    StreamSeat, TestServer, first_legal, first_to_hear, one_shift, play_on, room_of_four,
+    StreamSeat, TestServer, attach_all, first_legal, first_to_hear, one_shift, play_on,
+    room_of_four,
 };
-
-async fn attach_all(server: &TestServer, tickets: &[String]) -> Vec<StreamSeat> {
-    let mut seats = Vec::new();
-    for ticket in tickets {
-        seats.push(StreamSeat::attached(server.channel().await, ticket).await);
-    }
-    seats
-}
 
 /// Plays until `seat` has a decision open, which it leaves unanswered.
 async fn until_asked(seats: &mut [StreamSeat], seat: usize) -> v1::DecisionRequest {

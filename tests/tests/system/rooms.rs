@@ -1,10 +1,12 @@
 //! Making and finding rooms, and the promises about seeds, rewards and records.
 
-use chefshat_client::{Client, RandomAgent};
+use chefshat_client::Client;
 use chefshat_engine::RuleSetSpec;
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line, seat_config::FilledBy};
 use chefshat_records::{jsonl, replay};
-use chefshat_tests::{StreamSeat, TestServer, one_shift, patiently, play_on, room_of_four};
+use chefshat_tests::{
+    TestServer, attach_all, one_shift, patiently, play_on, random_agents, room_of_four,
+};
 
 fn built_in(name: &str) -> v1::SeatConfig {
     v1::SeatConfig {
@@ -230,12 +232,8 @@ async fn the_record_on_disk_is_the_record_told_and_replays() {
         .await
         .expect_err("no such game");
     assert_eq!(unknown.reason(), Some("GAME_UNKNOWN"));
-    let seats = tickets
-        .into_iter()
-        .zip(0..)
-        .map(|(ticket, seed)| (ticket, RandomAgent::new(seed)))
-        .collect::<Vec<_>>();
-    let outcomes = patiently("the game to end", client.play_many(seats)).await;
+    let playing = client.play_many(random_agents(tickets));
+    let outcomes = patiently("the game to end", playing).await;
     for outcome in outcomes {
         assert_eq!(outcome.expect("it ended").standings().len(), 4);
     }
@@ -273,10 +271,7 @@ async fn rewards_are_told_to_their_own_seat_alone() {
         },
     )
     .await;
-    let mut seats = Vec::new();
-    for ticket in &tickets {
-        seats.push(StreamSeat::attached(server.channel().await, ticket).await);
-    }
+    let mut seats = attach_all(&server, &tickets).await;
     let room_id = created.room.expect("a room").room_id;
     // What it has from the start on it is told while the game goes on: no hands.
     let mut watching = client.spectate(&room_id, 0);

@@ -1,26 +1,12 @@
 //! Those who watch: live, late, delayed, and not at all.
 
-use chefshat_client::RandomAgent;
 use chefshat_proto::v1::{
     self, SpectatorServiceWatchRequest, game_event::Kind,
     spectator_service_client::SpectatorServiceClient,
 };
-use chefshat_tests::{TestServer, one_shift, patiently, room_of_four};
+use chefshat_tests::{TestServer, narrow_spectator, one_shift, patiently, play_out, room_of_four};
 use tonic::Code;
-use tonic::transport::Channel;
 use tonic_types::StatusExt as _;
-
-async fn play_out(server: &TestServer, tickets: Vec<String>) {
-    let client = server.client().await;
-    let seats = tickets
-        .into_iter()
-        .zip(0..)
-        .map(|(ticket, seed)| (ticket, RandomAgent::new(seed)))
-        .collect::<Vec<_>>();
-    for outcome in patiently("the game to end", client.play_many(seats)).await {
-        outcome.expect("the game ended");
-    }
-}
 
 #[tokio::test]
 async fn a_spectator_that_stops_reading_is_cut_and_the_game_goes_on() {
@@ -32,21 +18,7 @@ async fn a_spectator_that_stops_reading_is_cut_and_the_game_goes_on() {
     };
     let (created, tickets) = room_of_four(&client, rules, v1::RoomPolicy::default()).await;
     let room_id = created.room.expect("a room").room_id;
-    // A small window, so that what is not read waits at the server, not in this process.
-    let channel = Channel::from_shared(server.url())
-        .expect("a URL")
-        .initial_stream_window_size(8 * 1024)
-        .connect()
-        .await
-        .expect("the server listens");
-    let mut deaf = SpectatorServiceClient::new(channel)
-        .watch(SpectatorServiceWatchRequest {
-            room_id,
-            ..SpectatorServiceWatchRequest::default()
-        })
-        .await
-        .expect("it may watch")
-        .into_inner();
+    let mut deaf = narrow_spectator(&server, room_id).await;
     // It does not read while two hundred Shifts are played.
     play_out(&server, tickets).await;
     let mut events = 0;

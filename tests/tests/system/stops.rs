@@ -3,14 +3,12 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_client::RandomAgent;
-use chefshat_proto::v1::spectator_service_client::SpectatorServiceClient;
 use chefshat_proto::v1::{self, game_event::Kind, seat_update::Update};
 use chefshat_server::store::{FailingStore, MemoryStore};
 use chefshat_tests::{
-    StreamSeat, TestServer, first_legal, one_shift, patiently, play_on, room_of_four,
+    TestServer, attach_all, first_legal, narrow_spectator, one_shift, patiently, play_on, play_out,
+    random_agents, room_of_four,
 };
-use tonic::transport::Channel;
 use tonic_health::pb::health_client::HealthClient;
 use tonic_health::pb::{HealthCheckRequest, health_check_response::ServingStatus};
 
@@ -20,10 +18,7 @@ async fn a_shutdown_in_mid_game_aborts_it_as_such() {
     let client = server.client().await;
     let (created, tickets) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
     let game_id = created.room.expect("a room").game_id;
-    let mut seats = Vec::new();
-    for ticket in &tickets {
-        seats.push(StreamSeat::attached(server.channel().await, ticket).await);
-    }
+    let mut seats = attach_all(&server, &tickets).await;
     server.ask_to_stop();
     for seat in &mut seats {
         let reason = loop {
@@ -63,10 +58,7 @@ async fn a_running_game_gets_its_grace_and_no_new_rooms_are_made() {
     let client = server.client().await;
     let (_, tickets) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
     let (waiting, _) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
-    let mut seats = Vec::new();
-    for ticket in &tickets {
-        seats.push(StreamSeat::attached(server.channel().await, ticket).await);
-    }
+    let mut seats = attach_all(&server, &tickets).await;
     let mut health = HealthClient::new(server.channel().await);
     let status = health
         .check(HealthCheckRequest::default())
@@ -119,27 +111,9 @@ async fn a_client_that_does_not_read_cannot_hold_up_a_shutdown() {
     };
     let (created, tickets) = room_of_four(&client, rules, v1::RoomPolicy::default()).await;
     // It answers pings but never reads its stream: what it is told fills its window and then the server's outbox.
-    let channel = Channel::from_shared(server.url())
-        .expect("a URL")
-        .initial_stream_window_size(8 * 1024)
-        .connect()
-        .await
-        .expect("the server listens");
-    let deaf = SpectatorServiceClient::new(channel)
-        .watch(v1::SpectatorServiceWatchRequest {
-            room_id: created.room.expect("a room").room_id,
-            ..v1::SpectatorServiceWatchRequest::default()
-        })
-        .await
-        .expect("it may watch")
-        .into_inner();
-    let seats = tickets
-        .into_iter()
-        .map(|ticket| (ticket, RandomAgent::new(1)))
-        .collect::<Vec<_>>();
-    for outcome in patiently("the game to end", client.play_many(seats)).await {
-        outcome.expect("the game ended");
-    }
+    let room_id = created.room.expect("a room").room_id;
+    let deaf = narrow_spectator(&server, room_id).await;
+    play_out(&server, tickets).await;
     server.ask_to_stop();
     server.stop().await;
     drop(deaf);
@@ -152,10 +126,7 @@ async fn a_store_that_fails_stops_its_room_and_tells_nobody_of_the_decision() {
     let client = server.client().await;
     let (created, tickets) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
     let room_id = created.room.expect("a room").room_id;
-    let mut seats = Vec::new();
-    for ticket in &tickets {
-        seats.push(StreamSeat::attached(server.channel().await, ticket).await);
-    }
+    let mut seats = attach_all(&server, &tickets).await;
     let ends = futures::future::join_all(seats.iter_mut().map(async |seat| {
         loop {
             match seat.next().await {
@@ -196,11 +167,8 @@ async fn an_agent_of_the_sdk_hears_of_a_failed_room() {
     let server = TestServer::with(|_| {}, Arc::new(FailingStore::after(8))).await;
     let client = server.client().await;
     let (_, tickets) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
-    let seats = tickets
-        .into_iter()
-        .map(|ticket| (ticket, RandomAgent::new(1)))
-        .collect::<Vec<_>>();
-    for outcome in patiently("the streams to end", client.play_many(seats)).await {
+    let playing = client.play_many(random_agents(tickets));
+    for outcome in patiently("the streams to end", playing).await {
         outcome.expect_err("there is no result");
     }
 }

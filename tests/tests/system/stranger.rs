@@ -2,7 +2,7 @@
 
 use bytes::{Buf, BufMut, Bytes};
 use chefshat_proto::v1;
-use chefshat_tests::{StreamSeat, TestServer, one_shift, play_on, room_of_four};
+use chefshat_tests::{StreamSeat, TestServer, attach_all, one_shift, play_on, room_of_four};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use tonic::Status;
@@ -97,10 +97,7 @@ async fn no_bytes_harm_a_server_or_a_game() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let (created, tickets) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
-    let mut seats = Vec::new();
-    for ticket in &tickets[..3] {
-        seats.push(StreamSeat::attached(server.channel().await, ticket).await);
-    }
+    let mut seats = attach_all(&server, &tickets[..3]).await;
     let room_id = created.room.expect("a room").room_id;
     let before = client.get_room(&room_id).await.expect("it is there");
 

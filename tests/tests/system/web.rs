@@ -7,7 +7,7 @@ use chefshat_proto::v1::{
     seat_update::Update,
 };
 use chefshat_tests::{
-    StreamSeat, TestServer, first_legal, one_shift, patiently, play_on, room_of_four,
+    TestServer, attach_all, first_legal, one_shift, patiently, play_on, room_of_four,
 };
 use hyper_util::client::legacy::Client as HttpClient;
 use hyper_util::rt::TokioExecutor;
@@ -24,10 +24,7 @@ async fn a_seat_plays_over_grpc_web_on_the_same_port() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let (created, tickets) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
-    let mut others = Vec::new();
-    for ticket in &tickets[1..] {
-        others.push(StreamSeat::attached(server.channel().await, ticket).await);
-    }
+    let mut others = attach_all(&server, &tickets[1..]).await;
     let others =
         tokio::spawn(
             async move { futures::future::join_all(others.iter_mut().map(play_on)).await },

@@ -6,6 +6,6 @@ mod rules;
 
 pub use events::{By, event_kind, seat_cards, seat_number};
 pub use rules::{
-    FieldProblem, action_space, reward_scheme_from_proto, role_from_number, rules_from_proto,
-    rules_to_proto,
+    FieldProblem, action_space, reward_scheme_from_proto, reward_scheme_to_proto, role_from_number,
+    rules_from_proto, rules_to_proto,
 };

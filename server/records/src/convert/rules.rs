@@ -157,6 +157,18 @@ pub fn reward_scheme_from_proto(scheme: v1::RewardScheme) -> Option<RewardScheme
     }
 }
 
+/// The message's name for a reward scheme, or for none.
+pub fn reward_scheme_to_proto(scheme: Option<RewardScheme>) -> v1::RewardScheme {
+    match scheme {
+        None => v1::RewardScheme::Unspecified,
+        Some(RewardScheme::Validity) => v1::RewardScheme::Validity,
+        Some(RewardScheme::Paper) => v1::RewardScheme::Paper,
+        Some(RewardScheme::PaperIntended) => v1::RewardScheme::PaperIntended,
+        Some(RewardScheme::Winning) => v1::RewardScheme::Winning,
+        Some(RewardScheme::Points) => v1::RewardScheme::Points,
+    }
+}
+
 fn small(field: &'static str, value: u32) -> Result<u8, FieldProblem> {
     u8::try_from(value)
         .map_err(|_| FieldProblem::new(field, format!("{value} is far out of range")))

@@ -9,6 +9,7 @@ use std::process::ExitCode;
 use chefshat_arena::AgentKind;
 use chefshat_client::v1::{self, seat_config::FilledBy};
 use chefshat_engine::RewardScheme;
+use chefshat_records::convert::reward_scheme_to_proto;
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 
@@ -152,15 +153,7 @@ impl PolicyArgs {
             max_timeouts: self.max_timeouts,
             pace_ms: self.pace_ms,
             waiting_time_ms: self.waiting_time_ms,
-            reward_scheme: match scheme {
-                None => v1::RewardScheme::Unspecified,
-                Some(RewardScheme::Validity) => v1::RewardScheme::Validity,
-                Some(RewardScheme::Paper) => v1::RewardScheme::Paper,
-                Some(RewardScheme::PaperIntended) => v1::RewardScheme::PaperIntended,
-                Some(RewardScheme::Winning) => v1::RewardScheme::Winning,
-                Some(RewardScheme::Points) => v1::RewardScheme::Points,
-            }
-            .into(),
+            reward_scheme: reward_scheme_to_proto(scheme).into(),
             spectator_delay_decisions: self.spectator_delay,
             ..v1::RoomPolicy::default()
         }

@@ -20,6 +20,7 @@ use chefshat_engine::{Action, Decision, Event, Game, Mask, Observation, Seat, Vi
 pub use answers::{AnswerInput, Answered, ExpressError, JoinError, SeatStanding, Verdict};
 
 use super::log::Log;
+use crate::ids::SecretHash;
 use crate::store::journal::{AbortReason, Change, Entry, Fill, GameHeader, SeatedParticipant};
 
 /// A joined seat whose ticket is not attached within this time is freed, before the game begins.
@@ -288,11 +289,12 @@ impl Core {
 
     /// The seat a ticket's secret belongs to, in constant time for each seat.
     pub fn seat_of_ticket(&self, secret: &[u8]) -> Option<Seat> {
+        let hash = SecretHash::of(secret);
         self.all_seats().find(|seat| {
             self.seats[seat.index()]
                 .participant
                 .as_ref()
-                .is_some_and(|participant| participant.ticket.matches(secret))
+                .is_some_and(|participant| participant.ticket.is(&hash))
         })
     }
 

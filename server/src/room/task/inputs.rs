@@ -1,7 +1,6 @@
 //! What a room does with a message: the core applies it, and what is to be said is put aside until it is kept.
 
 use std::sync::atomic::Ordering;
-use std::time::Duration;
 
 use chefshat_engine::Seat;
 use chefshat_proto::v1;
@@ -19,17 +18,16 @@ use crate::store::journal::{AbortReason, SeatedParticipant};
 
 impl Task {
     pub(super) fn receive(&mut self, message: Message) {
-        let now = self.now;
         match message {
             Message::Join(request, reply) => {
-                let joined = self.join(now, *request);
+                let joined = self.join(*request);
                 self.releases.push(Release::Join(reply, joined));
             }
-            Message::Attach(request, reply) => self.attach(now, request, reply),
-            Message::Lost(seat, connection, reason) => self.lost(now, seat, connection, reason),
+            Message::Attach(request, reply) => self.attach(request, reply),
+            Message::Lost(seat, connection, reason) => self.lost(seat, connection, reason),
             Message::Do(seat, connection, action, arrived) => {
                 if self.is_current(seat, connection) {
-                    match self.perform(now, seat, action, arrived) {
+                    match self.perform(seat, action, arrived) {
                         Ok(Some(result)) => {
                             self.releases
                                 .push(Release::Result(seat, connection, result));
@@ -46,7 +44,7 @@ impl Task {
             Message::Act(secret, action, arrived, reply) => {
                 match self.core.seat_of_ticket(&secret) {
                     Some(seat) => {
-                        let acted = self.perform(now, seat, action, arrived);
+                        let acted = self.perform(seat, action, arrived);
                         self.releases.push(Release::Acted(reply, acted));
                     }
                     None => answer(reply, None),
@@ -58,21 +56,21 @@ impl Task {
             Message::Describe(reply) => self.releases.push(Release::Describe(reply)),
             Message::Close(secret, reply) => {
                 if self.core.header().owner.matches(&secret) {
-                    self.core.abort(now, AbortReason::Closed);
+                    self.core.abort(self.now, AbortReason::Closed);
                     self.releases.push(Release::Closed(reply));
                 } else {
                     answer(reply, None);
                 }
             }
-            Message::Abort(reason) => self.core.abort(now, reason),
+            Message::Abort(reason) => self.core.abort(self.now, reason),
             Message::Space => {}
         }
     }
 
-    fn join(&mut self, now: Duration, request: JoinRequest) -> Result<Joined, JoinError> {
+    fn join(&mut self, request: JoinRequest) -> Result<Joined, JoinError> {
         let ticket = Token::random(self.core.header().room_id);
         let seat = self.core.join(
-            now,
+            self.now,
             request.seat,
             SeatedParticipant {
                 name: request.name,
@@ -89,7 +87,6 @@ impl Task {
 
     fn attach(
         &mut self,
-        now: Duration,
         request: Box<AttachRequest>,
         reply: oneshot::Sender<Option<(Seat, ConnectionId)>>,
     ) {
@@ -100,23 +97,17 @@ impl Task {
         let connection = ConnectionId(self.context.connections.fetch_add(1, Ordering::Relaxed));
         let handed = self.handed();
         self.core
-            .attach(now, seat, connection, request.entropy.clone(), handed);
+            .attach(self.now, seat, connection, request.entropy.clone(), handed);
         self.releases
             .push(Release::Attach(request, seat, connection, reply));
     }
 
-    fn lost(
-        &mut self,
-        now: Duration,
-        seat: Seat,
-        connection: ConnectionId,
-        reason: Option<v1::DetachReason>,
-    ) {
+    fn lost(&mut self, seat: Seat, connection: ConnectionId, reason: Option<v1::DetachReason>) {
         if !self.is_current(seat, connection) {
             return;
         }
         let handed = self.handed();
-        self.core.lost(now, seat, connection, handed);
+        self.core.lost(self.now, seat, connection, handed);
         if let Some(mut attachment) = self.attachments[seat.index()].take()
             && let Some(reason) = reason
         {
@@ -130,13 +121,7 @@ impl Task {
             .is_some_and(|attachment| attachment.connection() == connection)
     }
 
-    fn perform(
-        &mut self,
-        now: Duration,
-        seat: Seat,
-        action: SeatAction,
-        arrived: Instant,
-    ) -> Acted {
+    fn perform(&mut self, seat: Seat, action: SeatAction, arrived: Instant) -> Acted {
         match action {
             SeatAction::Answer {
                 decision_id,
@@ -148,7 +133,7 @@ impl Task {
                     .as_ref()
                     .and_then(|attachment| attachment.handed(decision_id));
                 let answered: Answered = self.core.answer(
-                    now,
+                    self.now,
                     AnswerInput {
                         seat,
                         decision_id,
@@ -166,10 +151,10 @@ impl Task {
                 expression,
             } => self
                 .core
-                .express(now, seat, record_only, expression)
+                .express(self.now, seat, record_only, expression)
                 .map(|()| None),
             SeatAction::Resume => {
-                self.core.resume(now, seat);
+                self.core.resume(self.now, seat);
                 Ok(None)
             }
         }
