@@ -15,8 +15,20 @@ pub const MAX_SEATS_PER_WATCH: usize = 64;
 pub const MAX_COMMANDS_PER_MESSAGE: usize = 1_024;
 /// Messages that wait for one room.
 pub const ROOM_MAILBOX: usize = 256;
-/// Records that are put together at a time.
+/// Largest record that may be imported, bytes as encoded.
+pub const MAX_IMPORT_BYTES: usize = 64 * 1024 * 1024;
+/// Most lines of a record that may be imported.
+pub const MAX_IMPORT_LINES: usize = 1_500_000;
+/// How long the whole of a record that is imported may take to arrive.
+pub const IMPORT_TIMEOUT: Duration = Duration::from_secs(120);
+/// Records that are being received at a time.
+pub const MAX_IMPORTS: usize = 2;
+/// Records that are put together, or replayed, at a time, for each of the purposes that they serve.
 pub const MAX_RECORDS_IN_HAND: usize = 2;
+/// Records that are being sent at a time.
+pub const MAX_RECORDS_SENT: usize = 8;
+/// How long a client may take to take in one message of a record.
+pub const RECORD_SEND_TIMEOUT: Duration = Duration::from_secs(30);
 /// How long streams and connections that do not close may hold up a shutdown.
 pub const DRAIN_LIMIT: Duration = Duration::from_secs(5);
 /// Longest name of a room or participant, characters.
@@ -41,6 +53,8 @@ pub struct ServerConfig {
     pub grace: Duration,
     /// How long a new connection may stay silent before it is dropped.
     pub first_byte_timeout: Duration,
+    /// Whether anybody may add records of games played elsewhere.
+    pub allow_import: bool,
     /// Web origins that may call the server from a browser; `*` is all.
     pub allowed_origins: Vec<String>,
 }
@@ -54,6 +68,7 @@ impl Default for ServerConfig {
             retention: Duration::from_secs(600),
             grace: Duration::from_secs(30),
             first_byte_timeout: Duration::from_secs(10),
+            allow_import: false,
             allowed_origins: Vec::new(),
         }
     }

@@ -63,6 +63,16 @@ impl SecretHash {
         Self(Sha256::digest(secret).into())
     }
 
+    /// The hash that was kept.
+    pub fn from_bytes(bytes: [u8; 32]) -> Self {
+        Self(bytes)
+    }
+
+    /// What to keep.
+    pub fn bytes(&self) -> &[u8; 32] {
+        &self.0
+    }
+
     /// Whether this is the hash of `secret`, in constant time.
     pub fn matches(&self, secret: &[u8]) -> bool {
         self.is(&Self::of(secret))

@@ -6,6 +6,7 @@ pub mod cli;
 pub mod config;
 pub mod connections;
 pub mod convert;
+pub mod filing;
 pub mod grpc;
 pub mod ids;
 pub mod outbox;

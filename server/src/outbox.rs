@@ -13,6 +13,8 @@ use tokio::sync::Notify;
 use tokio::time::Instant;
 use tonic::Status;
 
+use crate::room::RoomClock;
+
 /// Most that may wait in an outbox, counted in updates and events.
 pub const OUTBOX_CAPACITY: usize = 8_192;
 /// Most that goes into one message, counted in updates and events. Bounds a message to well below the 4 MiB that gRPC clients accept.
@@ -21,17 +23,16 @@ pub const MESSAGE_CAPACITY: usize = 4_096;
 /// Notes when a decision request was handed to the transport. Shared by the outbox that stamps and the room that reads.
 #[derive(Debug)]
 pub struct HandStamp {
-    /// Moment zero of the stamp.
-    epoch: Instant,
-    /// Microseconds after `epoch`, plus one; 0 while the request has not been handed over.
+    clock: RoomClock,
+    /// Microseconds since the room was created, plus one; 0 while the request has not been handed over.
     micros: AtomicU64,
 }
 
 impl HandStamp {
-    /// A stamp that counts from `epoch`.
-    pub fn new(epoch: Instant) -> Arc<Self> {
+    /// A stamp by the clock of a room.
+    pub fn new(clock: RoomClock) -> Arc<Self> {
         Arc::new(Self {
-            epoch,
+            clock,
             micros: AtomicU64::new(0),
         })
     }
@@ -41,14 +42,14 @@ impl HandStamp {
         self.micros.store(0, Ordering::Release);
     }
 
-    /// When the decision was handed over, since `epoch`.
+    /// When the decision was handed over, since the room was created.
     pub fn get(&self) -> Option<std::time::Duration> {
         let micros = self.micros.load(Ordering::Acquire).checked_sub(1)?;
         Some(std::time::Duration::from_micros(micros))
     }
 
     fn set(&self, now: Instant) {
-        let micros = now.saturating_duration_since(self.epoch).as_micros();
+        let micros = self.clock.at(now).as_micros();
         self.micros.store(
             u64::try_from(micros).unwrap_or(u64::MAX - 1) + 1,
             Ordering::Release,

@@ -13,7 +13,7 @@ use tokio::net::TcpListener;
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 use tonic::service::Routes;
-use tonic::transport::Server;
+use tonic::transport;
 use tonic::transport::server::Connected;
 use tower_http::cors::{AllowOrigin, Any, CorsLayer};
 use tracing::{info, warn};
@@ -22,7 +22,7 @@ use crate::config::{DRAIN_LIMIT, MAX_MESSAGE_BYTES, MAX_STREAMS_PER_CONNECTION, 
 use crate::connections::{self, Limits};
 use crate::grpc;
 use crate::rooms::Rooms;
-use crate::store::Store;
+use crate::store::{Store, StoreError};
 
 const KEEPALIVE_INTERVAL: std::time::Duration = std::time::Duration::from_secs(20);
 const KEEPALIVE_TIMEOUT: std::time::Duration = std::time::Duration::from_secs(10);
@@ -35,94 +35,151 @@ pub enum ServeError {
     /// The transport failed.
     #[error("the server's transport failed: {0}")]
     Transport(#[from] tonic::transport::Error),
+    /// The store failed. What was acknowledged is kept; the outcome of everything else shows when the store is opened again.
+    #[error(
+        "{0}; every decision that was acknowledged is kept, and durable games go on when the server is started again"
+    )]
+    Store(#[from] StoreError),
     /// A web origin is not one.
     #[error("{0:?} is not a web origin; write for instance https://example.org")]
     Origin(String),
 }
 
-/// Serves on a listening socket until `shutdown` is ready and everything has ended.
+/// Goes on with the store's games and serves on a listening socket until `shutdown` is ready and everything has ended.
 ///
 /// # Errors
-/// A failing transport, or a web origin that is none.
+/// A failing transport or store, or a web origin that is none.
 pub async fn serve(
     listener: TcpListener,
     config: ServerConfig,
     store: Arc<dyn Store>,
     shutdown: impl Future<Output = ()> + Send,
 ) -> Result<(), ServeError> {
-    let incoming = connections::accept(
-        listener,
-        Limits {
-            max_connections: config.max_connections,
-            first_byte_timeout: config.first_byte_timeout,
-        },
-    );
-    serve_incoming(incoming, config, store, shutdown).await
+    let server = Server::restored(config, store).await?;
+    server.serve(listener, shutdown).await
 }
 
-/// Serves on connections of any kind until `shutdown` is ready and everything has ended.
-///
-/// # Errors
-/// A failing transport, or a web origin that is none.
-pub async fn serve_incoming<I, C>(
-    incoming: I,
+/// A server whose games go on, before it has a socket.
+#[derive(Debug)]
+pub struct Server {
     config: ServerConfig,
     store: Arc<dyn Store>,
-    shutdown: impl Future<Output = ()> + Send,
-) -> Result<(), ServeError>
-where
-    I: Stream<Item = io::Result<C>> + Send,
-    C: AsyncRead + AsyncWrite + Connected + Unpin + Send + 'static,
-{
-    let tracker = TaskTracker::new();
-    let closing = CancellationToken::new();
-    let rooms = Rooms::new(&config, store, tracker.clone());
-    let (health, health_service) = tonic_health::server::health_reporter();
-    let routes = routes(&rooms, &config, &closing)
-        .add_service(health_service)
-        .add_service(reflection());
-    health
-        .set_service_status("", tonic_health::ServingStatus::Serving)
-        .await;
+    rooms: Arc<Rooms>,
+    tracker: TaskTracker,
+    games: usize,
+}
 
-    let closed = closing.clone();
-    let serving = Server::builder()
-        .accept_http1(true)
-        .tcp_nodelay(true)
-        .http2_keepalive_interval(Some(KEEPALIVE_INTERVAL))
-        .http2_keepalive_timeout(Some(KEEPALIVE_TIMEOUT))
-        .http2_max_header_list_size(MAX_HEADER_BYTES)
-        .max_concurrent_streams(Some(MAX_STREAMS_PER_CONNECTION))
-        .layer(cors(&config.allowed_origins)?)
-        .layer(tonic_web::GrpcWebLayer::new())
-        .add_routes(routes)
-        .serve_with_incoming_shutdown(incoming, async move { closed.cancelled().await });
-
-    let ending = async {
-        shutdown.await;
-        info!(
-            grace_seconds = config.grace.as_secs(),
-            open_rooms = rooms.open_count(),
-            "shutting down: no new rooms; running games may end"
-        );
-        health
-            .set_service_status("", tonic_health::ServingStatus::NotServing)
-            .await;
-        rooms.shut_down(config.grace).await;
-        closing.cancel();
-    };
-    let ended_or_drained = async {
-        ending.await;
-        tokio::time::sleep(DRAIN_LIMIT).await;
-    };
-    tokio::select! {
-        served = serving => served?,
-        () = ended_or_drained => warn!("connections that would not close are dropped"),
+impl Server {
+    /// A server in which every game goes on that its store holds unfinished.
+    ///
+    /// # Errors
+    /// The store's.
+    pub async fn restored(config: ServerConfig, store: Arc<dyn Store>) -> Result<Self, ServeError> {
+        let tracker = TaskTracker::new();
+        let rooms = Rooms::new(&config, Arc::clone(&store), tracker.clone());
+        let games = rooms.restore().await?;
+        Ok(Self {
+            config,
+            store,
+            rooms,
+            tracker,
+            games,
+        })
     }
-    drop(rooms);
-    tracker.close();
-    tracker.wait().await;
-    Ok(())
+
+    /// How many games go on that had begun or were awaited before the server was started.
+    pub fn games(&self) -> usize {
+        self.games
+    }
+
+    /// Serves on a listening socket until `shutdown` is ready and everything has ended.
+    ///
+    /// # Errors
+    /// A failing transport or store, or a web origin that is none.
+    pub async fn serve(
+        self,
+        listener: TcpListener,
+        shutdown: impl Future<Output = ()> + Send,
+    ) -> Result<(), ServeError> {
+        let limits = Limits {
+            max_connections: self.config.max_connections,
+            first_byte_timeout: self.config.first_byte_timeout,
+        };
+        let incoming = connections::accept(listener, limits);
+        self.serve_incoming(incoming, shutdown).await
+    }
+
+    /// Serves on connections of any kind until `shutdown` is ready and everything has ended.
+    ///
+    /// # Errors
+    /// A failing transport or store, or a web origin that is none.
+    pub async fn serve_incoming<I, C>(
+        self,
+        incoming: I,
+        shutdown: impl Future<Output = ()> + Send,
+    ) -> Result<(), ServeError>
+    where
+        I: Stream<Item = io::Result<C>> + Send,
+        C: AsyncRead + AsyncWrite + Connected + Unpin + Send + 'static,
+    {
+        let Self {
+            config,
+            store,
+            rooms,
+            tracker,
+            ..
+        } = self;
+        let closing = CancellationToken::new();
+        let (health, health_service) = tonic_health::server::health_reporter();
+        let routes = routes(&rooms, &config, &closing)
+            .add_service(health_service)
+            .add_service(reflection());
+        health
+            .set_service_status("", tonic_health::ServingStatus::Serving)
+            .await;
+
+        let closed = closing.clone();
+        let serving = transport::Server::builder()
+            .accept_http1(true)
+            .tcp_nodelay(true)
+            .http2_keepalive_interval(Some(KEEPALIVE_INTERVAL))
+            .http2_keepalive_timeout(Some(KEEPALIVE_TIMEOUT))
+            .http2_max_header_list_size(MAX_HEADER_BYTES)
+            .max_concurrent_streams(Some(MAX_STREAMS_PER_CONNECTION))
+            .layer(cors(&config.allowed_origins)?)
+            .layer(tonic_web::GrpcWebLayer::new())
+            .add_routes(routes)
+            .serve_with_incoming_shutdown(incoming, async move { closed.cancelled().await });
+
+        let ending = async {
+            shutdown.await;
+            info!(
+                grace_seconds = config.grace.as_secs(),
+                open_rooms = rooms.open_count(),
+                "shutting down: no new rooms; running games may end"
+            );
+            health
+                .set_service_status("", tonic_health::ServingStatus::NotServing)
+                .await;
+            rooms.shut_down(config.grace).await;
+            closing.cancel();
+        };
+        let ended_or_drained = async {
+            ending.await;
+            tokio::time::sleep(DRAIN_LIMIT).await;
+        };
+        tokio::select! {
+            served = serving => served?,
+            () = ended_or_drained => warn!("connections that would not close are dropped"),
+            // Nothing can be acknowledged any more: whoever waits is better told at once, by the end of the process.
+            failure = store.failed() => return Err(ServeError::Store(failure)),
+        }
+        drop(rooms);
+        tracker.close();
+        tracker.wait().await;
+        store.close().await;
+        Ok(())
+    }
 }
 
 fn routes(rooms: &Arc<Rooms>, config: &ServerConfig, closing: &CancellationToken) -> Routes {
@@ -131,12 +188,13 @@ fn routes(rooms: &Arc<Rooms>, config: &ServerConfig, closing: &CancellationToken
     use v1::room_service_server::RoomServiceServer;
     use v1::server_service_server::ServerServiceServer;
     use v1::spectator_service_server::SpectatorServiceServer;
+    let recorded = grpc::Recorded::new(Arc::clone(rooms));
     Routes::new(
         PlayServiceServer::new(grpc::Play::new(Arc::clone(rooms), closing.clone()))
             .max_decoding_message_size(MAX_MESSAGE_BYTES),
     )
     .add_service(
-        RoomServiceServer::new(grpc::RoomCalls::new(Arc::clone(rooms)))
+        RoomServiceServer::new(grpc::RoomCalls::new(Arc::clone(rooms), recorded.clone()))
             .max_decoding_message_size(MAX_MESSAGE_BYTES),
     )
     .add_service(
@@ -144,7 +202,7 @@ fn routes(rooms: &Arc<Rooms>, config: &ServerConfig, closing: &CancellationToken
             .max_decoding_message_size(MAX_MESSAGE_BYTES),
     )
     .add_service(
-        RecordServiceServer::new(grpc::Records::new(Arc::clone(rooms)))
+        RecordServiceServer::new(grpc::Records::new(recorded, config.allow_import))
             .max_decoding_message_size(MAX_MESSAGE_BYTES),
     )
     .add_service(

@@ -6,9 +6,15 @@
 )]
 
 mod cli {
+    mod branching;
     mod conformance;
     mod demo;
+    mod export;
+    mod import;
+    mod render;
     mod room;
     mod run;
+    mod server;
     mod simulate;
+    mod verify;
 }

@@ -1,14 +1,22 @@
-//! What the whole-system tests share: a server on a free port, rooms on it, and seats that do exactly what a test tells them, over real
-//! sockets. Agents that play by themselves come from the SDKs.
+//! What the whole-system tests share: a server on a free port, in this process or in one of its own, rooms on it, seats that do exactly
+//! what a test tells them, over real sockets, and a ledger of what agents were told. Agents that play by themselves come from the SDKs.
 
 /// The samples of the README, compiled.
 #[doc = include_str!("../../README.md")]
 #[cfg(doctest)]
 pub struct Readme;
 
+mod disk;
+mod ledger;
+mod process;
+mod regulars;
 mod seat;
 mod server;
 
+pub use disk::{SmallDisk, skip};
+pub use ledger::{Ledger, Noted};
+pub use process::{Ended, Launch, Process, set_up};
+pub use regulars::{Habit, Regulars};
 pub use seat::{StreamSeat, attach_all, first_legal, first_to_hear, is_legal, play_on};
 pub use server::{TestServer, narrow_spectator, one_shift, play_out, random_agents, room_of_four};
 

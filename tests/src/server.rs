@@ -94,6 +94,14 @@ impl TestServer {
         }
     }
 
+    /// Waits until the server has ended by itself.
+    ///
+    /// # Errors
+    /// Why it did.
+    pub async fn ended(self) -> Result<(), ServeError> {
+        self.serving.await.expect("the server does not panic")
+    }
+
     /// Stops the server and waits until it has ended; gives the folder it leaves behind.
     pub async fn stop(mut self) -> TempDir {
         self.ask_to_stop();

@@ -52,6 +52,7 @@ class FakeServer(
 
     def __init__(self) -> None:
         self.games: list[FakeGame] = []
+        self.created: list[pb.CreateRoomRequest] = []
         self.streams = 0
         self.questions = QUESTIONS
         self.fault: Callable[[FakeGame, FakeSeat, pb.Answer], str] = lambda game, seat, answer: ""
@@ -75,6 +76,7 @@ class FakeServer(
 
     def CreateRoom(self, request: pb.CreateRoomRequest, context: Context) -> pb.CreateRoomResponse:
         """Makes a room."""
+        self.created.append(request)
         game = FakeGame(len(self.games) + 1, request, self.questions)
         self.games.append(game)
         return pb.CreateRoomResponse(room=game.room, join_code=game.join_code, owner_token="owner")
@@ -129,6 +131,14 @@ class FakeServer(
         space = pb.ActionSpace(id="chefshat-11", size=SIZE, turn_actions=200)
         return pb.GetActionTableResponse(action_space=space, texts=["C1;Q1;J0", *["?"] * (SIZE - 1)])
 
+    def ListRecords(self, request: pb.ListRecordsRequest, context: Context) -> pb.ListRecordsResponse:
+        """The games of rooms with the name that is wanted, whether over or not, two a page."""
+        wanted = request.filter.room_name
+        games = [game for game in self.games if not wanted or game.room.name == wanted]
+        at = int(request.page_token or "0")
+        page = [pb.RecordSummary(game_id=game.room.game_id, room_name=game.room.name) for game in games[at : at + 2]]
+        return pb.ListRecordsResponse(records=page, next_page_token=str(at + 2) if at + 2 < len(games) else "")
+
     def GetRecord(self, request: pb.GetRecordRequest, context: Context) -> Iterator[pb.GetRecordResponse]:
         """The events of a game that is over, between a header and a footer."""
         for game in self.games:
@@ -138,6 +148,16 @@ class FakeServer(
                 yield pb.GetRecordResponse(lines=[pb.RecordLine(footer=pb.RecordFooter(events=len(game.events)))])
                 return
         refuse(context, grpc.StatusCode.NOT_FOUND, "GAME_UNKNOWN", "there is no such game")
+
+    def StreamRecords(self, request: pb.StreamRecordsRequest, context: Context) -> NoReturn:
+        """The package fetches records one by one."""
+        context.abort(grpc.StatusCode.UNIMPLEMENTED, "the package does not use it")
+        raise AssertionError("abort always raises")
+
+    def ImportRecord(self, request_iterator: Iterator[pb.ImportRecordRequest], context: Context) -> NoReturn:
+        """The package adds no records."""
+        context.abort(grpc.StatusCode.UNIMPLEMENTED, "the package does not use it")
+        raise AssertionError("abort always raises")
 
     # Playing.
 

@@ -11,19 +11,54 @@ START_S = 60.0
 
 
 class RealServer:
-    """`chefshat serve` on a free port, with a data directory of its own; a context manager."""
+    """`chefshat serve` on a free port, with a data directory of its own; a context manager.
 
-    def __init__(self, binary: Path, data_dir: Path) -> None:
+    It can be killed and started again, on the same address and data directory.
+    """
+
+    def __init__(self, binary: Path, data_dir: Path, *, host: str = "127.0.0.1") -> None:
+        self._binary = binary
+        self._data_dir = data_dir
         self._log = (data_dir / "server.log").open("w+")
-        self._process = subprocess.Popen(
-            [str(binary), "serve", "--listen", "127.0.0.1:0", "--data-dir", str(data_dir), "--json"],
+        self.address = f"{host}:0"
+        self._process = self._spawn()
+
+    def __enter__(self) -> Self:
+        self._wait_until_it_listens()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
+    def kill(self) -> None:
+        """Ends the process without a warning."""
+        self._process.kill()
+        self._ended()
+
+    def start(self) -> None:
+        """Starts another process in place of the one that ended."""
+        self._process = self._spawn()
+        self._wait_until_it_listens()
+
+    def stop(self) -> None:
+        """Ends the process."""
+        self._process.terminate()
+        try:
+            self._process.wait(10)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+        self._ended()
+        self._log.close()
+
+    def _spawn(self) -> subprocess.Popen[str]:
+        return subprocess.Popen(
+            [str(self._binary), "serve", "--listen", self.address, "--data-dir", str(self._data_dir), "--json"],
             stdout=subprocess.PIPE,
             stderr=self._log,
             text=True,
         )
-        self.address = ""
 
-    def __enter__(self) -> Self:
+    def _wait_until_it_listens(self) -> None:
         # A server that hangs is killed, which ends its output and so the wait for its first line.
         watchdog = threading.Timer(START_S, self._process.kill)
         watchdog.start()
@@ -33,7 +68,7 @@ class RealServer:
                 said = json.loads(line)
                 if said.get("event") == "listening":
                     self.address = said["address"]
-                    return self
+                    return
         finally:
             watchdog.cancel()
         self._log.seek(0)
@@ -41,17 +76,7 @@ class RealServer:
         self.stop()
         raise AssertionError(f"the server named by CHEFSHAT_BIN did not start listening; it said:\n{said_instead}")
 
-    def __exit__(self, *_: object) -> None:
-        self.stop()
-
-    def stop(self) -> None:
-        """Ends the process."""
-        self._process.terminate()
-        try:
-            self._process.wait(10)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+    def _ended(self) -> None:
+        self._process.wait()
         if self._process.stdout is not None:
             self._process.stdout.close()
-        self._log.close()

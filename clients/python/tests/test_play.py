@@ -280,6 +280,9 @@ def test_the_rest_of_the_blocking_client(fake: FakeServer) -> None:
         lines = list(client.record(room.room.game_id))
         assert len(lines) == len(watched) + 2
         assert lines[1].event.HasField("expression_shown")
+        assert [summary.room_name for summary in client.records()] == [f"room {number}" for number in range(5)] + [""]
+        (summary,) = client.records(pb.RecordFilter(room_name="room 3"))
+        assert summary.game_id == client.get_room(made[3]).game_id
 
 
 def test_the_rest_of_the_asyncio_client(fake: FakeServer) -> None:
@@ -298,5 +301,42 @@ def test_the_rest_of_the_asyncio_client(fake: FakeServer) -> None:
             assert watched == list(range(1, len(watched) + 1))
             assert [event.sequence async for event in client.watch(room.room.room_id, from_sequence=4)] == watched[3:]
             assert len([line async for line in client.record(room.room.game_id)]) == len(watched) + 2
+            names = [summary.room_name async for summary in client.records()]
+            assert names == [f"room {number}" for number in range(5)] + [""]
+            wanted = pb.RecordFilter(room_name="room 3")
+            assert [summary.room_name async for summary in client.records(wanted)] == ["room 3"]
 
     asyncio.run(run())
+
+
+POINT = pb.BranchPoint(game_id="0f" * 16, decisions=40, same_deals=True)
+HANDS = pb.ScriptedShift(hands=[pb.SeatCards(seat=0, cards=[1, 4, 12], golden=True)])
+PLAYER = pb.RecordedPlayer(game_id="0f" * 16, seat=2)
+
+
+def test_how_a_game_begins_reaches_the_server(fake: FakeServer) -> None:
+    slow = pb.RoomPolicy(pace_ms=500)
+    with chefshat.Client(fake.address) as client:
+        client.create_room(seats=[PLAYER, "greedy", None, None], branch=POINT)
+        client.create_room(hands=HANDS, durability=pb.DURABILITY_EPHEMERAL)
+        client.create_room(policy=slow, durability=pb.DURABILITY_EPHEMERAL)
+        client.create_room(policy=slow)
+        with pytest.raises(ValueError, match="not with both"):
+            client.create_room(branch=POINT, hands=HANDS)
+
+    async def run() -> None:
+        async with aio.Client(fake.address) as client:
+            await client.create_room(seats=[PLAYER, "greedy", None, None], branch=POINT)
+
+    asyncio.run(run())
+    branched, scripted, slow_ephemeral, plain, branched_too = fake.created
+    assert branched == branched_too
+    assert branched.branch == POINT
+    assert not branched.HasField("rules")
+    assert branched.seats[0].replay == PLAYER
+    assert branched.seats[1].built_in_agent == "greedy"
+    assert scripted.scripted == HANDS
+    assert scripted.policy == pb.RoomPolicy(durability=pb.DURABILITY_EPHEMERAL)
+    assert slow_ephemeral.policy == pb.RoomPolicy(pace_ms=500, durability=pb.DURABILITY_EPHEMERAL)
+    assert plain.policy == slow == pb.RoomPolicy(pace_ms=500)
+    assert plain.WhichOneof("start") is None

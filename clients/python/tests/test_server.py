@@ -246,3 +246,43 @@ def test_refusals(real_address: str) -> None:
             client.play(RandomAgent(), "nonsense")
         with pytest.raises(chefshat.ChefsHatError, match="ROOM_UNKNOWN"):
             client.get_room("0" * 32)
+
+
+def test_a_recorded_game_is_branched_and_played_again(real_address: str) -> None:
+    with chefshat.Client(real_address) as client:
+
+        def ended(room: pb.Room) -> list[tuple[int, int]]:
+            for _ in client.watch(room.room_id):
+                pass
+            lines = client.record(room.game_id)
+            return [(line.decision.seat, line.decision.action) for line in lines if line.HasField("decision")]
+
+        rules, seats = pb.RuleSet(target_shifts=2), ["greedy", "random", "random", "random"]
+        first = client.create_room("to branch from", rules=rules, seats=seats).room
+        course = ended(first)
+        players = [pb.RecordedPlayer(game_id=first.game_id, seat=seat) for seat in range(4)]
+        again = client.create_room(
+            "again",
+            seats=players,
+            branch=pb.BranchPoint(game_id=first.game_id, decisions=30, same_deals=True),
+            durability=pb.DURABILITY_EPHEMERAL,
+        ).room
+        assert again.origin == pb.GAME_ORIGIN_BRANCHED
+        assert again.policy.durability == pb.DURABILITY_EPHEMERAL
+        assert [seat.replay for seat in again.seats] == players
+        assert ended(again) == course
+        listed = {summary.game_id: summary for summary in client.records(pb.RecordFilter(origin=pb.GAME_ORIGIN_BRANCHED))}
+        assert listed[again.game_id].decisions == len(course)
+        assert first.game_id not in listed
+
+        # The hands of its second Shift begin another game.
+        starts = [line.event.shift_started for line in client.record(first.game_id) if line.event.HasField("shift_started")]
+        hands = pb.ScriptedShift(hands=starts[1].hands)
+        scripted = client.create_room("given", rules=pb.RuleSet(target_shifts=1), seats=["greedy"] * 4, hands=hands).room
+        ended(scripted)
+        events = (line.event for line in client.record(scripted.game_id))
+        (dealt,) = (event.shift_started for event in events if event.HasField("shift_started"))
+        assert dealt.hands == starts[1].hands
+
+        with pytest.raises(chefshat.ChefsHatError, match="BRANCH_REFUSED"):
+            client.create_room(branch=pb.BranchPoint(game_id=first.game_id, decisions=len(course)))

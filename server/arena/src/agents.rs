@@ -1,11 +1,15 @@
-//! The built-in agents. Each is a function of what its seat may know and of its own generator, and of nothing else. Who asks them, and
-//! what follows from an answer, is decided in `play` (offline) and by the server's rooms.
+//! The built-in agents. Each is a function of what its seat may know and of its own generator or its own past, and of nothing else. Who asks
+//! them, and what follows from an answer, is decided in `play` (offline) and by the server's rooms; what `replay` does is in `recorded`.
+
+use std::sync::Arc;
 
 use chefshat_engine::{Action, ActionSpace, DecisionKind, Mask, Move, Observation, Role};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
 
-/// Which built-in agent.
+use crate::RecordedPlayer;
+
+/// Which built-in agent, of those that need nothing but a seed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub enum AgentKind {
     /// Uniform over the legal actions.
@@ -36,25 +40,56 @@ impl AgentKind {
     }
 }
 
-/// A built-in agent with its generator.
+/// A built-in agent, ready to decide.
 #[derive(Debug, Clone)]
 pub struct BuiltInAgent {
-    kind: AgentKind,
-    generator: ChaCha8Rng,
+    mind: Mind,
+}
+
+#[derive(Debug, Clone)]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "nearly all are of the large variant, and a box would cost offline games an allocation for each agent"
+)]
+enum Mind {
+    /// An agent of a kind, with its generator.
+    Kind(AgentKind, Chance),
+    /// One that plays as a recorded player.
+    Replay(Arc<RecordedPlayer>),
 }
 
 impl BuiltInAgent {
+    /// Name of the agents that [`BuiltInAgent::replay`] makes.
+    pub const REPLAY: &str = "replay";
+
     /// An agent whose choices follow from `seed` alone.
     pub fn new(kind: AgentKind, seed: [u8; 32]) -> Self {
         Self {
-            kind,
-            generator: ChaCha8Rng::from_seed(seed),
+            mind: Mind::Kind(kind, Chance(ChaCha8Rng::from_seed(seed))),
         }
     }
 
-    /// Which agent it is.
-    pub fn kind(&self) -> AgentKind {
-        self.kind
+    /// An agent that plays as a recorded player. Its choices follow from what it sees alone.
+    pub fn replay(player: Arc<RecordedPlayer>) -> Self {
+        Self {
+            mind: Mind::Replay(player),
+        }
+    }
+
+    /// The name by which people and messages call it.
+    pub fn name(&self) -> &'static str {
+        match &self.mind {
+            Mind::Kind(kind, _) => kind.name(),
+            Mind::Replay(_) => Self::REPLAY,
+        }
+    }
+
+    /// Whether its choices depend on how often it was asked before. Otherwise they follow from what it sees alone.
+    pub fn has_generator(&self) -> bool {
+        match &self.mind {
+            Mind::Kind(kind, _) => *kind != AgentKind::Greedy,
+            Mind::Replay(_) => false,
+        }
     }
 
     /// Decides. The action is one of `legal`, except that `random_unmasked` may answer a turn with any of its T actions.
@@ -64,13 +99,24 @@ impl BuiltInAgent {
     pub fn decide(&mut self, observation: &Observation, legal: &Mask) -> Action {
         let space = ActionSpace::new(observation.faces).expect("an observation has 4 to 15 faces");
         let turn = observation.kind == Some(DecisionKind::Turn);
-        match self.kind {
-            AgentKind::RandomUnmasked if turn => Action::new(self.below(space.turn_actions())),
-            AgentKind::Random | AgentKind::RandomUnmasked => self.uniform(legal),
-            AgentKind::Greedy => greedy(observation, legal, space),
+        match &mut self.mind {
+            Mind::Kind(AgentKind::RandomUnmasked, chance) if turn => {
+                Action::new(chance.below(space.turn_actions()))
+            }
+            Mind::Kind(AgentKind::Random | AgentKind::RandomUnmasked, chance) => {
+                chance.uniform(legal)
+            }
+            Mind::Kind(AgentKind::Greedy, _) => greedy(observation, legal, space),
+            Mind::Replay(player) => player.decide(observation, legal),
         }
     }
+}
 
+/// Where the choices of an agent come from.
+#[derive(Debug, Clone)]
+struct Chance(ChaCha8Rng);
+
+impl Chance {
     fn uniform(&mut self, legal: &Mask) -> Action {
         assert!(!legal.is_empty(), "a decision has a legal action");
         let count = u16::try_from(legal.len()).expect("a mask has below 400 actions");
@@ -82,7 +128,7 @@ impl BuiltInAgent {
     /// A number below `n`. Spelled out, so that no library's next version changes what a seed brings about. Its bias, that of a
     /// multiplication with 32 random bits, is below 400 / 2^32.
     fn below(&mut self, n: u16) -> u16 {
-        let number = (u64::from(self.generator.next_u32()) * u64::from(n)) >> 32;
+        let number = (u64::from(self.0.next_u32()) * u64::from(n)) >> 32;
         u16::try_from(number).expect("the number is below n")
     }
 }

@@ -2,7 +2,8 @@
 //! fills it in is in `game::view`; the mask of legal actions is not part of it
 //! ([`crate::Game::legal_actions`]).
 
-use crate::{ActionSpace, BySeat, Cards, DecisionKind, Mask, Role, Seat};
+use crate::game::default_gift;
+use crate::{Action, ActionSpace, BySeat, Cards, DecisionKind, Mask, Role, Seat};
 
 /// What lies on the board.
 #[derive(Copy, Clone, Eq, PartialEq, Debug, Default)]
@@ -55,6 +56,20 @@ pub struct Observation {
 }
 
 impl Observation {
+    /// The default decision ([`crate::Game::default_action`]) as it follows from what the seat sees
+    /// and from its legal actions. `None` if no decision is open for the seat, or nothing is legal.
+    pub fn default_action(&self, legal: &Mask) -> Option<Action> {
+        let space = ActionSpace::of(self.faces);
+        let default = match self.kind? {
+            DecisionKind::Turn => space.pass(),
+            DecisionKind::Exchange => default_gift(self.hand, space),
+            DecisionKind::SpecialAction => space.decline(),
+        };
+        Some(default)
+            .filter(|action| legal.contains(*action))
+            .or(legal.nth(0))
+    }
+
     /// Length of the classic vector: F + H + T, the paper's 228 for the standard deck.
     pub fn classic_len(&self) -> usize {
         usize::from(self.faces)

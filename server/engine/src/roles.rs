@@ -20,7 +20,7 @@ pub enum Role {
 
 impl Role {
     /// The role of a rank, counted from 0, among `players` seats.
-    pub(crate) fn of_rank(rank: usize, players: usize) -> Role {
+    pub fn of_rank(rank: usize, players: usize) -> Role {
         if rank == 0 {
             Role::Chef
         } else if rank + 1 == players {
@@ -41,6 +41,11 @@ impl Role {
             roles[seat] = Some(Role::of_rank(rank, ranking.len()));
         }
         roles
+    }
+
+    /// The roles of a game with this many seats, from the first place of the last Shift to the last.
+    pub fn in_order(players: usize) -> impl ExactSizeIterator<Item = Role> {
+        (0..players).map(move |rank| Role::of_rank(rank, players))
     }
 
     /// The role's name as the rulebook prints it.

@@ -1,7 +1,13 @@
 //! A finished game as a file: its form (JSON Lines of `chefshat.v1.RecordLine`), writing, reading and replaying it, and the translation
 //! between the engine's values and the protocol's messages that all of this rests on. Hosting games lives in the server.
 
+pub mod branch;
 pub mod convert;
+pub mod dataset;
 pub mod jsonl;
+pub mod picture;
+pub mod players;
 pub mod replay;
 pub mod seeds;
+pub mod summary;
+pub mod table;

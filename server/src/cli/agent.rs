@@ -1,32 +1,52 @@
-//! `chefshat agent`: a built-in agent as a remote client, over the Rust SDK like anybody's agent.
+//! `chefshat agent`: a built-in agent, or one that plays as a recorded player, as a remote client, over the Rust SDK like anybody's agent.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_arena::AgentKind;
+use chefshat_arena::{AgentKind, BuiltInAgent, RecordedPlayer};
 use chefshat_client::{Client, Outcome, PlayError, v1};
+use chefshat_records::jsonl;
 use clap::Args;
 
 use super::connect::{KindArg, ServerArg, code_in, free_seats};
 use super::remote::{MAX_PACE_MS, RemoteAgent, agent_kind, seed_for};
 use super::{CommandError, say};
+use crate::convert::recorded_player;
 
 /// Play as a built-in agent on a server.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  chefshat agent greedy --server http://127.0.0.1:50051 --code BCDF2345\n  \
-                  chefshat agent random --code-file ./join-code --name Rolf --seed 7\n\n\
+                  chefshat agent random --code-file ./join-code --name Rolf --seed 7\n  \
+                  chefshat agent replay --record 5f0c6a4de2b14b7f8a3d9c1e7b60425d.jsonl --seat 2 --code BCDF2345\n\n\
+                  replay does what the player of that seat did where it sees exactly what that player saw, and elsewhere what it did \
+                  where it saw what is most like it (docs/branching.md).\n\n\
                   Exit code: 0 when the game finished, 1 when it was aborted or the seat was lost."
 )]
 pub(super) struct AgentCommand {
-    /// Which agent: random, random_unmasked or greedy.
-    #[arg(value_parser = agent_kind, value_name = "KIND")]
-    agent: AgentKind,
+    /// Which agent: random, random_unmasked or greedy; or replay, which plays as a recorded player.
+    #[arg(value_parser = agent_arg, value_name = "KIND")]
+    agent: AgentArg,
     #[command(flatten)]
     server: ServerArg,
     #[command(flatten)]
-    seat: SeatArgs,
+    way_in: WayIn,
+    /// For replay: the record of the game in which the player played.
+    #[arg(
+        long,
+        value_name = "FILE",
+        required_if_eq("agent", BuiltInAgent::REPLAY)
+    )]
+    record: Option<PathBuf>,
+    /// For replay: the seat that the player had there, from 0.
+    #[arg(
+        long,
+        value_name = "SEAT",
+        required_if_eq("agent", BuiltInAgent::REPLAY)
+    )]
+    seat: Option<u32>,
     /// Name to show; standard: the agent's.
     #[arg(long)]
     name: Option<String>,
@@ -47,10 +67,26 @@ pub(super) struct AgentCommand {
     json: bool,
 }
 
-/// How the seat is come by.
+/// The agent that is named.
+#[derive(Debug, Clone, Copy)]
+enum AgentArg {
+    Kind(AgentKind),
+    Replay,
+}
+
+impl AgentArg {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Kind(kind) => kind.name(),
+            Self::Replay => BuiltInAgent::REPLAY,
+        }
+    }
+}
+
+/// How a seat is come by.
 #[derive(Debug, Args)]
 #[group(required = true, multiple = false)]
-struct SeatArgs {
+struct WayIn {
     /// The room's join code.
     #[arg(long)]
     code: Option<String>,
@@ -64,13 +100,12 @@ struct SeatArgs {
 
 impl AgentCommand {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
-        if self.games > 1 && self.seat.code_file.is_none() {
+        if self.games > 1 && self.way_in.code_file.is_none() {
             return Err("a code or ticket is for one game; for more --games give a --code-file into which new codes are written".into());
         }
+        let agent = self.built_in_agent()?;
         let client = self.server.connect_patiently().await?;
-        let seed = seed_for("chefshat agent", self.seed);
-        let pace = Duration::from_millis(self.pace_ms);
-        let mut agent = RemoteAgent::new(self.agent, seed, pace);
+        let mut agent = RemoteAgent::new(agent, Duration::from_millis(self.pace_ms));
         let mut last_code = None;
         let mut all_finished = true;
         for _ in 0..self.games {
@@ -90,16 +125,32 @@ impl AgentCommand {
         })
     }
 
+    fn built_in_agent(&self) -> Result<BuiltInAgent, CommandError> {
+        match (self.agent, &self.record, self.seat) {
+            (AgentArg::Kind(kind), None, None) => Ok(BuiltInAgent::new(
+                kind,
+                seed_for("chefshat agent", self.seed),
+            )),
+            (AgentArg::Kind(_), ..) => Err(
+                "--record and --seat say whom the agent replay plays as; name that agent".into(),
+            ),
+            (AgentArg::Replay, Some(record), Some(seat)) => {
+                Ok(BuiltInAgent::replay(player_of(record, seat)?))
+            }
+            (AgentArg::Replay, ..) => Err("replay needs --record and --seat".into()),
+        }
+    }
+
     /// The ticket for the next game.
     async fn ticket(
         &self,
         client: &Client,
         last_code: &mut Option<String>,
     ) -> Result<String, CommandError> {
-        if let Some(ticket) = &self.seat.ticket {
+        if let Some(ticket) = &self.way_in.ticket {
             return Ok(ticket.clone());
         }
-        let code = match (&self.seat.code, &self.seat.code_file) {
+        let code = match (&self.way_in.code, &self.way_in.code_file) {
             (Some(code), _) => code.clone(),
             (None, Some(file)) => code_in(file, last_code.as_deref()).await?,
             (None, None) => return Err("give --code, --code-file or --ticket".into()),
@@ -122,6 +173,21 @@ impl AgentCommand {
         anstream::eprintln!("{name} has seat {}; {waits}plays to the end", joined.seat);
         Ok(joined.ticket)
     }
+}
+
+fn agent_arg(name: &str) -> Result<AgentArg, String> {
+    if name == BuiltInAgent::REPLAY {
+        return Ok(AgentArg::Replay);
+    }
+    let kind = agent_kind(name).map_err(|known| format!("{known}, {}", BuiltInAgent::REPLAY))?;
+    Ok(AgentArg::Kind(kind))
+}
+
+/// The player of a seat in a recorded game.
+fn player_of(record: &Path, seat: u32) -> Result<Arc<RecordedPlayer>, CommandError> {
+    let lines = jsonl::read(record)?;
+    let name = record.display();
+    recorded_player(&lines, seat).map_err(|error| format!("{name}: {error}").into())
 }
 
 fn in_words(played: &Result<Outcome, PlayError>) -> String {

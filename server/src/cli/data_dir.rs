@@ -6,10 +6,7 @@ use super::CommandError;
 
 /// The folder asked for, or the standard one, made ready for records.
 pub(super) fn prepare(wanted: Option<PathBuf>) -> Result<PathBuf, CommandError> {
-    let folder = match wanted {
-        Some(folder) => folder,
-        None => standard()?,
-    };
+    let folder = name(wanted)?;
     std::fs::create_dir_all(folder.join("records")).map_err(|error| {
         format!(
             "the data folder {} cannot be used: {error}; choose another with --data-dir",
@@ -17,6 +14,26 @@ pub(super) fn prepare(wanted: Option<PathBuf>) -> Result<PathBuf, CommandError> 
         )
     })?;
     Ok(folder)
+}
+
+/// The folder asked for, or the standard one, whether it is there or not.
+pub(super) fn name(wanted: Option<PathBuf>) -> Result<PathBuf, CommandError> {
+    wanted.map_or_else(standard, Ok)
+}
+
+/// The folder of records in the data folder asked for, or in the standard one. It is not made.
+pub(super) fn records(wanted: Option<PathBuf>) -> Result<PathBuf, CommandError> {
+    let folder = name(wanted)?;
+    let records = folder.join("records");
+    if records.is_dir() {
+        Ok(records)
+    } else {
+        Err(format!(
+            "there are no records in {} yet; name files or folders, or another data folder with --data-dir",
+            folder.display()
+        )
+        .into())
+    }
 }
 
 /// `chefshat` in the user's data folder, as the XDG base directory specification has it.

@@ -5,12 +5,17 @@ mod conformance;
 mod connect;
 mod data_dir;
 mod demo;
+mod export;
+mod import;
 mod narrator;
+mod records;
 mod remote;
+mod render;
 mod room;
 mod rules_args;
 mod serve;
 mod simulate;
+mod verify;
 
 use std::fmt::Display;
 use std::io::{self, IsTerminal as _, Write as _};
@@ -47,10 +52,20 @@ enum Command {
     Agent(agent::AgentCommand),
     /// Make, list, watch and close rooms of a server.
     Room(room::RoomCommand),
+    /// List, fetch and add records of games that have ended.
+    Records(records::RecordsCommand),
+    /// Make a dataset of records: Parquet, CSV or JSON Lines, with a dataset card.
+    Export(export::Export),
+    /// Draw a record: a picture of a moment, a film of a game, the look-up table of a decision.
+    Render(render::Render),
     /// Play many games offline and print what they add up to.
     Simulate(simulate::Simulate),
     /// Check the rule engine against test vectors.
     Conformance(conformance::Conformance),
+    /// Replay records and name the first line that does not fit.
+    Verify(verify::Verify),
+    /// Add the record of a game played elsewhere, at a real table too.
+    Import(import::Import),
 }
 
 /// Runs what the command line asks for.
@@ -61,8 +76,13 @@ pub fn main() -> ExitCode {
         Command::Demo(command) => in_runtime(command.run()),
         Command::Agent(command) => in_runtime(command.run()),
         Command::Room(command) => in_runtime(command.run()),
+        Command::Records(command) => in_runtime(command.run()),
+        Command::Export(command) => command.run(),
+        Command::Render(command) => command.run(),
         Command::Simulate(command) => command.run(),
         Command::Conformance(command) => command.run(),
+        Command::Verify(command) => command.run(),
+        Command::Import(command) => command.run(),
     });
     match result {
         Ok(code) => code,

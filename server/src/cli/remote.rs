@@ -26,10 +26,10 @@ pub(super) struct RemoteAgent {
 }
 
 impl RemoteAgent {
-    /// An agent whose choices follow from `seed` alone; it waits for `pace` before each.
-    pub(super) fn new(kind: AgentKind, seed: [u8; 32], pace: Duration) -> Self {
+    /// Plays as this agent; waits for `pace` before each decision.
+    pub(super) fn new(agent: BuiltInAgent, pace: Duration) -> Self {
         Self {
-            agent: BuiltInAgent::new(kind, seed),
+            agent,
             pace,
             seat: None,
             rules: None,
@@ -108,7 +108,10 @@ pub(super) fn agent_kind(name: &str) -> Result<AgentKind, String> {
 
 #[cfg(test)]
 mod tests {
-    use chefshat_engine::{Game, RuleSetSpec, Seed, Viewer};
+    use std::sync::Arc;
+
+    use chefshat_arena::{RecordedDecision, RecordedPlayer};
+    use chefshat_engine::{DecisionKind, Game, RuleSetSpec, Seed, Viewer};
     use chefshat_records::convert::rules_to_proto;
 
     use super::*;
@@ -119,7 +122,12 @@ mod tests {
         let decision = game.decision().expect("a decision is open");
         let observation = game.observe(Viewer::Seat(decision.seat));
         v1::DecisionRequest {
-            kind: v1::DecisionKind::Turn.into(),
+            kind: match decision.kind {
+                DecisionKind::Turn => v1::DecisionKind::Turn,
+                DecisionKind::Exchange => v1::DecisionKind::Exchange,
+                DecisionKind::SpecialAction => v1::DecisionKind::SpecialAction,
+            }
+            .into(),
             observation: Some(observation_to_proto(&observation)),
             action_mask: game.legal_actions().to_bytes(game.rules().actions().size()),
             ..v1::DecisionRequest::default()
@@ -144,7 +152,7 @@ mod tests {
         for kind in AgentKind::ALL {
             let mut game = Game::new(rules, Seed([5; 32]), |_| {});
             let mut inside = BuiltInAgent::new(kind, [9; 32]);
-            let mut remote = RemoteAgent::new(kind, [9; 32], Duration::ZERO);
+            let mut remote = RemoteAgent::new(inside.clone(), Duration::ZERO);
             remote.on_event(&started(&game));
             let mut turns = 0;
             while game.shift() == 1 {
@@ -172,10 +180,45 @@ mod tests {
     }
 
     #[test]
+    fn a_recorded_player_sees_remotely_what_it_saw() {
+        let rules = RuleSetSpec::default().validate().expect("the standard");
+        let mut chance = BuiltInAgent::new(AgentKind::Random, [4; 32]);
+        let mut game = Game::new(rules, Seed([5; 32]), |_| {});
+        let (mut requests, mut decisions) = (Vec::new(), Vec::new());
+        while let Some(decision) = game.decision() {
+            let observation = game.observe(Viewer::Seat(decision.seat));
+            let legal = game.legal_actions();
+            let action = chance.decide(&observation, &legal);
+            requests.push((decision, request(&game), action));
+            decisions.push(RecordedDecision {
+                observation,
+                legal,
+                action,
+                // No model elsewhere: only what looks exactly the same finds its action again.
+                own: false,
+            });
+            game.apply(action, |_| {}).expect("the action is legal");
+        }
+        let player = Arc::new(RecordedPlayer::new(decisions));
+        let mut remote = RemoteAgent::new(BuiltInAgent::replay(player), Duration::ZERO);
+        remote.on_event(&started(&game));
+        for (decision, request, action) in requests {
+            remote.on_attached(&v1::Attached {
+                seat: u32::try_from(decision.seat.index()).expect("a seat is below six"),
+                ..v1::Attached::default()
+            });
+            assert_eq!(remote.decide(&request).0, u32::from(action.index()));
+        }
+    }
+
+    #[test]
     fn what_cannot_be_read_is_answered_all_the_same() {
         let rules = RuleSetSpec::default().validate().expect("the standard");
         let game = Game::new(rules, Seed([5; 32]), |_| {});
-        let mut remote = RemoteAgent::new(AgentKind::Greedy, [9; 32], Duration::ZERO);
+        let mut remote = RemoteAgent::new(
+            BuiltInAgent::new(AgentKind::Greedy, [9; 32]),
+            Duration::ZERO,
+        );
         let first = game.legal_actions().nth(0).expect("an action is legal");
         assert_eq!(remote.decide(&request(&game)).0, u32::from(first.index()));
         remote.on_event(&started(&game));

@@ -94,6 +94,15 @@ enum PassScopeFlag {
 }
 
 impl RulesArgs {
+    /// Whether no flag was given that changes the standard.
+    pub(super) fn are_standard(&self) -> bool {
+        let standard = v1::RuleSet {
+            preset: RuleSetSpec::PRESETS[0].to_owned(),
+            ..v1::RuleSet::default()
+        };
+        self.message() == standard
+    }
+
     /// The rule set as a server is asked for it: what was not said is left to the preset.
     pub(super) fn message(&self) -> v1::RuleSet {
         use v1::rule_set::Stop;

@@ -12,8 +12,8 @@ use tokio::signal::unix::{SignalKind, signal};
 
 use super::{CommandError, data_dir, say};
 use crate::config::ServerConfig;
-use crate::serve::serve;
-use crate::store::MemoryStore;
+use crate::serve::Server;
+use crate::store::{MemoryStore, SqliteStore, Store};
 
 /// Host rooms: one port for gRPC, gRPC-web, health checks and reflection.
 #[derive(Debug, Args)]
@@ -24,12 +24,16 @@ pub(super) struct Serve {
     /// Address and port to listen on, such as 0.0.0.0:50051 or localhost:50051; port 0 takes a free one.
     #[arg(long, env = "CHEFSHAT_LISTEN", value_name = "HOST:PORT", default_value = "127.0.0.1:50051", value_parser = host_and_port)]
     listen: String,
-    /// Folder for records of finished games (records/GAME-ID.jsonl). Standard: chefshat in the user's data folder.
+    /// Folder in which games are kept: a database (games.sqlite3) and the records of finished games (records/GAME-ID.jsonl). Standard:
+    /// chefshat in the user's data folder.
     #[arg(long, env = "CHEFSHAT_DATA_DIR")]
     data_dir: Option<PathBuf>,
-    /// Write no records.
+    /// Keep games in memory alone: no database, no records.
     #[arg(long, env = "CHEFSHAT_NO_RECORDS", value_parser = FalseyValueParser::new())]
     no_records: bool,
+    /// Let anybody add records of games played elsewhere.
+    #[arg(long, env = "CHEFSHAT_ALLOW_IMPORT", value_parser = FalseyValueParser::new())]
+    allow_import: bool,
     /// Most rooms at a time.
     #[arg(long, env = "CHEFSHAT_MAX_ROOMS", default_value_t = 10_000, value_parser = RangedU64ValueParser::<usize>::new().range(1..))]
     max_rooms: usize,
@@ -60,6 +64,10 @@ impl Serve {
             }
             (false, data_dir) => Some(data_dir::prepare(data_dir)?),
         };
+        let store: Arc<dyn Store> = match &data_dir {
+            Some(folder) => Arc::new(SqliteStore::open(folder).await?),
+            None => Arc::new(MemoryStore::default()),
+        };
         let listener = TcpListener::bind(&self.listen).await.map_err(|error| {
             format!(
                 "cannot listen on {}: {error}; choose another address with --listen",
@@ -70,22 +78,32 @@ impl Serve {
         // Before anybody is told where to connect, so that a stop that comes at once is heard.
         let mut terminate = signal(SignalKind::terminate())?;
         let mut interrupt = signal(SignalKind::interrupt())?;
-        if self.json {
-            say(serde_json::json!({"event": "listening", "address": address.to_string()}))?;
-        }
-        eprintln!("listening on http://{address}");
-        if let Some(folder) = &data_dir {
-            eprintln!("records go to {}", folder.join("records").display());
-        }
+        let kept_in = data_dir.clone();
         let config = ServerConfig {
             data_dir,
             max_rooms: self.max_rooms,
+            allow_import: self.allow_import,
             grace: Duration::from_secs(self.grace),
             allowed_origins: (self.allowed_origins.into_iter())
                 .filter(|origin| !origin.is_empty())
                 .collect(),
             ..ServerConfig::default()
         };
+        let server = Server::restored(config, store).await?;
+        if let Some(folder) = kept_in {
+            eprintln!("games are kept in {}", folder.display());
+        }
+        if server.games() > 0 {
+            eprintln!("unfinished games that go on: {}", server.games());
+        }
+        if self.json {
+            say(serde_json::json!({
+                "event": "listening",
+                "address": address.to_string(),
+                "games": server.games(),
+            }))?;
+        }
+        eprintln!("listening on http://{address}");
         let stop = async move {
             tokio::select! {
                 _ = terminate.recv() => {}
@@ -99,11 +117,13 @@ impl Serve {
                     _ = terminate.recv() => {}
                     _ = interrupt.recv() => {}
                 }
-                eprintln!("stopped at once: running games are lost");
+                eprintln!(
+                    "stopped at once: durable games go on when the server is started again, all others are lost"
+                );
                 std::process::exit(1);
             });
         };
-        serve(listener, config, Arc::new(MemoryStore::default()), stop).await?;
+        server.serve(listener, stop).await?;
         Ok(ExitCode::SUCCESS)
     }
 }

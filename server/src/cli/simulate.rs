@@ -1,10 +1,12 @@
-//! `chefshat simulate`: a batch of offline games on all cores, and what it adds up to. How the result is written is in `report`; the games
-//! are played by `chefshat-arena`.
+//! `chefshat simulate`: a batch of offline games on all cores, and what it adds up to. How the result is written is in `report`, how its games are
+//! written down in `records`; the games are played by `chefshat-arena`.
 
+mod records;
 mod report;
 
 use std::io::Write as _;
 use std::num::NonZeroU32;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -13,6 +15,7 @@ use chefshat_engine::RewardScheme;
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use indicatif::{ProgressBar, ProgressStyle};
+use rayon::prelude::*;
 
 use super::CommandError;
 use super::rules_args::RulesArgs;
@@ -21,6 +24,7 @@ const EXAMPLES: &str = "\
 Examples:
   chefshat simulate --games 2000 --seed 7
   chefshat simulate --games 500 --agents greedy,random_unmasked,random --players 3 --reward validity
+  chefshat simulate --games 50 --records simulated/
   chefshat simulate --games 10000 --preset original2020 --no-exchange --no-special-actions --json
 
 The same seed gives the same output, on any number of threads.";
@@ -50,6 +54,9 @@ pub(super) struct Simulate {
     /// Threads to play on, at most 256 and one for each game; 0 is one for each core.
     #[arg(long, value_name = "N", default_value_t = 0)]
     threads: usize,
+    /// Write the record of every game into this folder, as the server writes those of hosted games.
+    #[arg(long, value_name = "DIR")]
+    records: Option<PathBuf>,
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
@@ -82,6 +89,9 @@ impl Simulate {
         if !bar.is_hidden() {
             say_speed(&table, start.elapsed().as_secs_f64());
         }
+        if let Some(folder) = &self.records {
+            pool.install(|| write_records(&batch, folder))?;
+        }
         let mut out = anstream::stdout().lock();
         if self.json {
             writeln!(out, "{}", report::json(&batch, &table))?;
@@ -110,10 +120,29 @@ impl Simulate {
             batch = batch.with_rewards(scheme);
         }
         if let Some(attempts) = self.max_invalid_attempts {
+            if self.records.is_some() && attempts.get() > records::MAX_INVALID_ATTEMPTS {
+                return Err(format!(
+                    "--max-invalid-attempts: with --records at most {}",
+                    records::MAX_INVALID_ATTEMPTS
+                )
+                .into());
+            }
             batch = batch.with_max_invalid_attempts(attempts);
         }
         Ok(batch)
     }
+}
+
+/// Writes the records of all games, on the threads of the pool it is called in.
+fn write_records(batch: &Batch, folder: &Path) -> Result<(), CommandError> {
+    let bar = ProgressBar::new(batch.games()).with_style(ProgressStyle::with_template(
+        "{bar:40} {human_pos} of {human_len} records, {eta} left",
+    )?);
+    (0..batch.games())
+        .into_par_iter()
+        .try_for_each(|index| records::write(batch, index, folder).inspect(|()| bar.inc(1)))?;
+    bar.finish_and_clear();
+    Ok(())
 }
 
 /// Threads to start for so many games; 0 leaves it to the number of cores. Threads without a game would only be started and ended.

@@ -2,19 +2,11 @@
 
 use chefshat_engine::{Board, BySeat, Cards, DecisionKind, Mask, Observation, RuleSet, Seat};
 use chefshat_proto::v1;
-use chefshat_records::convert::{FieldProblem, role_from_number};
+use chefshat_records::convert::{FieldProblem, check_expression, role_from_number};
 use prost::Message as _;
 
 use crate::room::core::{Answered, Verdict};
 use crate::store::journal::Source;
-
-/// Longest label of an expression, bytes.
-const MAX_LABEL: usize = 64;
-/// The years 1 to 9999, which alone a timestamp can be written for, in seconds since the Unix epoch.
-const FIRST_SECOND: i64 = -62_135_596_800;
-const LAST_SECOND: i64 = 253_402_300_799;
-/// Longest reference to recorded media, bytes.
-const MAX_MEDIA: usize = 256;
 
 /// A mask as the protocol writes it.
 pub(super) fn mask_bytes(mask: &Mask, rules: &RuleSet) -> Vec<u8> {
@@ -38,6 +30,7 @@ pub(super) fn source_to_proto(source: Source) -> v1::DecisionSource {
         Source::Invalid => v1::DecisionSource::Invalid,
         Source::Disconnected => v1::DecisionSource::Disconnected,
         Source::Substitute => v1::DecisionSource::Substitute,
+        Source::Recorded => v1::DecisionSource::Recorded,
     }
 }
 
@@ -199,41 +192,7 @@ pub fn annotations_from_proto(
 /// # Errors
 /// The field out of its range.
 pub fn expression_from_proto(expression: &v1::Expression) -> Result<Box<[u8]>, FieldProblem> {
-    let text = |field, text: &str, least: usize, most: usize| {
-        if (least..=most).contains(&text.len()) {
-            Ok(())
-        } else {
-            Err(FieldProblem::new(
-                field,
-                format!("{} bytes are not in {least}..={most}", text.len()),
-            ))
-        }
-    };
-    let number = |field, value: Option<f32>, least: f32| match value {
-        Some(value) if !(least..=1.0).contains(&value) => Err(FieldProblem::new(
-            field,
-            format!("{value} is not in {least}..=1"),
-        )),
-        _ => Ok(()),
-    };
-    text("label", &expression.label, 1, MAX_LABEL)?;
-    text("media", &expression.media, 0, MAX_MEDIA)?;
-    number("valence", expression.valence, -1.0)?;
-    number("arousal", expression.arousal, -1.0)?;
-    number("dominance", expression.dominance, -1.0)?;
-    number("confidence", expression.confidence, 0.0)?;
-    if let Some(time) = &expression.taken_at
-        && !(FIRST_SECOND..=LAST_SECOND).contains(&time.seconds)
-            | !(0..1_000_000_000).contains(&time.nanos)
-    {
-        return Err(FieldProblem::new(
-            "taken_at",
-            "not a time of the years 1 to 9999",
-        ));
-    }
-    if v1::ExpressionSource::try_from(expression.source).is_err() {
-        return Err(FieldProblem::new("source", "not a value of this enum"));
-    }
+    check_expression(expression)?;
     Ok(expression.encode_to_vec().into_boxed_slice())
 }
 

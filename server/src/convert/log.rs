@@ -124,6 +124,7 @@ fn kind(core: &Core, happening: &Happening, viewer: Viewer) -> Kind {
             .into(),
             reveal: reveal(core),
         })),
+        Happening::ServerRestarted => Kind::ServerRestarted(v1::ServerRestarted {}),
         Happening::Expressed(seat, expression) => {
             Kind::ExpressionShown(Box::new(v1::ExpressionShown {
                 seat: seat_number(*seat),
@@ -146,7 +147,7 @@ pub fn game_started(core: &Core) -> v1::GameStarted {
     v1::GameStarted {
         game_id: header.game_id.to_string(),
         rules: Some(rules_to_proto(&header.rules)),
-        rules_version: chefshat_engine::RULES_VERSION,
+        rules_version: header.rules_version,
         policy: Some(policy_to_proto(&header.policy)),
         seats: participants(core),
         action_space: Some(action_space(&header.rules.actions())),
@@ -158,7 +159,7 @@ pub fn game_started(core: &Core) -> v1::GameStarted {
     }
 }
 
-fn standings(core: &Core) -> Vec<v1::Standing> {
+pub(super) fn standings(core: &Core) -> Vec<v1::Standing> {
     let Some(game) = core.game() else {
         return Vec::new();
     };

@@ -7,7 +7,7 @@ use chefshat_arena::AgentKind;
 use chefshat_proto::v1;
 use chefshat_records::convert::{FieldProblem, reward_scheme_from_proto, reward_scheme_to_proto};
 
-use crate::room::policy::{AbortPolicy, Policy};
+use crate::room::policy::{AbortPolicy, Durability, Policy};
 
 /// A day, the longest time a policy may name, milliseconds.
 const DAY_MS: u32 = 86_400_000;
@@ -57,6 +57,11 @@ pub fn policy_from_proto(message: &v1::RoomPolicy) -> Result<Policy, FieldProble
         spectators_see_hands: message
             .spectators_see_hands
             .unwrap_or(standard.spectators_see_hands),
+        durability: match v1::Durability::try_from(message.durability) {
+            Ok(v1::Durability::Unspecified | v1::Durability::Durable) => Durability::Durable,
+            Ok(v1::Durability::Ephemeral) => Durability::Ephemeral,
+            Err(_) => return Err(unknown("durability", message.durability)),
+        },
     };
     if policy.spectators_see_hands && policy.spectator_delay_decisions == 0 {
         return Err(FieldProblem::new(
@@ -89,6 +94,11 @@ pub fn policy_to_proto(policy: &Policy) -> v1::RoomPolicy {
             u32::try_from(policy.spectator_delay_decisions).unwrap_or(u32::MAX),
         ),
         spectators_see_hands: Some(policy.spectators_see_hands),
+        durability: match policy.durability {
+            Durability::Durable => v1::Durability::Durable,
+            Durability::Ephemeral => v1::Durability::Ephemeral,
+        }
+        .into(),
     }
 }
 

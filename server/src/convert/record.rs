@@ -1,5 +1,6 @@
 //! The record of a finished game: its journal folded again, with every decision and event in the order in which they happened.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use chefshat_engine::Viewer;
@@ -9,10 +10,12 @@ use chefshat_records::jsonl::FORMAT_VERSION;
 use prost::Message as _;
 
 use super::decision::{decision_kind, mask_bytes, source_to_proto};
-use super::log::view;
+use super::log::{standings, view};
 use super::policy::policy_to_proto;
 use super::room::{participants, state_to_proto};
+use super::start::{origin, start_to_proto};
 use crate::room::core::Core;
+use crate::store::KeptGame;
 use crate::store::journal::{Change, Decided, Entry, GameHeader};
 
 /// Every line of the record of a game, from its header and its journal.
@@ -68,19 +71,47 @@ fn record_header(core: &Core) -> v1::RecordHeader {
         game_id: header.game_id.to_string(),
         room_id: header.room_id.to_string(),
         room_name: header.name.clone(),
-        origin: match commitment {
-            Some(_) => v1::GameOrigin::Dealt,
-            None => v1::GameOrigin::FixedSeed,
-        }
-        .into(),
+        origin: origin(header).into(),
         rules: Some(rules_to_proto(&header.rules)),
-        rules_version: chefshat_engine::RULES_VERSION,
+        rules_version: header.rules_version,
         policy: Some(policy_to_proto(&header.policy)),
         seats: participants(core),
         seed_commitment: commitment.map_or_else(Vec::new, |hash| hash.to_vec()),
         created_at_ms: header.created_at_ms,
         server_version: env!("CARGO_PKG_VERSION").into(),
         action_space: Some(action_space(&header.rules.actions())),
+        start: start_to_proto(&header.start, header.rules.faces()),
+    }
+}
+
+/// A record in short. The game ended with the last event.
+pub fn summary(core: &Core) -> v1::RecordSummary {
+    let header = core.header();
+    let last = core.log().len().checked_sub(1);
+    let ended_at_ms =
+        (last.and_then(|last| core.log().get(last))).map_or(0, |entry| u64::from(entry.at_ms));
+    v1::RecordSummary {
+        game_id: header.game_id.to_string(),
+        room_id: header.room_id.to_string(),
+        room_name: header.name.clone(),
+        state: state_to_proto(core.state()).into(),
+        origin: origin(header).into(),
+        created_at_ms: header.created_at_ms,
+        ended_at_ms: header.created_at_ms.saturating_add(ended_at_ms),
+        rules: Some(rules_to_proto(&header.rules)),
+        seats: participants(core),
+        standings: standings(core),
+        shifts: core.game().map_or(0, |game| game.shift()),
+        decisions: core.decisions(),
+        added: false,
+    }
+}
+
+/// Every line of the record of a game, however it is kept.
+pub fn lines_of(kept: &KeptGame) -> Cow<'_, [v1::RecordLine]> {
+    match kept {
+        KeptGame::Hosted(header, journal) => Cow::Owned(record_lines(header, journal)),
+        KeptGame::Imported(lines) => Cow::Borrowed(lines),
     }
 }
 

@@ -1,12 +1,15 @@
 //! A room and its seats as messages.
 
-use chefshat_engine::RuleSet;
+use chefshat_arena::BuiltInAgent;
+use chefshat_engine::{MAX_SEATS, RuleSet, Seat};
 use chefshat_proto::v1::{self, seat_config::FilledBy};
 use chefshat_records::convert::{FieldProblem, rules_to_proto, seat_number};
 
 use super::policy::{agent, policy_to_proto};
+use super::start::{branch_point, origin};
+use crate::ids::Id;
 use crate::room::core::{Core, State};
-use crate::store::journal::{Fill, ParticipantKind};
+use crate::store::journal::{Fill, ParticipantKind, RecordedSeat};
 
 /// What fills the seats of a new room; none given means that all are open.
 ///
@@ -36,11 +39,42 @@ pub fn fills_from_proto(
             Some(FilledBy::ReservedFor(kind)) => Ok(Fill::Open {
                 reserved_for: kind_from_proto("seats", *kind)?,
             }),
+            Some(FilledBy::Replay(player)) => recorded_seat(player).map(Fill::Replay),
             Some(FilledBy::BuiltInAgent(name)) => agent("seats", name)?
                 .map(Fill::BuiltIn)
                 .ok_or_else(|| FieldProblem::new("seats", "a built-in agent has no name")),
         })
         .collect()
+}
+
+/// What fills a seat, as it was asked for.
+pub fn fill_to_proto(fill: &Fill) -> v1::SeatConfig {
+    v1::SeatConfig {
+        filled_by: Some(match fill {
+            Fill::Open { reserved_for } => FilledBy::ReservedFor(kind_to_proto(*reserved_for)),
+            Fill::BuiltIn(kind) => FilledBy::BuiltInAgent(kind.name().into()),
+            Fill::Replay(player) => FilledBy::Replay(player_to_proto(*player)),
+        }),
+    }
+}
+
+fn recorded_seat(player: &v1::RecordedPlayer) -> Result<RecordedSeat, FieldProblem> {
+    let problem = |message: String| FieldProblem::new("seats", message);
+    let game = Id::parse(&player.game_id)
+        .ok_or_else(|| problem(format!("{:?} is no game id", player.game_id)))?;
+    let seat = usize::try_from(player.seat)
+        .ok()
+        .filter(|index| *index < MAX_SEATS)
+        .map(Seat::new)
+        .ok_or_else(|| problem(format!("no game has a seat {}", player.seat)))?;
+    Ok(RecordedSeat { game, seat })
+}
+
+fn player_to_proto(player: RecordedSeat) -> v1::RecordedPlayer {
+    v1::RecordedPlayer {
+        game_id: player.game.to_string(),
+        seat: seat_number(player.seat),
+    }
 }
 
 /// The kind of a participant; `None` when unspecified.
@@ -89,6 +123,8 @@ pub fn describe(core: &Core) -> v1::Room {
         seed_commitment: commitment.map_or_else(Vec::new, |hash| hash.to_vec()),
         seed_fixed: commitment.is_none(),
         created_at_ms: header.created_at_ms,
+        origin: origin(header).into(),
+        branched_from: header.start.branch.as_ref().map(branch_point),
     }
 }
 
@@ -110,6 +146,7 @@ pub fn participants(core: &Core) -> Vec<v1::Participant> {
             let (reserved_for, built_in) = match standing.fill {
                 Fill::Open { reserved_for } => (reserved_for, None),
                 Fill::BuiltIn(kind) => (None, Some(kind.name())),
+                Fill::Replay(_) => (None, Some(BuiltInAgent::REPLAY)),
             };
             let participant = standing.participant;
             v1::Participant {
@@ -127,6 +164,10 @@ pub fn participants(core: &Core) -> Vec<v1::Participant> {
                 built_in_agent: built_in.unwrap_or_default().to_owned(),
                 connected: standing.connected || built_in.is_some(),
                 substituted: standing.substituted,
+                replay: match standing.fill {
+                    Fill::Replay(player) => Some(player_to_proto(player)),
+                    _ => None,
+                },
             }
         })
         .collect()

@@ -1,7 +1,9 @@
 //! The gRPC services: they translate and forward. No handler owns state, so that one dropped half-way loses nothing.
 
 mod info;
+mod new_room;
 mod play;
+mod recorded;
 mod records;
 mod room_service;
 mod spectate;
@@ -9,6 +11,7 @@ pub mod status;
 
 pub use info::Info;
 pub use play::Play;
+pub use recorded::Recorded;
 pub use records::Records;
 pub use room_service::RoomCalls;
 pub use spectate::Spectate;

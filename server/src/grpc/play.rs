@@ -16,7 +16,7 @@ use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 use tonic::{Code, Request, Response, Status, Streaming};
 
-use super::status::{Refusal, field, refused, status, ticket_unknown};
+use super::status::{Refusal, field, refused, room_gone, status, ticket_unknown};
 use crate::config::{
     HEARTBEAT, MAX_COMMANDS_PER_MESSAGE, MAX_SEATS_PER_STREAM, MAX_SEATS_PER_WATCH,
 };
@@ -25,7 +25,7 @@ use crate::ids::Token;
 use crate::outbox::{Outbox, OutboxStream};
 use crate::room::core::ConnectionId;
 use crate::room::delivery::Wishes;
-use crate::room::{AttachRequest, Handle, SeatAction};
+use crate::room::{AttachRequest, Handle, RoomGone, SeatAction};
 use crate::rooms::Rooms;
 use crate::wire::Updates;
 use crate::wire::service::play_service_server::PlayService;
@@ -226,7 +226,7 @@ impl Reader {
             .await
             .is_err()
         {
-            self.refuse(handle, 0, &super::status::room_unknown());
+            self.refuse(handle, 0, &room_gone());
         }
     }
 
@@ -254,16 +254,23 @@ impl Reader {
             return self.refuse_field(handle, request_id, "ENTROPY_REFUSED", &problem);
         }
         match self.bind(attach, handle).await {
-            Some(bound) => {
+            Ok(Some(bound)) => {
                 self.seats.insert(handle, bound);
             }
-            None => self.refuse(handle, request_id, &ticket_unknown()),
+            Ok(None) => self.refuse(handle, request_id, &ticket_unknown()),
+            // A seat that is refused is given up by its agent; a stream that ends so is opened again until the room is back.
+            Err(RoomGone) => self.outbox.end(Err(room_gone())),
         }
     }
 
-    async fn bind(&self, attach: v1::Attach, handle: u32) -> Option<BoundSeat> {
-        let token = Token::parse(&attach.ticket)?;
-        let room = self.rooms.get(token.room)?;
+    /// Attaches a seat; `None` if nobody has such a ticket.
+    async fn bind(&self, attach: v1::Attach, handle: u32) -> Result<Option<BoundSeat>, RoomGone> {
+        let Some(token) = Token::parse(&attach.ticket) else {
+            return Ok(None);
+        };
+        let Some(room) = self.rooms.get(token.room) else {
+            return Ok(None);
+        };
         let at_once = match attach.delivery() {
             v1::EventDelivery::Unspecified => !self.with_decisions,
             v1::EventDelivery::WithDecisions => false,
@@ -283,15 +290,16 @@ impl Reader {
                 from: usize::try_from(from).unwrap_or(usize::MAX),
             },
             entropy: attach.entropy,
+            arrived: Instant::now(),
             ended: Arc::clone(&ended),
         };
-        let (seat, connection) = room.attach(request).await.ok()??;
-        Some(BoundSeat {
+        let attached = room.attach(request).await?;
+        Ok(attached.map(|(seat, connection)| BoundSeat {
             room,
             seat,
             connection,
             ended,
-        })
+        }))
     }
 
     async fn detach(&mut self, handle: u32) {

@@ -1,87 +1,339 @@
-//! `RecordService`: records of games that have ended.
+//! `RecordService`: finding, reading and importing records of games that have ended.
 
+use std::iter::Peekable;
 use std::pin::Pin;
 use std::sync::Arc;
 
 use chefshat_proto::v1::{self, record_service_server::RecordService};
-use futures::{Stream, StreamExt as _, stream};
-use tokio::sync::Semaphore;
-use tonic::{Code, Request, Response, Status};
+use chefshat_records::convert::FieldProblem;
+use chefshat_records::replay;
+use chefshat_records::summary::summary;
+use futures::Stream;
+use prost::Message as _;
+use tokio::sync::{Semaphore, mpsc};
+use tokio::time::timeout;
+use tokio_stream::wrappers::ReceiverStream;
+use tonic::{Code, Request, Response, Status, Streaming};
 
-use super::status::{room_failed, status};
-use crate::config::MAX_RECORDS_IN_HAND;
-use crate::convert::record_lines;
+use super::recorded::{Recorded, not_read, turn};
+use super::status::{field, status};
+use crate::config::{
+    IMPORT_TIMEOUT, MAX_IMPORT_BYTES, MAX_IMPORT_LINES, MAX_IMPORTS, MAX_RECORDS_SENT,
+    RECORD_SEND_TIMEOUT,
+};
 use crate::ids::Id;
-use crate::rooms::Rooms;
 
-/// Lines in one message: bounds it to well below what gRPC clients accept.
+/// Lines in one message, and bytes, but for a single line of more: well below what gRPC clients accept.
 const LINES_PER_MESSAGE: usize = 512;
+const BYTES_PER_MESSAGE: usize = 1024 * 1024;
+const STANDARD_PAGE: u32 = 50;
+const MAX_PAGE: u32 = 100;
+/// Summaries read at a time while many records are streamed.
+const STREAM_PAGE: usize = 100;
 
 /// The service.
 #[derive(Debug, Clone)]
 pub struct Records {
-    rooms: Arc<Rooms>,
-    /// Records are large while they are put together: only so many at a time.
-    turns: Arc<Semaphore>,
+    recorded: Recorded,
+    /// Records that are on their way to clients stay in memory until these have taken them.
+    sending: Arc<Semaphore>,
+    receiving: Arc<Semaphore>,
+    allow_import: bool,
 }
 
 impl Records {
-    /// The service for these rooms.
-    pub fn new(rooms: Arc<Rooms>) -> Self {
+    /// The service for these games.
+    pub fn new(recorded: Recorded, allow_import: bool) -> Self {
         Self {
-            rooms,
-            turns: Arc::new(Semaphore::new(MAX_RECORDS_IN_HAND)),
+            recorded,
+            sending: Arc::new(Semaphore::new(MAX_RECORDS_SENT)),
+            receiving: Arc::new(Semaphore::new(MAX_IMPORTS)),
+            allow_import,
+        }
+    }
+
+    async fn page(
+        &self,
+        filter: &v1::RecordFilter,
+        after: u64,
+        count: usize,
+    ) -> Result<Vec<(u64, v1::RecordSummary)>, Status> {
+        let store = self.recorded.rooms().store();
+        store.list(filter, after, count).await.map_err(not_read)
+    }
+
+    /// Sends all records that a filter lets through, page by page: nothing is read before the client has taken what was read before.
+    async fn send_all(
+        &self,
+        filter: &v1::RecordFilter,
+        sender: &mpsc::Sender<Result<v1::StreamRecordsResponse, Status>>,
+    ) -> Result<(), Status> {
+        let mut after = 0;
+        loop {
+            let page = self.page(filter, after, STREAM_PAGE).await?;
+            let Some((last, _)) = page.last() else {
+                return Ok(());
+            };
+            after = *last;
+            for (_, summary) in page {
+                let _turn = turn(&self.sending).await;
+                let lines = self
+                    .recorded
+                    .of_game(&summary.game_id, |lines| lines)
+                    .await?;
+                let response = |lines| v1::StreamRecordsResponse { lines };
+                send(sender, lines, response).await?;
+            }
         }
     }
 }
 
+type Responses<T> = Pin<Box<dyn Stream<Item = Result<T, Status>> + Send>>;
+
 #[tonic::async_trait]
 impl RecordService for Records {
-    type GetRecordStream =
-        Pin<Box<dyn Stream<Item = Result<v1::GetRecordResponse, Status>> + Send>>;
+    type GetRecordStream = Responses<v1::GetRecordResponse>;
+    type StreamRecordsStream = Responses<v1::StreamRecordsResponse>;
+
+    async fn list_records(
+        &self,
+        request: Request<v1::ListRecordsRequest>,
+    ) -> Result<Response<v1::ListRecordsResponse>, Status> {
+        let request = request.into_inner();
+        let filter = checked(request.filter)?;
+        let after = match request.page_token.as_str() {
+            "" => 0,
+            token => token.parse().map_err(|_| {
+                let problem = FieldProblem::new("page_token", "not a token of this server");
+                field("PAGE_TOKEN_REFUSED", &problem)
+            })?,
+        };
+        let size = match request.page_size {
+            0 => STANDARD_PAGE,
+            size => size.min(MAX_PAGE),
+        };
+        let size = usize::try_from(size).unwrap_or(usize::MAX);
+        // One more than asked for tells whether there is another page.
+        let mut found = self.page(&filter, after, size + 1).await?;
+        let more = found.len() > size;
+        found.truncate(size);
+        let next_page_token = match found.last() {
+            Some((last, _)) if more => last.to_string(),
+            _ => String::new(),
+        };
+        Ok(Response::new(v1::ListRecordsResponse {
+            records: found.into_iter().map(|(_, summary)| summary).collect(),
+            next_page_token,
+        }))
+    }
 
     async fn get_record(
         &self,
         request: Request<v1::GetRecordRequest>,
     ) -> Result<Response<Self::GetRecordStream>, Status> {
-        let unknown = || {
-            status(
-                Code::NotFound,
-                "GAME_UNKNOWN",
-                "the server holds no game of this id",
-                [("field", "game_id")],
-            )
-        };
-        let game = Id::parse(&request.into_inner().game_id).ok_or_else(unknown)?;
-        if self.rooms.is_running(game) {
+        let turn = turn(&self.sending).await;
+        let game_id = request.into_inner().game_id;
+        let lines = self.recorded.of_game(&game_id, |lines| lines).await?;
+        let (sender, responses) = channel();
+        tokio::spawn(async move {
+            let response = |lines| v1::GetRecordResponse { lines };
+            let sent = send(&sender, lines, response).await;
+            drop(turn);
+            end(&sender, sent).await;
+        });
+        Ok(Response::new(responses))
+    }
+
+    async fn stream_records(
+        &self,
+        request: Request<v1::StreamRecordsRequest>,
+    ) -> Result<Response<Self::StreamRecordsStream>, Status> {
+        let filter = checked(request.into_inner().filter)?;
+        let service = self.clone();
+        let (sender, responses) = channel();
+        tokio::spawn(async move {
+            let sent = service.send_all(&filter, &sender).await;
+            end(&sender, sent).await;
+        });
+        Ok(Response::new(responses))
+    }
+
+    async fn import_record(
+        &self,
+        request: Request<Streaming<v1::ImportRecordRequest>>,
+    ) -> Result<Response<v1::ImportRecordResponse>, Status> {
+        if !self.allow_import {
             return Err(status(
-                Code::FailedPrecondition,
-                "GAME_RUNNING",
-                "this game has not ended; its record can be had when it has",
+                Code::PermissionDenied,
+                "IMPORT_OFF",
+                "this server takes no records from elsewhere; its host switches that on with --allow-import",
+                [],
+            ));
+        }
+        let _turn = turn(&self.receiving).await;
+        let lines = timeout(IMPORT_TIMEOUT, received(request.into_inner()))
+            .await
+            .map_err(|_| import_too_slow())??;
+        let replaying = move || {
+            let replayed = replay::replay(&lines);
+            (lines, replayed)
+        };
+        let (lines, replayed) = self.recorded.in_turn(replaying).await?;
+        let replayed = replayed.map_err(|error| refused(error.line, &error.problem))?;
+        let summary = summary(&lines, &replayed)
+            .ok_or_else(|| refused(1, "nothing was dealt in this game"))?;
+        let game = Id::parse(&summary.game_id)
+            .ok_or_else(|| refused(1, "the game id has not 32 hexadecimal digits"))?;
+        let rooms = self.recorded.rooms();
+        let new = !rooms.is_running(game)
+            && (rooms
+                .store()
+                .import(game, summary.clone(), lines.into())
+                .await)
+                .map_err(not_kept)?;
+        if !new {
+            return Err(status(
+                Code::AlreadyExists,
+                "GAME_KNOWN",
+                "the server holds a game of this id already",
                 [("field", "game_id")],
             ));
         }
-        // Nobody closes it; if somebody did, the request would merely not wait.
-        let _turn = self.turns.acquire().await.ok();
-        let (header, journal) = self
-            .rooms
-            .finished(game)
-            .await
-            .map_err(|error| {
-                tracing::error!(%game, %error, "a record was not read");
-                room_failed()
-            })?
-            .ok_or_else(unknown)?;
-        // Replaying a game takes milliseconds: not on a thread that serves others.
-        let lines = tokio::task::spawn_blocking(move || record_lines(&header, &journal))
-            .await
-            .map_err(|error| {
-                tracing::error!(%game, %error, "a record was not made");
-                room_failed()
-            })?;
-        let messages = stream::iter(lines)
-            .chunks(LINES_PER_MESSAGE)
-            .map(|lines| Ok(v1::GetRecordResponse { lines }));
-        Ok(Response::new(Box::pin(messages)))
+        rooms.filing().file(game);
+        Ok(Response::new(v1::ImportRecordResponse {
+            record: Some(summary),
+        }))
     }
+}
+
+/// A filter whose values are all of their enums.
+fn checked(filter: Option<v1::RecordFilter>) -> Result<v1::RecordFilter, Status> {
+    let filter = filter.unwrap_or_default();
+    let wrong = if v1::RoomState::try_from(filter.state).is_err() {
+        Some("state")
+    } else if v1::ParticipantKind::try_from(filter.kind).is_err() {
+        Some("kind")
+    } else if v1::GameOrigin::try_from(filter.origin).is_err() {
+        Some("origin")
+    } else {
+        None
+    };
+    match wrong {
+        Some(name) => {
+            let problem = FieldProblem::new(name, "not a value of this enum");
+            Err(field("FILTER_REFUSED", &problem))
+        }
+        None => Ok(filter),
+    }
+}
+
+async fn received(
+    mut requests: Streaming<v1::ImportRecordRequest>,
+) -> Result<Vec<v1::RecordLine>, Status> {
+    let (mut lines, mut bytes) = (Vec::new(), 0);
+    while let Some(request) = requests.message().await? {
+        bytes += request.encoded_len();
+        if bytes > MAX_IMPORT_BYTES {
+            return Err(status(
+                Code::ResourceExhausted,
+                "RECORD_TOO_LARGE",
+                format!("a record of more than {MAX_IMPORT_BYTES} bytes is not taken"),
+                [("max_bytes", &MAX_IMPORT_BYTES.to_string())],
+            ));
+        }
+        // A line takes more memory than it takes bytes, and an empty one takes next to none of these.
+        if let Some(empty) = request.lines.iter().position(|line| line.line.is_none()) {
+            return Err(refused(lines.len() + empty + 1, "the line is empty"));
+        }
+        if lines.len() + request.lines.len() > MAX_IMPORT_LINES {
+            return Err(status(
+                Code::ResourceExhausted,
+                "RECORD_TOO_LARGE",
+                format!("a record of more than {MAX_IMPORT_LINES} lines is not taken"),
+                [("max_lines", &MAX_IMPORT_LINES.to_string())],
+            ));
+        }
+        lines.extend(request.lines);
+    }
+    Ok(lines)
+}
+
+fn refused(line: usize, problem: &str) -> Status {
+    status(
+        Code::InvalidArgument,
+        "RECORD_REFUSED",
+        format!("line {line} of the record: {problem}"),
+        [("line", &line.to_string())],
+    )
+}
+
+fn not_kept(error: crate::store::StoreError) -> Status {
+    tracing::error!(%error, "a record was not kept");
+    super::status::store_failed()
+}
+
+fn import_too_slow() -> Status {
+    status(
+        Code::DeadlineExceeded,
+        "IMPORT_TOO_SLOW",
+        format!(
+            "the record did not arrive within {} s",
+            IMPORT_TIMEOUT.as_secs()
+        ),
+        [],
+    )
+}
+
+/// Where responses are put, and the stream that gives them to the transport.
+fn channel<T: Send + 'static>() -> (mpsc::Sender<Result<T, Status>>, Responses<T>) {
+    let (sender, receiver) = mpsc::channel(1);
+    (sender, Box::pin(ReceiverStream::new(receiver)))
+}
+
+/// Sends the lines of one record.
+///
+/// # Errors
+/// The client has gone away, or does not take them in.
+async fn send<T>(
+    sender: &mpsc::Sender<Result<T, Status>>,
+    lines: Vec<v1::RecordLine>,
+    response: impl Fn(Vec<v1::RecordLine>) -> T,
+) -> Result<(), Status> {
+    let mut lines = lines.into_iter().peekable();
+    while lines.peek().is_some() {
+        let part = next_part(&mut lines);
+        let sent = sender.send_timeout(Ok(response(part)), RECORD_SEND_TIMEOUT);
+        sent.await.map_err(|_| reader_too_slow())?;
+    }
+    Ok(())
+}
+
+/// Tells the client why there is no more. It waits, without anything large in its hands, until that is taken or the client has gone away.
+async fn end<T>(sender: &mpsc::Sender<Result<T, Status>>, sent: Result<(), Status>) {
+    if let Err(status) = sent {
+        // A client that has gone away does not want to know.
+        let _ = sender.send(Err(status)).await;
+    }
+}
+
+fn reader_too_slow() -> Status {
+    let seconds = RECORD_SEND_TIMEOUT.as_secs();
+    status(
+        Code::ResourceExhausted,
+        "READER_TOO_SLOW",
+        format!("a part of a record was not taken in within {seconds} s; ask for it again"),
+        [],
+    )
+}
+
+/// The next lines that make up one message.
+fn next_part(lines: &mut Peekable<impl Iterator<Item = v1::RecordLine>>) -> Vec<v1::RecordLine> {
+    let (mut part, mut bytes) = (Vec::new(), 0);
+    while let Some(line) = lines.next_if(|line| {
+        bytes += line.encoded_len();
+        part.is_empty() || (part.len() < LINES_PER_MESSAGE && bytes <= BYTES_PER_MESSAGE)
+    }) {
+        part.push(line);
+    }
+    part
 }

@@ -2,17 +2,17 @@
 
 use std::sync::Arc;
 
-use chefshat_engine::Stop;
 use chefshat_proto::v1::{self, room_service_server::RoomService};
-use chefshat_records::convert::{FieldProblem, rules_from_proto, seat_number};
+use chefshat_records::convert::{FieldProblem, seat_number};
 use tonic::{Code, Request, Response, Status};
 
+use super::new_room::{check_name, new_room};
+use super::recorded::Recorded;
 use super::status::{self, Refusal, field, room_unknown};
-use crate::config::{MAX_HOSTED_SHIFTS, MAX_NAME_CHARS};
 use crate::convert;
 use crate::ids::{Id, Token};
 use crate::room::{Handle, JoinRequest};
-use crate::rooms::{NewRoom, Rooms};
+use crate::rooms::Rooms;
 use crate::store::journal::ParticipantKind;
 
 const STANDARD_PAGE: u32 = 50;
@@ -24,12 +24,13 @@ const ROOMS_LOOKED_AT: usize = 200;
 #[derive(Debug, Clone)]
 pub struct RoomCalls {
     rooms: Arc<Rooms>,
+    recorded: Recorded,
 }
 
 impl RoomCalls {
-    /// The service for these rooms.
-    pub fn new(rooms: Arc<Rooms>) -> Self {
-        Self { rooms }
+    /// The service for these rooms, and these recorded games that new ones may begin from.
+    pub fn new(rooms: Arc<Rooms>, recorded: Recorded) -> Self {
+        Self { rooms, recorded }
     }
 
     fn find(&self, room_id: &str) -> Result<Handle, Status> {
@@ -50,7 +51,7 @@ impl RoomService for RoomCalls {
         &self,
         request: Request<v1::CreateRoomRequest>,
     ) -> Result<Response<v1::CreateRoomResponse>, Status> {
-        let new = new_room(request.into_inner())?;
+        let new = new_room(&self.recorded, request.into_inner()).await?;
         let created = self.rooms.create(new).await.map_err(Refusal::from)?;
         let room = created.handle.describe().await.map_err(Refusal::from)?;
         Ok(Response::new(v1::CreateRoomResponse {
@@ -179,65 +180,6 @@ impl RoomService for RoomCalls {
             .ok_or_else(wrong)?;
         Ok(Response::new(v1::CloseRoomResponse { room: Some(room) }))
     }
-}
-
-fn new_room(request: v1::CreateRoomRequest) -> Result<NewRoom, Status> {
-    let name = request.name.trim().to_owned();
-    check_name(&name, 0).map_err(|problem| field("NAME_REFUSED", &problem))?;
-    let rules = rules_from_proto(&request.rules.unwrap_or_default())
-        .map_err(|problem| field("RULE_SET_REFUSED", &problem))?;
-    let (stop_field, length) = match rules.stop() {
-        Stop::Points(points) => ("target_points", points),
-        Stop::Shifts(shifts) => ("target_shifts", shifts),
-    };
-    if length > MAX_HOSTED_SHIFTS {
-        return Err(status::status(
-            Code::InvalidArgument,
-            "RULE_SET_REFUSED",
-            format!(
-                "a hosted game ends after at most {MAX_HOSTED_SHIFTS} points or Shifts, not {length}"
-            ),
-            [
-                ("field", stop_field),
-                ("max_shifts", &MAX_HOSTED_SHIFTS.to_string()),
-            ],
-        ));
-    }
-    let policy = convert::policy_from_proto(&request.policy.unwrap_or_default())
-        .map_err(|problem| field("POLICY_REFUSED", &problem))?;
-    let fills = convert::fills_from_proto(&request.seats, &rules)
-        .map_err(|problem| field("SEATS_REFUSED", &problem))?;
-    let game_seed = match request.game_seed.as_slice() {
-        [] => None,
-        bytes => Some(bytes.try_into().map_err(|_| {
-            let message = format!("{} bytes; give 32, or none", bytes.len());
-            field("SEED_REFUSED", &FieldProblem::new("game_seed", message))
-        })?),
-    };
-    Ok(NewRoom {
-        name,
-        rules,
-        policy,
-        fills,
-        game_seed,
-    })
-}
-
-fn check_name(name: &str, least: usize) -> Result<(), FieldProblem> {
-    let length = name.chars().count();
-    if !(least..=MAX_NAME_CHARS).contains(&length) {
-        return Err(FieldProblem::new(
-            "name",
-            format!("{length} characters are not in {least}..={MAX_NAME_CHARS}"),
-        ));
-    }
-    if name.chars().any(char::is_control) {
-        return Err(FieldProblem::new(
-            "name",
-            "control characters cannot be shown",
-        ));
-    }
-    Ok(())
 }
 
 fn join_code_wrong() -> Status {

@@ -78,12 +78,22 @@ pub fn ticket_unknown() -> Status {
     )
 }
 
-/// The room stopped because its store failed.
-pub fn room_failed() -> Status {
+/// The server's store failed, and the server stops.
+pub fn store_failed() -> Status {
+    status(
+        Code::Unavailable,
+        "STORE_FAILED",
+        "the server can keep nothing any more and stops; what it has acknowledged is kept: connect again when it is back",
+        [],
+    )
+}
+
+/// The server failed in a way that a client can do nothing about.
+pub fn internal() -> Status {
     status(
         Code::Internal,
-        "ROOM_FAILED",
-        "the server could not keep this game and has stopped it",
+        "INTERNAL",
+        "the server could not do this; its log says why",
         [],
     )
 }
@@ -108,9 +118,19 @@ pub fn spectator_too_slow() -> Status {
     )
 }
 
+/// A room was there and is not to be reached: it has just gone, or it was put down because the server stops.
+pub fn room_gone() -> Status {
+    status(
+        Code::Unavailable,
+        "ROOM_GONE",
+        "the room is not to be reached just now: the server stops, or the room has ended this moment; try again",
+        [],
+    )
+}
+
 impl From<RoomGone> for Refusal {
     fn from(_: RoomGone) -> Self {
-        Self(room_unknown())
+        Self(room_gone())
     }
 }
 
@@ -160,7 +180,7 @@ impl From<CreateError> for Refusal {
             CreateError::ShuttingDown => shutting_down(),
             CreateError::Store(error) => {
                 tracing::error!(%error, "a room was not made");
-                room_failed()
+                store_failed()
             }
         })
     }

@@ -11,6 +11,8 @@ use chefshat_proto::v1::{self, seat_update::Update};
 
 use chefshat_records::convert::seat_number;
 
+use tonic::Status;
+
 use super::core::{ConnectionId, Core};
 use super::log::Happening;
 use crate::convert;
@@ -160,6 +162,13 @@ impl Attachment {
             self.outbox.push_last(&mut self.held);
             self.ended.store(true, Ordering::Relaxed);
         }
+    }
+
+    /// Ends the whole stream, because the server ends. Nothing that is held is told.
+    pub fn end(&mut self, status: Status) {
+        self.done = true;
+        self.outbox.end(Err(status));
+        self.ended.store(true, Ordering::Relaxed);
     }
 
     /// Sends what is due. `urgent`: something happened that the seat is told of at once in any case.

@@ -58,6 +58,8 @@ pub struct AttachRequest {
     pub wishes: Wishes,
     /// The seat's part of the game seed.
     pub entropy: Vec<u8>,
+    /// When it was asked.
+    pub arrived: Instant,
     /// Set when the seat has left the stream.
     pub ended: Arc<AtomicBool>,
 }
@@ -134,6 +136,7 @@ pub(super) enum Message {
     Describe(oneshot::Sender<v1::Room>),
     Close([u8; 32], oneshot::Sender<Option<v1::Room>>),
     Abort(AbortReason),
+    PutDown,
     Space,
 }
 
@@ -250,10 +253,15 @@ impl Handle {
         self.ask(|reply| Message::Close(secret, reply)).await
     }
 
-    /// Ends the game without a result, if it has not ended.
-    pub async fn abort(&self, reason: AbortReason) {
+    /// Ends the room because the server ends, if its game is not over: puts it down where it stands if it is durable, else aborts the game.
+    pub async fn end(&self, durable: bool) {
+        let message = if durable {
+            Message::PutDown
+        } else {
+            Message::Abort(AbortReason::Shutdown)
+        };
         // A room that is gone has nothing left to end.
-        let _ = self.mailbox.send(Message::Abort(reason)).await;
+        let _ = self.mailbox.send(message).await;
     }
 
     async fn ask<T>(

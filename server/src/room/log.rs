@@ -1,5 +1,5 @@
 //! The log of a room: everything public that happened in it, compactly, in order. The number of an event is its position plus one. How
-//! an event looks to a viewer is written in `convert::events`.
+//! an event looks to a viewer is written in `convert::log`.
 
 use std::time::Duration;
 
@@ -76,6 +76,8 @@ pub enum Happening {
     GameEnded,
     /// The game ended without a result.
     GameAborted(AbortReason),
+    /// The server was restarted.
+    ServerRestarted,
     /// A seat expressed something publicly.
     Expressed(Seat, Box<[u8]>),
 }

@@ -16,6 +16,15 @@ pub enum AbortPolicy {
     Never,
 }
 
+/// What a game outlives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Durability {
+    /// The death of the server.
+    Durable,
+    /// Nothing: it is kept when it ends.
+    Ephemeral,
+}
+
 /// A room's policy. Made by `convert::policy`, which checks the ranges stated in `room.proto`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Policy {
@@ -43,6 +52,8 @@ pub struct Policy {
     pub spectator_delay_decisions: usize,
     /// Whether spectators see all hands.
     pub spectators_see_hands: bool,
+    /// What the game outlives.
+    pub durability: Durability,
 }
 
 impl Default for Policy {
@@ -60,6 +71,7 @@ impl Default for Policy {
             spectators: true,
             spectator_delay_decisions: 0,
             spectators_see_hands: false,
+            durability: Durability::Durable,
         }
     }
 }

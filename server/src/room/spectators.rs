@@ -10,6 +10,7 @@ use super::delivery::snapshot;
 use crate::convert;
 use crate::grpc::status;
 use crate::outbox::{OnSpace, Outbox};
+use tonic::Status;
 
 /// Events that may happen while a spectator's stream has no space, before it is cut off.
 pub const MAX_SPECTATOR_LAG: usize = 1_024;
@@ -82,9 +83,9 @@ impl Spectator {
         !self.outbox.is_abandoned()
     }
 
-    /// Ends the stream because the room is no more.
-    pub(super) fn fail(self) {
-        self.outbox.end(Err(status::room_failed()));
+    /// Ends the stream because the server ends.
+    pub(super) fn end(self, status: Status) {
+        self.outbox.end(Err(status));
     }
 
     fn event(&self, core: &Core, position: usize) -> Option<v1::GameEvent> {

@@ -1,10 +1,11 @@
 //! The shell of a room under tokio's paused clock: streams that do not read, and what they find when they do.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 use std::time::Duration;
 
-use chefshat_engine::{RuleSetSpec, Seat, Stop};
+use chefshat_engine::{RULES_VERSION, RuleSetSpec, Seat, Stop};
 use chefshat_proto::v1::{self, seat_update::Update};
 use chefshat_records::seeds::SeedPlan;
 use futures::StreamExt as _;
@@ -16,9 +17,10 @@ use super::core::ConnectionId;
 use super::delivery::Wishes;
 use super::policy::{AbortPolicy, Policy};
 use super::{AttachRequest, Handle, JoinRequest, RoomWatcher, SeatAction, TaskContext, start};
+use crate::filing::Filing;
 use crate::ids::{Id, SecretHash, Token};
 use crate::outbox::{Outbox, OutboxStream};
-use crate::store::journal::{Fill, GameHeader, ParticipantKind};
+use crate::store::journal::{Fill, GameHeader, GameStart, ParticipantKind};
 use crate::store::{MemoryStore, Store as _};
 use crate::wire::Updates;
 
@@ -40,7 +42,10 @@ async fn room(policy: Policy, shifts: u32) -> Handle {
         }
         .validate()
         .expect("the rule set makes sense"),
+        rules_version: RULES_VERSION,
         policy,
+        recorded: BTreeMap::new(),
+        start: GameStart::default(),
         fills: vec![Fill::Open { reserved_for: None }; 4],
         seed: SeedPlan::Fixed { game_seed: [3; 32] },
         created_at_ms: 0,
@@ -56,8 +61,8 @@ async fn room(policy: Policy, shifts: u32) -> Handle {
         header,
         journal,
         TaskContext {
+            filing: Filing::new(store.clone(), None, TaskTracker::new()),
             store,
-            data_dir: None,
             retention: Duration::from_secs(1_000_000),
             connections: Arc::new(AtomicU64::new(1)),
             tracker: TaskTracker::new(),
@@ -101,6 +106,7 @@ async fn attach(room: &Handle, ticket: Token) -> AttachedSeat {
                 from: 0,
             },
             entropy: Vec::new(),
+            arrived: Instant::now(),
             ended: Arc::default(),
         })
         .await

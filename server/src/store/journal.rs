@@ -1,10 +1,13 @@
 //! What a game is kept as: its header and every change that moved it. Everything else (events, records) follows by folding the changes
 //! again. The form on disk belongs to the store that writes one; here are the values.
 
+use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_arena::AgentKind;
-use chefshat_engine::{Action, RuleSet, Seat};
+use chefshat_arena::{AgentKind, RecordedPlayer};
+use chefshat_engine::{Action, RuleSet, Script, Seat};
+pub use chefshat_records::branch::TakenOver;
 use chefshat_records::seeds::SeedPlan;
 
 use crate::ids::{Id, SecretHash};
@@ -20,6 +23,44 @@ pub enum Fill {
     },
     /// A built-in agent.
     BuiltIn(AgentKind),
+    /// A built-in agent that plays what a recorded player played.
+    Replay(RecordedSeat),
+}
+
+impl Fill {
+    /// Whether a built-in agent has the seat.
+    pub fn is_built_in(&self) -> bool {
+        !matches!(self, Self::Open { .. })
+    }
+}
+
+/// A seat of a recorded game.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RecordedSeat {
+    /// The recorded game.
+    pub game: Id,
+    /// The seat in it.
+    pub seat: Seat,
+}
+
+/// How a game begins. The standard is a deal.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct GameStart {
+    /// The first Shift, where its hands are given.
+    pub script: Option<Script>,
+    /// The record it branches from.
+    pub branch: Option<Branch>,
+}
+
+/// What a game takes over from the record of another.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Branch {
+    /// The recorded game.
+    pub game: Id,
+    /// Whether later Shifts are dealt as in the recorded game.
+    pub same_deals: bool,
+    /// What is taken over, in order; not empty, so that the seed of its first Shift is known.
+    pub taken_over: Vec<TakenOver>,
 }
 
 /// What a participant is.
@@ -44,10 +85,16 @@ pub struct GameHeader {
     pub name: String,
     /// The rules.
     pub rules: RuleSet,
+    /// Version of the rules it is played by.
+    pub rules_version: u32,
     /// The policy.
     pub policy: Policy,
     /// What fills each seat.
     pub fills: Vec<Fill>,
+    /// The recorded players of the seats that are filled by one, by seat.
+    pub recorded: BTreeMap<usize, Arc<RecordedPlayer>>,
+    /// How the game begins.
+    pub start: GameStart,
     /// Where the game seed comes from.
     pub seed: SeedPlan,
     /// When the room was created, milliseconds since the Unix epoch.
@@ -80,6 +127,8 @@ pub enum Source {
     Disconnected,
     /// A built-in agent in place of the seat's own.
     Substitute,
+    /// Taken over from the record that the game branches from.
+    Recorded,
 }
 
 /// Why a game has no result.
@@ -140,6 +189,8 @@ pub enum Change {
     },
     /// The game ended without a result.
     Aborted(AbortReason),
+    /// The server was restarted; all connections were lost.
+    ServerRestarted,
 }
 
 /// A participant that took a seat.

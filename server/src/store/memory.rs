@@ -1,14 +1,14 @@
-//! Games in memory, for as long as the process lives; and a store that fails when told to, for tests.
+//! Games in memory, for as long as the process lives.
 
-use std::collections::{BTreeMap, VecDeque};
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard};
 
+use chefshat_proto::v1;
 use futures::FutureExt as _;
-use futures::future::{BoxFuture, ready};
+use futures::future::{BoxFuture, pending, ready};
 
 use super::journal::{Entry, GameHeader};
-use super::{Journal, KeptGame, Store, StoreError};
+use super::{Journal, KeptGame, LeftGame, Store, StoreError, lets_through};
 use crate::ids::Id;
 
 /// Finished games that are kept; older ones are forgotten.
@@ -24,29 +24,56 @@ pub struct MemoryStore {
 
 #[derive(Debug, Default)]
 struct Finished {
-    games: BTreeMap<Id, KeptGame>,
-    /// Oldest first.
-    order: VecDeque<Id>,
+    /// By number, oldest first.
+    games: BTreeMap<u64, FinishedGame>,
+    numbers: BTreeMap<Id, u64>,
+    last_number: u64,
     /// Changes of all of them.
     entries: usize,
 }
 
-impl Finished {
-    fn keep(&mut self, header: Arc<GameHeader>, entries: Arc<[Entry]>) {
-        self.entries += entries.len();
-        self.order.push_back(header.game_id);
-        self.games.insert(header.game_id, (header, entries));
-        while self.order.len() > 1
-            && (self.order.len() > MAX_FINISHED_GAMES || self.entries > MAX_FINISHED_ENTRIES)
-            && let Some(oldest) = self.order.pop_front()
-            && let Some((_, entries)) = self.games.remove(&oldest)
-        {
-            self.entries -= entries.len();
+#[derive(Debug)]
+struct FinishedGame {
+    id: Id,
+    summary: v1::RecordSummary,
+    kept: KeptGame,
+}
+
+impl FinishedGame {
+    fn entries(&self) -> usize {
+        match &self.kept {
+            KeptGame::Hosted(_, entries) => entries.len(),
+            KeptGame::Imported(lines) => lines.len(),
         }
     }
 }
 
+impl Finished {
+    fn keep(&mut self, game: FinishedGame) {
+        self.last_number += 1;
+        self.entries += game.entries();
+        self.numbers.insert(game.id, self.last_number);
+        self.games.insert(self.last_number, game);
+        while self.games.len() > 1
+            && (self.games.len() > MAX_FINISHED_GAMES || self.entries > MAX_FINISHED_ENTRIES)
+            && let Some((_, oldest)) = self.games.pop_first()
+        {
+            self.numbers.remove(&oldest.id);
+            self.entries -= oldest.entries();
+        }
+    }
+
+    fn get(&self, game: Id) -> Option<&KeptGame> {
+        let number = self.numbers.get(&game)?;
+        self.games.get(number).map(|game| &game.kept)
+    }
+}
+
 impl Store for MemoryStore {
+    fn outlives_server(&self) -> bool {
+        false
+    }
+
     fn create(
         &self,
         header: Arc<GameHeader>,
@@ -59,8 +86,63 @@ impl Store for MemoryStore {
         ready(Ok(Box::new(journal) as Box<dyn Journal>)).boxed()
     }
 
+    fn left(&self, _ended_since_ms: u64) -> BoxFuture<'_, Result<Vec<LeftGame>, StoreError>> {
+        ready(Ok(Vec::new())).boxed()
+    }
+
     fn finished(&self, game: Id) -> BoxFuture<'_, Result<Option<KeptGame>, StoreError>> {
-        ready(Ok(lock(&self.finished).games.get(&game).cloned())).boxed()
+        ready(Ok(lock(&self.finished).get(game).cloned())).boxed()
+    }
+
+    fn list<'a>(
+        &'a self,
+        filter: &'a v1::RecordFilter,
+        after: u64,
+        count: usize,
+    ) -> BoxFuture<'a, Result<Vec<(u64, v1::RecordSummary)>, StoreError>> {
+        let listed = lock(&self.finished)
+            .games
+            .range(after.saturating_add(1)..)
+            .filter(|(_, game)| lets_through(filter, &game.summary))
+            .take(count)
+            .map(|(number, game)| (*number, game.summary.clone()))
+            .collect();
+        ready(Ok(listed)).boxed()
+    }
+
+    fn import(
+        &self,
+        game: Id,
+        mut summary: v1::RecordSummary,
+        lines: Arc<[v1::RecordLine]>,
+    ) -> BoxFuture<'_, Result<bool, StoreError>> {
+        summary.added = true;
+        let mut finished = lock(&self.finished);
+        let new = finished.get(game).is_none();
+        if new {
+            finished.keep(FinishedGame {
+                id: game,
+                summary,
+                kept: KeptGame::Imported(lines),
+            });
+        }
+        ready(Ok(new)).boxed()
+    }
+
+    fn unfiled(&self) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
+        ready(Ok(Vec::new())).boxed()
+    }
+
+    fn note_filed(&self, _game: Id) -> BoxFuture<'_, Result<(), StoreError>> {
+        ready(Ok(())).boxed()
+    }
+
+    fn failed(&self) -> BoxFuture<'static, StoreError> {
+        pending().boxed()
+    }
+
+    fn close(&self) -> BoxFuture<'_, ()> {
+        ready(()).boxed()
     }
 }
 
@@ -79,9 +161,18 @@ impl Journal for MemoryJournal {
         ready(Ok(())).boxed()
     }
 
-    fn finish(&mut self) -> BoxFuture<'_, Result<(), StoreError>> {
+    fn finish(
+        &mut self,
+        summary: Option<Box<v1::RecordSummary>>,
+    ) -> BoxFuture<'_, Result<(), StoreError>> {
         let entries = std::mem::take(&mut self.entries).into();
-        lock(&self.finished).keep(Arc::clone(&self.header), entries);
+        if let Some(summary) = summary {
+            lock(&self.finished).keep(FinishedGame {
+                id: self.header.game_id,
+                summary: *summary,
+                kept: KeptGame::Hosted(Arc::clone(&self.header), entries),
+            });
+        }
         ready(Ok(())).boxed()
     }
 }
@@ -90,72 +181,4 @@ fn lock(finished: &Mutex<Finished>) -> MutexGuard<'_, Finished> {
     finished
         .lock()
         .expect("nothing that holds this lock can panic")
-}
-
-/// A memory store whose appends fail from a certain one on: what a full disk would do.
-#[derive(Debug)]
-pub struct FailingStore {
-    inner: MemoryStore,
-    appends_left: Arc<AtomicU64>,
-}
-
-impl FailingStore {
-    /// A store that takes `appends` appends and fails at every later one.
-    pub fn after(appends: u64) -> Self {
-        Self {
-            inner: MemoryStore::default(),
-            appends_left: Arc::new(AtomicU64::new(appends)),
-        }
-    }
-}
-
-impl Store for FailingStore {
-    fn create(
-        &self,
-        header: Arc<GameHeader>,
-    ) -> BoxFuture<'_, Result<Box<dyn Journal>, StoreError>> {
-        let appends_left = Arc::clone(&self.appends_left);
-        self.inner
-            .create(header)
-            .map(|inner| {
-                let inner = inner?;
-                Ok(Box::new(FailingJournal {
-                    inner,
-                    appends_left,
-                }) as Box<dyn Journal>)
-            })
-            .boxed()
-    }
-
-    fn finished(&self, game: Id) -> BoxFuture<'_, Result<Option<KeptGame>, StoreError>> {
-        self.inner.finished(game)
-    }
-}
-
-struct FailingJournal {
-    inner: Box<dyn Journal>,
-    appends_left: Arc<AtomicU64>,
-}
-
-impl Journal for FailingJournal {
-    fn append<'a>(
-        &'a mut self,
-        entries: &'a mut Vec<Entry>,
-    ) -> BoxFuture<'a, Result<(), StoreError>> {
-        let allowed = self
-            .appends_left
-            .fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| {
-                left.checked_sub(1)
-            })
-            .is_ok();
-        if allowed {
-            self.inner.append(entries)
-        } else {
-            ready(Err(StoreError("told to fail".into()))).boxed()
-        }
-    }
-
-    fn finish(&mut self) -> BoxFuture<'_, Result<(), StoreError>> {
-        self.inner.finish()
-    }
 }

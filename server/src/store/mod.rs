@@ -1,35 +1,91 @@
 //! Where games are kept. One trait, awaited even where it keeps things in memory: a room tells nobody of a change before the store has
 //! taken it.
 
+mod failing;
 pub mod journal;
 mod memory;
+mod sqlite;
 
 use std::sync::Arc;
 
+use chefshat_proto::v1;
 use futures::future::BoxFuture;
 
-pub use memory::{FailingStore, MAX_FINISHED_ENTRIES, MAX_FINISHED_GAMES, MemoryStore};
+pub use failing::FailingStore;
+pub use memory::{MAX_FINISHED_ENTRIES, MAX_FINISHED_GAMES, MemoryStore};
+pub use sqlite::{OpenError, SqliteStore};
 
 use crate::ids::Id;
 use journal::{Entry, GameHeader};
 
-/// Why a store could not do what it was asked.
-#[derive(Debug, thiserror::Error)]
-#[error("the store failed: {0}")]
+/// Why a store could not do what it was asked, and what to do about it.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
 pub struct StoreError(pub String);
 
-/// A game as it was kept: its header and its journal.
-pub type KeptGame = (Arc<GameHeader>, Arc<[Entry]>);
+/// A finished game as it was kept.
+#[derive(Debug, Clone)]
+pub enum KeptGame {
+    /// A game that was hosted: its header and its journal.
+    Hosted(Arc<GameHeader>, Arc<[Entry]>),
+    /// A game that was imported: the lines of its record.
+    Imported(Arc<[v1::RecordLine]>),
+}
+
+/// A game whose room is to be there again after the server ended.
+pub struct LeftGame {
+    /// Its header; the recorded players of its seats are left for the caller to fill in.
+    pub header: GameHeader,
+    /// Everything that was kept of it.
+    pub entries: Vec<Entry>,
+    /// What its next changes go to.
+    pub journal: Box<dyn Journal>,
+    /// Whether its end has been kept, with everything that follows from it.
+    pub concluded: bool,
+}
 
 /// Keeps games.
 pub trait Store: Send + Sync + 'static {
+    /// Whether unfinished games are still there when the server has ended, however it ended.
+    fn outlives_server(&self) -> bool;
     /// Begins a game; its journal is written through what is returned.
     fn create(
         &self,
         header: Arc<GameHeader>,
     ) -> BoxFuture<'_, Result<Box<dyn Journal>, StoreError>>;
-    /// A game that is finished, or `None`.
+    /// The games that were going on when the server ended, and those that had ended since a time (milliseconds since the Unix epoch), of
+    /// which somebody may not have heard; oldest first. One that cannot be read is left as it is, and logged.
+    fn left(&self, ended_since_ms: u64) -> BoxFuture<'_, Result<Vec<LeftGame>, StoreError>>;
+    /// A finished game, or `None`.
     fn finished(&self, game: Id) -> BoxFuture<'_, Result<Option<KeptGame>, StoreError>>;
+    /// At most `count` finished games that a filter lets through, oldest first, from after the one numbered `after`, with their numbers.
+    fn list<'a>(
+        &'a self,
+        filter: &'a v1::RecordFilter,
+        after: u64,
+        count: usize,
+    ) -> BoxFuture<'a, Result<Vec<(u64, v1::RecordSummary)>, StoreError>>;
+    /// Keeps the record of a game that was played elsewhere. `false` if there is a game of this id.
+    fn import(
+        &self,
+        game: Id,
+        summary: v1::RecordSummary,
+        lines: Arc<[v1::RecordLine]>,
+    ) -> BoxFuture<'_, Result<bool, StoreError>>;
+    /// Finished games whose record has not been written to a file.
+    fn unfiled(&self) -> BoxFuture<'_, Result<Vec<Id>, StoreError>>;
+    /// Notes that the record of a game has been written to a file.
+    fn note_filed(&self, game: Id) -> BoxFuture<'_, Result<(), StoreError>>;
+    /// Returns when the store can keep nothing any more; until then it waits.
+    fn failed(&self) -> BoxFuture<'static, StoreError>;
+    /// Ends in good order; nothing is asked of it afterwards.
+    fn close(&self) -> BoxFuture<'_, ()>;
+}
+
+impl std::fmt::Debug for dyn Store {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter.write_str("Store")
+    }
 }
 
 /// The journal of one game that goes on.
@@ -39,6 +95,23 @@ pub trait Journal: Send + 'static {
         &'a mut self,
         entries: &'a mut Vec<Entry>,
     ) -> BoxFuture<'a, Result<(), StoreError>>;
-    /// Says that nothing more will be added.
-    fn finish(&mut self) -> BoxFuture<'_, Result<(), StoreError>>;
+    /// Says that the game is over and nothing more will be added; without a summary there is nothing to make a record of.
+    fn finish(
+        &mut self,
+        summary: Option<Box<v1::RecordSummary>>,
+    ) -> BoxFuture<'_, Result<(), StoreError>>;
+}
+
+/// Whether a filter lets a record through.
+fn lets_through(filter: &v1::RecordFilter, summary: &v1::RecordSummary) -> bool {
+    let unset = 0;
+    (filter.state == unset || filter.state == summary.state)
+        && (filter.origin == unset || filter.origin == summary.origin)
+        && !(filter.hosted_here && summary.added)
+        && (filter.room_name.is_empty() || filter.room_name == summary.room_name)
+        && summary.created_at_ms >= filter.created_from_ms
+        && (filter.created_before_ms == 0 || summary.created_at_ms < filter.created_before_ms)
+        && (filter.kind == unset || summary.seats.iter().any(|seat| seat.kind == filter.kind))
+        && (filter.participant.is_empty()
+            || (summary.seats.iter()).any(|seat| seat.name == filter.participant))
 }

@@ -2,69 +2,11 @@
 //! spectator watches, and everybody agrees how it ended.
 
 use std::io::{BufRead as _, BufReader};
-use std::path::Path;
-use std::process::{Child, Command, Output, Stdio};
 
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// Runs with the program, and not longer than the test.
-struct Running(Child);
-
-impl Drop for Running {
-    fn drop(&mut self) {
-        // It may have ended already.
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
-fn program() -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_chefshat"));
-    for (name, _) in std::env::vars_os() {
-        if name.to_string_lossy().starts_with("CHEFSHAT_") {
-            command.env_remove(name);
-        }
-    }
-    command.stdout(Stdio::piped()).stderr(Stdio::piped());
-    command
-}
-
-/// A server, and its address.
-fn serve(data_dir: &Path) -> (Running, String) {
-    let mut command = program();
-    command.args(["serve", "--listen", "127.0.0.1:0", "--json", "--data-dir"]);
-    // Both say no, so that the records are written.
-    command.env("CHEFSHAT_NO_RECORDS", "0");
-    command.env("CHEFSHAT_LOG_JSON", "");
-    let mut child = command
-        .arg(data_dir)
-        .stderr(Stdio::inherit())
-        .spawn()
-        .unwrap();
-    let mut line = String::new();
-    BufReader::new(child.stdout.take().unwrap())
-        .read_line(&mut line)
-        .unwrap();
-    let listening: Value = serde_json::from_str(&line).unwrap();
-    let address = listening["address"].as_str().unwrap();
-    let url = format!("http://{address}");
-    (Running(child), url)
-}
-
-fn json(output: &Output) -> Value {
-    let text = std::str::from_utf8(&output.stdout).unwrap();
-    serde_json::from_str(text).unwrap_or_else(|error| {
-        let errors = String::from_utf8_lossy(&output.stderr);
-        panic!("{error}: {text:?}, {errors}")
-    })
-}
-
-fn run(server: &str, arguments: &[&str]) -> Output {
-    let mut command = program();
-    command.args(arguments).args(["--server", server]);
-    command.output().unwrap()
-}
+use super::server::{Running, json, program, run, serve};
 
 #[test]
 fn four_processes_play_a_game_that_a_fifth_watches() {

@@ -88,6 +88,11 @@ impl Host {
         };
         let policy = v1::RoomPolicy {
             decision_time_ms: Some(DECISION_TIME_MS),
+            durability: match self.plan.durable {
+                true => v1::Durability::Durable,
+                false => v1::Durability::Ephemeral,
+            }
+            .into(),
             ..v1::RoomPolicy::default()
         };
         let created = self

@@ -2,6 +2,7 @@
 //! file only parses and wires; see the README beside this crate for what is measured and how.
 
 mod bare;
+mod disk;
 mod error;
 mod gauge;
 mod host;
@@ -10,6 +11,7 @@ mod ping;
 mod play;
 mod pulse;
 mod report;
+mod restart;
 mod scenario;
 mod server;
 mod tally;
@@ -45,12 +47,16 @@ fn main() -> ExitCode {
 }
 
 async fn measure(load: &Load) -> Result<(), LoadError> {
+    if let Some(rooms) = load.restart {
+        return restart::measure(load, rooms).await;
+    }
+    let disk_syncs = (load.durability.then(|| disk::syncs_per_second(load))).transpose()?;
     let mut outcomes = Vec::new();
     for scenario in scenario::scenarios(load) {
         eprintln!("{} ...", scenario.name());
         outcomes.push(scenario::run(load, scenario).await?);
     }
-    let report = Report::new(load, &outcomes);
+    let report = Report::new(load, &outcomes, disk_syncs);
     if load.json {
         let json = serde_json::to_string_pretty(&report).expect("a report is plain data");
         println!("{json}");

@@ -1,5 +1,6 @@
 //! The command line: what is run, how much of it, and where. What the figures mean is in the README beside this crate.
 
+use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand};
@@ -16,7 +17,7 @@ const MAX_SECONDS: f64 = 600.0;
 #[command(
     name = "chefshat-load",
     version,
-    after_help = "Examples:\n  chefshat-load                        the standard scenarios\n  chefshat-load --pin --rounds 7       the same with both sides on one core\n  chefshat-load --rooms 16 --streams 8 one scenario of your own\n  chefshat-load --server http://127.0.0.1:50051 --rooms 16 --streams 64"
+    after_help = "Examples:\n  chefshat-load                        the standard scenarios\n  chefshat-load --pin --rounds 7       the same with both sides on one core\n  chefshat-load --rooms 16 --streams 8 one scenario of your own\n  chefshat-load --durability           durable rooms beside ephemeral ones\n  chefshat-load --restart 1000         a restart with so many unfinished games\n  chefshat-load --server http://127.0.0.1:50051 --rooms 16 --streams 64"
 )]
 pub(crate) struct Options {
     #[command(subcommand)]
@@ -39,6 +40,9 @@ pub(crate) struct Serve {
     /// The bare room instead of the game server.
     #[arg(long)]
     pub(crate) bare: bool,
+    /// Keep games in this folder.
+    #[arg(long, conflicts_with = "bare")]
+    pub(crate) data_dir: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) place: Place,
 }
@@ -90,6 +94,16 @@ pub(crate) struct Load {
     /// Measure the load on a server that runs elsewhere; no bare room, no figures from inside the server.
     #[arg(long, value_name = "URL", conflicts_with = "pin")]
     pub(crate) server: Option<String>,
+    /// Measure rooms that outlive the server beside rooms that are kept when they end, both on a server that keeps games on disk: 64
+    /// rooms unless --rooms says otherwise.
+    #[arg(long, conflicts_with = "server")]
+    pub(crate) durability: bool,
+    /// Measure how long a server that was killed takes until so many unfinished games can be played again.
+    #[arg(long, value_name = "ROOMS", conflicts_with_all = ["rooms", "server", "durability"], value_parser = clap::value_parser!(u64).range(1..=MAX_ROOMS))]
+    pub(crate) restart: Option<u64>,
+    /// Folder for what --durability and --restart keep on disk; it must lie on the disk that is meant. Standard: the temporary folder.
+    #[arg(long, value_name = "FOLDER")]
+    pub(crate) disk: Option<PathBuf>,
     /// One room, one round, a moment: does the program work?
     #[arg(long, conflicts_with_all = ["rooms", "rounds", "seconds", "warmup", "decisions", "shifts"])]
     pub(crate) smoke: bool,

@@ -25,7 +25,7 @@ use crate::wire::{
 };
 
 /// A response and how many bytes it had.
-type Weighed = (usize, PlayResponse);
+pub(crate) type Weighed = (usize, PlayResponse);
 
 /// Requests that wait for one stream.
 const REQUESTS: usize = 1_024;
@@ -118,7 +118,7 @@ pub(crate) async fn segment(
 }
 
 /// Opens a stream, as a generated client does, but for messages with the fields alone that are needed.
-async fn open(
+pub(crate) async fn open(
     channel: Channel,
     requests: mpsc::Receiver<v1::PlayRequest>,
 ) -> Result<Streaming<Weighed>, LoadError> {

@@ -23,6 +23,8 @@ pub(crate) struct Plan {
     pub(crate) streams: usize,
     /// Shifts of a game; 0: games to 15 points.
     pub(crate) shifts: u32,
+    /// Whether the games outlive the server.
+    pub(crate) durable: bool,
     /// Played before the window opens.
     pub(crate) warmup: Duration,
     /// Length of the window.

@@ -1,5 +1,5 @@
 //! What is printed: figures from outcomes, as JSON and as tables. Figures of a scenario are medians of its rounds; ratios are medians of
-//! the ratios of each round's pair.
+//! the ratios of each round's pair. What a restart showed is printed in `restart`.
 
 use comfy_table::{CellAlignment, Table, presets};
 use serde::Serialize;
@@ -15,6 +15,8 @@ const GOAL_THROUGHPUT: f64 = 0.90;
 const GOAL_CPU: f64 = 1.15;
 /// How many times the throughput of connections apart a shared connection is to reach.
 const GOAL_SHARED: f64 = 2.0;
+/// The least of ephemeral rooms' throughput that durable rooms are to reach.
+const GOAL_DURABLE: f64 = 0.5;
 /// The most memory a seat may take, KiB.
 const GOAL_KIB: f64 = 100.0;
 
@@ -22,9 +24,10 @@ const GOAL_KIB: f64 = 100.0;
 #[derive(Debug, Serialize)]
 pub(crate) struct Report {
     pinned: bool,
-    records_written: bool,
     seconds: f64,
     scenarios: Vec<Figures>,
+    /// Small writes, each synced, that the disk takes in a second; only where games are kept on disk.
+    disk_syncs_per_second: Option<f64>,
     goals: Vec<Goal>,
 }
 
@@ -39,14 +42,16 @@ struct Figures {
     server: Side,
     /// Decision times as the server measures them: from handing a request to the transport to the arrival of the answer.
     decision_time_us: Quantiles,
-    bare: Option<Side>,
+    /// What the server is measured beside.
+    beside: &'static str,
+    other: Option<Side>,
     throughput_ratio: Option<Spread>,
     server_cpu_ratio: Option<Spread>,
     memory_per_seat_kib: Option<f64>,
     bytes_per_decision: PerDecision,
     messages: Traffic,
     checked: Counts,
-    bare_answers: u64,
+    other_answers: u64,
 }
 
 /// One side of a comparison.
@@ -92,14 +97,14 @@ struct Goal {
 
 impl Report {
     /// The report of outcomes.
-    pub(crate) fn new(load: &Load, outcomes: &[Outcome]) -> Self {
+    pub(crate) fn new(load: &Load, outcomes: &[Outcome], disk_syncs_per_second: Option<f64>) -> Self {
         let scenarios: Vec<Figures> = outcomes.iter().map(Figures::new).collect();
         Self {
             pinned: load.place.pin,
-            records_written: false,
             seconds: load.seconds.as_secs_f64(),
             goals: goals(outcomes, &scenarios),
             scenarios,
+            disk_syncs_per_second,
         }
     }
 
@@ -123,9 +128,15 @@ impl Report {
             }
             text.push_str(&format!("{table}\n"));
         }
-        text.push_str(
-            "No records are written. Times are of this machine; ratios are what compares.\n",
-        );
+        let kept = match self.disk_syncs_per_second {
+            Some(syncs) => format!(
+                "Games are kept on disk, which takes {syncs:.0} small synced writes a second."
+            ),
+            None => "Games are kept in memory.".to_owned(),
+        };
+        text.push_str(&format!(
+            "{kept} Times are of this machine; ratios are what compares.\n"
+        ));
         text
     }
 }
@@ -136,11 +147,11 @@ impl Figures {
         let windows = |of: fn(&Round) -> Option<Window>| -> Vec<Window> {
             outcome.rounds.iter().filter_map(of).collect()
         };
-        let bare = windows(|round| round.bare);
+        let other = windows(|round| round.other);
         let ratio = |of: fn(&Window) -> Option<f64>| {
             Spread::of(outcome.rounds.iter().filter_map(|round| {
-                let bare = of(round.bare.as_ref()?)?;
-                Some(of(&round.server)? / bare).filter(|ratio| ratio.is_finite())
+                let other = of(round.other.as_ref()?)?;
+                Some(of(&round.server)? / other).filter(|ratio| ratio.is_finite())
             }))
         };
         let decisions = outcome.counts.answers as f64;
@@ -154,7 +165,8 @@ impl Figures {
             decision_time_us: Quantiles::of(&outcome.server_us, 1.0),
             throughput_ratio: ratio(|window| Some(rate(window))),
             server_cpu_ratio: ratio(server_cpu_us),
-            bare: (!bare.is_empty()).then(|| Side::new(&bare, &outcome.bare_ns)),
+            beside: beside(scenario.purpose),
+            other: (!other.is_empty()).then(|| Side::new(&other, &outcome.other_ns)),
             memory_per_seat_kib: median(
                 outcome
                     .rounds
@@ -169,7 +181,7 @@ impl Figures {
             },
             messages: outcome.traffic,
             checked: outcome.counts.clone(),
-            bare_answers: outcome.bare_answers,
+            other_answers: outcome.other_answers,
         }
     }
 
@@ -194,8 +206,8 @@ impl Figures {
             ]);
         };
         row("server", &self.server);
-        if let Some(bare) = &self.bare {
-            row("bare room", bare);
+        if let Some(other) = &self.other {
+            row(self.beside, other);
         }
         if let (Some(throughput), Some(cpu)) = (self.throughput_ratio, self.server_cpu_ratio) {
             table.add_row(["ratio".into(), throughput.to_string(), cpu.to_string()]);
@@ -302,6 +314,16 @@ fn goals(outcomes: &[Outcome], scenarios: &[Figures]) -> Vec<Goal> {
             });
         }
     }
+    for figures in with(Purpose::Durability) {
+        if let Some(throughput) = figures.throughput_ratio {
+            goals.push(Goal {
+                what: format!("throughput of durable to ephemeral rooms, {}", figures.name),
+                aim: format!(">= {GOAL_DURABLE:.2}"),
+                reached: throughput.median,
+                met: throughput.median >= GOAL_DURABLE,
+            });
+        }
+    }
     for figures in with(Purpose::Memory) {
         if let Some(kib) = figures.memory_per_seat_kib {
             goals.push(Goal {
@@ -313,6 +335,14 @@ fn goals(outcomes: &[Outcome], scenarios: &[Figures]) -> Vec<Goal> {
         }
     }
     goals
+}
+
+/// What the server is measured beside.
+fn beside(purpose: Purpose) -> &'static str {
+    match purpose {
+        Purpose::Durability => "ephemeral rooms",
+        _ => "bare room",
+    }
 }
 
 fn rate(window: &Window) -> f64 {

@@ -1,15 +1,19 @@
-//! Scenarios: which rooms on which streams, and the order of measurements. Server and bare room take turns within a scenario, each
-//! time in processes of their own, so that what disturbs the machine disturbs both.
+//! Scenarios: which rooms on which streams, and the order of measurements. What is measured and what it is measured beside take turns
+//! within a scenario, each time in processes of their own, so that what disturbs the machine disturbs both.
 
 use std::time::Duration;
 
+use crate::disk;
 use crate::error::LoadError;
 use crate::options::{Load, Place, SEATS};
 use crate::ping::{self, Sizes};
 use crate::play;
 use crate::pulse::{Latencies, Plan, Window, latencies};
-use crate::server::ServerProcess;
+use crate::server::{Kind, ServerProcess};
 use crate::tally::{Counts, Traffic};
+
+/// Rooms in the scenario of durability, unless the options say otherwise.
+const DURABLE_ROOMS: usize = 64;
 
 /// What a scenario is for, which decides the goals it is held to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -20,6 +24,8 @@ pub(crate) enum Purpose {
     Shared,
     /// Many seats, for their memory.
     Memory,
+    /// Rooms that outlive the server, beside rooms that do not.
+    Durability,
     /// Anything else.
     Own,
 }
@@ -71,13 +77,23 @@ pub(crate) fn scenarios(load: &Load) -> Vec<Scenario> {
         rounds: load.rounds,
     };
     if load.smoke {
+        let purpose = match load.durability {
+            true => Purpose::Durability,
+            false => Purpose::Own,
+        };
         return vec![Scenario {
             shifts: 2,
             rounds: 1,
-            ..scenario(Purpose::Own, 1, 4)
+            ..scenario(purpose, 1, 4)
         }];
     }
-    if let Some(rooms) = load.rooms.map(count) {
+    let rooms = load.rooms.map(count);
+    if load.durability {
+        let rooms = rooms.unwrap_or(DURABLE_ROOMS);
+        let streams = load.streams.map_or(rooms * SEATS, count);
+        return vec![scenario(Purpose::Durability, rooms, streams)];
+    }
+    if let Some(rooms) = rooms {
         let streams = load.streams.map_or(rooms * SEATS, count);
         return vec![scenario(Purpose::Own, rooms, streams)];
     }
@@ -94,13 +110,13 @@ pub(crate) fn scenarios(load: &Load) -> Vec<Scenario> {
     ]
 }
 
-/// One measurement of the server, and the one of the bare room that followed it.
+/// One measurement of the server, and the one of what it is measured beside that followed it.
 #[derive(Debug)]
 pub(crate) struct Round {
     /// The server.
     pub(crate) server: Window,
-    /// The bare room; none where the server runs elsewhere.
-    pub(crate) bare: Option<Window>,
+    /// What it is measured beside; none where the server runs elsewhere.
+    pub(crate) other: Option<Window>,
     /// Memory of the server's process per seat, attached and playing, bytes.
     pub(crate) bytes_per_seat: Option<f64>,
 }
@@ -116,12 +132,12 @@ pub(crate) struct Outcome {
     pub(crate) server_us: Latencies,
     /// Response times of the server as the client saw them, nanoseconds.
     pub(crate) client_ns: Latencies,
-    /// Response times of the bare room, nanoseconds.
-    pub(crate) bare_ns: Latencies,
+    /// Response times of what it is measured beside, nanoseconds.
+    pub(crate) other_ns: Latencies,
     /// What was done on the server in the measured segments.
     pub(crate) counts: Counts,
-    /// Answers in the measured segments of the bare room.
-    pub(crate) bare_answers: u64,
+    /// Answers in the measured segments of what it is measured beside.
+    pub(crate) other_answers: u64,
     /// The messages of the segments on the server.
     pub(crate) traffic: Traffic,
 }
@@ -146,6 +162,7 @@ pub(crate) async fn run(load: &Load, scenario: Scenario) -> Result<Outcome, Load
         rooms: scenario.rooms,
         streams: scenario.streams,
         shifts: scenario.shifts,
+        durable: true,
         warmup: load.warmup,
         window: load.seconds,
         decisions: load.decisions,
@@ -160,22 +177,31 @@ pub(crate) async fn run(load: &Load, scenario: Scenario) -> Result<Outcome, Load
         rounds: Vec::new(),
         server_us: latencies(),
         client_ns: latencies(),
-        bare_ns: latencies(),
+        other_ns: latencies(),
         counts: Counts::default(),
-        bare_answers: 0,
+        other_answers: 0,
         traffic: Traffic::default(),
     };
     for _ in 0..outcome.scenario.rounds {
         plan.seed = plan.seed.wrapping_add(plan.streams as u64);
-        let (played, idle_bytes) = on_server(load, &plan).await?;
+        let (played, idle_bytes) = on_server(load, &plan, outcome.scenario.purpose).await?;
         outcome.server_us += &played.server_us;
         outcome.client_ns += &played.client_ns;
         outcome.counts.add(&played.counts);
         outcome.traffic.add(&played.traffic);
-        let bare = if load.server.is_none() {
+        let other = if outcome.scenario.purpose == Purpose::Durability {
+            let ephemeral = Plan {
+                durable: false,
+                ..plan.clone()
+            };
+            let (played, _) = on_server(load, &ephemeral, outcome.scenario.purpose).await?;
+            outcome.other_ns += &played.client_ns;
+            outcome.other_answers += played.counts.answers;
+            Some(played.window)
+        } else if load.server.is_none() {
             let pinged = on_bare_room(load.place, &plan, outcome.sizes()).await?;
-            outcome.bare_ns += &pinged.client_ns;
-            outcome.bare_answers += pinged.answers;
+            outcome.other_ns += &pinged.client_ns;
+            outcome.other_answers += pinged.answers;
             Some(pinged.window)
         } else {
             None
@@ -183,7 +209,7 @@ pub(crate) async fn run(load: &Load, scenario: Scenario) -> Result<Outcome, Load
         let seats = outcome.scenario.seats() as f64;
         outcome.rounds.push(Round {
             server: played.window,
-            bare,
+            other,
             bytes_per_seat: played
                 .window
                 .playing_bytes
@@ -195,11 +221,20 @@ pub(crate) async fn run(load: &Load, scenario: Scenario) -> Result<Outcome, Load
 }
 
 /// A segment on the game server, with the memory its process had before anybody connected.
-async fn on_server(load: &Load, plan: &Plan) -> Result<(play::Played, Option<u64>), LoadError> {
+async fn on_server(
+    load: &Load,
+    plan: &Plan,
+    purpose: Purpose,
+) -> Result<(play::Played, Option<u64>), LoadError> {
     if let Some(url) = &load.server {
         return Ok((play::segment(url, None, plan).await?, None));
     }
-    let server = ServerProcess::start(false, load.place).await?;
+    let folder = disk::folder(load)?;
+    let kind = match purpose {
+        Purpose::Durability => Kind::OnDisk(folder.path()),
+        _ => Kind::InMemory,
+    };
+    let server = ServerProcess::start(kind, load.place).await?;
     let idle = crate::gauge::resident_bytes(server.pid())
         .map_err(LoadError::io("reading the server's memory"))?;
     let played = play::segment(&server.url(), Some(server.pid()), plan).await?;
@@ -208,7 +243,7 @@ async fn on_server(load: &Load, plan: &Plan) -> Result<(play::Played, Option<u64
 }
 
 async fn on_bare_room(place: Place, plan: &Plan, sizes: Sizes) -> Result<ping::Pinged, LoadError> {
-    let server = ServerProcess::start(true, place).await?;
+    let server = ServerProcess::start(Kind::Bare, place).await?;
     let pinged = ping::segment(&server.url(), server.pid(), plan, sizes).await?;
     server.stop().await?;
     Ok(pinged)

@@ -3,12 +3,13 @@
 
 use std::io::Write as _;
 use std::net::SocketAddr;
+use std::path::Path;
 use std::process::Stdio;
 use std::sync::Arc;
 use std::time::Duration;
 
 use chefshat_server::config::ServerConfig;
-use chefshat_server::store::MemoryStore;
+use chefshat_server::store::{MemoryStore, SqliteStore, Store};
 use tokio::io::{AsyncBufReadExt as _, AsyncReadExt as _, BufReader};
 use tokio::net::TcpListener;
 use tokio::process::{Child, Command};
@@ -26,8 +27,27 @@ const STOP_LIMIT: Duration = Duration::from_secs(10);
 /// Ended rooms are forgotten soon: a run plays more of them than a day of people does.
 const RETENTION: Duration = Duration::from_secs(1);
 
+/// What a child serves.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Kind<'a> {
+    /// The bare room.
+    Bare,
+    /// The game server, which keeps games in memory.
+    InMemory,
+    /// The game server, which keeps games in this folder.
+    OnDisk(&'a Path),
+}
+
 /// The part of the child.
 pub(crate) async fn serve(options: &Serve) -> Result<(), LoadError> {
+    let failed = |error: &dyn std::error::Error| LoadError::Protocol(error.to_string());
+    let store: Arc<dyn Store> = match &options.data_dir {
+        Some(folder) => {
+            let opened = SqliteStore::open(folder).await;
+            Arc::new(opened.map_err(|error| failed(&error))?)
+        }
+        None => Arc::new(MemoryStore::default()),
+    };
     let listener = TcpListener::bind(("127.0.0.1", 0))
         .await
         .map_err(LoadError::io("listening"))?;
@@ -48,19 +68,14 @@ pub(crate) async fn serve(options: &Serve) -> Result<(), LoadError> {
         return Ok(());
     }
     let config = ServerConfig {
-        data_dir: None,
+        data_dir: options.data_dir.clone(),
         retention: RETENTION,
         grace: Duration::ZERO,
         ..ServerConfig::default()
     };
-    chefshat_server::serve::serve(
-        listener,
-        config,
-        Arc::new(MemoryStore::default()),
-        parent_gone,
-    )
-    .await
-    .map_err(|error| LoadError::Protocol(error.to_string()))
+    chefshat_server::serve::serve(listener, config, store, parent_gone)
+        .await
+        .map_err(|error| failed(&error))
 }
 
 /// A server process. Killed when dropped.
@@ -73,12 +88,14 @@ pub(crate) struct ServerProcess {
 
 impl ServerProcess {
     /// Starts a server and waits until it listens.
-    pub(crate) async fn start(bare: bool, place: Place) -> Result<Self, LoadError> {
+    pub(crate) async fn start(kind: Kind<'_>, place: Place) -> Result<Self, LoadError> {
         let program = std::env::current_exe().map_err(LoadError::io("finding this program"))?;
         let mut command = Command::new(program);
         command.arg("serve");
-        if bare {
-            command.arg("--bare");
+        match kind {
+            Kind::Bare => drop(command.arg("--bare")),
+            Kind::InMemory => {}
+            Kind::OnDisk(folder) => drop(command.arg("--data-dir").arg(folder)),
         }
         if place.pin {
             command.args(["--pin", "--core", &place.core.to_string()]);
@@ -119,6 +136,11 @@ impl ServerProcess {
     /// Where it listens.
     pub(crate) fn url(&self) -> String {
         format!("http://{}", self.address)
+    }
+
+    /// Kills it, as an accident would.
+    pub(crate) async fn kill(mut self) -> Result<(), LoadError> {
+        (self.child.kill().await).map_err(LoadError::io("killing a server"))
     }
 
     /// Ends it: by the end of its standard input, or else by force.

@@ -23,14 +23,14 @@ fn a_moment_of_load_is_counted_on_both_sides() {
     for path in [
         "/server/decisions_per_second",
         "/server/decisions_in_windows",
-        "/bare/decisions_per_second",
-        "/bare/decisions_in_windows",
+        "/other/decisions_per_second",
+        "/other/decisions_in_windows",
         "/throughput_ratio/median",
         "/bytes_per_decision/request",
         "/bytes_per_decision/response",
         "/checked/games",
         "/checked/shifts",
-        "/bare_answers",
+        "/other_answers",
     ] {
         let figure = scenario.pointer(path).and_then(Value::as_f64);
         assert!(

@@ -1,75 +1,13 @@
 //! The main job: one game of four processes in three languages, played against the binary over its port.
 
-use std::path::PathBuf;
-use std::process::{ExitStatus, Output, Stdio};
+use std::process::{Output, Stdio};
 
 use chefshat_client::Client;
 use chefshat_proto::v1;
 use chefshat_records::{jsonl, replay};
-use chefshat_tests::patiently;
+use chefshat_tests::{Launch, patiently, set_up};
 use serde_json::Value;
-use tempfile::TempDir;
-use tokio::io::{AsyncBufReadExt as _, BufReader};
-use tokio::process::{Child, Command};
-
-/// What `cargo xtask test` has set up: the binary, a Python with the package, a folder with the Node agent.
-fn set_up(name: &str) -> PathBuf {
-    std::env::var_os(name)
-        .map(PathBuf::from)
-        .unwrap_or_else(|| panic!("{name} is not set: run this test by `cargo xtask test`"))
-}
-
-/// A running `chefshat serve`.
-struct Server {
-    process: Child,
-    address: String,
-    data: TempDir,
-}
-
-impl Server {
-    async fn start() -> Self {
-        let data = tempfile::tempdir().expect("a temporary folder");
-        let mut process = Command::new(set_up("CHEFSHAT_BIN"))
-            .args(["serve", "--listen", "127.0.0.1:0", "--json", "--data-dir"])
-            .arg(data.path())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .kill_on_drop(true)
-            .spawn()
-            .expect("the binary runs");
-        let stdout = process.stdout.take().expect("it is piped");
-        let mut lines = BufReader::new(stdout).lines();
-        let line = patiently("the server to listen", lines.next_line())
-            .await
-            .expect("it writes text")
-            .expect("it says where it listens");
-        let listening: Value = serde_json::from_str(&line).expect("a JSON line");
-        assert_eq!(listening["event"], "listening");
-        Self {
-            process,
-            address: listening["address"]
-                .as_str()
-                .expect("an address")
-                .to_owned(),
-            data,
-        }
-    }
-
-    /// Asks the server to stop as an operator would, and waits until it has.
-    async fn stop(mut self) -> (ExitStatus, TempDir) {
-        let id = self.process.id().expect("it is running").to_string();
-        let asked = Command::new("kill")
-            .args(["-TERM", &id])
-            .status()
-            .await
-            .expect("kill runs");
-        assert!(asked.success());
-        let status = patiently("the server to stop", self.process.wait())
-            .await
-            .expect("it ends");
-        (status, self.data)
-    }
-}
+use tokio::process::Command;
 
 /// Runs a participant and waits for what it prints.
 async fn participant(name: &str, mut command: Command) -> Output {
@@ -92,17 +30,18 @@ async fn rust_python_and_javascript_play_a_game_to_fifteen_points() {
     let binary = set_up("CHEFSHAT_BIN");
     let python = set_up("CHEFSHAT_PYTHON");
     let node = set_up("CHEFSHAT_NODE_DIR");
-    let server = Server::start().await;
-    let client = Client::connect(&server.address)
-        .await
-        .expect("the server listens");
+    let data = tempfile::tempdir().expect("a temporary folder");
+    let mut launch = Launch::new(data.path());
+    let server = launch.start().await.expect("it starts");
+    let url = launch.url();
+    let client = Client::connect(&url).await.expect("it listens");
     let created = client
         .create_room(v1::CreateRoomRequest::default())
         .await
         .expect("the room is made");
     let room = created.room.expect("a room");
-    let (address, code) = (server.address.as_str(), created.join_code.as_str());
-    let url = format!("http://{address}");
+    let address = url.trim_start_matches("http://");
+    let code = created.join_code.as_str();
     let built_in = |kind: &str| {
         let mut command = Command::new(&binary);
         command.args(["agent", kind, "--server", &url, "--code", code]);
@@ -136,8 +75,7 @@ async fn rust_python_and_javascript_play_a_game_to_fifteen_points() {
     for name in ["greedy", "random", "python", "node"] {
         assert!(names.contains(&name), "{name} is not among {names:?}");
     }
-    let (status, data) = server.stop().await;
-    assert!(status.success());
+    assert!(server.stop().await.status.success());
     let record = jsonl::read(&jsonl::path_of(data.path(), &room.game_id)).expect("it was written");
     let replayed = replay::replay(&record).expect("it replays to the same result");
     assert_eq!(replayed.state, v1::RoomState::Finished);

@@ -1,9 +1,15 @@
 //! Whole-system tests over real sockets: what a participant, a spectator or a stranger can do to a server, and what it makes of it.
 
 mod answers;
+mod beginnings;
+mod branches;
 mod connections;
 mod doors;
+mod faults;
 mod languages;
+mod played;
+mod records;
+mod restarts;
 mod rooms;
 mod spectators;
 mod stops;

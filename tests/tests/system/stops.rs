@@ -7,10 +7,12 @@ use chefshat_proto::v1::{self, game_event::Kind, seat_update::Update};
 use chefshat_server::store::{FailingStore, MemoryStore};
 use chefshat_tests::{
     TestServer, attach_all, first_legal, narrow_spectator, one_shift, patiently, play_on, play_out,
-    random_agents, room_of_four,
+    room_of_four,
 };
+use tonic::Code;
 use tonic_health::pb::health_client::HealthClient;
 use tonic_health::pb::{HealthCheckRequest, health_check_response::ServingStatus};
+use tonic_types::StatusExt as _;
 
 #[tokio::test]
 async fn a_shutdown_in_mid_game_aborts_it_as_such() {
@@ -120,27 +122,32 @@ async fn a_client_that_does_not_read_cannot_hold_up_a_shutdown() {
 }
 
 #[tokio::test]
-async fn a_store_that_fails_stops_its_room_and_tells_nobody_of_the_decision() {
+async fn a_store_that_fails_ends_the_server_and_tells_nobody_of_the_decision() {
     // Four joins and the start are kept, then ten decisions; the next is not.
     let server = TestServer::with(|_| {}, Arc::new(FailingStore::after(15))).await;
     let client = server.client().await;
-    let (created, tickets) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
-    let room_id = created.room.expect("a room").room_id;
+    let (_, tickets) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
     let mut seats = attach_all(&server, &tickets).await;
     let ends = futures::future::join_all(seats.iter_mut().map(async |seat| {
         loop {
-            match seat.next().await {
-                Update::Decision(decision) => {
+            match seat.next_or_end().await {
+                Ok(Some(Update::Decision(decision))) => {
                     let action = first_legal(&decision);
                     seat.answer(decision.decision_id, action).await;
                 }
-                Update::Detached(detached) => return detached.reason(),
-                _ => {}
+                Ok(Some(Update::Result(_))) => {}
+                Ok(other) => panic!("unexpected {other:?}"),
+                Err(status) => return status,
             }
         }
     }))
     .await;
-    assert_eq!(ends, [v1::DetachReason::RoomFailed; 4]);
+    for status in ends {
+        // What the SDKs try again after, until the server is back.
+        assert_eq!(status.code(), Code::Unavailable, "{status}");
+        let reason = status.get_details_error_info().map(|info| info.reason);
+        assert_eq!(reason.as_deref(), Some("STORE_FAILED"));
+    }
     for seat in &seats {
         let turns = seat
             .events
@@ -149,26 +156,10 @@ async fn a_store_that_fails_stops_its_room_and_tells_nobody_of_the_decision() {
             .count();
         assert!(turns <= 10, "{turns} decisions were told, ten were kept");
     }
-    let gone = loop {
-        match client.get_room(&room_id).await {
-            Err(error) => break error,
-            Ok(_) => tokio::task::yield_now().await,
-        }
-    };
-    assert_eq!(gone.reason(), Some("ROOM_UNKNOWN"));
-    // Nothing else is harmed: the server answers, and stops when it is told to.
-    client.server_info().await.expect("the server answers");
-    drop(seats);
-    patiently("the server to stop", server.stop()).await;
-}
-
-#[tokio::test]
-async fn an_agent_of_the_sdk_hears_of_a_failed_room() {
-    let server = TestServer::with(|_| {}, Arc::new(FailingStore::after(8))).await;
-    let client = server.client().await;
-    let (_, tickets) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
-    let playing = client.play_many(random_agents(tickets));
-    for outcome in patiently("the streams to end", playing).await {
-        outcome.expect_err("there is no result");
-    }
+    let failure = patiently("the server to end", server.ended()).await;
+    let failure = failure.expect_err("it cannot go on").to_string();
+    assert!(
+        failure.contains("started again"),
+        "it says what to do: {failure}"
+    );
 }

@@ -59,6 +59,14 @@ pub(crate) fn node_package(places: &Places) -> Result<(), Failure> {
     note_made_from(&modules, &made_from)
 }
 
+/// strace, by which a test has a disk fail.
+pub(crate) fn strace() -> Result<(), Failure> {
+    if succeeds("strace", &["--version"]) {
+        return Ok(());
+    }
+    debian_package("strace")
+}
+
 /// cargo-deny: the one on the path if it is of the right version, else one built here. Returns the program to start.
 pub(crate) fn cargo_deny(places: &Places) -> Result<Command, Failure> {
     let wanted = format!("cargo-deny {CARGO_DENY}");

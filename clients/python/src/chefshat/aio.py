@@ -72,9 +72,13 @@ class Client:
         seats: Sequence[requests.SeatSpec] = (),
         policy: pb.RoomPolicy | None = None,
         game_seed: bytes = b"",
+        branch: pb.BranchPoint | None = None,
+        hands: pb.ScriptedShift | None = None,
+        durability: pb.Durability.ValueType | None = None,
     ) -> pb.CreateRoomResponse:
         """Makes a room; the arguments are those of the blocking client."""
-        return await _called(self._rooms.CreateRoom(requests.create_room(name, rules, seats, policy, game_seed)))
+        request = requests.create_room(name, rules, seats, policy, game_seed, branch, hands, durability)
+        return await _called(self._rooms.CreateRoom(request))
 
     async def join_room(
         self,
@@ -116,6 +120,17 @@ class Client:
     async def action_table(self, faces: int = 0) -> pb.GetActionTableResponse:
         """The text of every action for decks of so many faces (0: the standard 11)."""
         return await _called(self._server.GetActionTable(pb.GetActionTableRequest(faces=faces)))
+
+    async def records(self, wanted: pb.RecordFilter | None = None) -> AsyncIterator[pb.RecordSummary]:
+        """The records the server holds, oldest first; those a filter lets through if one is given. Pages are fetched as needed."""
+        token = ""
+        while True:
+            page = await _called(self._records.ListRecords(pb.ListRecordsRequest(filter=wanted, page_token=token)))
+            for summary in page.records:
+                yield summary
+            token = page.next_page_token
+            if not token:
+                return
 
     async def record(self, game_id: str) -> AsyncIterator[pb.RecordLine]:
         """The record of a game that has ended, line by line."""

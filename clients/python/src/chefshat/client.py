@@ -80,6 +80,9 @@ class Client:
         seats: Sequence[requests.SeatSpec] = (),
         policy: pb.RoomPolicy | None = None,
         game_seed: bytes = b"",
+        branch: pb.BranchPoint | None = None,
+        hands: pb.ScriptedShift | None = None,
+        durability: pb.Durability.ValueType | None = None,
     ) -> pb.CreateRoomResponse:
         """Makes a room.
 
@@ -89,11 +92,15 @@ class Client:
             seats: how each seat is filled, index = seat; all open if empty. See `SeatSpec`.
             policy: times, limits and manners; standard where unset.
             game_seed: 32 bytes that fix all deals, for experiments; the server draws them if empty.
+            branch: the point of a recorded game from which this one goes on, by its rules (leave `rules` out).
+            hands: the hands to begin with instead of a deal.
+            durability: what the game outlives, in place of what the policy says; standard: the server.
 
         Returns:
             The room, its join code, and the token that closes it.
         """
-        return _called(lambda: self._rooms.CreateRoom(requests.create_room(name, rules, seats, policy, game_seed)))
+        request = requests.create_room(name, rules, seats, policy, game_seed, branch, hands, durability)
+        return _called(lambda: self._rooms.CreateRoom(request))
 
     def join_room(
         self,
@@ -137,6 +144,19 @@ class Client:
     def action_table(self, faces: int = 0) -> pb.GetActionTableResponse:
         """The text of every action for decks of so many faces (0: the standard 11)."""
         return _called(lambda: self._server.GetActionTable(pb.GetActionTableRequest(faces=faces)))
+
+    def records(self, wanted: pb.RecordFilter | None = None) -> Iterator[pb.RecordSummary]:
+        """The records the server holds, oldest first; those a filter lets through if one is given. Pages are fetched as needed."""
+        token = ""
+        while True:
+            page = self._records_page(pb.ListRecordsRequest(filter=wanted, page_token=token))
+            yield from page.records
+            token = page.next_page_token
+            if not token:
+                return
+
+    def _records_page(self, request: pb.ListRecordsRequest) -> pb.ListRecordsResponse:
+        return _called(lambda: self._records.ListRecords(request))
 
     def record(self, game_id: str) -> Iterator[pb.RecordLine]:
         """The record of a game that has ended, line by line."""

@@ -17,8 +17,9 @@ CHANNEL_OPTIONS: list[tuple[str, int]] = [
     ("grpc.use_local_subchannel_pool", 1),
 ]
 
-SeatSpec: TypeAlias = "pb.SeatConfig | pb.ParticipantKind.ValueType | str | None"
-"""How to fill a seat: a built-in agent's name, a kind it is reserved for, None (open to everybody), or the message itself."""
+SeatSpec: TypeAlias = "pb.SeatConfig | pb.RecordedPlayer | pb.ParticipantKind.ValueType | str | None"
+"""How to fill a seat: a built-in agent's name, a recorded player to play as, a kind it is reserved for, None (open to everybody),
+or the message itself."""
 
 
 class Target(NamedTuple):
@@ -44,18 +45,33 @@ def create_room(
     seats: Sequence[SeatSpec],
     policy: pb.RoomPolicy | None,
     game_seed: bytes,
+    branch: pb.BranchPoint | None,
+    hands: pb.ScriptedShift | None,
+    durability: pb.Durability.ValueType | None,
 ) -> pb.CreateRoomRequest:
     """The request for a room."""
+    if branch is not None and hands is not None:
+        raise ValueError("a game begins from a record (branch) or with given hands (hands), not with both")
     if isinstance(rules, str):
         rules = pb.RuleSet(preset=rules)
+    if durability is not None:
+        # A copy: the caller may use its policy for other rooms.
+        asked = pb.RoomPolicy()
+        asked.MergeFrom(policy or asked)
+        asked.durability = durability
+        policy = asked
     configs = [seat_config(seat) for seat in seats]
-    return pb.CreateRoomRequest(name=name, rules=rules, seats=configs, policy=policy, game_seed=game_seed)
+    return pb.CreateRoomRequest(
+        name=name, rules=rules, seats=configs, policy=policy, game_seed=game_seed, branch=branch, scripted=hands
+    )
 
 
 def seat_config(seat: SeatSpec) -> pb.SeatConfig:
     """The message for one seat."""
     if isinstance(seat, pb.SeatConfig):
         return seat
+    if isinstance(seat, pb.RecordedPlayer):
+        return pb.SeatConfig(replay=seat)
     if isinstance(seat, str):
         return pb.SeatConfig(built_in_agent=seat)
     return pb.SeatConfig(reserved_for=pb.PARTICIPANT_KIND_UNSPECIFIED if seat is None else seat)

@@ -9,3 +9,4 @@ mod agents;
 mod batch;
 mod conformance;
 mod play;
+mod recorded;

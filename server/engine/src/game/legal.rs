@@ -156,7 +156,7 @@ impl Game {
 }
 
 /// Gives the highest plain face, else the Golden card, else a joker.
-fn default_gift(hand: Cards, space: crate::ActionSpace) -> Action {
+pub(crate) fn default_gift(hand: Cards, space: crate::ActionSpace) -> Action {
     let mut plain = hand;
     if hand.has_golden() {
         plain.remove_counts(space.faces(), 1, 0);

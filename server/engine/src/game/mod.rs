@@ -13,6 +13,7 @@ mod turn;
 mod view;
 
 pub use error::{ActionError, Refusal};
+pub(crate) use legal::default_gift;
 pub use script::{Script, ScriptError};
 
 use crate::{
@@ -210,12 +211,19 @@ impl Game {
         Ok(())
     }
 
+    /// Lets this seed deal all later Shifts, so that a game can go on otherwise than the one it
+    /// was branched from. The Shift being played stays as it was dealt.
+    pub fn reseed(&mut self, seed: Seed) {
+        self.seed = seed;
+    }
+
     /// The rule set.
     pub fn rules(&self) -> &RuleSet {
         &self.rules
     }
 
-    /// The seed of all deals. Records need it; nobody may see it before the game has ended.
+    /// The seed of the deals to come, and of all before unless [`Game::reseed`] changed it. Records
+    /// need it; nobody may see it before the game has ended.
     pub fn seed(&self) -> Seed {
         self.seed
     }

@@ -1,7 +1,7 @@
 //! What must hold in every game: for any rule set that makes sense, any seed and any way of
 //! playing.
 
-use chefshat_engine::{Action, Game, Mask, RuleSet, Seed, Stop};
+use chefshat_engine::{Action, Game, Mask, RuleSet, Seed, Stop, Viewer};
 use proptest::prelude::*;
 
 use crate::model::Model;
@@ -77,6 +77,8 @@ proptest! {
             let plain: Mask = space.iter().filter(allowed).collect();
             prop_assert_eq!(mask, plain);
             prop_assert!(mask.contains(game.default_action().unwrap()));
+            let view = game.observe(Viewer::Seat(game.decision().unwrap().seat));
+            prop_assert_eq!(view.default_action(&mask), game.default_action());
             game.apply(choose(policy, &game, &mut chance), |event| model.follow(&event)).unwrap();
             if !game.is_over() {
                 model.check_cards(&game);

@@ -147,6 +147,36 @@ fn a_scripted_shift_is_followed_by_dealt_ones() {
 }
 
 #[test]
+fn another_seed_deals_the_shifts_that_begin_after_it() {
+    let rules = spec().validate().unwrap();
+    let (first, second) = (Seed([8; 32]), Seed([9; 32]));
+    let mut original = Game::new(rules, first, |_| {});
+    let mut branch = original.clone();
+    branch.reseed(second);
+    let mut chance = crate::support::Chance(2);
+    while original.shift() == 1 {
+        assert_eq!(
+            (branch.hands(), branch.decision(), branch.legal_actions()),
+            (
+                original.hands(),
+                original.decision(),
+                original.legal_actions()
+            ),
+            "the Shift being played stays as it was dealt"
+        );
+        let action = chance.legal_action(&original);
+        original.apply(action, |_| {}).unwrap();
+        branch.apply(action, |_| {}).unwrap();
+    }
+    let dealt = |seed| chefshat_engine::Deal::new(&rules, seed, 2).hands();
+    assert_eq!((branch.seed(), branch.shift()), (second, 2));
+    assert_eq!(*original.hands(), dealt(first));
+    assert_eq!(*branch.hands(), dealt(second));
+    assert_ne!(branch.hands(), original.hands());
+    assert_eq!(branch.scores(), original.scores());
+}
+
+#[test]
 fn hidden_cards_can_be_replaced_while_a_turn_is_open() {
     let rules = spec().validate().unwrap();
     let mut game = Game::scripted(rules, Seed([0; 32]), &script(), |_| {}).unwrap();

@@ -2,10 +2,14 @@
 //! nothing of rooms or files.
 
 mod events;
+mod expression;
 mod rules;
+mod start;
 
 pub use events::{By, event_kind, seat_cards, seat_number};
+pub use expression::check_expression;
 pub use rules::{
     FieldProblem, action_space, reward_scheme_from_proto, reward_scheme_to_proto, role_from_number,
     rules_from_proto, rules_to_proto,
 };
+pub use start::{cards_from_numbers, script_from_proto, script_to_proto, seat_from_number};

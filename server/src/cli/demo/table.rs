@@ -3,7 +3,7 @@
 use std::net::SocketAddr;
 use std::time::Duration;
 
-use chefshat_arena::AgentKind;
+use chefshat_arena::{AgentKind, BuiltInAgent};
 use chefshat_client::{Client, Outcome, PlayError, v1};
 use tokio::task::JoinHandle;
 
@@ -68,7 +68,7 @@ impl Table {
             .enumerate()
             .map(|(seat, ((own, ticket), kind))| {
                 let seed = seed_for(&format!("chefshat demo agent {seat}"), seed);
-                let agent = RemoteAgent::new(*kind, seed, pace);
+                let agent = RemoteAgent::new(BuiltInAgent::new(*kind, seed), pace);
                 tokio::spawn(async move { own.play(ticket, agent).await })
             })
             .collect();

@@ -260,6 +260,7 @@ fn reason(source: v1::DecisionSource) -> Option<&'static str> {
         v1::DecisionSource::Disconnected => Some("absent"),
         v1::DecisionSource::Agent
         | v1::DecisionSource::Substitute
+        | v1::DecisionSource::Recorded
         | v1::DecisionSource::Unspecified => None,
     }
 }

@@ -35,6 +35,8 @@ pub(super) struct Narrator {
     scores: Vec<u64>,
     declared: bool,
     exchanges: Vec<Piece>,
+    /// The last decision told was taken over from a recorded game.
+    recorded: bool,
     chain: Chain,
 }
 
@@ -57,10 +59,14 @@ impl Narrator {
             return String::new();
         };
         match kind {
-            Kind::Play(play) => self.exchange_told() + &self.chain.play(play, &self.names),
+            Kind::Play(play) => {
+                let before = self.exchange_told() + &self.branch_told(play.source());
+                before + &self.chain.play(play, &self.names)
+            }
             Kind::Pass(pass) => {
+                let before = self.exchange_told() + &self.branch_told(pass.source());
                 self.chain.pass(pass);
-                self.exchange_told()
+                before
             }
             Kind::SeatFinished(finished) => self.chain.finished(finished),
             Kind::CardsExchanged(cards) => {
@@ -70,7 +76,9 @@ impl Narrator {
             Kind::PizzaDone(done) => self.chain.done(done, &self.names),
             Kind::ShiftStarted(start) => self.shift_started(start),
             Kind::RolesAssigned(assigned) => self.roles_assigned(assigned),
-            Kind::SpecialActionDeclared(declared) => self.special(declared),
+            Kind::SpecialActionDeclared(declared) => {
+                self.branch_told(declared.source()) + &self.special(declared)
+            }
             Kind::ShiftEnded(end) => self.shift_ended(end),
             Kind::GameStarted(start) => self.game_started(start),
             Kind::GameEnded(end) => self.game_ended(end),
@@ -95,6 +103,9 @@ impl Narrator {
             }
             Kind::Disconnected(seat) => self.remark(seat.seat, None, " has lost the connection"),
             Kind::Returned(seat) => self.remark(seat.seat, None, " is back"),
+            Kind::ServerRestarted(_) => {
+                self.note("the server was restarted; the game goes on where it stood")
+            }
             Kind::Substituted(seat) => {
                 let agent = clean(&seat.built_in_agent, MAX_NAME);
                 let words = format!(" is played by the built-in agent {agent} from here on");
@@ -217,6 +228,21 @@ impl Narrator {
         }
         let start = Piece::new(PLAIN, INDENT).and(DIM, "exchange  ");
         wrapped(&start, &std::mem::take(&mut self.exchanges))
+    }
+
+    /// The point up to which decisions were taken over from a recorded game, once one has been taken otherwise.
+    fn branch_told(&mut self, source: v1::DecisionSource) -> String {
+        let recorded = source == v1::DecisionSource::Recorded;
+        if std::mem::replace(&mut self.recorded, recorded) && !recorded {
+            return self.note("so far as in a recorded game; from here on by those at the table");
+        }
+        String::new()
+    }
+
+    /// A line about the whole game, in the middle of whatever is being told.
+    fn note(&mut self, words: &str) -> String {
+        let line = Piece::new(PLAIN, INDENT).and(DIM, words);
+        self.chain.interrupted_by(line.as_str())
     }
 
     /// A line about a seat, in the middle of whatever is being told.

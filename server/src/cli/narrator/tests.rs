@@ -238,6 +238,47 @@ The game was aborted and has no result: its room was closed.
 }
 
 #[test]
+fn a_branch_and_a_restart_are_told() {
+    use v1::DecisionSource::{Agent, Recorded};
+    let by = |source: v1::DecisionSource, kind| match kind {
+        Kind::Play(play) => Kind::Play(v1::Play {
+            source: source.into(),
+            ..play
+        }),
+        kind => kind,
+    };
+    let events = [
+        game_started(&standard(), &["Greta", "Rolf", "Gustav", "Rita"]),
+        shift_started(3),
+        gives(0, 2, 3),
+        by(Recorded, play(3, (2, 11, 0), 15)),
+        pass(0, Recorded),
+        by(Recorded, play(1, (2, 9, 0), 15)),
+        by(Agent, play(2, (2, 8, 0), 15)),
+        Kind::ServerRestarted(v1::ServerRestarted {}),
+        pass(3, Agent),
+        play(0, (2, 7, 0), 15),
+        done(1, Some(0), 0),
+    ];
+    check(
+        events,
+        "   at the table  Greta agent · Rolf agent · Gustav agent · Rita agent
+   the rules     to 15 points · 11 faces and 2 jokers · 17 cards each · 5, 3, 1, 0 points by place
+
+━━ Shift 3 ━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━
+   exchange  Greta 2 → Rita
+
+pizza                                                                Greta    Rolf  Gustav    Rita
+    1  Rita 2×11★ › (Greta) › Rolf 2×9
+   so far as in a recorded game; from here on by those at the table
+       Gustav 2×8
+   the server was restarted; the game goes on where it stood
+       (Rita) › Greta 2×7                                               15      15      15      15
+",
+    );
+}
+
+#[test]
 fn standings_name_the_winner() {
     let standing = |seat, points, place| v1::Standing {
         seat,

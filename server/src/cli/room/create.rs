@@ -1,21 +1,21 @@
-//! `chefshat room create`: a room as the flags describe it, and the secrets it comes with.
+//! `chefshat room create`: a room as the flags describe it, and the secrets it comes with. How its game begins is in `start`, the file
+//! with a join code in `code_file`.
 
-use std::fs::File;
-use std::io::{self, Write as _};
-use std::os::unix::fs::OpenOptionsExt as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use chefshat_arena::AgentKind;
-use chefshat_client::v1::{self, seat_config::FilledBy};
-use chefshat_engine::RewardScheme;
+use chefshat_client::v1::{self, create_room_request::Start, seat_config::FilledBy};
+use chefshat_engine::{RewardScheme, RuleSet};
 use chefshat_records::convert::reward_scheme_to_proto;
-use clap::Args;
 use clap::builder::PossibleValuesParser;
+use clap::{Args, ValueEnum};
 
 use super::super::connect::{ServerArg, free_seats};
 use super::super::rules_args::{RulesArgs, by_flag};
 use super::super::{CommandError, say};
+use super::code_file::CodeFile;
+use super::start::{StartArgs, players_of};
 
 /// Names of the reward schemes, in the order of the protocol's numbers from 1.
 const REWARDS: [&str; 5] = ["validity", "paper", "paper_intended", "winning", "points"];
@@ -25,7 +25,9 @@ const REWARDS: [&str; 5] = ["validity", "paper", "paper_intended", "winning", "p
 #[command(
     after_help = "Examples:\n  chefshat room create --name friday --seat greedy --seat random\n  \
                   chefshat room create --preset rulebook --target-shifts 10 --decision-time-ms 60000\n  \
-                  chefshat room create --code-file ./join-code"
+                  chefshat room create --code-file ./join-code\n  \
+                  chefshat room create --branch GAME-ID@40 --seat replay:GAME-ID:0 --seat greedy\n  \
+                  chefshat room create --hands ./hands.json --durability ephemeral"
 )]
 pub(super) struct Create {
     /// Name to show.
@@ -33,8 +35,9 @@ pub(super) struct Create {
     name: String,
     #[command(flatten)]
     server: ServerArg,
-    /// How the next seat is filled: random, random_unmasked or greedy (played by the server), or open, agent, human or robot (for whom
-    /// it is free). Repeatable; seats not named are open.
+    /// How the next seat is filled: random, random_unmasked or greedy (played by the server), replay:GAME-ID:SEAT (played by the server
+    /// as the player of that seat of a recorded game played), or open, agent, human or robot (for whom it is free). Repeatable; seats
+    /// not named are open.
     #[arg(long = "seat", value_name = "SEAT", value_parser = seat)]
     seats: Vec<FilledBy>,
     /// The game seed, 64 hexadecimal digits, for experiments; such a game has no seed commitment.
@@ -46,6 +49,8 @@ pub(super) struct Create {
     /// Print the room with its secrets as a JSON line.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    start: StartArgs,
     #[command(flatten)]
     rules: RulesArgs,
     #[command(flatten)]
@@ -80,15 +85,36 @@ struct PolicyArgs {
     /// Decisions by which spectators are behind; standard 0.
     #[arg(long, value_name = "N")]
     spectator_delay: Option<u32>,
+    /// What the game outlives; standard durable.
+    #[arg(long)]
+    durability: Option<DurabilityArg>,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum DurabilityArg {
+    /// The death of the server: it goes on where it stood.
+    Durable,
+    /// Nothing; takes less time, and its record is kept when it ends.
+    Ephemeral,
 }
 
 impl Create {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
-        let request = self.request()?;
+        let start = self.start.message()?;
+        let rules = self.rules()?;
         let client = match &self.code_file {
             Some(_) => self.server.connect_patiently().await?,
             None => self.server.connect().await?,
         };
+        let players = match (rules, self.start.branch()) {
+            (Some(rules), _) => rules.players(),
+            // Who plays is asked for seat by seat; if no seat is named, all are open and it need not be known how many there are.
+            (None, Some(point)) if !self.seats.is_empty() => {
+                players_of(&client, &point.game_id).await?
+            }
+            (None, _) => 0,
+        };
+        let request = self.request(start, players)?;
         // Before there is a room: whoever cannot be told its code has no use for it.
         let code_file = (self.code_file.as_deref())
             .map(CodeFile::prepare)
@@ -118,8 +144,25 @@ impl Create {
         Ok(ExitCode::SUCCESS)
     }
 
-    fn request(&self) -> Result<v1::CreateRoomRequest, CommandError> {
-        let players = self.rules.rules()?.players();
+    /// The rule set, unless it is that of a recorded game.
+    fn rules(&self) -> Result<Option<RuleSet>, CommandError> {
+        if self.start.branch().is_none() {
+            return Ok(Some(self.rules.rules()?));
+        }
+        if !self.rules.are_standard() {
+            return Err(
+                "--branch: the recorded game's rules are played; leave out the flags for rules"
+                    .into(),
+            );
+        }
+        Ok(None)
+    }
+
+    fn request(
+        &self,
+        start: Option<Start>,
+        players: usize,
+    ) -> Result<v1::CreateRoomRequest, CommandError> {
         if self.seats.len() > players {
             let described = self.seats.len();
             return Err(
@@ -130,7 +173,7 @@ impl Create {
         let all = self.seats.iter().cloned().chain(std::iter::repeat(open));
         Ok(v1::CreateRoomRequest {
             name: self.name.clone(),
-            rules: Some(self.rules.message()),
+            rules: (self.start.branch().is_none()).then(|| self.rules.message()),
             seats: all
                 .take(players)
                 .map(|filled_by| v1::SeatConfig {
@@ -139,6 +182,7 @@ impl Create {
                 .collect(),
             policy: Some(self.policy.message()),
             game_seed: self.game_seed.map_or_else(Vec::new, |seed| seed.to_vec()),
+            start,
         })
     }
 }
@@ -155,12 +199,21 @@ impl PolicyArgs {
             waiting_time_ms: self.waiting_time_ms,
             reward_scheme: reward_scheme_to_proto(scheme).into(),
             spectator_delay_decisions: self.spectator_delay,
+            durability: match self.durability {
+                None => v1::Durability::Unspecified,
+                Some(DurabilityArg::Durable) => v1::Durability::Durable,
+                Some(DurabilityArg::Ephemeral) => v1::Durability::Ephemeral,
+            }
+            .into(),
             ..v1::RoomPolicy::default()
         }
     }
 }
 
 fn seat(word: &str) -> Result<FilledBy, String> {
+    if let Some(player) = word.strip_prefix("replay:") {
+        return recorded_player(player).map(FilledBy::Replay);
+    }
     let reserved = match word {
         "open" => v1::ParticipantKind::Unspecified,
         "agent" => v1::ParticipantKind::Agent,
@@ -171,11 +224,21 @@ fn seat(word: &str) -> Result<FilledBy, String> {
                 .map(|kind| FilledBy::BuiltInAgent(kind.name().to_owned()))
                 .ok_or_else(|| {
                     let known = AgentKind::ALL.map(AgentKind::name).join(", ");
-                    format!("use one of {known}, open, agent, human, robot")
+                    format!("use one of {known}, replay:GAME-ID:SEAT, open, agent, human, robot")
                 });
         }
     };
     Ok(FilledBy::ReservedFor(reserved.into()))
+}
+
+fn recorded_player(words: &str) -> Result<v1::RecordedPlayer, String> {
+    let player = words.split_once(':').and_then(|(game_id, seat)| {
+        Some(v1::RecordedPlayer {
+            game_id: game_id.to_owned(),
+            seat: seat.parse().ok()?,
+        })
+    });
+    player.ok_or_else(|| "give replay:, the id of a recorded game, :, and a seat of it".to_owned())
 }
 
 fn game_seed(digits: &str) -> Result<[u8; 32], String> {
@@ -193,6 +256,8 @@ fn refused(error: chefshat_client::Error) -> CommandError {
             let said = format!("{field}: ");
             by_flag(field, message.strip_prefix(&said).unwrap_or(message)).into()
         }
+        (Some("SCRIPT_REFUSED"), _) => format!("--hands: {}", error.message()).into(),
+        (Some("BRANCH_REFUSED"), _) => format!("--branch: {}", error.message()).into(),
         _ => error.into(),
     }
 }
@@ -215,67 +280,6 @@ fn next_step(room: &v1::Room, server: &str, code: &str) -> Option<String> {
     ))
 }
 
-/// A file that a join code is going to be left in: whole or not at all, and for its owner alone.
-struct CodeFile<'a> {
-    file: &'a Path,
-    part: PathBuf,
-    whole: File,
-}
-
-impl<'a> CodeFile<'a> {
-    /// Begins it under another name, beside where it is to be.
-    ///
-    /// # Errors
-    /// It cannot be written.
-    fn prepare(file: &'a Path) -> Result<Self, CommandError> {
-        let mut part = file.as_os_str().to_owned();
-        part.push(".part");
-        let part = PathBuf::from(part);
-        let open = || {
-            if file.is_dir() {
-                return Err(io::ErrorKind::IsADirectory.into());
-            }
-            // One left behind by a process that was stopped may have been made otherwise.
-            match std::fs::remove_file(&part) {
-                Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
-                _ => {}
-            }
-            let mut options = File::options();
-            options.write(true).create_new(true).mode(0o600).open(&part)
-        };
-        match open() {
-            Ok(whole) => Ok(Self { file, part, whole }),
-            Err(error) => {
-                let file = file.display();
-                Err(format!(
-                    "--code-file: a join code cannot be left in {file}: {error}; no room was made"
-                )
-                .into())
-            }
-        }
-    }
-
-    /// Leaves the code.
-    fn leave(mut self, code: &str) -> Result<(), CommandError> {
-        writeln!(self.whole, "{code}")
-            .and_then(|()| std::fs::rename(&self.part, self.file))
-            .map_err(|error| {
-                format!(
-                    "the room was made, but its join code cannot be left in {}: {error}",
-                    self.file.display()
-                )
-                .into()
-            })
-    }
-}
-
-impl Drop for CodeFile<'_> {
-    fn drop(&mut self) {
-        // Nothing is there any more once the code was left.
-        let _ = std::fs::remove_file(&self.part);
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use clap::Parser;
@@ -290,8 +294,11 @@ mod tests {
 
     fn request(flags: &str) -> Result<v1::CreateRoomRequest, CommandError> {
         let words = std::iter::once("test").chain(flags.split_whitespace());
-        let only = Only::try_parse_from(words).expect("the flags are known");
-        only.create.request()
+        let create = Only::try_parse_from(words)
+            .expect("the flags are known")
+            .create;
+        let players = create.rules()?.map_or(4, |rules| rules.players());
+        create.request(create.start.message()?, players)
     }
 
     #[test]
@@ -316,6 +323,43 @@ mod tests {
     }
 
     #[test]
+    fn a_seat_can_be_a_recorded_players() {
+        let request = request("--seat replay:5f0c6a4d:3").expect("a room");
+        let replay = FilledBy::Replay(v1::RecordedPlayer {
+            game_id: "5f0c6a4d".into(),
+            seat: 3,
+        });
+        assert_eq!(request.seats[0].filled_by, Some(replay));
+        for word in ["replay", "replay:5f0c6a4d", "replay:5f0c6a4d:x", "ada"] {
+            assert!(seat(word).is_err(), "{word}");
+        }
+    }
+
+    #[test]
+    fn a_branch_leaves_the_rules_to_the_record() {
+        let branch = request("--branch 5f0c6a4d@7 --seat greedy").expect("a room");
+        assert_eq!(branch.rules, None);
+        assert_eq!(branch.seats.len(), 4);
+        let Some(Start::Branch(point)) = branch.start else {
+            panic!("a branch begins with a point");
+        };
+        assert_eq!((&*point.game_id, point.decisions), ("5f0c6a4d", 7));
+        assert!(request("--branch 5f0c6a4d@7 --faces 9").is_err());
+    }
+
+    #[test]
+    fn a_room_is_durable_or_not() {
+        for (flags, expected) in [
+            ("", v1::Durability::Unspecified),
+            ("--durability durable", v1::Durability::Durable),
+            ("--durability ephemeral", v1::Durability::Ephemeral),
+        ] {
+            let policy = request(flags).expect("a room").policy.expect("a policy");
+            assert_eq!(policy.durability(), expected);
+        }
+    }
+
+    #[test]
     fn too_many_seats_are_refused() {
         let error = request("--players 2 --seat open --seat open --seat open")
             .expect_err("three seats for two");
@@ -332,34 +376,6 @@ mod tests {
             let wire = policy.reward_scheme().as_str_name();
             assert_eq!(wire, format!("REWARD_SCHEME_{}", name.to_uppercase()));
         }
-    }
-
-    #[test]
-    fn a_code_is_left_for_its_owner_alone() {
-        use std::os::unix::fs::PermissionsExt as _;
-        let folder = tempfile::tempdir().expect("a folder");
-        let file = folder.path().join("code");
-        for code in ["BCDF2345", "BCDF2346"] {
-            let prepared = CodeFile::prepare(&file).expect("it can be written");
-            prepared.leave(code).expect("written");
-        }
-        assert_eq!(std::fs::read_to_string(&file).expect("read"), "BCDF2346\n");
-        let mode = std::fs::metadata(&file)
-            .expect("it is there")
-            .permissions()
-            .mode();
-        assert_eq!(mode & 0o777, 0o600);
-    }
-
-    #[test]
-    fn a_file_that_gets_no_code_leaves_nothing_behind() {
-        let folder = tempfile::tempdir().expect("a folder");
-        drop(CodeFile::prepare(&folder.path().join("code")).expect("it can be written"));
-        let left = std::fs::read_dir(folder.path())
-            .expect("the folder")
-            .count();
-        assert_eq!(left, 0);
-        assert!(CodeFile::prepare(folder.path()).is_err(), "a folder");
     }
 
     #[test]

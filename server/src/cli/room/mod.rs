@@ -1,7 +1,9 @@
 //! `chefshat room`: rooms of a server, made, listed, shown, watched and closed from the command line.
 
+mod code_file;
 mod create;
 mod show;
+mod start;
 mod watch;
 
 use std::process::ExitCode;

@@ -119,8 +119,13 @@ fn in_a_line(room: &v1::Room) -> String {
     let seats = room.seats.len();
     let state = state(room.state());
     let name = clean(&room.name, 30);
+    let beginning = match room.origin() {
+        v1::GameOrigin::Branched => "  (branched)",
+        v1::GameOrigin::Scripted => "  (given hands)",
+        _ => "",
+    };
     let line = format!(
-        "{}  {state:<8}  {taken}/{seats} seats  {name}",
+        "{}  {state:<8}  {taken}/{seats} seats  {name}{beginning}",
         room.room_id
     );
     line.trim_end().to_owned()
@@ -132,6 +137,9 @@ fn in_full(room: &v1::Room) -> String {
         out.push_str(&format!("name  {}\n", clean(&room.name, 64)));
     }
     out.push_str(&format!("state {}\n", state(room.state())));
+    if let Some(words) = beginning(room) {
+        out.push_str(&format!("start {words}\n"));
+    }
     if room.seed_fixed {
         out.push_str("deal  from a seed its creator fixed\n");
     } else {
@@ -140,10 +148,31 @@ fn in_full(room: &v1::Room) -> String {
             hex::encode(&room.seed_commitment)
         ));
     }
+    let policy = room.policy.clone().unwrap_or_default();
+    if policy.durability() == v1::Durability::Ephemeral {
+        out.push_str("kept  in memory until it ends; lost when the server stops\n");
+    }
     for seat in &room.seats {
         out.push_str(&format!("seat {} {}\n", seat.seat, seat_in_words(seat)));
     }
     out
+}
+
+/// How the game of a room begins, where it is not simply dealt.
+pub(super) fn beginning(room: &v1::Room) -> Option<String> {
+    if let Some(point) = &room.branched_from {
+        let (game, decisions) = (clean(&point.game_id, 40), point.decisions);
+        let deals = if point.same_deals {
+            "later deals as there"
+        } else {
+            "later deals of its own"
+        };
+        return Some(format!(
+            "as game {game} until after decision {decisions}, {deals}"
+        ));
+    }
+    let scripted = room.origin() == v1::GameOrigin::Scripted;
+    scripted.then(|| "with hands its creator gave".to_owned())
 }
 
 fn seat_in_words(seat: &v1::Participant) -> String {
@@ -157,6 +186,13 @@ fn seat_in_words(seat: &v1::Participant) -> String {
         return format!("free for {}", kind(seat.reserved_for()));
     }
     let name = clean(&seat.name, 30);
+    if let Some(player) = &seat.replay {
+        let game = clean(&player.game_id, 40);
+        return format!(
+            "{name}, played by the server as seat {} of game {game} played",
+            player.seat
+        );
+    }
     if !seat.built_in_agent.is_empty() {
         return format!("{name}, played by the server");
     }
@@ -166,4 +202,62 @@ fn seat_in_words(seat: &v1::Participant) -> String {
         (false, false) => "not connected",
     };
     format!("{name}, {}, {there}", kind(seat.kind()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_branched_room_says_where_it_comes_from() {
+        let room = v1::Room {
+            room_id: "a".into(),
+            game_id: "b".into(),
+            state: v1::RoomState::Playing.into(),
+            policy: Some(v1::RoomPolicy {
+                durability: v1::Durability::Ephemeral.into(),
+                ..v1::RoomPolicy::default()
+            }),
+            seats: vec![
+                v1::Participant {
+                    name: "replay".into(),
+                    built_in_agent: "replay".into(),
+                    replay: Some(v1::RecordedPlayer {
+                        game_id: "c".into(),
+                        seat: 2,
+                    }),
+                    ..v1::Participant::default()
+                },
+                v1::Participant {
+                    seat: 1,
+                    ..v1::Participant::default()
+                },
+            ],
+            seed_fixed: true,
+            origin: v1::GameOrigin::Branched.into(),
+            branched_from: Some(v1::BranchPoint {
+                game_id: "c".into(),
+                decisions: 40,
+                same_deals: true,
+            }),
+            ..v1::Room::default()
+        };
+        assert_eq!(
+            in_full(&room),
+            "room  a\ngame  b\nstate playing\n\
+             start as game c until after decision 40, later deals as there\n\
+             deal  from a seed its creator fixed\n\
+             kept  in memory until it ends; lost when the server stops\n\
+             seat 0 replay, played by the server as seat 2 of game c played\n\
+             seat 1 free for anybody\n"
+        );
+        assert_eq!(in_a_line(&room), "a  playing   1/2 seats    (branched)");
+        let scripted = v1::Room {
+            origin: v1::GameOrigin::Scripted.into(),
+            ..v1::Room::default()
+        };
+        let words = beginning(&scripted);
+        assert_eq!(words.as_deref(), Some("with hands its creator gave"));
+        assert_eq!(beginning(&v1::Room::default()), None);
+    }
 }

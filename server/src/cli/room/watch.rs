@@ -10,6 +10,7 @@ use clap::Args;
 use super::super::CommandError;
 use super::super::connect::{PATIENCE, ServerArg};
 use super::super::narrator::{Narrator, clean, heading};
+use super::show::beginning;
 
 /// Follow the game of a room.
 #[derive(Debug, Args)]
@@ -43,6 +44,9 @@ impl Watch {
                 "{}",
                 heading(&format!("Chef's Hat · {}", clean(name, 64)))
             )?;
+            if let Some(words) = beginning(&room) {
+                writeln!(out, "   begins {words}")?;
+            }
         }
         let mut narrator = Narrator::new();
         let mut spectator = client.spectate(self.room_id, 1).with_backoff(Backoff {

@@ -6,7 +6,9 @@ use std::time::Duration;
 use chefshat_arena::BuiltInAgent;
 use chefshat_engine::{Game, Seat, Viewer};
 
-use super::{BUILT_IN_BUDGET, Core, JOIN_HOLD, LOOK_AGAIN, MAX_HANDOVER, State};
+use super::{
+    BUILT_IN_BUDGET, Core, JOIN_HOLD, LOOK_AGAIN, MAX_HANDOVER, RECALL_TIME, REPLAY_COST, State,
+};
 use crate::room::policy::AbortPolicy;
 use crate::store::journal::{AbortReason, Change, Fill, Source};
 
@@ -14,14 +16,11 @@ impl Core {
     /// When the room must next be told that time has passed; `None` when nothing depends on it.
     pub fn deadline(&self) -> Option<Duration> {
         match self.state {
-            State::Waiting => Some(
-                self.holds()
-                    .map(|(_, until)| until)
-                    .min()
-                    .map_or(self.header.policy.waiting_time, |hold| {
-                        hold.min(self.header.policy.waiting_time)
-                    }),
-            ),
+            State::Waiting => {
+                let hold = self.holds().map(|(_, until)| until).min();
+                let given_up = self.waits_until();
+                Some(hold.map_or(given_up, |hold| hold.min(given_up)))
+            }
             State::Playing => {
                 let open = self.open.as_ref()?;
                 let seat = open.decision.seat;
@@ -54,7 +53,8 @@ impl Core {
 
     /// Lets built-in agents and substitutes decide as far as they may now.
     pub(super) fn advance(&mut self, now: Duration) {
-        for _ in 0..BUILT_IN_BUDGET {
+        let mut budget = BUILT_IN_BUDGET;
+        while budget > 0 {
             if self.state == State::Playing && self.is_too_long() {
                 self.abort(now, AbortReason::TooLong);
             }
@@ -66,8 +66,17 @@ impl Core {
             if !due {
                 return;
             }
+            budget = budget.saturating_sub(self.cost_of_open());
             self.decide_automatically(now);
         }
+    }
+
+    /// What the open decision of a built-in agent counts for.
+    fn cost_of_open(&self) -> usize {
+        let replayed = self.open.as_ref().is_some_and(|open| {
+            matches!(self.seats[open.decision.seat.index()].fill, Fill::Replay(_))
+        });
+        if replayed { REPLAY_COST } else { 1 }
     }
 
     /// Time a seat has for a decision, its bank included.
@@ -95,21 +104,51 @@ impl Core {
 
     /// Settles when the clock of the open decision began, if it is not settled yet. It never begins again.
     pub(super) fn settle_start(&mut self, now: Duration, handed: Option<Duration>) {
+        let Some(seat) = self.open.as_ref().map(|open| open.decision.seat) else {
+            return;
+        };
+        let connected = self.seats[seat.index()].connection.is_some();
+        let recalled_until = self.recalled_until(seat);
         let Some(open) = &mut self.open else { return };
         if open.start.is_some() {
             return;
         }
-        let connected = self.seats[open.decision.seat.index()].connection.is_some();
         let latest = open.released + MAX_HANDOVER;
-        open.start = match handed {
-            Some(handed) => Some(handed.clamp(open.released, latest)),
-            None if !connected => Some(open.released),
-            None => (now >= latest).then_some(latest),
+        (open.start, open.look_again) = match (handed, connected, recalled_until) {
+            (Some(handed), _, _) => (Some(handed.clamp(open.released, latest)), Duration::ZERO),
+            (None, false, Some(until)) if now < until => (None, until),
+            (None, false, Some(until)) => (Some(open.released.max(until)), Duration::ZERO),
+            (None, false, None) => (Some(open.released), Duration::ZERO),
+            (None, true, _) if now >= latest => (Some(latest), Duration::ZERO),
+            (None, true, _) => (None, now + LOOK_AGAIN),
         };
-        open.look_again = match open.start {
-            Some(_) => Duration::ZERO,
-            None => now + LOOK_AGAIN,
-        };
+    }
+
+    /// A seat that comes back after a restart of the server has all the time for the decision that waits for it.
+    pub(super) fn restart_clock(&mut self, now: Duration, seat: Seat) {
+        let recalled = self.seats[seat.index()].recalled;
+        if let Some(open) = &mut self.open
+            && recalled
+            && open.start.is_none()
+        {
+            open.released = now;
+            open.told = false;
+            open.look_again = Duration::ZERO;
+        }
+    }
+
+    /// The seat whose decision is open waits for our word since then.
+    pub(super) fn wait_for_word(&mut self, since: Duration) {
+        if let Some(open) = &mut self.open {
+            open.waits.get_or_insert(since);
+        }
+    }
+
+    /// Until when a seat is waited for that has not come back since the server was restarted.
+    fn recalled_until(&self, seat: Seat) -> Option<Duration> {
+        self.restarted
+            .filter(|_| self.seats[seat.index()].recalled)
+            .map(|at| at + RECALL_TIME)
     }
 
     fn holds(&self) -> impl Iterator<Item = (Seat, Duration)> + '_ {
@@ -118,6 +157,12 @@ impl Core {
             (state.participant.is_some() && !state.ever_attached)
                 .then_some((seat, state.joined_at + JOIN_HOLD))
         })
+    }
+
+    /// When a room is given up whose seats have not come. A restart leaves them time to come back.
+    fn waits_until(&self) -> Duration {
+        let after_restart = self.restarted.map_or(Duration::ZERO, |at| at + JOIN_HOLD);
+        self.header.policy.waiting_time.max(after_restart)
     }
 
     fn tick_waiting(&mut self, now: Duration) {
@@ -129,7 +174,7 @@ impl Core {
         for seat in expired {
             self.commit(now, Change::Vacated(seat));
         }
-        if now >= self.header.policy.waiting_time {
+        if now >= self.waits_until() {
             self.abort(now, AbortReason::NeverStarted);
         }
     }
@@ -138,9 +183,11 @@ impl Core {
         self.settle_start(now, handed);
         if let Some(open) = &self.open {
             let seat = open.decision.seat;
+            // While the seat waits for our word its clock stands.
+            let by = open.waits.map_or(now, |since| since.min(now));
             let late = open
                 .start
-                .is_some_and(|start| start + self.time_allowed(seat) <= now);
+                .is_some_and(|start| start + self.time_allowed(seat) <= by);
             if late && !self.is_automatic(seat) {
                 self.time_out(now);
             }
@@ -203,12 +250,17 @@ impl Core {
             self.abort(now, AbortReason::ParticipantsLost);
             return;
         }
+        self.give_substitute(seat);
+        self.commit(now, Change::Substituted(seat));
+    }
+
+    /// Makes the agent that plays for a seat while it is substituted.
+    pub(super) fn give_substitute(&mut self, seat: Seat) {
         let substitute = self.header.policy.substitute;
         let seed = self.header.seed.agent_seed(seat.index());
         self.seats[seat.index()]
             .agent
             .get_or_insert_with(|| Box::new(BuiltInAgent::new(substitute, seed)));
-        self.commit(now, Change::Substituted(seat));
     }
 
     fn decide_automatically(&mut self, now: Duration) {

@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use chefshat_engine::{Action, DecisionKind, Event, Game, Seat};
+use chefshat_engine::{Action, DecisionKind, Event, Game, Seat, Seed};
 
 use super::{Answered, Core, LastAnswer, MAX_GAME_CHANGES, OpenDecision, State, Verdict};
 use crate::room::log::{ByWhom, GameHappening, Happening, MAX_GAME_EVENTS};
@@ -64,6 +64,7 @@ impl Core {
                         .push(at, Happening::Expressed(*seat, expression.clone()));
                 }
             }
+            Change::ServerRestarted => self.restart(at),
             Change::Aborted(reason) => {
                 self.state = State::Aborted(*reason);
                 self.open = None;
@@ -72,16 +73,51 @@ impl Core {
         }
     }
 
+    /// Nobody is connected any more, and the open decision has all its time again.
+    fn restart(&mut self, at: Duration) {
+        self.restarted = Some(at);
+        for state in &mut self.seats {
+            if state.participant.is_none() {
+                continue;
+            }
+            state.connection = None;
+            state.recalled = true;
+            match self.state {
+                // Its ticket has to be attached again within the time in which it had to be at first.
+                State::Waiting => {
+                    state.ever_attached = false;
+                    state.joined_at = at;
+                }
+                _ => state.away = true,
+            }
+        }
+        if let Some(open) = &mut self.open {
+            open.released = at;
+            open.told = false;
+            open.start = None;
+            open.look_again = Duration::ZERO;
+        }
+        self.log.push(at, Happening::ServerRestarted);
+    }
+
     fn begin(&mut self, at: Duration, entropy: &[Vec<u8>]) {
         self.entropy = entropy.to_vec();
         self.state = State::Playing;
         self.log.push(at, Happening::GameStarted);
         self.log_before_deal = self.log.len();
-        let seed = self.header.seed.game_seed(entropy);
+        let recorded = self.header.start.branch.as_ref();
+        let seed = recorded
+            .and_then(|branch| branch.taken_over.first())
+            .map_or_else(|| self.seed_for(0), |part| part.seed);
         let mut events = std::mem::take(&mut self.events);
-        self.game = Some(Box::new(Game::new(self.header.rules, seed, |event| {
-            events.push(event);
-        })));
+        let note = |event| events.push(event);
+        let game = match &self.header.start.script {
+            None => Game::new(self.header.rules, seed, note),
+            Some(script) => Game::scripted(self.header.rules, seed, script, note)
+                .expect("a script is tried before a room is made with it"),
+        };
+        self.game = Some(Box::new(game));
+        self.reseed();
         self.events = events;
         self.log_events(
             at,
@@ -120,7 +156,7 @@ impl Core {
                 });
             }
             Source::Timeout | Source::Disconnected => seat.timeouts += 1,
-            Source::Invalid | Source::Substitute => {}
+            Source::Invalid | Source::Substitute | Source::Recorded => {}
         }
         self.log_events(
             at,
@@ -131,8 +167,37 @@ impl Core {
             },
         );
         self.decisions += 1;
+        if decided.source == Source::Recorded {
+            self.reseed();
+        }
         self.note_decision();
         self.open_next(at);
+    }
+
+    /// Has later Shifts dealt from the seed they are to be dealt from.
+    fn reseed(&mut self) {
+        let seed = self.seed_for(self.decisions);
+        if let Some(game) = &mut self.game {
+            game.reseed(seed);
+        }
+    }
+
+    /// The seed from which a Shift is dealt that begins after so many decisions: one that was taken over, or the game's own.
+    fn seed_for(&self, decisions: u64) -> Seed {
+        let mut end = 0;
+        self.header
+            .start
+            .branch
+            .iter()
+            .flat_map(|branch| &branch.taken_over)
+            .find(|part| {
+                end += u64::try_from(part.actions.len()).unwrap_or(u64::MAX);
+                decisions < end
+            })
+            .map_or_else(
+                || self.header.seed.game_seed(&self.entropy),
+                |part| part.seed,
+            )
     }
 
     /// Remembers how far spectators with a delay may see after this decision.
@@ -218,8 +283,10 @@ impl Core {
                     decision,
                     id: seat.decisions,
                     released: at,
+                    told: false,
                     start: None,
                     look_again: Duration::ZERO,
+                    waits: None,
                     attempts: 0,
                 }
             });

@@ -1,6 +1,7 @@
 //! What participants do: join, attach, leave, answer, express, come back. Each input is checked against the state; what is not right is
 //! answered and changes nothing.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use chefshat_engine::{ActionError, Seat};
@@ -73,19 +74,23 @@ impl Core {
         Ok(seat)
     }
 
-    /// Attaches a connection to a seat. Whoever was attached before has lost the seat.
+    /// Attaches a connection to a seat, which asked for it at `arrived`. Whoever was attached before has lost the seat.
     pub fn attach(
         &mut self,
         now: Duration,
         seat: Seat,
         connection: ConnectionId,
         entropy: Vec<u8>,
+        arrived: Duration,
         handed_before: Option<Duration>,
     ) {
         if self.awaited_from(seat).is_some() {
             self.settle_start(now, handed_before);
+            self.restart_clock(now, seat);
+            self.wait_for_word(arrived);
         }
         let state = &mut self.seats[seat.index()];
+        state.recalled = false;
         state.connection = Some(connection);
         state.ever_attached = true;
         if self.state == State::Waiting {
@@ -251,6 +256,8 @@ impl Core {
         );
         if attempts >= self.attempts_limit() {
             self.take_default(now, input.seat, Source::Invalid, time);
+        } else {
+            self.wait_for_word(input.arrived);
         }
         Answered {
             verdict: Verdict::Invalid {
@@ -290,7 +297,7 @@ impl Core {
             && self
                 .seats
                 .iter()
-                .all(|seat| matches!(seat.fill, Fill::BuiltIn(_)) || seat.connection.is_some());
+                .all(|seat| seat.fill.is_built_in() || seat.connection.is_some());
         if complete {
             let entropy = self
                 .seats
@@ -298,6 +305,23 @@ impl Core {
                 .map(|seat| std::mem::take(&mut seat.entropy))
                 .collect();
             self.commit(now, Change::Started { entropy });
+            self.take_over(now);
+        }
+    }
+
+    /// Takes the decisions of the record that the game branches from.
+    fn take_over(&mut self, now: Duration) {
+        let header = Arc::clone(&self.header);
+        let parts = header.start.branch.iter().flat_map(|b| &b.taken_over);
+        for action in parts.flat_map(|part| &part.actions) {
+            let seat = self
+                .open
+                .as_ref()
+                .map(|open| open.decision.seat)
+                .expect("a record is replayed before a room branches from it");
+            let bank_left = self.seats[seat.index()].bank_left;
+            let decided = self.decided(seat, *action, Source::Recorded, Duration::ZERO, bank_left);
+            self.commit(now, Change::Decided(decided));
         }
     }
 
@@ -315,7 +339,7 @@ impl Core {
     fn admits(&self, seat: Seat, kind: ParticipantKind) -> bool {
         match self.seats[seat.index()].fill {
             Fill::Open { reserved_for } => reserved_for.is_none_or(|wanted| wanted == kind),
-            Fill::BuiltIn(_) => false,
+            Fill::BuiltIn(_) | Fill::Replay(_) => false,
         }
     }
 }

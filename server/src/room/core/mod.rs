@@ -8,6 +8,7 @@ mod answers;
 mod clock;
 mod fold;
 mod inputs;
+mod revive;
 #[cfg(test)]
 mod tests;
 
@@ -19,6 +20,8 @@ use chefshat_engine::{Action, Decision, Event, Game, Mask, Observation, Seat, Vi
 
 pub use answers::{AnswerInput, Answered, ExpressError, JoinError, SeatStanding, Verdict};
 
+pub use revive::BadJournal;
+
 use super::log::Log;
 use crate::ids::SecretHash;
 use crate::store::journal::{AbortReason, Change, Entry, Fill, GameHeader, SeatedParticipant};
@@ -27,6 +30,11 @@ use crate::store::journal::{AbortReason, Change, Entry, Fill, GameHeader, Seated
 pub const JOIN_HOLD: Duration = Duration::from_secs(120);
 /// The clock of a decision starts at the latest this long after the decision was released, even if the transport has not taken it.
 pub const MAX_HANDOVER: Duration = Duration::from_secs(5);
+/// After a restart of the server the clock of a decision waits this long for its seat to be attached again.
+pub const RECALL_TIME: Duration = Duration::from_secs(60);
+/// A seat that has had to wait this long for the store is given the time back. Shorter waits are part of every answer; were they given
+/// back as well, wrong answers would buy time.
+const SLOW_STORE: Duration = Duration::from_millis(100);
 /// How often to ask whether the transport has taken a request whose deadline would have passed.
 const LOOK_AGAIN: Duration = Duration::from_millis(20);
 /// Most annotations recorded per seat and game, bytes.
@@ -43,6 +51,8 @@ pub const MAX_ATTEMPTS: u32 = 10_000;
 pub const MAX_GAME_CHANGES: u64 = 2_000_000;
 /// Decisions a room's built-in agents take before it looks at its mailbox again.
 pub const BUILT_IN_BUDGET: usize = 256;
+/// A recorded player compares what it sees with all it has seen: one decision of it counts as so many.
+const REPLAY_COST: usize = 32;
 
 /// Where a room stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -84,6 +94,8 @@ pub struct Core {
     log_after_decision: Vec<u32>,
     changes: u64,
     decisions: u64,
+    /// When the server was last restarted.
+    restarted: Option<Duration>,
     /// Changes that have been folded and not yet been handed to the store.
     unkept: Vec<Entry>,
     /// Room for the events of one action.
@@ -100,6 +112,8 @@ struct SeatState {
     entropy: Vec<u8>,
     /// Whether everybody was told that the agent is away.
     away: bool,
+    /// Whether it has not been attached since the server was restarted.
+    recalled: bool,
     connection_events: u32,
     expressions: u32,
     agent: Option<Box<BuiltInAgent>>,
@@ -127,10 +141,14 @@ pub struct OpenDecision {
     pub id: u64,
     /// When it was opened or, for a seat that came back from a substitute, given back.
     released: Duration,
+    /// Whether it has been kept, so that its seat may be told: from then on nothing moves its release.
+    told: bool,
     /// When its clock began, once that is settled.
     start: Option<Duration>,
     /// When to ask again whether the transport has taken the request; zero before it was asked.
     look_again: Duration,
+    /// Since when its seat waits for our word: on an answer that is refused, or on a new connection.
+    waits: Option<Duration>,
     /// Actions refused so far.
     attempts: u32,
 }
@@ -142,29 +160,40 @@ impl Core {
             .fills
             .iter()
             .enumerate()
-            .map(|(index, fill)| SeatState {
-                fill: *fill,
-                participant: None,
-                joined_at: Duration::ZERO,
-                ever_attached: false,
-                connection: None,
-                entropy: Vec::new(),
-                away: false,
-                connection_events: 0,
-                expressions: 0,
-                agent: match fill {
-                    Fill::BuiltIn(kind) => Some(Box::new(BuiltInAgent::new(
-                        *kind,
-                        header.seed.agent_seed(index),
-                    ))),
-                    Fill::Open { .. } => None,
-                },
-                substituted: false,
-                decisions: 0,
-                timeouts: 0,
-                bank_left: header.policy.bank,
-                annotation_bytes: 0,
-                last_answer: None,
+            .map(|(index, fill)| {
+                let built_in =
+                    |kind| Box::new(BuiltInAgent::new(kind, header.seed.agent_seed(index)));
+                SeatState {
+                    fill: *fill,
+                    participant: None,
+                    joined_at: Duration::ZERO,
+                    ever_attached: false,
+                    connection: None,
+                    entropy: Vec::new(),
+                    away: false,
+                    recalled: false,
+                    connection_events: 0,
+                    expressions: 0,
+                    agent: match fill {
+                        Fill::BuiltIn(kind) => Some(built_in(*kind)),
+                        Fill::Replay(_) => header
+                            .recorded
+                            .get(&index)
+                            .map_or_else(
+                                // Whose record is gone is played for as if it had been lost.
+                                || built_in(header.policy.substitute),
+                                |player| Box::new(BuiltInAgent::replay(Arc::clone(player))),
+                            )
+                            .into(),
+                        Fill::Open { .. } => None,
+                    },
+                    substituted: false,
+                    decisions: 0,
+                    timeouts: 0,
+                    bank_left: header.policy.bank,
+                    annotation_bytes: 0,
+                    last_answer: None,
+                }
             })
             .collect();
         Self {
@@ -179,6 +208,7 @@ impl Core {
             log_after_decision: Vec::new(),
             changes: 0,
             decisions: 0,
+            restarted: None,
             unkept: Vec::new(),
             events: Vec::new(),
         }
@@ -318,13 +348,29 @@ impl Core {
     /// Whether a built-in agent decides for the seat, its own or a substitute.
     fn is_automatic(&self, seat: Seat) -> bool {
         let state = &self.seats[seat.index()];
-        state.substituted || matches!(state.fill, Fill::BuiltIn(_))
+        state.substituted || state.fill.is_built_in()
     }
 
     /// Changes that have been made and are not kept yet, for the store, which empties this. They have been folded already; nobody may be
     /// told before they are kept.
     pub fn unkept(&mut self) -> &mut Vec<Entry> {
         &mut self.unkept
+    }
+
+    /// The changes so far have been kept, and what is open is told now: its time begins now, whatever the store took. If it was told
+    /// before, the time is given back in which its seat could do nothing but wait for the store.
+    pub fn released(&mut self, now: Duration) {
+        let Some(open) = &mut self.open else { return };
+        if !open.told {
+            open.told = true;
+            open.released = open.released.max(now);
+        }
+        if let (Some(since), Some(start)) = (open.waits.take(), &mut open.start) {
+            let waited = now.saturating_sub(since.max(*start));
+            if waited >= SLOW_STORE {
+                *start += waited;
+            }
+        }
     }
 
     fn commit(&mut self, now: Duration, change: Change) {

@@ -63,6 +63,7 @@ impl Task {
                 }
             }
             Message::Abort(reason) => self.core.abort(self.now, reason),
+            Message::PutDown => self.put_down = true,
             Message::Space => {}
         }
     }
@@ -96,8 +97,9 @@ impl Task {
         };
         let connection = ConnectionId(self.context.connections.fetch_add(1, Ordering::Relaxed));
         let handed = self.handed();
+        let (entropy, arrived) = (request.entropy.clone(), self.clock.at(request.arrived));
         self.core
-            .attach(self.now, seat, connection, request.entropy.clone(), handed);
+            .attach(self.now, seat, connection, entropy, arrived, handed);
         self.releases
             .push(Release::Attach(request, seat, connection, reply));
     }
@@ -140,7 +142,7 @@ impl Task {
                         action,
                         annotations,
                         annotations_refused,
-                        arrived: arrived.saturating_duration_since(self.epoch),
+                        arrived: self.clock.at(arrived),
                         handed,
                     },
                 );

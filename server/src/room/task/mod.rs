@@ -4,20 +4,22 @@
 mod inputs;
 mod outputs;
 
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 use std::time::Duration;
 
 use tokio::sync::mpsc;
-use tokio::time::{Instant, Sleep};
+use tokio::time::Sleep;
 use tokio_util::task::TaskTracker;
 use tracing::debug;
 
 use self::outputs::Release;
 use crate::config::ROOM_MAILBOX;
+use crate::filing::Filing;
+use crate::grpc::status;
 use crate::ids::Id;
 use crate::outbox::OnSpace;
+use crate::room::RoomClock;
 use crate::room::core::Core;
 use crate::room::delivery::{Attachment, PublicLog};
 use crate::room::handle::{Handle, Message, TellSpace};
@@ -33,8 +35,8 @@ const INPUTS_PER_COMMIT: usize = 64;
 pub struct TaskContext {
     /// Where games are kept.
     pub store: Arc<dyn Store>,
-    /// Where records are written.
-    pub data_dir: Option<PathBuf>,
+    /// Writes records to files.
+    pub filing: Filing,
     /// How long an ended room is still shown.
     pub retention: Duration,
     /// Numbers for connections.
@@ -55,24 +57,37 @@ pub trait RoomWatcher: Send + Sync {
 
 /// Starts a room.
 pub fn start(header: Arc<GameHeader>, journal: Box<dyn Journal>, context: TaskContext) -> Handle {
+    let clock = RoomClock::of_age(Duration::ZERO);
+    go_on(Core::new(header), clock, None, journal, context)
+}
+
+/// Starts a room whose game may have begun before. `over_since`: the game is over, and everything that follows from that has been done.
+pub fn go_on(
+    core: Core,
+    clock: RoomClock,
+    over_since: Option<Duration>,
+    journal: Box<dyn Journal>,
+    context: TaskContext,
+) -> Handle {
     let (mailbox, inbox) = mpsc::channel(ROOM_MAILBOX);
     let handle = Handle {
-        id: header.room_id,
+        id: core.header().room_id,
         mailbox: mailbox.clone(),
     };
-    let seats = header.fills.len();
+    let seats = core.header().fills.len();
     let task = Task {
-        core: Core::new(header),
+        core,
         journal,
-        epoch: Instant::now(),
-        now: Duration::ZERO,
+        now: clock.now(),
+        clock,
         attachments: (0..seats).map(|_| None).collect(),
         spectators: Vec::new(),
         on_space: Arc::new(TellSpace(mailbox.downgrade())),
         releases: Vec::new(),
         public: PublicLog::default(),
         delivered: 0,
-        over_since: None,
+        over_since,
+        put_down: false,
         context: context.clone(),
     };
     context.tracker.spawn(task.run(inbox));
@@ -94,8 +109,8 @@ impl Drop for TellGone {
 struct Task {
     core: Core,
     journal: Box<dyn Journal>,
-    epoch: Instant,
-    /// The time of the inputs in hand, since `epoch`.
+    clock: RoomClock,
+    /// The time of the inputs in hand.
     now: Duration,
     attachments: Vec<Option<Attachment>>,
     spectators: Vec<Spectator>,
@@ -105,6 +120,8 @@ struct Task {
     /// Length of the log when everybody had last been looked after.
     delivered: usize,
     over_since: Option<Duration>,
+    /// The room ends without its game being over, which goes on when the server is back.
+    put_down: bool,
     context: TaskContext,
 }
 
@@ -114,13 +131,17 @@ impl Task {
             room: self.core.header().room_id,
             watcher: Arc::clone(&self.context.watcher),
         };
-        self.core.begin_if_all_built_in(Duration::ZERO);
+        self.core.begin_if_all_built_in(self.now);
         let mut messages = Vec::with_capacity(INPUTS_PER_COMMIT);
-        let alarm = tokio::time::sleep_until(self.epoch);
+        let alarm = tokio::time::sleep_until(self.clock.instant(self.now));
         tokio::pin!(alarm);
         let mut armed = true;
         loop {
             if !self.keep_and_tell().await {
+                break;
+            }
+            if self.put_down && self.over_since.is_none() {
+                self.end_streams(&status::shutting_down());
                 break;
             }
             armed = self.arm(alarm.as_mut(), armed);
@@ -130,18 +151,18 @@ impl Task {
                     if received == 0 {
                         break;
                     }
-                    self.now = self.epoch.elapsed();
+                    self.now = self.clock.now();
                     for message in messages.drain(..) {
                         self.receive(message);
                     }
                     // A mailbox that is never empty does not stop the clock.
-                    let due = armed && alarm.deadline() <= self.epoch + self.now;
+                    let due = armed && self.clock.at(alarm.deadline()) <= self.now;
                     if due && !self.ring(&mut armed) {
                         break;
                     }
                 }
                 () = alarm.as_mut(), if armed => {
-                    self.now = self.epoch.elapsed();
+                    self.now = self.clock.now();
                     if !self.ring(&mut armed) {
                         break;
                     }
@@ -172,7 +193,7 @@ impl Task {
         let Some(deadline) = deadline else {
             return false;
         };
-        let deadline = self.epoch + deadline;
+        let deadline = self.clock.instant(deadline);
         if !armed || alarm.deadline() > deadline {
             alarm.reset(deadline);
         }

@@ -1,23 +1,23 @@
 //! What a room tells once its changes are kept: answers to those who asked, news to seats and spectators, the record of a game that has
 //! ended.
 
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use chefshat_engine::Seat;
 use chefshat_proto::v1;
 use tokio::sync::oneshot;
+use tonic::Status;
 use tracing::{error, info};
 
 use super::Task;
 use crate::convert;
-use crate::ids::Id;
+use crate::grpc::status;
 use crate::outbox::HandStamp;
 use crate::room::core::{ConnectionId, JoinError, State};
 use crate::room::delivery::{Attachment, is_urgent};
 use crate::room::handle::{Acted, AttachRequest, Joined, SpectateError, SpectateRequest};
 use crate::room::spectators::{MAX_SPECTATORS, Spectator};
-use crate::store::Store;
+use crate::store::StoreError;
 
 /// What is told once the changes are kept.
 pub(super) enum Release {
@@ -61,12 +61,15 @@ impl Task {
 
     /// Hands new changes to the store, awaits it, then tells everybody what they may know. `false` when the room must stop.
     pub(super) async fn keep_and_tell(&mut self) -> bool {
-        if !self.core.unkept().is_empty()
-            && let Err(error) = self.journal.append(self.core.unkept()).await
-        {
-            self.fail(&error.to_string());
-            return false;
+        if !self.core.unkept().is_empty() {
+            if let Err(error) = self.journal.append(self.core.unkept()).await {
+                self.fail(&error);
+                return false;
+            }
+            // What the store took is nobody's thinking time.
+            self.now = self.clock.now();
         }
+        self.core.released(self.now);
         let ends = self.core.state().is_over() && self.over_since.is_none();
         if ends && !self.conclude().await {
             return false;
@@ -120,7 +123,7 @@ impl Task {
             request.outbox,
             request.handle,
             request.wishes,
-            HandStamp::new(self.epoch),
+            HandStamp::new(self.clock),
             request.ended,
             Arc::clone(&self.on_space),
         );
@@ -161,8 +164,11 @@ impl Task {
     async fn conclude(&mut self) -> bool {
         self.over_since = Some(self.now);
         let header = Arc::clone(self.core.header());
-        if let Err(error) = self.journal.finish().await {
-            self.fail(&error.to_string());
+        // Of a room in which nothing was ever dealt there is no record.
+        let summary = self.core.game().map(|_| convert::summary(&self.core));
+        let has_record = summary.is_some();
+        if let Err(error) = self.journal.finish(summary.map(Box::new)).await {
+            self.fail(&error);
             return false;
         }
         info!(
@@ -172,51 +178,28 @@ impl Task {
             decisions = self.core.decisions(),
             "the game has ended"
         );
-        // A room in which nothing was ever dealt leaves no record.
-        if let (Some(data_dir), true) = (&self.context.data_dir, self.core.game().is_some()) {
-            let write = write_record(
-                Arc::clone(&self.context.store),
-                header.game_id,
-                data_dir.clone(),
-            );
-            self.context.tracker.spawn(write);
+        if has_record {
+            self.context.filing.file(header.game_id);
         }
         true
     }
 
-    /// The store has failed: nobody is told of what may not be kept; everybody is told that the room has stopped.
-    fn fail(&mut self, error: &str) {
-        error!(room = %self.core.header().room_id, error, "the room stops because its store failed");
+    /// The store has failed: nobody is told of what may not be kept. The streams end, so that agents connect again and find the game where
+    /// the server, once it is back, finds it.
+    fn fail(&mut self, error: &StoreError) {
+        error!(room = %self.core.header().room_id, %error, "the room stops");
         self.releases.clear();
+        self.end_streams(&status::store_failed());
+    }
+
+    /// Ends the streams of everybody in the room, who may connect again when the server is back.
+    pub(super) fn end_streams(&mut self, status: &Status) {
         for attachment in self.attachments.iter_mut().flatten() {
-            attachment.detach(v1::DetachReason::RoomFailed);
+            attachment.end(status.clone());
         }
         for spectator in self.spectators.drain(..) {
-            spectator.fail();
+            spectator.end(status.clone());
         }
-    }
-}
-
-async fn write_record(store: Arc<dyn Store>, game: Id, data_dir: PathBuf) {
-    let kept = match store.finished(game).await {
-        Ok(Some(kept)) => kept,
-        Ok(None) => return,
-        Err(error) => {
-            error!(%game, %error, "the record is not written");
-            return;
-        }
-    };
-    let written = tokio::task::spawn_blocking(move || {
-        let (header, journal) = kept;
-        let lines = convert::record_lines(&header, &journal);
-        let path = chefshat_records::jsonl::path_of(&data_dir, &game.to_string());
-        chefshat_records::jsonl::write(&path, &lines).map(|()| path)
-    })
-    .await;
-    match written {
-        Ok(Ok(path)) => info!(%game, path = %path.display(), "the record is written"),
-        Ok(Err(error)) => error!(%game, %error, "the record is not written"),
-        Err(error) => error!(%game, %error, "the record is not written"),
     }
 }
 

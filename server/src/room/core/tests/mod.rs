@@ -2,13 +2,15 @@
 
 mod clocks;
 mod hidden;
+mod revival;
 mod seats;
 mod strange;
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_engine::{Action, RuleSetSpec, Seat, Stop};
+use chefshat_engine::{Action, RULES_VERSION, RuleSetSpec, Seat, Stop};
 use chefshat_records::seeds::SeedPlan;
 
 use super::{AnswerInput, Answered, ConnectionId, Core, State, Verdict};
@@ -16,7 +18,7 @@ use crate::ids::{Id, SecretHash};
 use crate::room::log::Happening;
 use crate::room::policy::Policy;
 use crate::store::journal::{
-    Change, Decided, Entry, Fill, GameHeader, ParticipantKind, SeatedParticipant, Source,
+    Change, Decided, Entry, Fill, GameHeader, GameStart, ParticipantKind, SeatedParticipant, Source,
 };
 
 const OPEN: Fill = Fill::Open { reserved_for: None };
@@ -31,6 +33,8 @@ struct Table {
     now: Duration,
     journal: Vec<Entry>,
     connections: u64,
+    /// How long the store takes for what it is given next.
+    store_takes: Duration,
 }
 
 impl Table {
@@ -45,7 +49,10 @@ impl Table {
             game_id: Id([2; 16]),
             name: "table".into(),
             rules: rules.validate().expect("the rule set makes sense"),
+            rules_version: RULES_VERSION,
             policy,
+            recorded: BTreeMap::new(),
+            start: GameStart::default(),
             fills,
             seed: SeedPlan::Fixed { game_seed: [7; 32] },
             created_at_ms: 0,
@@ -57,6 +64,7 @@ impl Table {
             now: Duration::ZERO,
             journal: Vec::new(),
             connections: 0,
+            store_takes: Duration::ZERO,
         }
     }
 
@@ -94,8 +102,10 @@ impl Table {
     fn attach(&mut self, seat: Seat) -> ConnectionId {
         self.connections += 1;
         let connection = ConnectionId(self.connections);
+        // The connection before it, where there is one, has handed over everything.
+        let handed = (self.core.standing(seat).connected).then_some(self.now);
         self.core
-            .attach(self.now, seat, connection, Vec::new(), Some(self.now));
+            .attach(self.now, seat, connection, Vec::new(), self.now, handed);
         self.keep();
         connection
     }
@@ -110,8 +120,11 @@ impl Table {
         let until = self.now + time;
         while let Some(deadline) = self.core.deadline().filter(|deadline| *deadline <= until) {
             self.now = self.now.max(deadline);
-            // The transport took every request the moment it was released.
-            let handed = self.core.open().map(|open| open.released);
+            // The transport, where there is one, took every request the moment it was released.
+            let connected = |seat| self.core.standing(seat).connected;
+            let handed = (self.core.open())
+                .filter(|open| connected(open.decision.seat))
+                .map(|open| open.released);
             self.core.tick(self.now, handed);
             self.keep();
         }
@@ -166,6 +179,8 @@ impl Table {
 
     fn keep(&mut self) {
         self.journal.append(self.core.unkept());
+        self.now += std::mem::take(&mut self.store_takes);
+        self.core.released(self.now);
     }
 
     fn last_decision(&self) -> &Decided {

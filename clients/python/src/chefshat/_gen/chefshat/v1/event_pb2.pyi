@@ -42,6 +42,8 @@ class _DecisionSourceEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_Decisi
     """The default decision: time ran out while no agent was connected."""
     DECISION_SOURCE_SUBSTITUTE: _DecisionSource.ValueType  # 5
     """A built-in agent that stands in for the seat's own decided."""
+    DECISION_SOURCE_RECORDED: _DecisionSource.ValueType  # 6
+    """Taken over from the recorded game that this one branched from."""
 
 class DecisionSource(_DecisionSource, metaclass=_DecisionSourceEnumTypeWrapper):
     """How a decision came about."""
@@ -58,6 +60,8 @@ DECISION_SOURCE_DISCONNECTED: DecisionSource.ValueType  # 4
 """The default decision: time ran out while no agent was connected."""
 DECISION_SOURCE_SUBSTITUTE: DecisionSource.ValueType  # 5
 """A built-in agent that stands in for the seat's own decided."""
+DECISION_SOURCE_RECORDED: DecisionSource.ValueType  # 6
+"""Taken over from the recorded game that this one branched from."""
 Global___DecisionSource: _TypeAlias = DecisionSource  # noqa: Y015
 
 class _AbortReason:
@@ -123,6 +127,7 @@ class GameEvent(_message.Message):
     GAME_ABORTED_FIELD_NUMBER: _builtins.int
     EXPRESSION_SHOWN_FIELD_NUMBER: _builtins.int
     VACATED_FIELD_NUMBER: _builtins.int
+    SERVER_RESTARTED_FIELD_NUMBER: _builtins.int
     sequence: _builtins.int
     """Number of the event in its game, from 1, gap-free."""
     elapsed_ms: _builtins.int
@@ -199,6 +204,10 @@ class GameEvent(_message.Message):
     def vacated(self) -> Global___Vacated:
         """A seat became free again before the game began."""
 
+    @_builtins.property
+    def server_restarted(self) -> Global___ServerRestarted:
+        """The server was restarted."""
+
     def __init__(
         self,
         *,
@@ -222,12 +231,13 @@ class GameEvent(_message.Message):
         game_aborted: Global___GameAborted | None = ...,
         expression_shown: Global___ExpressionShown | None = ...,
         vacated: Global___Vacated | None = ...,
+        server_restarted: Global___ServerRestarted | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["cards_exchanged", b"cards_exchanged", "disconnected", b"disconnected", "expression_shown", b"expression_shown", "game_aborted", b"game_aborted", "game_ended", b"game_ended", "game_started", b"game_started", "kind", b"kind", "pass", b"pass", "pizza_done", b"pizza_done", "play", b"play", "returned", b"returned", "roles_assigned", b"roles_assigned", "seat_finished", b"seat_finished", "seated", b"seated", "shift_ended", b"shift_ended", "shift_started", b"shift_started", "special_action_declared", b"special_action_declared", "substituted", b"substituted", "vacated", b"vacated"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["cards_exchanged", b"cards_exchanged", "disconnected", b"disconnected", "expression_shown", b"expression_shown", "game_aborted", b"game_aborted", "game_ended", b"game_ended", "game_started", b"game_started", "kind", b"kind", "pass", b"pass", "pizza_done", b"pizza_done", "play", b"play", "returned", b"returned", "roles_assigned", b"roles_assigned", "seat_finished", b"seat_finished", "seated", b"seated", "server_restarted", b"server_restarted", "shift_ended", b"shift_ended", "shift_started", b"shift_started", "special_action_declared", b"special_action_declared", "substituted", b"substituted", "vacated", b"vacated"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["cards_exchanged", b"cards_exchanged", "disconnected", b"disconnected", "elapsed_ms", b"elapsed_ms", "expression_shown", b"expression_shown", "game_aborted", b"game_aborted", "game_ended", b"game_ended", "game_started", b"game_started", "kind", b"kind", "pass", b"pass", "pizza_done", b"pizza_done", "play", b"play", "returned", b"returned", "rewards", b"rewards", "roles_assigned", b"roles_assigned", "seat_finished", b"seat_finished", "seated", b"seated", "sequence", b"sequence", "shift_ended", b"shift_ended", "shift_started", b"shift_started", "special_action_declared", b"special_action_declared", "substituted", b"substituted", "vacated", b"vacated"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["cards_exchanged", b"cards_exchanged", "disconnected", b"disconnected", "elapsed_ms", b"elapsed_ms", "expression_shown", b"expression_shown", "game_aborted", b"game_aborted", "game_ended", b"game_ended", "game_started", b"game_started", "kind", b"kind", "pass", b"pass", "pizza_done", b"pizza_done", "play", b"play", "returned", b"returned", "rewards", b"rewards", "roles_assigned", b"roles_assigned", "seat_finished", b"seat_finished", "seated", b"seated", "sequence", b"sequence", "server_restarted", b"server_restarted", "shift_ended", b"shift_ended", "shift_started", b"shift_started", "special_action_declared", b"special_action_declared", "substituted", b"substituted", "vacated", b"vacated"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
-    _WhichOneofReturnType_kind: _TypeAlias = _typing.Literal["seated", "disconnected", "returned", "substituted", "game_started", "shift_started", "roles_assigned", "special_action_declared", "cards_exchanged", "play", "pass", "pizza_done", "seat_finished", "shift_ended", "game_ended", "game_aborted", "expression_shown", "vacated"]  # noqa: Y015
+    _WhichOneofReturnType_kind: _TypeAlias = _typing.Literal["seated", "disconnected", "returned", "substituted", "game_started", "shift_started", "roles_assigned", "special_action_declared", "cards_exchanged", "play", "pass", "pizza_done", "seat_finished", "shift_ended", "game_ended", "game_aborted", "expression_shown", "vacated", "server_restarted"]  # noqa: Y015
     _WhichOneofArgType_kind: _TypeAlias = _typing.Literal["kind", b"kind"]  # noqa: Y015
     def WhichOneof(self, oneof_group: _WhichOneofArgType_kind) -> _WhichOneofReturnType_kind | None: ...
 
@@ -356,6 +366,25 @@ class Returned(_message.Message):
 Global___Returned: _TypeAlias = Returned  # noqa: Y015
 
 @_typing.final
+class ServerRestarted(_message.Message):
+    """The server was restarted and goes on with the game where its last kept decision left it. Every agent's connection was lost; the open
+    decision's clock starts anew when its seat is attached again, at the latest a minute after the restart.
+    """
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    def __init__(
+        self,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___ServerRestarted: _TypeAlias = ServerRestarted  # noqa: Y015
+
+@_typing.final
 class Substituted(_message.Message):
     """A built-in agent plays for a seat from now on."""
 
@@ -440,38 +469,6 @@ class GameStarted(_message.Message):
 Global___GameStarted: _TypeAlias = GameStarted  # noqa: Y015
 
 @_typing.final
-class SeatCards(_message.Message):
-    """One seat's cards."""
-
-    DESCRIPTOR: _descriptor.Descriptor
-
-    SEAT_FIELD_NUMBER: _builtins.int
-    CARDS_FIELD_NUMBER: _builtins.int
-    GOLDEN_FIELD_NUMBER: _builtins.int
-    seat: _builtins.int
-    """The seat."""
-    golden: _builtins.bool
-    """Whether one of them is the Golden card."""
-    @_builtins.property
-    def cards(self) -> _containers.RepeatedScalarFieldContainer[_builtins.int]:
-        """The cards ascending: faces 1..F, F+1 for a joker."""
-
-    def __init__(
-        self,
-        *,
-        seat: _builtins.int = ...,
-        cards: _abc.Iterable[_builtins.int] | None = ...,
-        golden: _builtins.bool = ...,
-    ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
-    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["cards", b"cards", "golden", b"golden", "seat", b"seat"]  # noqa: Y015
-    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
-    def WhichOneof(self, oneof_group: _Never) -> None: ...
-
-Global___SeatCards: _TypeAlias = SeatCards  # noqa: Y015
-
-@_typing.final
 class ShiftStarted(_message.Message):
     """Cards were dealt."""
 
@@ -482,14 +479,14 @@ class ShiftStarted(_message.Message):
     shift: _builtins.int
     """Number of the Shift, from 1."""
     @_builtins.property
-    def hands(self) -> _containers.RepeatedCompositeFieldContainer[Global___SeatCards]:
+    def hands(self) -> _containers.RepeatedCompositeFieldContainer[_rules_pb2.SeatCards]:
         """The hands the viewer may see: a seat its own."""
 
     def __init__(
         self,
         *,
         shift: _builtins.int = ...,
-        hands: _abc.Iterable[Global___SeatCards] | None = ...,
+        hands: _abc.Iterable[_rules_pb2.SeatCards] | None = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...

@@ -63,8 +63,6 @@ class _DetachReasonEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_DetachRe
     """A newer connection has the seat."""
     DETACH_REASON_GAME_OVER: _DetachReason.ValueType  # 3
     """The game is over and everything has been said."""
-    DETACH_REASON_ROOM_FAILED: _DetachReason.ValueType  # 4
-    """The server could not keep the game and has stopped it. What was not acknowledged may or may not count."""
 
 class DetachReason(_DetachReason, metaclass=_DetachReasonEnumTypeWrapper):
     """Why a seat left the stream."""
@@ -77,8 +75,6 @@ DETACH_REASON_SUPERSEDED: DetachReason.ValueType  # 2
 """A newer connection has the seat."""
 DETACH_REASON_GAME_OVER: DetachReason.ValueType  # 3
 """The game is over and everything has been said."""
-DETACH_REASON_ROOM_FAILED: DetachReason.ValueType  # 4
-"""The server could not keep the game and has stopped it. What was not acknowledged may or may not count."""
 Global___DetachReason: _TypeAlias = DetachReason  # noqa: Y015
 
 @_typing.final

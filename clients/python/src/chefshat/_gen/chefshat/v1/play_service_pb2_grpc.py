@@ -58,7 +58,8 @@ class PlayServiceServicer:
 
     def Play(self, request_iterator, context):
         """One stream for an agent process: any number of seats in any number of games. Half-close to leave; the stream then ends. The server's
-        response headers come at once, before the first message. INVALID_ARGUMENT (TOO_MANY_COMMANDS) ends a stream.
+        response headers come at once, before the first message. INVALID_ARGUMENT (TOO_MANY_COMMANDS) ends a stream; so does UNAVAILABLE
+        (SHUTTING_DOWN, STORE_FAILED) when the server stops while durable games go on: connect and attach again until it is back.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -66,7 +67,7 @@ class PlayServiceServicer:
 
     def Watch(self, request, context):
         """The same for clients that cannot stream both ways (browsers): all updates of the seats named, until the client cancels. A message
-        without updates is a heartbeat. Answer with Act. INVALID_ARGUMENT (SEATS_REFUSED).
+        without updates is a heartbeat. Answer with Act. INVALID_ARGUMENT (SEATS_REFUSED); UNAVAILABLE as for Play.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

@@ -35,11 +35,12 @@ class PlayServiceStub:
     def __new__(cls, channel: _aio.Channel) -> PlayServiceAsyncStub: ...
     Play: _grpc.StreamStreamMultiCallable[_play_service_pb2.PlayRequest, _play_service_pb2.PlayResponse]
     """One stream for an agent process: any number of seats in any number of games. Half-close to leave; the stream then ends. The server's
-    response headers come at once, before the first message. INVALID_ARGUMENT (TOO_MANY_COMMANDS) ends a stream.
+    response headers come at once, before the first message. INVALID_ARGUMENT (TOO_MANY_COMMANDS) ends a stream; so does UNAVAILABLE
+    (SHUTTING_DOWN, STORE_FAILED) when the server stops while durable games go on: connect and attach again until it is back.
     """
     Watch: _grpc.UnaryStreamMultiCallable[_play_service_pb2.PlayServiceWatchRequest, _play_service_pb2.PlayServiceWatchResponse]
     """The same for clients that cannot stream both ways (browsers): all updates of the seats named, until the client cancels. A message
-    without updates is a heartbeat. Answer with Act. INVALID_ARGUMENT (SEATS_REFUSED).
+    without updates is a heartbeat. Answer with Act. INVALID_ARGUMENT (SEATS_REFUSED); UNAVAILABLE as for Play.
     """
     Act: _grpc.UnaryUnaryMultiCallable[_play_service_pb2.ActRequest, _play_service_pb2.ActResponse]
     """One command for one seat, without a stream of requests. UNAUTHENTICATED (TICKET_UNKNOWN); INVALID_ARGUMENT (COMMAND_MISSING,
@@ -53,11 +54,12 @@ class PlayServiceAsyncStub(PlayServiceStub):
     def __init__(self, channel: _aio.Channel) -> None: ...
     Play: _aio.StreamStreamMultiCallable[_play_service_pb2.PlayRequest, _play_service_pb2.PlayResponse]  # type: ignore[assignment]
     """One stream for an agent process: any number of seats in any number of games. Half-close to leave; the stream then ends. The server's
-    response headers come at once, before the first message. INVALID_ARGUMENT (TOO_MANY_COMMANDS) ends a stream.
+    response headers come at once, before the first message. INVALID_ARGUMENT (TOO_MANY_COMMANDS) ends a stream; so does UNAVAILABLE
+    (SHUTTING_DOWN, STORE_FAILED) when the server stops while durable games go on: connect and attach again until it is back.
     """
     Watch: _aio.UnaryStreamMultiCallable[_play_service_pb2.PlayServiceWatchRequest, _play_service_pb2.PlayServiceWatchResponse]  # type: ignore[assignment]
     """The same for clients that cannot stream both ways (browsers): all updates of the seats named, until the client cancels. A message
-    without updates is a heartbeat. Answer with Act. INVALID_ARGUMENT (SEATS_REFUSED).
+    without updates is a heartbeat. Answer with Act. INVALID_ARGUMENT (SEATS_REFUSED); UNAVAILABLE as for Play.
     """
     Act: _aio.UnaryUnaryMultiCallable[_play_service_pb2.ActRequest, _play_service_pb2.ActResponse]  # type: ignore[assignment]
     """One command for one seat, without a stream of requests. UNAUTHENTICATED (TICKET_UNKNOWN); INVALID_ARGUMENT (COMMAND_MISSING,
@@ -74,7 +76,8 @@ class PlayServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_abc.Iterator[_play_service_pb2.PlayResponse], _abc.AsyncIterator[_play_service_pb2.PlayResponse]]:
         """One stream for an agent process: any number of seats in any number of games. Half-close to leave; the stream then ends. The server's
-        response headers come at once, before the first message. INVALID_ARGUMENT (TOO_MANY_COMMANDS) ends a stream.
+        response headers come at once, before the first message. INVALID_ARGUMENT (TOO_MANY_COMMANDS) ends a stream; so does UNAVAILABLE
+        (SHUTTING_DOWN, STORE_FAILED) when the server stops while durable games go on: connect and attach again until it is back.
         """
 
     @_abc_1.abstractmethod
@@ -84,7 +87,7 @@ class PlayServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_abc.Iterator[_play_service_pb2.PlayServiceWatchResponse], _abc.AsyncIterator[_play_service_pb2.PlayServiceWatchResponse]]:
         """The same for clients that cannot stream both ways (browsers): all updates of the seats named, until the client cancels. A message
-        without updates is a heartbeat. Answer with Act. INVALID_ARGUMENT (SEATS_REFUSED).
+        without updates is a heartbeat. Answer with Act. INVALID_ARGUMENT (SEATS_REFUSED); UNAVAILABLE as for Play.
         """
 
     @_abc_1.abstractmethod

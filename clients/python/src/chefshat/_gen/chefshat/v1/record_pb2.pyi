@@ -13,7 +13,6 @@ from collections import abc as _abc
 from google.protobuf import descriptor as _descriptor
 from google.protobuf import message as _message
 from google.protobuf.internal import containers as _containers
-from google.protobuf.internal import enum_type_wrapper as _enum_type_wrapper
 import builtins as _builtins
 import sys
 import typing as _typing
@@ -24,30 +23,6 @@ else:
     from typing_extensions import TypeAlias as _TypeAlias, Never as _Never
 
 DESCRIPTOR: _descriptor.FileDescriptor
-
-class _GameOrigin:
-    ValueType = _typing.NewType("ValueType", _builtins.int)
-    V: _TypeAlias = ValueType  # noqa: Y015
-
-class _GameOriginEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_GameOrigin.ValueType], _builtins.type):
-    DESCRIPTOR: _descriptor.EnumDescriptor
-    GAME_ORIGIN_UNSPECIFIED: _GameOrigin.ValueType  # 0
-    """Not set."""
-    GAME_ORIGIN_DEALT: _GameOrigin.ValueType  # 1
-    """Dealt from a seed that the server committed to."""
-    GAME_ORIGIN_FIXED_SEED: _GameOrigin.ValueType  # 2
-    """Dealt from a seed that the room's creator fixed."""
-
-class GameOrigin(_GameOrigin, metaclass=_GameOriginEnumTypeWrapper):
-    """Where a game came from."""
-
-GAME_ORIGIN_UNSPECIFIED: GameOrigin.ValueType  # 0
-"""Not set."""
-GAME_ORIGIN_DEALT: GameOrigin.ValueType  # 1
-"""Dealt from a seed that the server committed to."""
-GAME_ORIGIN_FIXED_SEED: GameOrigin.ValueType  # 2
-"""Dealt from a seed that the room's creator fixed."""
-Global___GameOrigin: _TypeAlias = GameOrigin  # noqa: Y015
 
 @_typing.final
 class RecordLine(_message.Message):
@@ -118,6 +93,7 @@ class RecordHeader(_message.Message):
     CREATED_AT_MS_FIELD_NUMBER: _builtins.int
     SERVER_VERSION_FIELD_NUMBER: _builtins.int
     ACTION_SPACE_FIELD_NUMBER: _builtins.int
+    START_FIELD_NUMBER: _builtins.int
     format_version: _builtins.int
     """Version of this form, 1."""
     game_id: _builtins.str
@@ -126,7 +102,7 @@ class RecordHeader(_message.Message):
     """Identifies the room."""
     room_name: _builtins.str
     """Name of the room."""
-    origin: Global___GameOrigin.ValueType
+    origin: _room_pb2.GameOrigin.ValueType
     """Where the game came from."""
     rules_version: _builtins.int
     """Version of the rules."""
@@ -152,6 +128,10 @@ class RecordHeader(_message.Message):
     def action_space(self) -> _rules_pb2.ActionSpace:
         """The numbering of actions."""
 
+    @_builtins.property
+    def start(self) -> Global___GameStart:
+        """How the game began, where it was not simply dealt."""
+
     def __init__(
         self,
         *,
@@ -159,7 +139,7 @@ class RecordHeader(_message.Message):
         game_id: _builtins.str = ...,
         room_id: _builtins.str = ...,
         room_name: _builtins.str = ...,
-        origin: Global___GameOrigin.ValueType = ...,
+        origin: _room_pb2.GameOrigin.ValueType = ...,
         rules: _rules_pb2.RuleSet | None = ...,
         rules_version: _builtins.int = ...,
         policy: _room_pb2.RoomPolicy | None = ...,
@@ -168,14 +148,79 @@ class RecordHeader(_message.Message):
         created_at_ms: _builtins.int = ...,
         server_version: _builtins.str = ...,
         action_space: _rules_pb2.ActionSpace | None = ...,
+        start: Global___GameStart | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["action_space", b"action_space", "policy", b"policy", "rules", b"rules"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["action_space", b"action_space", "policy", b"policy", "rules", b"rules", "start", b"start"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["action_space", b"action_space", "created_at_ms", b"created_at_ms", "format_version", b"format_version", "game_id", b"game_id", "origin", b"origin", "policy", b"policy", "room_id", b"room_id", "room_name", b"room_name", "rules", b"rules", "rules_version", b"rules_version", "seats", b"seats", "seed_commitment", b"seed_commitment", "server_version", b"server_version"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["action_space", b"action_space", "created_at_ms", b"created_at_ms", "format_version", b"format_version", "game_id", b"game_id", "origin", b"origin", "policy", b"policy", "room_id", b"room_id", "room_name", b"room_name", "rules", b"rules", "rules_version", b"rules_version", "seats", b"seats", "seed_commitment", b"seed_commitment", "server_version", b"server_version", "start", b"start"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
 Global___RecordHeader: _TypeAlias = RecordHeader  # noqa: Y015
+
+@_typing.final
+class GameStart(_message.Message):
+    """How a game began that was not simply dealt."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    SCRIPTED_FIELD_NUMBER: _builtins.int
+    BRANCHED_FROM_FIELD_NUMBER: _builtins.int
+    TAKEN_OVER_FIELD_NUMBER: _builtins.int
+    @_builtins.property
+    def scripted(self) -> _rules_pb2.ScriptedShift:
+        """The hands of its first Shift, where they were given."""
+
+    @_builtins.property
+    def branched_from(self) -> _room_pb2.BranchPoint:
+        """The point of another game's record from which it branched."""
+
+    @_builtins.property
+    def taken_over(self) -> _containers.RepeatedCompositeFieldContainer[Global___TakenOver]:
+        """The seeds by which Shifts were dealt during the decisions taken over from that record, in order. After them the game's own seed
+        deals.
+        """
+
+    def __init__(
+        self,
+        *,
+        scripted: _rules_pb2.ScriptedShift | None = ...,
+        branched_from: _room_pb2.BranchPoint | None = ...,
+        taken_over: _abc.Iterable[Global___TakenOver] | None = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _typing.Literal["branched_from", b"branched_from", "scripted", b"scripted"]  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["branched_from", b"branched_from", "scripted", b"scripted", "taken_over", b"taken_over"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___GameStart: _TypeAlias = GameStart  # noqa: Y015
+
+@_typing.final
+class TakenOver(_message.Message):
+    """Decisions taken over from a record."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    DECISIONS_FIELD_NUMBER: _builtins.int
+    GAME_SEED_FIELD_NUMBER: _builtins.int
+    decisions: _builtins.int
+    """How many decisions; they stand in the record with DECISION_SOURCE_RECORDED."""
+    game_seed: _builtins.bytes
+    """The game seed, 32 bytes, from which Shifts that began with or between them were dealt."""
+    def __init__(
+        self,
+        *,
+        decisions: _builtins.int = ...,
+        game_seed: _builtins.bytes = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["decisions", b"decisions", "game_seed", b"game_seed"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___TakenOver: _TypeAlias = TakenOver  # noqa: Y015
 
 @_typing.final
 class DecisionRecord(_message.Message):
@@ -213,7 +258,7 @@ class DecisionRecord(_message.Message):
     bank_left_ms: _builtins.int
     """Time bank left to the seat afterwards, milliseconds."""
     action_mask: _builtins.bytes
-    """Legal actions, as in DecisionRequest."""
+    """Legal actions, as in DecisionRequest; empty in an imported game whose hand is not known."""
     invalid_reward: _builtins.float
     """Rewards of the invalid attempts, by the room's scheme, summed; the reward of the decision itself stands in its event."""
     elapsed_ms: _builtins.int

@@ -26,7 +26,7 @@ if _version_not_supported:
 
 
 class RecordServiceStub:
-    """Gives records of games that have ended.
+    """The records of a server.
     """
 
     def __init__(self, channel):
@@ -35,16 +35,38 @@ class RecordServiceStub:
         Args:
             channel: A grpc.Channel.
         """
+        self.ListRecords = channel.unary_unary(
+                '/chefshat.v1.RecordService/ListRecords',
+                request_serializer=chefshat_dot_v1_dot_record__service__pb2.ListRecordsRequest.SerializeToString,
+                response_deserializer=chefshat_dot_v1_dot_record__service__pb2.ListRecordsResponse.FromString,
+                _registered_method=True)
         self.GetRecord = channel.unary_stream(
                 '/chefshat.v1.RecordService/GetRecord',
                 request_serializer=chefshat_dot_v1_dot_record__service__pb2.GetRecordRequest.SerializeToString,
                 response_deserializer=chefshat_dot_v1_dot_record__service__pb2.GetRecordResponse.FromString,
                 _registered_method=True)
+        self.StreamRecords = channel.unary_stream(
+                '/chefshat.v1.RecordService/StreamRecords',
+                request_serializer=chefshat_dot_v1_dot_record__service__pb2.StreamRecordsRequest.SerializeToString,
+                response_deserializer=chefshat_dot_v1_dot_record__service__pb2.StreamRecordsResponse.FromString,
+                _registered_method=True)
+        self.ImportRecord = channel.stream_unary(
+                '/chefshat.v1.RecordService/ImportRecord',
+                request_serializer=chefshat_dot_v1_dot_record__service__pb2.ImportRecordRequest.SerializeToString,
+                response_deserializer=chefshat_dot_v1_dot_record__service__pb2.ImportRecordResponse.FromString,
+                _registered_method=True)
 
 
 class RecordServiceServicer:
-    """Gives records of games that have ended.
+    """The records of a server.
     """
+
+    def ListRecords(self, request, context):
+        """What the server holds, oldest first. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, FILTER_REFUSED).
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
 
     def GetRecord(self, request, context):
         """The record of one game, in order, many lines a message. NOT_FOUND (GAME_UNKNOWN) if the server does not hold it;
@@ -54,13 +76,44 @@ class RecordServiceServicer:
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
+    def StreamRecords(self, request, context):
+        """All records that a filter lets through, oldest first, one whole record after the other. INVALID_ARGUMENT (FILTER_REFUSED).
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def ImportRecord(self, request_iterator, context):
+        """Adds the record of a game played elsewhere: on another server, or at a real table. It is verified first. INVALID_ARGUMENT
+        (RECORD_REFUSED) names the first line that does not fit; ALREADY_EXISTS (GAME_KNOWN); RESOURCE_EXHAUSTED (RECORD_TOO_LARGE);
+        PERMISSION_DENIED (IMPORT_OFF) where the server's host has not switched it on.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
 
 def add_RecordServiceServicer_to_server(servicer, server):
     rpc_method_handlers = {
+            'ListRecords': grpc.unary_unary_rpc_method_handler(
+                    servicer.ListRecords,
+                    request_deserializer=chefshat_dot_v1_dot_record__service__pb2.ListRecordsRequest.FromString,
+                    response_serializer=chefshat_dot_v1_dot_record__service__pb2.ListRecordsResponse.SerializeToString,
+            ),
             'GetRecord': grpc.unary_stream_rpc_method_handler(
                     servicer.GetRecord,
                     request_deserializer=chefshat_dot_v1_dot_record__service__pb2.GetRecordRequest.FromString,
                     response_serializer=chefshat_dot_v1_dot_record__service__pb2.GetRecordResponse.SerializeToString,
+            ),
+            'StreamRecords': grpc.unary_stream_rpc_method_handler(
+                    servicer.StreamRecords,
+                    request_deserializer=chefshat_dot_v1_dot_record__service__pb2.StreamRecordsRequest.FromString,
+                    response_serializer=chefshat_dot_v1_dot_record__service__pb2.StreamRecordsResponse.SerializeToString,
+            ),
+            'ImportRecord': grpc.stream_unary_rpc_method_handler(
+                    servicer.ImportRecord,
+                    request_deserializer=chefshat_dot_v1_dot_record__service__pb2.ImportRecordRequest.FromString,
+                    response_serializer=chefshat_dot_v1_dot_record__service__pb2.ImportRecordResponse.SerializeToString,
             ),
     }
     generic_handler = grpc.method_handlers_generic_handler(
@@ -71,8 +124,35 @@ def add_RecordServiceServicer_to_server(servicer, server):
 
  # This class is part of an EXPERIMENTAL API.
 class RecordService:
-    """Gives records of games that have ended.
+    """The records of a server.
     """
+
+    @staticmethod
+    def ListRecords(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/chefshat.v1.RecordService/ListRecords',
+            chefshat_dot_v1_dot_record__service__pb2.ListRecordsRequest.SerializeToString,
+            chefshat_dot_v1_dot_record__service__pb2.ListRecordsResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
 
     @staticmethod
     def GetRecord(request,
@@ -91,6 +171,60 @@ class RecordService:
             '/chefshat.v1.RecordService/GetRecord',
             chefshat_dot_v1_dot_record__service__pb2.GetRecordRequest.SerializeToString,
             chefshat_dot_v1_dot_record__service__pb2.GetRecordResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def StreamRecords(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_stream(
+            request,
+            target,
+            '/chefshat.v1.RecordService/StreamRecords',
+            chefshat_dot_v1_dot_record__service__pb2.StreamRecordsRequest.SerializeToString,
+            chefshat_dot_v1_dot_record__service__pb2.StreamRecordsResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def ImportRecord(request_iterator,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.stream_unary(
+            request_iterator,
+            target,
+            '/chefshat.v1.RecordService/ImportRecord',
+            chefshat_dot_v1_dot_record__service__pb2.ImportRecordRequest.SerializeToString,
+            chefshat_dot_v1_dot_record__service__pb2.ImportRecordResponse.FromString,
             options,
             channel_credentials,
             insecure,

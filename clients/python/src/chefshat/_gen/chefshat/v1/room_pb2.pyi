@@ -48,6 +48,66 @@ PARTICIPANT_KIND_ROBOT: ParticipantKind.ValueType  # 3
 """A robot."""
 Global___ParticipantKind: _TypeAlias = ParticipantKind  # noqa: Y015
 
+class _Durability:
+    ValueType = _typing.NewType("ValueType", _builtins.int)
+    V: _TypeAlias = ValueType  # noqa: Y015
+
+class _DurabilityEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_Durability.ValueType], _builtins.type):
+    DESCRIPTOR: _descriptor.EnumDescriptor
+    DURABILITY_UNSPECIFIED: _Durability.ValueType  # 0
+    """As DURABLE."""
+    DURABILITY_DURABLE: _Durability.ValueType  # 1
+    """The death of the server: nobody is told of a decision that is not kept, and the game goes on where it stood when the server is back."""
+    DURABILITY_EPHEMERAL: _Durability.ValueType  # 2
+    """Nothing: it is kept in memory while it is played, which costs less time; its record is kept when it ends."""
+
+class Durability(_Durability, metaclass=_DurabilityEnumTypeWrapper):
+    """What a game outlives."""
+
+DURABILITY_UNSPECIFIED: Durability.ValueType  # 0
+"""As DURABLE."""
+DURABILITY_DURABLE: Durability.ValueType  # 1
+"""The death of the server: nobody is told of a decision that is not kept, and the game goes on where it stood when the server is back."""
+DURABILITY_EPHEMERAL: Durability.ValueType  # 2
+"""Nothing: it is kept in memory while it is played, which costs less time; its record is kept when it ends."""
+Global___Durability: _TypeAlias = Durability  # noqa: Y015
+
+class _GameOrigin:
+    ValueType = _typing.NewType("ValueType", _builtins.int)
+    V: _TypeAlias = ValueType  # noqa: Y015
+
+class _GameOriginEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_GameOrigin.ValueType], _builtins.type):
+    DESCRIPTOR: _descriptor.EnumDescriptor
+    GAME_ORIGIN_UNSPECIFIED: _GameOrigin.ValueType  # 0
+    """Not set."""
+    GAME_ORIGIN_DEALT: _GameOrigin.ValueType  # 1
+    """Dealt from a seed that the server committed to."""
+    GAME_ORIGIN_FIXED_SEED: _GameOrigin.ValueType  # 2
+    """Dealt from a seed that the room's creator fixed."""
+    GAME_ORIGIN_SCRIPTED: _GameOrigin.ValueType  # 3
+    """Begun with hands that the room's creator gave."""
+    GAME_ORIGIN_BRANCHED: _GameOrigin.ValueType  # 4
+    """Branched from the record of another game."""
+    GAME_ORIGIN_IMPORTED: _GameOrigin.ValueType  # 5
+    """Played elsewhere with real cards and imported; what nobody wrote down is not known."""
+
+class GameOrigin(_GameOrigin, metaclass=_GameOriginEnumTypeWrapper):
+    """Where a game came from."""
+
+GAME_ORIGIN_UNSPECIFIED: GameOrigin.ValueType  # 0
+"""Not set."""
+GAME_ORIGIN_DEALT: GameOrigin.ValueType  # 1
+"""Dealt from a seed that the server committed to."""
+GAME_ORIGIN_FIXED_SEED: GameOrigin.ValueType  # 2
+"""Dealt from a seed that the room's creator fixed."""
+GAME_ORIGIN_SCRIPTED: GameOrigin.ValueType  # 3
+"""Begun with hands that the room's creator gave."""
+GAME_ORIGIN_BRANCHED: GameOrigin.ValueType  # 4
+"""Branched from the record of another game."""
+GAME_ORIGIN_IMPORTED: GameOrigin.ValueType  # 5
+"""Played elsewhere with real cards and imported; what nobody wrote down is not known."""
+Global___GameOrigin: _TypeAlias = GameOrigin  # noqa: Y015
+
 class _RewardScheme:
     ValueType = _typing.NewType("ValueType", _builtins.int)
     V: _TypeAlias = ValueType  # noqa: Y015
@@ -152,25 +212,93 @@ class SeatConfig(_message.Message):
 
     RESERVED_FOR_FIELD_NUMBER: _builtins.int
     BUILT_IN_AGENT_FIELD_NUMBER: _builtins.int
+    REPLAY_FIELD_NUMBER: _builtins.int
     reserved_for: Global___ParticipantKind.ValueType
     """Participants of this kind, with the room's join code; UNSPECIFIED admits every kind."""
     built_in_agent: _builtins.str
     """A built-in agent of the server: "random", "random_unmasked" or "greedy"."""
+    @_builtins.property
+    def replay(self) -> Global___RecordedPlayer:
+        """A built-in agent that plays what a recorded player played."""
+
     def __init__(
         self,
         *,
         reserved_for: Global___ParticipantKind.ValueType = ...,
         built_in_agent: _builtins.str = ...,
+        replay: Global___RecordedPlayer | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["built_in_agent", b"built_in_agent", "filled_by", b"filled_by", "reserved_for", b"reserved_for"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["built_in_agent", b"built_in_agent", "filled_by", b"filled_by", "replay", b"replay", "reserved_for", b"reserved_for"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["built_in_agent", b"built_in_agent", "filled_by", b"filled_by", "reserved_for", b"reserved_for"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["built_in_agent", b"built_in_agent", "filled_by", b"filled_by", "replay", b"replay", "reserved_for", b"reserved_for"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
-    _WhichOneofReturnType_filled_by: _TypeAlias = _typing.Literal["reserved_for", "built_in_agent"]  # noqa: Y015
+    _WhichOneofReturnType_filled_by: _TypeAlias = _typing.Literal["reserved_for", "built_in_agent", "replay"]  # noqa: Y015
     _WhichOneofArgType_filled_by: _TypeAlias = _typing.Literal["filled_by", b"filled_by"]  # noqa: Y015
     def WhichOneof(self, oneof_group: _WhichOneofArgType_filled_by) -> _WhichOneofReturnType_filled_by | None: ...
 
 Global___SeatConfig: _TypeAlias = SeatConfig  # noqa: Y015
+
+@_typing.final
+class RecordedPlayer(_message.Message):
+    """A player of a recorded game. As an agent it repeats its decisions as long as it sees exactly what it saw then (so all along in a game
+    that branches from its own); at any other decision it takes what it did at the most similar one it recorded.
+    """
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    GAME_ID_FIELD_NUMBER: _builtins.int
+    SEAT_FIELD_NUMBER: _builtins.int
+    game_id: _builtins.str
+    """The recorded game, which the server must hold."""
+    seat: _builtins.int
+    """The seat it had there."""
+    def __init__(
+        self,
+        *,
+        game_id: _builtins.str = ...,
+        seat: _builtins.int = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["game_id", b"game_id", "seat", b"seat"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___RecordedPlayer: _TypeAlias = RecordedPlayer  # noqa: Y015
+
+@_typing.final
+class BranchPoint(_message.Message):
+    """A point of a recorded game from which another game branches. Whoever can read that game's record knows every hand of the Shift at the
+    point, and what a `replay` seat will do.
+    """
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    GAME_ID_FIELD_NUMBER: _builtins.int
+    DECISIONS_FIELD_NUMBER: _builtins.int
+    SAME_DEALS_FIELD_NUMBER: _builtins.int
+    game_id: _builtins.str
+    """The recorded game, which the server must hold."""
+    decisions: _builtins.int
+    """How many of its decisions are taken over, from its first on; the next is the first of the new game's own."""
+    same_deals: _builtins.bool
+    """Whether later Shifts are dealt as in the recorded game, so that who knows its record knows their hands too. Otherwise the new game's
+    own seed deals them.
+    """
+    def __init__(
+        self,
+        *,
+        game_id: _builtins.str = ...,
+        decisions: _builtins.int = ...,
+        same_deals: _builtins.bool = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["decisions", b"decisions", "game_id", b"game_id", "same_deals", b"same_deals"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___BranchPoint: _TypeAlias = BranchPoint  # noqa: Y015
 
 @_typing.final
 class RoomPolicy(_message.Message):
@@ -190,6 +318,7 @@ class RoomPolicy(_message.Message):
     SPECTATORS_FIELD_NUMBER: _builtins.int
     SPECTATOR_DELAY_DECISIONS_FIELD_NUMBER: _builtins.int
     SPECTATORS_SEE_HANDS_FIELD_NUMBER: _builtins.int
+    DURABILITY_FIELD_NUMBER: _builtins.int
     decision_time_ms: _builtins.int
     """Milliseconds for a decision, 10..=86400000; standard 10000."""
     bank_ms: _builtins.int
@@ -218,6 +347,8 @@ class RoomPolicy(_message.Message):
     """
     spectators_see_hands: _builtins.bool
     """Spectators see all hands (after the delay, which must then be at least 1). Otherwise only after the game has ended."""
+    durability: Global___Durability.ValueType
+    """What the game outlives; standard DURABLE, or EPHEMERAL on a server that keeps games in memory alone and refuses DURABLE."""
     def __init__(
         self,
         *,
@@ -233,10 +364,11 @@ class RoomPolicy(_message.Message):
         spectators: _builtins.bool | None = ...,
         spectator_delay_decisions: _builtins.int | None = ...,
         spectators_see_hands: _builtins.bool | None = ...,
+        durability: Global___Durability.ValueType = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["_bank_ms", b"_bank_ms", "_decision_time_ms", b"_decision_time_ms", "_max_invalid_attempts", b"_max_invalid_attempts", "_max_timeouts", b"_max_timeouts", "_pace_ms", b"_pace_ms", "_spectator_delay_decisions", b"_spectator_delay_decisions", "_spectators", b"_spectators", "_spectators_see_hands", b"_spectators_see_hands", "_waiting_time_ms", b"_waiting_time_ms", "bank_ms", b"bank_ms", "decision_time_ms", b"decision_time_ms", "max_invalid_attempts", b"max_invalid_attempts", "max_timeouts", b"max_timeouts", "pace_ms", b"pace_ms", "spectator_delay_decisions", b"spectator_delay_decisions", "spectators", b"spectators", "spectators_see_hands", b"spectators_see_hands", "waiting_time_ms", b"waiting_time_ms"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["_bank_ms", b"_bank_ms", "_decision_time_ms", b"_decision_time_ms", "_max_invalid_attempts", b"_max_invalid_attempts", "_max_timeouts", b"_max_timeouts", "_pace_ms", b"_pace_ms", "_spectator_delay_decisions", b"_spectator_delay_decisions", "_spectators", b"_spectators", "_spectators_see_hands", b"_spectators_see_hands", "_waiting_time_ms", b"_waiting_time_ms", "abort", b"abort", "bank_ms", b"bank_ms", "decision_time_ms", b"decision_time_ms", "max_invalid_attempts", b"max_invalid_attempts", "max_timeouts", b"max_timeouts", "pace_ms", b"pace_ms", "reward_scheme", b"reward_scheme", "spectator_delay_decisions", b"spectator_delay_decisions", "spectators", b"spectators", "spectators_see_hands", b"spectators_see_hands", "substitute", b"substitute", "waiting_time_ms", b"waiting_time_ms"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_bank_ms", b"_bank_ms", "_decision_time_ms", b"_decision_time_ms", "_max_invalid_attempts", b"_max_invalid_attempts", "_max_timeouts", b"_max_timeouts", "_pace_ms", b"_pace_ms", "_spectator_delay_decisions", b"_spectator_delay_decisions", "_spectators", b"_spectators", "_spectators_see_hands", b"_spectators_see_hands", "_waiting_time_ms", b"_waiting_time_ms", "abort", b"abort", "bank_ms", b"bank_ms", "decision_time_ms", b"decision_time_ms", "durability", b"durability", "max_invalid_attempts", b"max_invalid_attempts", "max_timeouts", b"max_timeouts", "pace_ms", b"pace_ms", "reward_scheme", b"reward_scheme", "spectator_delay_decisions", b"spectator_delay_decisions", "spectators", b"spectators", "spectators_see_hands", b"spectators_see_hands", "substitute", b"substitute", "waiting_time_ms", b"waiting_time_ms"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType__bank_ms: _TypeAlias = _typing.Literal["bank_ms"]  # noqa: Y015
     _WhichOneofArgType__bank_ms: _TypeAlias = _typing.Literal["_bank_ms", b"_bank_ms"]  # noqa: Y015
@@ -290,6 +422,7 @@ class Participant(_message.Message):
     BUILT_IN_AGENT_FIELD_NUMBER: _builtins.int
     CONNECTED_FIELD_NUMBER: _builtins.int
     SUBSTITUTED_FIELD_NUMBER: _builtins.int
+    REPLAY_FIELD_NUMBER: _builtins.int
     seat: _builtins.int
     """Seat number, from 0."""
     name: _builtins.str
@@ -299,11 +432,15 @@ class Participant(_message.Message):
     reserved_for: Global___ParticipantKind.ValueType
     """Kind the seat is reserved for; UNSPECIFIED: any."""
     built_in_agent: _builtins.str
-    """Name of the built-in agent that fills the seat, or empty."""
+    """Name of the built-in agent that fills the seat ("replay" for a recorded player), or empty."""
     connected: _builtins.bool
     """Whether an agent is attached to the seat now; a built-in agent always is."""
     substituted: _builtins.bool
     """Whether a substitute is playing for the seat now."""
+    @_builtins.property
+    def replay(self) -> Global___RecordedPlayer:
+        """The recorded player that the built-in agent "replay" plays as; unset for all others."""
+
     def __init__(
         self,
         *,
@@ -314,10 +451,11 @@ class Participant(_message.Message):
         built_in_agent: _builtins.str = ...,
         connected: _builtins.bool = ...,
         substituted: _builtins.bool = ...,
+        replay: Global___RecordedPlayer | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["replay", b"replay"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["built_in_agent", b"built_in_agent", "connected", b"connected", "kind", b"kind", "name", b"name", "reserved_for", b"reserved_for", "seat", b"seat", "substituted", b"substituted"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["built_in_agent", b"built_in_agent", "connected", b"connected", "kind", b"kind", "name", b"name", "replay", b"replay", "reserved_for", b"reserved_for", "seat", b"seat", "substituted", b"substituted"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
@@ -339,6 +477,8 @@ class Room(_message.Message):
     SEED_COMMITMENT_FIELD_NUMBER: _builtins.int
     SEED_FIXED_FIELD_NUMBER: _builtins.int
     CREATED_AT_MS_FIELD_NUMBER: _builtins.int
+    ORIGIN_FIELD_NUMBER: _builtins.int
+    BRANCHED_FROM_FIELD_NUMBER: _builtins.int
     room_id: _builtins.str
     """Identifies the room: 32 hexadecimal digits."""
     game_id: _builtins.str
@@ -355,6 +495,8 @@ class Room(_message.Message):
     """The room's creator fixed the game seed: such a game is not rated."""
     created_at_ms: _builtins.int
     """Milliseconds since the Unix epoch when the room was created."""
+    origin: Global___GameOrigin.ValueType
+    """Where its game comes from."""
     @_builtins.property
     def rules(self) -> _rules_pb2.RuleSet:
         """The rule set, every field set."""
@@ -366,6 +508,10 @@ class Room(_message.Message):
     @_builtins.property
     def seats(self) -> _containers.RepeatedCompositeFieldContainer[Global___Participant]:
         """The seats, index = seat."""
+
+    @_builtins.property
+    def branched_from(self) -> Global___BranchPoint:
+        """For a game that branches from a record: where."""
 
     def __init__(
         self,
@@ -380,10 +526,12 @@ class Room(_message.Message):
         seed_commitment: _builtins.bytes = ...,
         seed_fixed: _builtins.bool = ...,
         created_at_ms: _builtins.int = ...,
+        origin: Global___GameOrigin.ValueType = ...,
+        branched_from: Global___BranchPoint | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["policy", b"policy", "rules", b"rules"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["branched_from", b"branched_from", "policy", b"policy", "rules", b"rules"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["created_at_ms", b"created_at_ms", "game_id", b"game_id", "name", b"name", "policy", b"policy", "room_id", b"room_id", "rules", b"rules", "seats", b"seats", "seed_commitment", b"seed_commitment", "seed_fixed", b"seed_fixed", "state", b"state"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["branched_from", b"branched_from", "created_at_ms", b"created_at_ms", "game_id", b"game_id", "name", b"name", "origin", b"origin", "policy", b"policy", "room_id", b"room_id", "rules", b"rules", "seats", b"seats", "seed_commitment", b"seed_commitment", "seed_fixed", b"seed_fixed", "state", b"state"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

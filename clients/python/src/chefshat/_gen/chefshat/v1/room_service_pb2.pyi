@@ -31,6 +31,8 @@ class CreateRoomRequest(_message.Message):
     SEATS_FIELD_NUMBER: _builtins.int
     POLICY_FIELD_NUMBER: _builtins.int
     GAME_SEED_FIELD_NUMBER: _builtins.int
+    SCRIPTED_FIELD_NUMBER: _builtins.int
+    BRANCH_FIELD_NUMBER: _builtins.int
     name: _builtins.str
     """Name to show, at most 64 characters."""
     game_seed: _builtins.bytes
@@ -47,6 +49,14 @@ class CreateRoomRequest(_message.Message):
     def policy(self) -> _room_pb2.RoomPolicy:
         """Times, limits and manners."""
 
+    @_builtins.property
+    def scripted(self) -> _rules_pb2.ScriptedShift:
+        """With given hands."""
+
+    @_builtins.property
+    def branch(self) -> _room_pb2.BranchPoint:
+        """As a recorded game did, up to a point. Leave `rules` unset: they are the recorded game's."""
+
     def __init__(
         self,
         *,
@@ -55,12 +65,16 @@ class CreateRoomRequest(_message.Message):
         seats: _abc.Iterable[_room_pb2.SeatConfig] | None = ...,
         policy: _room_pb2.RoomPolicy | None = ...,
         game_seed: _builtins.bytes = ...,
+        scripted: _rules_pb2.ScriptedShift | None = ...,
+        branch: _room_pb2.BranchPoint | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["policy", b"policy", "rules", b"rules"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["branch", b"branch", "policy", b"policy", "rules", b"rules", "scripted", b"scripted", "start", b"start"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["game_seed", b"game_seed", "name", b"name", "policy", b"policy", "rules", b"rules", "seats", b"seats"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["branch", b"branch", "game_seed", b"game_seed", "name", b"name", "policy", b"policy", "rules", b"rules", "scripted", b"scripted", "seats", b"seats", "start", b"start"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
-    def WhichOneof(self, oneof_group: _Never) -> None: ...
+    _WhichOneofReturnType_start: _TypeAlias = _typing.Literal["scripted", "branch"]  # noqa: Y015
+    _WhichOneofArgType_start: _TypeAlias = _typing.Literal["start", b"start"]  # noqa: Y015
+    def WhichOneof(self, oneof_group: _WhichOneofArgType_start) -> _WhichOneofReturnType_start | None: ...
 
 Global___CreateRoomRequest: _TypeAlias = CreateRoomRequest  # noqa: Y015
 

@@ -24,23 +24,27 @@ _sym_db = _symbol_database.Default()
 
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x17\x63hefshat/v1/rules.proto\x12\x0b\x63hefshat.v1\"\xf0\x03\n\x07RuleSet\x12\x0e\n\x06preset\x18\x01 \x01(\t\x12\x14\n\x07players\x18\x02 \x01(\rH\x01\x88\x01\x01\x12\x12\n\x05\x66\x61\x63\x65s\x18\x03 \x01(\rH\x02\x88\x01\x01\x12\x13\n\x06jokers\x18\x04 \x01(\rH\x03\x88\x01\x01\x12\x17\n\rtarget_points\x18\x05 \x01(\rH\x00\x12\x17\n\rtarget_shifts\x18\x06 \x01(\rH\x00\x12\x0e\n\x06points\x18\x07 \x03(\r\x12\x15\n\x08\x65xchange\x18\x08 \x01(\x08H\x04\x88\x01\x01\x12\x1c\n\x0fspecial_actions\x18\t \x01(\x08H\x05\x88\x01\x01\x12%\n\x07opening\x18\n \x01(\x0e\x32\x14.chefshat.v1.Opening\x12\x19\n\x0copening_pass\x18\x0b \x01(\x08H\x06\x88\x01\x01\x12*\n\npass_scope\x18\x0c \x01(\x0e\x32\x16.chefshat.v1.PassScope\x12\x1c\n\x0fmax_idle_pizzas\x18\r \x01(\rH\x07\x88\x01\x01\x12\x16\n\tmax_turns\x18\x0e \x01(\rH\x08\x88\x01\x01\x42\x06\n\x04stopB\n\n\x08_playersB\x08\n\x06_facesB\t\n\x07_jokersB\x0b\n\t_exchangeB\x12\n\x10_special_actionsB\x0f\n\r_opening_passB\x12\n\x10_max_idle_pizzasB\x0c\n\n_max_turns\"=\n\x0b\x41\x63tionSpace\x12\n\n\x02id\x18\x01 \x01(\t\x12\x0c\n\x04size\x18\x02 \x01(\r\x12\x14\n\x0cturn_actions\x18\x03 \x01(\r*P\n\x07Opening\x12\x17\n\x13OPENING_UNSPECIFIED\x10\x00\x12\x12\n\x0eOPENING_GOLDEN\x10\x01\x12\x18\n\x14OPENING_ANY_TOP_FACE\x10\x02*R\n\tPassScope\x12\x1a\n\x16PASS_SCOPE_UNSPECIFIED\x10\x00\x12\x14\n\x10PASS_SCOPE_PIZZA\x10\x01\x12\x13\n\x0fPASS_SCOPE_TURN\x10\x02*t\n\x04Role\x12\x14\n\x10ROLE_UNSPECIFIED\x10\x00\x12\r\n\tROLE_CHEF\x10\x01\x12\x12\n\x0eROLE_SOUS_CHEF\x10\x02\x12\r\n\tROLE_COOK\x10\x03\x12\x0f\n\x0bROLE_WAITER\x10\x04\x12\x13\n\x0fROLE_DISHWASHER\x10\x05*s\n\rSpecialAction\x12\x1e\n\x1aSPECIAL_ACTION_UNSPECIFIED\x10\x00\x12\x1d\n\x19SPECIAL_ACTION_FOOD_FIGHT\x10\x01\x12#\n\x1fSPECIAL_ACTION_DINNER_IS_SERVED\x10\x02\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x17\x63hefshat/v1/rules.proto\x12\x0b\x63hefshat.v1\"\xf0\x03\n\x07RuleSet\x12\x0e\n\x06preset\x18\x01 \x01(\t\x12\x14\n\x07players\x18\x02 \x01(\rH\x01\x88\x01\x01\x12\x12\n\x05\x66\x61\x63\x65s\x18\x03 \x01(\rH\x02\x88\x01\x01\x12\x13\n\x06jokers\x18\x04 \x01(\rH\x03\x88\x01\x01\x12\x17\n\rtarget_points\x18\x05 \x01(\rH\x00\x12\x17\n\rtarget_shifts\x18\x06 \x01(\rH\x00\x12\x0e\n\x06points\x18\x07 \x03(\r\x12\x15\n\x08\x65xchange\x18\x08 \x01(\x08H\x04\x88\x01\x01\x12\x1c\n\x0fspecial_actions\x18\t \x01(\x08H\x05\x88\x01\x01\x12%\n\x07opening\x18\n \x01(\x0e\x32\x14.chefshat.v1.Opening\x12\x19\n\x0copening_pass\x18\x0b \x01(\x08H\x06\x88\x01\x01\x12*\n\npass_scope\x18\x0c \x01(\x0e\x32\x16.chefshat.v1.PassScope\x12\x1c\n\x0fmax_idle_pizzas\x18\r \x01(\rH\x07\x88\x01\x01\x12\x16\n\tmax_turns\x18\x0e \x01(\rH\x08\x88\x01\x01\x42\x06\n\x04stopB\n\n\x08_playersB\x08\n\x06_facesB\t\n\x07_jokersB\x0b\n\t_exchangeB\x12\n\x10_special_actionsB\x0f\n\r_opening_passB\x12\n\x10_max_idle_pizzasB\x0c\n\n_max_turns\"=\n\x0b\x41\x63tionSpace\x12\n\n\x02id\x18\x01 \x01(\t\x12\x0c\n\x04size\x18\x02 \x01(\r\x12\x14\n\x0cturn_actions\x18\x03 \x01(\r\"8\n\tSeatCards\x12\x0c\n\x04seat\x18\x01 \x01(\r\x12\r\n\x05\x63\x61rds\x18\x02 \x03(\r\x12\x0e\n\x06golden\x18\x03 \x01(\x08\"\x91\x01\n\rScriptedShift\x12\r\n\x05shift\x18\x01 \x01(\r\x12%\n\x05hands\x18\x02 \x03(\x0b\x32\x16.chefshat.v1.SeatCards\x12\x12\n\nlast_order\x18\x03 \x03(\r\x12\x0e\n\x06points\x18\x04 \x03(\r\x12\x17\n\ndrawn_seat\x18\x05 \x01(\rH\x00\x88\x01\x01\x42\r\n\x0b_drawn_seat*P\n\x07Opening\x12\x17\n\x13OPENING_UNSPECIFIED\x10\x00\x12\x12\n\x0eOPENING_GOLDEN\x10\x01\x12\x18\n\x14OPENING_ANY_TOP_FACE\x10\x02*R\n\tPassScope\x12\x1a\n\x16PASS_SCOPE_UNSPECIFIED\x10\x00\x12\x14\n\x10PASS_SCOPE_PIZZA\x10\x01\x12\x13\n\x0fPASS_SCOPE_TURN\x10\x02*t\n\x04Role\x12\x14\n\x10ROLE_UNSPECIFIED\x10\x00\x12\r\n\tROLE_CHEF\x10\x01\x12\x12\n\x0eROLE_SOUS_CHEF\x10\x02\x12\r\n\tROLE_COOK\x10\x03\x12\x0f\n\x0bROLE_WAITER\x10\x04\x12\x13\n\x0fROLE_DISHWASHER\x10\x05*s\n\rSpecialAction\x12\x1e\n\x1aSPECIAL_ACTION_UNSPECIFIED\x10\x00\x12\x1d\n\x19SPECIAL_ACTION_FOOD_FIGHT\x10\x01\x12#\n\x1fSPECIAL_ACTION_DINNER_IS_SERVED\x10\x02\x62\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
 _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'chefshat._gen.chefshat.v1.rules_pb2', _globals)
 if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
-  _globals['_OPENING']._serialized_start=602
-  _globals['_OPENING']._serialized_end=682
-  _globals['_PASSSCOPE']._serialized_start=684
-  _globals['_PASSSCOPE']._serialized_end=766
-  _globals['_ROLE']._serialized_start=768
-  _globals['_ROLE']._serialized_end=884
-  _globals['_SPECIALACTION']._serialized_start=886
-  _globals['_SPECIALACTION']._serialized_end=1001
+  _globals['_OPENING']._serialized_start=808
+  _globals['_OPENING']._serialized_end=888
+  _globals['_PASSSCOPE']._serialized_start=890
+  _globals['_PASSSCOPE']._serialized_end=972
+  _globals['_ROLE']._serialized_start=974
+  _globals['_ROLE']._serialized_end=1090
+  _globals['_SPECIALACTION']._serialized_start=1092
+  _globals['_SPECIALACTION']._serialized_end=1207
   _globals['_RULESET']._serialized_start=41
   _globals['_RULESET']._serialized_end=537
   _globals['_ACTIONSPACE']._serialized_start=539
   _globals['_ACTIONSPACE']._serialized_end=600
+  _globals['_SEATCARDS']._serialized_start=602
+  _globals['_SEATCARDS']._serialized_end=658
+  _globals['_SCRIPTEDSHIFT']._serialized_start=661
+  _globals['_SCRIPTEDSHIFT']._serialized_end=806
 # @@protoc_insertion_point(module_scope)

@@ -269,3 +269,81 @@ class ActionSpace(_message.Message):
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
 Global___ActionSpace: _TypeAlias = ActionSpace  # noqa: Y015
+
+@_typing.final
+class SeatCards(_message.Message):
+    """One seat's cards."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    SEAT_FIELD_NUMBER: _builtins.int
+    CARDS_FIELD_NUMBER: _builtins.int
+    GOLDEN_FIELD_NUMBER: _builtins.int
+    seat: _builtins.int
+    """The seat."""
+    golden: _builtins.bool
+    """Whether one of them is the Golden card."""
+    @_builtins.property
+    def cards(self) -> _containers.RepeatedScalarFieldContainer[_builtins.int]:
+        """The cards ascending: faces 1..F, F+1 for a joker."""
+
+    def __init__(
+        self,
+        *,
+        seat: _builtins.int = ...,
+        cards: _abc.Iterable[_builtins.int] | None = ...,
+        golden: _builtins.bool = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["cards", b"cards", "golden", b"golden", "seat", b"seat"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___SeatCards: _TypeAlias = SeatCards  # noqa: Y015
+
+@_typing.final
+class ScriptedShift(_message.Message):
+    """Hands to begin with instead of a deal. Later Shifts are dealt from the game seed."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    SHIFT_FIELD_NUMBER: _builtins.int
+    HANDS_FIELD_NUMBER: _builtins.int
+    LAST_ORDER_FIELD_NUMBER: _builtins.int
+    POINTS_FIELD_NUMBER: _builtins.int
+    DRAWN_SEAT_FIELD_NUMBER: _builtins.int
+    shift: _builtins.int
+    """Number of the Shift the game begins with; 0 means 1."""
+    drawn_seat: _builtins.int
+    """The seat drawn for OPENING_ANY_TOP_FACE; set for that opening and for no other."""
+    @_builtins.property
+    def hands(self) -> _containers.RepeatedCompositeFieldContainer[Global___SeatCards]:
+        """The cards dealt to every seat, before any exchange: each hand of the size that the rule set deals, one with the Golden card."""
+
+    @_builtins.property
+    def last_order(self) -> _containers.RepeatedScalarFieldContainer[_builtins.int]:
+        """Seats by place in the Shift before, which gives the roles; empty for the first Shift and for no other."""
+
+    @_builtins.property
+    def points(self) -> _containers.RepeatedScalarFieldContainer[_builtins.int]:
+        """Points of each seat so far, index = seat; empty: none."""
+
+    def __init__(
+        self,
+        *,
+        shift: _builtins.int = ...,
+        hands: _abc.Iterable[Global___SeatCards] | None = ...,
+        last_order: _abc.Iterable[_builtins.int] | None = ...,
+        points: _abc.Iterable[_builtins.int] | None = ...,
+        drawn_seat: _builtins.int | None = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _typing.Literal["_drawn_seat", b"_drawn_seat", "drawn_seat", b"drawn_seat"]  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_drawn_seat", b"_drawn_seat", "drawn_seat", b"drawn_seat", "hands", b"hands", "last_order", b"last_order", "points", b"points", "shift", b"shift"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    _WhichOneofReturnType__drawn_seat: _TypeAlias = _typing.Literal["drawn_seat"]  # noqa: Y015
+    _WhichOneofArgType__drawn_seat: _TypeAlias = _typing.Literal["_drawn_seat", b"_drawn_seat"]  # noqa: Y015
+    def WhichOneof(self, oneof_group: _WhichOneofArgType__drawn_seat) -> _WhichOneofReturnType__drawn_seat | None: ...
+
+Global___ScriptedShift: _TypeAlias = ScriptedShift  # noqa: Y015

@@ -1,0 +1,118 @@
+"""A game that goes on while its server dies and comes back: the agents notice nothing but lost connections."""
+
+import asyncio
+import os
+import threading
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from conftest import BINARY
+from real_server import RealServer
+
+import chefshat
+from chefshat import Agent, Backoff, Decision, RandomAgent, SeatResult, aio, pb
+
+pytestmark = pytest.mark.server
+
+# Keeps trying for as long as a server may take to start on a slow machine.
+PATIENT = Backoff(first_s=0.005, max_s=0.05, attempts=2000)
+# After so many acknowledged decisions of the game the server is killed.
+KILLS = (5, 20, 21, 60)
+# Seconds to wait for what must happen: generous, because nothing is measured by it.
+WAIT_S = 120.0
+
+Agents = dict[str, Agent]
+Player = Callable[[str, Agents], dict[str, SeatResult]]
+
+
+def play_blocking(address: str, agents: Agents) -> dict[str, SeatResult]:
+    with chefshat.Client(address, backoff=PATIENT) as client:
+        return client.play_many(agents)
+
+
+def play_asyncio(address: str, agents: Agents) -> dict[str, SeatResult]:
+    async def run() -> dict[str, SeatResult]:
+        async with aio.Client(address, backoff=PATIENT) as client:
+            return await client.play_many(agents)
+
+    return asyncio.run(run())
+
+
+class Ledger:
+    """What all agents of the game were told. At certain counts they wait until the server has been killed."""
+
+    def __init__(self) -> None:
+        self.accepted: dict[tuple[int, int], int] = {}
+        self.reached = {count: threading.Event() for count in KILLS}
+        self.killed = {count: threading.Event() for count in KILLS}
+
+    def accept(self, seat: int, result: pb.AnswerResult) -> None:
+        """Notes an acknowledged decision."""
+        assert result.status == pb.ANSWER_STATUS_ACCEPTED
+        self.accepted[seat, result.decision_id] = result.action
+        count = len(self.accepted)
+        if count in self.reached:
+            self.reached[count].set()
+            assert self.killed[count].wait(WAIT_S)
+
+
+class Noting(RandomAgent):
+    """Plays at random and notes what is acknowledged."""
+
+    def __init__(self, seat: int, ledger: Ledger) -> None:
+        super().__init__(seat)
+        self.seat = seat
+        self.ledger = ledger
+        self.asked: Counter[int] = Counter()
+        self.sequences: list[int] = []
+
+    def decide(self, request: Decision) -> int:
+        self.asked[request.decision_id] += 1
+        return super().decide(request)
+
+    def on_event(self, event: pb.GameEvent) -> None:
+        self.sequences.append(event.sequence)
+
+    def on_result(self, result: pb.AnswerResult) -> None:
+        self.ledger.accept(self.seat, result)
+
+
+@pytest.mark.parametrize("play", [play_blocking, play_asyncio], ids=["blocking", "asyncio"])
+def test_agents_play_on_through_restarts(play: Player, tmp_path: Path) -> None:
+    binary = os.environ.get(BINARY)
+    if not binary:
+        pytest.skip(f"{BINARY} is not set: name the chefshat binary to play against the real server")
+    ledger = Ledger()
+    results: dict[str, SeatResult] = {}
+    # An address of its own: connections come from another one, and can never be given the server's port while it is away.
+    with RealServer(Path(binary), tmp_path, host="127.0.0.2") as server:
+        with chefshat.Client(server.address) as client:
+            room = client.create_room(rules=pb.RuleSet(target_shifts=2))
+            tickets = [client.join_room(room.join_code, f"player {seat}", seat=seat).ticket for seat in range(4)]
+        agents = {ticket: Noting(seat, ledger) for seat, ticket in enumerate(tickets)}
+        playing = threading.Thread(target=lambda: results.update(play(server.address, dict(agents))))
+        playing.start()
+        for count in KILLS:
+            assert ledger.reached[count].wait(WAIT_S)
+            server.kill()
+            ledger.killed[count].set()
+            server.start()
+        playing.join(WAIT_S)
+        assert not playing.is_alive()
+        with chefshat.Client(server.address) as client:
+            lines = list(client.record(room.room.game_id))
+    restarts = sum(line.event.HasField("server_restarted") for line in lines if line.HasField("event"))
+    assert restarts == len(KILLS)
+    decisions = [line.decision for line in lines if line.HasField("decision")]
+    kept = {(decision.seat, decision.decision_id): decision.action for decision in decisions}
+    assert len(kept) == len(decisions)
+    assert all(decision.source == pb.DECISION_SOURCE_AGENT for decision in decisions)
+    assert ledger.accepted.items() <= kept.items()
+    for ticket, agent in agents.items():
+        assert results[ticket].finished
+        assert results[ticket].reconnects >= len(KILLS)
+        # Nobody was asked twice, and no event was missed or told twice.
+        assert set(agent.asked.values()) == {1}
+        assert agent.sequences == list(range(1, len(agent.sequences) + 1))

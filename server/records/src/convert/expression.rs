@@ -1,0 +1,59 @@
+//! What an expression may hold. Where it goes, and who is told, is decided by rooms.
+
+use std::ops::RangeInclusive;
+
+use chefshat_proto::v1;
+
+use super::rules::FieldProblem;
+
+/// Longest label of an expression, bytes.
+const MAX_LABEL: usize = 64;
+/// Longest reference to recorded media, bytes.
+const MAX_MEDIA: usize = 256;
+/// The years 1 to 9999, which alone a timestamp can be written for, in seconds since the Unix epoch.
+const SECONDS: RangeInclusive<i64> = -62_135_596_800..=253_402_300_799;
+/// Nanoseconds within a second.
+const NANOS: RangeInclusive<i32> = 0..=999_999_999;
+
+/// Checks an expression.
+///
+/// # Errors
+/// The field out of its range.
+pub fn check_expression(expression: &v1::Expression) -> Result<(), FieldProblem> {
+    let text = |field, text: &str, bytes: RangeInclusive<usize>| {
+        if bytes.contains(&text.len()) {
+            Ok(())
+        } else {
+            let (least, most) = bytes.into_inner();
+            Err(FieldProblem::new(
+                field,
+                format!("{} bytes are not in {least}..={most}", text.len()),
+            ))
+        }
+    };
+    let number = |field, value: Option<f32>, least: f32| match value {
+        Some(value) if !(least..=1.0).contains(&value) => Err(FieldProblem::new(
+            field,
+            format!("{value} is not in {least}..=1"),
+        )),
+        _ => Ok(()),
+    };
+    text("label", &expression.label, 1..=MAX_LABEL)?;
+    text("media", &expression.media, 0..=MAX_MEDIA)?;
+    number("valence", expression.valence, -1.0)?;
+    number("arousal", expression.arousal, -1.0)?;
+    number("dominance", expression.dominance, -1.0)?;
+    number("confidence", expression.confidence, 0.0)?;
+    if let Some(time) = &expression.taken_at
+        && !(SECONDS.contains(&time.seconds) && NANOS.contains(&time.nanos))
+    {
+        return Err(FieldProblem::new(
+            "taken_at",
+            "not a time of the years 1 to 9999",
+        ));
+    }
+    if v1::ExpressionSource::try_from(expression.source).is_err() {
+        return Err(FieldProblem::new("source", "not a value of this enum"));
+    }
+    Ok(())
+}

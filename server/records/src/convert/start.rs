@@ -1,0 +1,140 @@
+//! Scripted Shifts in both directions. Whether a game may begin with given hands is decided by the engine; here its answer becomes the name
+//! of a field.
+
+use chefshat_engine::{BySeat, Cards, Game, RuleSet, Script, ScriptError, Seat, SeatOrder, Seed};
+use chefshat_proto::v1;
+
+use super::events::{seat_cards, seat_number};
+use super::rules::FieldProblem;
+
+/// The script a message describes. One that is returned makes a game: `Game::scripted` accepts it with these rules and any seed.
+///
+/// # Errors
+/// The first field that makes no sense, or does not fit the rule set.
+pub fn script_from_proto(
+    message: &v1::ScriptedShift,
+    rules: &RuleSet,
+) -> Result<Script, FieldProblem> {
+    let players = rules.players();
+    let last_order = message
+        .last_order
+        .iter()
+        .map(|&seat| seat_from_number(seat, players))
+        .collect::<Option<Vec<_>>>()
+        .filter(|seats| seats.is_empty() || seats.len() == players)
+        .and_then(|seats| SeatOrder::from_slice(&seats))
+        .ok_or_else(|| {
+            FieldProblem::new(
+                "last_order",
+                format!("name each of the seats 0..{players} once, best place first"),
+            )
+        })?;
+    let scores = match message.points.as_slice() {
+        [] => Some(BySeat::filled(players, 0)),
+        points => BySeat::from_slice(points).filter(|points| points.len() == players),
+    }
+    .ok_or_else(|| {
+        FieldProblem::new(
+            "points",
+            format!("give one number for each of the {players} seats, or none at all"),
+        )
+    })?;
+    let drawn = message
+        .drawn_seat
+        .map(|seat| {
+            seat_from_number(seat, players)
+                .ok_or_else(|| FieldProblem::new("drawn_seat", format!("there is no seat {seat}")))
+        })
+        .transpose()?;
+    let script = Script {
+        shift: message.shift.max(1),
+        hands: hands_from_proto(&message.hands, rules)?,
+        last_order: Some(last_order).filter(|order| !order.is_empty()),
+        scores,
+        drawn,
+    };
+    Game::scripted(*rules, Seed([0; 32]), &script, |_| {})
+        .map_err(|error| FieldProblem::new(field_of(&error), error.to_string()))?;
+    Ok(script)
+}
+
+/// The message that describes a script of a game with so many faces.
+pub fn script_to_proto(script: &Script, faces: u8) -> v1::ScriptedShift {
+    v1::ScriptedShift {
+        shift: script.shift,
+        hands: script
+            .hands
+            .iter()
+            .map(|(seat, &hand)| seat_cards(seat, hand, faces))
+            .collect(),
+        last_order: script.last_order.map_or_else(Vec::new, |order| {
+            order.as_slice().iter().copied().map(seat_number).collect()
+        }),
+        points: script.scores.values().copied().collect(),
+        drawn_seat: script.drawn.map(seat_number),
+    }
+}
+
+/// Cards as messages list them, in any order: faces 1..=F, F+1 for a joker, one of face F the Golden card if `golden`. `None` if no deck of
+/// so many faces holds them all.
+pub fn cards_from_numbers(numbers: &[u32], golden: bool, faces: u8) -> Option<Cards> {
+    let mut counts = vec![0u8; usize::from(faces) + 1];
+    for &number in numbers {
+        let index = usize::try_from(number).ok()?.checked_sub(1)?;
+        let count = counts.get_mut(index)?;
+        *count = count.checked_add(1)?;
+    }
+    Cards::from_counts(faces, &counts, golden)
+}
+
+/// The seat with a number, or `None` if there are not so many players.
+pub fn seat_from_number(number: u32, players: usize) -> Option<Seat> {
+    usize::try_from(number)
+        .ok()
+        .filter(|&index| index < players)
+        .map(Seat::new)
+}
+
+/// Every seat's hand, from a list that names each seat once.
+fn hands_from_proto(
+    listed: &[v1::SeatCards],
+    rules: &RuleSet,
+) -> Result<BySeat<Cards>, FieldProblem> {
+    let players = rules.players();
+    let problem = |message: String| FieldProblem::new("hands", message);
+    let mut hands = BySeat::filled(players, None);
+    for hand in listed {
+        let seat = seat_from_number(hand.seat, players)
+            .ok_or_else(|| problem(format!("there is no seat {}", hand.seat)))?;
+        let cards =
+            cards_from_numbers(&hand.cards, hand.golden, rules.faces()).ok_or_else(|| {
+                problem(format!(
+                    "no deck of {} faces holds the cards of seat {seat} (a joker is {}; the Golden card is of face {})",
+                    rules.faces(),
+                    rules.faces() + 1,
+                    rules.faces(),
+                ))
+            })?;
+        if hands[seat].replace(cards).is_some() {
+            return Err(problem(format!("seat {seat} has two hands")));
+        }
+    }
+    match hands.iter().find(|(_, hand)| hand.is_none()) {
+        Some((seat, _)) => Err(problem(format!("seat {seat} has no hand"))),
+        None => Ok(hands.map(Option::unwrap_or_default)),
+    }
+}
+
+fn field_of(error: &ScriptError) -> &'static str {
+    match error {
+        ScriptError::Seats(_)
+        | ScriptError::HandSize { .. }
+        | ScriptError::NotInDeck
+        | ScriptError::Golden
+        | ScriptError::NotATurn
+        | ScriptError::Leader => "hands",
+        ScriptError::Shift => "last_order",
+        ScriptError::Ended => "points",
+        ScriptError::Drawn => "drawn_seat",
+    }
+}

@@ -1,0 +1,446 @@
+//! The table of decisions: one row for each decision of each game, with what its seat knew, what it did and what came of it. How rows are
+//! gathered from a record is in `gather`.
+
+use std::sync::Arc;
+
+use chefshat_engine::{Cards, Mask, Observation, RewardScheme};
+
+use super::column::{Column, ColumnInfo, Type, Value};
+use super::gather::{GameInfo, LatestExpression};
+
+/// Rewards by scheme, in the order of [`RewardScheme::ALL`].
+pub(super) type Rewards = [f32; RewardScheme::ALL.len()];
+
+/// One decision.
+#[derive(Debug, Clone)]
+pub(super) struct DecisionRow {
+    /// The game.
+    pub(super) game: Arc<GameInfo>,
+    /// What the deciding seat could see. Its hand, and what it gave and received, count only where they are known.
+    pub(super) seen: Observation,
+    pub(super) hand_known: bool,
+    pub(super) gave_known: bool,
+    pub(super) received_known: bool,
+    pub(super) number: u64,
+    pub(super) decision_id: u64,
+    pub(super) turn: Option<u32>,
+    pub(super) phase: &'static str,
+    pub(super) seat: usize,
+    pub(super) mask: Mask,
+    pub(super) action: u16,
+    pub(super) text: String,
+    pub(super) invalid_attempts: Vec<u32>,
+    pub(super) source: &'static str,
+    pub(super) decision_time_us: Option<u64>,
+    pub(super) elapsed_ms: u64,
+    /// The latest expression of each seat, index = seat.
+    pub(super) expressions: Vec<Option<LatestExpression>>,
+    pub(super) rewards: Rewards,
+    pub(super) invalid_rewards: Rewards,
+    pub(super) shift_points: Option<u32>,
+    pub(super) shift_place: Option<u8>,
+    pub(super) game_points: Option<u64>,
+    pub(super) game_place: Option<u8>,
+}
+
+impl DecisionRow {
+    fn faces(&self) -> u8 {
+        self.seen.faces
+    }
+
+    fn known(&self, value: impl Into<Value>) -> Value {
+        if self.hand_known {
+            value.into()
+        } else {
+            Value::Null
+        }
+    }
+
+    fn cards(&self, cards: Cards) -> Value {
+        Value::List(cards.counts(self.faces()).map(Value::from).collect())
+    }
+
+    /// Cards given or received: null if there were none, or if they are not known.
+    fn exchanged(&self, cards: Cards, known: bool) -> Value {
+        if known && !cards.is_empty() {
+            self.cards(cards)
+        } else {
+            Value::Null
+        }
+    }
+}
+
+const EXPRESSION: Type = Type::Struct(&[
+    ("label", Type::Text),
+    ("valence", Type::Float32),
+    ("arousal", Type::Float32),
+    ("dominance", Type::Float32),
+    ("confidence", Type::Float32),
+    ("source", Type::Text),
+    ("public", Type::Bool),
+    ("age_ms", Type::Uint64),
+]);
+
+const COUNTS: Type = Type::List(&Type::Uint8);
+
+/// The columns, in the order of the files.
+pub(super) const COLUMNS: &[Column<DecisionRow>] = &[
+    Column::new(
+        "game_id",
+        Type::Text,
+        "Identifies the game: 32 hexadecimal digits.",
+        |row| (&row.game.game_id).into(),
+    ),
+    Column::new("room_name", Type::Text, "Name of the room.", |row| {
+        (&row.game.room_name).into()
+    }),
+    Column::new(
+        "origin",
+        Type::Text,
+        "Where the game came from: `dealt`, `fixed_seed`, `scripted`, `branched` or `imported`.",
+        |row| row.game.origin.into(),
+    ),
+    Column::new(
+        "rules",
+        Type::Text,
+        "The rule set, as the JSON of `chefshat.v1.RuleSet`.",
+        |row| (&row.game.rules).into(),
+    ),
+    Column::new(
+        "rules_version",
+        Type::Uint32,
+        "Version of the rules the game was played by.",
+        |row| row.game.rules_version.into(),
+    ),
+    Column::new(
+        "created_at",
+        Type::Time,
+        "When the room was created; null for a game that was simulated.",
+        |row| row.game.created_at.map_or(Value::Null, Value::Time),
+    ),
+    Column::new(
+        "finished",
+        Type::Bool,
+        "Whether the game was played to its end; false if it was aborted.",
+        |row| row.game.finished.into(),
+    ),
+    Column::new("players", Type::Uint8, "Number of seats.", |row| {
+        row.game.players.into()
+    }),
+    Column::new(
+        "number",
+        Type::Uint64,
+        "Number of the decision in its game, from 1, over all seats.",
+        |row| row.number.into(),
+    ),
+    Column::new(
+        "shift",
+        Type::Uint32,
+        "Number of the Shift, from 1.",
+        |row| row.seen.shift.into(),
+    ),
+    Column::new(
+        "pizza",
+        Type::Uint32,
+        "Number of the pizza in its Shift, from 1; null before the Shift's first turn.",
+        |row| Some(row.seen.pizza).filter(|pizza| *pizza > 0).into(),
+    ),
+    Column::new(
+        "turn",
+        Type::Uint32,
+        "Number of the turn in its Shift, from 1; null for decisions that are no turns.",
+        |row| row.turn.into(),
+    ),
+    Column::new(
+        "seat",
+        Type::Uint8,
+        "Who decided: the number of the seat, from 0.",
+        |row| Value::Uint(row.seat as u64),
+    ),
+    Column::new("agent", Type::Text, "Name of the seat's player.", |row| {
+        (&row.game.seats[row.seat].name).into()
+    }),
+    Column::new(
+        "agent_kind",
+        Type::Text,
+        "What the player is: `agent` (a program), `human`, `robot` or `built_in` (an agent of the server).",
+        |row| row.game.seats[row.seat].kind.into(),
+    ),
+    Column::new(
+        "built_in_agent",
+        Type::Text,
+        "Which built-in agent filled the seat; null for all others.",
+        |row| row.game.seats[row.seat].built_in.as_ref().into(),
+    ),
+    Column::new(
+        "decision_id",
+        Type::Uint64,
+        "Number of the decision among those of its seat, from 1.",
+        |row| row.decision_id.into(),
+    ),
+    Column::new(
+        "phase",
+        Type::Text,
+        "What was decided: `turn` (play or pass), `exchange` (give a card) or `special_action` (declare or decline).",
+        |row| row.phase.into(),
+    ),
+    Column::new(
+        "hand",
+        COUNTS,
+        "The seat's hand before the decision, F+1 counts: index f-1 counts face f, index F the jokers; null where it is not known.",
+        |row| row.known(row.cards(row.seen.hand)),
+    ),
+    Column::new(
+        "golden",
+        Type::Bool,
+        "Whether the hand holds the Golden card; null where the hand is not known.",
+        |row| row.known(row.seen.hand.has_golden()),
+    ),
+    Column::new(
+        "board_face",
+        Type::Uint8,
+        "Face on the board: 0 empty, 1..F, F+1 for a joker played alone.",
+        |row| row.seen.board.face.into(),
+    ),
+    Column::new(
+        "board_size",
+        Type::Uint8,
+        "Cards on the board, jokers included.",
+        |row| row.seen.board.size.into(),
+    ),
+    Column::new(
+        "board_jokers",
+        Type::Uint8,
+        "Jokers among the cards on the board.",
+        |row| row.seen.board.jokers.into(),
+    ),
+    Column::new(
+        "cards_left",
+        COUNTS,
+        "Cards in each hand, index = seat.",
+        |row| row.seen.cards_left.as_slice().into(),
+    ),
+    Column::new(
+        "passed",
+        Type::List(&Type::Bool),
+        "Who has passed and is out of the pizza, index = seat.",
+        |row| row.seen.passed.as_slice().into(),
+    ),
+    Column::new(
+        "places",
+        COUNTS,
+        "Place in the Shift of each seat that has finished it, from 1, else 0; index = seat.",
+        |row| row.seen.places.as_slice().into(),
+    ),
+    Column::new(
+        "roles",
+        COUNTS,
+        "Role of each seat: 1 Chef, 2 Sous-Chef, 3 Cook, 4 Waiter, 5 Dishwasher, 0 none (first Shift); index = seat.",
+        |row| {
+            Value::List(
+                row.seen
+                    .roles
+                    .values()
+                    .map(|role| role.map_or(0, |role| role as u8).into())
+                    .collect(),
+            )
+        },
+    ),
+    Column::new(
+        "points",
+        Type::List(&Type::Uint64),
+        "Points of each seat in the Shifts before, index = seat.",
+        |row| row.seen.points.as_slice().into(),
+    ),
+    Column::new(
+        "played",
+        COUNTS,
+        "Cards played so far in the Shift by anybody, F+1 counts.",
+        |row| row.cards(row.seen.played),
+    ),
+    Column::new(
+        "gave",
+        COUNTS,
+        "Cards the seat gave in the Shift's exchange, F+1 counts; null if none, or not known.",
+        |row| row.exchanged(row.seen.gave, row.gave_known),
+    ),
+    Column::new(
+        "received",
+        COUNTS,
+        "Cards the seat received in the Shift's exchange, F+1 counts; null if none, or not known.",
+        |row| row.exchanged(row.seen.received, row.received_known),
+    ),
+    Column::new(
+        "mask",
+        Type::Binary,
+        "Legal actions as bits: bit i%8 of byte i/8 is action i (numpy.unpackbits with bitorder=\"little\"); null where the hand is not known.",
+        |row| row.known(Value::Binary(row.mask.to_bytes(row.game.actions))),
+    ),
+    Column::new(
+        "legal_actions",
+        Type::List(&Type::Uint16),
+        "The same as ascending indices; null where the hand is not known.",
+        |row| {
+            row.known(Value::List(
+                row.mask
+                    .iter()
+                    .map(|action| action.index().into())
+                    .collect(),
+            ))
+        },
+    ),
+    Column::new(
+        "action",
+        Type::Uint16,
+        "The action taken, by its index.",
+        |row| row.action.into(),
+    ),
+    Column::new(
+        "text",
+        Type::Text,
+        "The action taken, in text: `C{face};Q{quantity};J{jokers}`, `pass`, `give C{face}`, `give J`, `declare` or `decline`.",
+        |row| (&row.text).into(),
+    ),
+    Column::new(
+        "valid",
+        Type::Bool,
+        "Whether the decision was reached without an invalid attempt.",
+        |row| row.invalid_attempts.is_empty().into(),
+    ),
+    Column::new(
+        "invalid_count",
+        Type::Uint32,
+        "Number of invalid attempts before it.",
+        |row| Value::Uint(row.invalid_attempts.len() as u64),
+    ),
+    Column::new(
+        "invalid_attempts",
+        Type::List(&Type::Uint32),
+        "The invalid attempts, by index, in order.",
+        |row| (&row.invalid_attempts).into(),
+    ),
+    Column::new(
+        "source",
+        Type::Text,
+        "Who decided: `agent` (the seat's own player), `substitute` (a built-in agent in its place), `timeout`, `invalid` or `disconnected` (the default decision, and why), `recorded` (taken over from the game that this one branched from).",
+        |row| row.source.into(),
+    ),
+    Column::new(
+        "decision_time_us",
+        Type::Uint64,
+        "Measured time of the decision, microseconds; null for built-in agents, substitutes and recorded decisions, and where nobody measured it.",
+        |row| row.decision_time_us.into(),
+    ),
+    Column::new(
+        "elapsed_ms",
+        Type::Uint64,
+        "When it was taken, milliseconds since the room was created.",
+        |row| row.elapsed_ms.into(),
+    ),
+    Column::new(
+        "expressions",
+        Type::List(&EXPRESSION),
+        "The latest expression of each seat before the decision, index = seat, null where there was none; `public` tells those that the room was told from those for the record only, `age_ms` is its age in milliseconds.",
+        |row| {
+            Value::List(
+                row.expressions
+                    .iter()
+                    .map(|latest| {
+                        latest
+                            .as_ref()
+                            .map_or(Value::Null, |latest| latest.value_at(row.elapsed_ms))
+                    })
+                    .collect(),
+            )
+        },
+    ),
+    Column::new(
+        "reward_validity",
+        Type::Float32,
+        "Reward by the scheme `validity`: 1 for every turn.",
+        |row| row.rewards[0].into(),
+    ),
+    Column::new(
+        "reward_paper",
+        Type::Float32,
+        "Reward by the scheme `paper` (the paper's Experiment 3 as printed).",
+        |row| row.rewards[1].into(),
+    ),
+    Column::new(
+        "reward_paper_intended",
+        Type::Float32,
+        "Reward by the scheme `paper_intended` (the same with the share of cards already shed).",
+        |row| row.rewards[2].into(),
+    ),
+    Column::new(
+        "reward_winning",
+        Type::Float32,
+        "Reward by the scheme `winning`: 1 for finishing first, else -0.001.",
+        |row| row.rewards[3].into(),
+    ),
+    Column::new(
+        "reward_points",
+        Type::Float32,
+        "Reward by the scheme `points`: on a seat's last turn of a Shift its points, else 0.",
+        |row| row.rewards[4].into(),
+    ),
+    Column::new(
+        "invalid_reward_validity",
+        Type::Float32,
+        "What the invalid attempts before it brought by `validity`, summed.",
+        |row| row.invalid_rewards[0].into(),
+    ),
+    Column::new(
+        "invalid_reward_paper",
+        Type::Float32,
+        "What they brought by `paper`.",
+        |row| row.invalid_rewards[1].into(),
+    ),
+    Column::new(
+        "invalid_reward_paper_intended",
+        Type::Float32,
+        "What they brought by `paper_intended`.",
+        |row| row.invalid_rewards[2].into(),
+    ),
+    Column::new(
+        "invalid_reward_winning",
+        Type::Float32,
+        "What they brought by `winning`.",
+        |row| row.invalid_rewards[3].into(),
+    ),
+    Column::new(
+        "invalid_reward_points",
+        Type::Float32,
+        "What they brought by `points`.",
+        |row| row.invalid_rewards[4].into(),
+    ),
+    Column::new(
+        "shift_points",
+        Type::Uint32,
+        "The seat's points of this Shift; null if the Shift was not played to its end.",
+        |row| row.shift_points.into(),
+    ),
+    Column::new(
+        "shift_place",
+        Type::Uint8,
+        "The seat's place in this Shift, from 1; null if the Shift was not played to its end.",
+        |row| row.shift_place.into(),
+    ),
+    Column::new(
+        "game_points",
+        Type::Uint64,
+        "The seat's points at the end of the game; null for an aborted game.",
+        |row| row.game_points.into(),
+    ),
+    Column::new(
+        "game_place",
+        Type::Uint8,
+        "The seat's place in the game, from 1; null for an aborted game.",
+        |row| row.game_place.into(),
+    ),
+];
+
+/// Names, types and descriptions of the columns.
+pub(super) fn columns() -> Vec<ColumnInfo> {
+    COLUMNS.iter().map(Column::info).collect()
+}

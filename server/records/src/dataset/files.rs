@@ -1,0 +1,65 @@
+//! Files that are summed up while they are written: their size and SHA-256, as dataset cards and `SHA256SUMS` state them.
+
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
+
+use sha2::{Digest as _, Sha256};
+
+/// A file of a dataset.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FileSummary {
+    /// Its path within the dataset's folder, with `/` between folders.
+    pub path: String,
+    /// Its size.
+    pub bytes: u64,
+    /// SHA-256 of its content, lower-case hexadecimal digits.
+    pub sha256: String,
+}
+
+/// A file being written.
+pub(super) struct SummedFile {
+    path: String,
+    file: BufWriter<File>,
+    hash: Sha256,
+    bytes: u64,
+}
+
+impl SummedFile {
+    /// A new file at `path` within `folder`; folders between are made.
+    pub(super) fn create(folder: &Path, path: &str) -> io::Result<Self> {
+        let whole = folder.join(path);
+        if let Some(parent) = whole.parent() {
+            std::fs::create_dir_all(parent)?;
+        }
+        Ok(Self {
+            path: path.to_owned(),
+            file: BufWriter::new(File::create_new(whole)?),
+            hash: Sha256::new(),
+            bytes: 0,
+        })
+    }
+
+    /// Ends the file, safe on disk.
+    pub(super) fn finish(self) -> io::Result<FileSummary> {
+        self.file.into_inner()?.sync_all()?;
+        Ok(FileSummary {
+            path: self.path,
+            bytes: self.bytes,
+            sha256: hex::encode(self.hash.finalize()),
+        })
+    }
+}
+
+impl Write for SummedFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let written = self.file.write(bytes)?;
+        self.hash.update(&bytes[..written]);
+        self.bytes += written as u64;
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}

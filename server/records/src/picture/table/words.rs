@@ -1,0 +1,318 @@
+//! What the picture of the table says in words: the title, what the game waits for, what happened.
+
+use chefshat_engine::{Role, Seat, Viewer};
+use serde::Serialize;
+
+use super::super::chronicle::Happening;
+use super::super::paint::Painter;
+use super::super::scene::{Card, Demand, Hand, Now, Scene};
+use super::{COLUMN, is_end};
+
+/// Width of a name within what happened.
+const IN_A_LINE: f32 = 92.0;
+
+/// What the game waits for, or how it ended.
+#[derive(Serialize)]
+pub(super) struct Notice {
+    pub(super) heading: String,
+    pub(super) seat: Option<usize>,
+    pub(super) tiles: Vec<Tile>,
+    pub(super) lines: Vec<String>,
+    pub(super) rows: Vec<Row>,
+}
+
+/// One demand on a play, to be read from afar.
+#[derive(Serialize)]
+pub(super) struct Tile {
+    pub(super) sign: &'static str,
+    pub(super) number: String,
+    pub(super) text: &'static str,
+}
+
+/// One line of a result.
+#[derive(Serialize)]
+pub(super) struct Row {
+    pub(super) place: String,
+    pub(super) seat: usize,
+    pub(super) name: String,
+    pub(super) points: String,
+}
+
+/// What a seat is called.
+pub(super) fn name(scene: &Scene, seat: Seat) -> String {
+    match scene.seats.get(seat.index()) {
+        Some(shown) if !shown.participant.name.is_empty() => shown.participant.name.clone(),
+        _ => format!("seat {seat}"),
+    }
+}
+
+/// Where the game stands.
+pub(super) fn title(scene: &Scene) -> String {
+    let shift = scene.shift;
+    match &scene.now {
+        Now::GameOver(_) => "The game is over".to_owned(),
+        Now::Aborted => "The game was given up".to_owned(),
+        Now::ShiftOver { .. } => format!("Shift {shift} is over"),
+        _ if scene.pizza == 0 => format!("Shift {shift} · before the first pizza"),
+        _ => format!(
+            "Shift {shift} · Pizza {} · Turn {}",
+            scene.pizza, scene.turn
+        ),
+    }
+}
+
+/// With whose eyes the scene is seen, and by which number it is found.
+pub(super) fn eyes(painter: &Painter, scene: &Scene) -> String {
+    let eyes = match scene.viewer {
+        Viewer::Everything => "all hands open".to_owned(),
+        Viewer::Spectator => "as spectators see it".to_owned(),
+        Viewer::Seat(seat) => {
+            let name = painter.fit(&name(scene, seat), 18.0, true, 170.0);
+            format!("as {name} sees it")
+        }
+    };
+    match scene.decision {
+        Some(decision) => format!("decision {decision} · {eyes}"),
+        None => eyes,
+    }
+}
+
+/// How many cards are held.
+pub(super) fn held(hand: &Hand) -> String {
+    let count = match hand {
+        Hand::Open(cards) => cards.len(),
+        Hand::Hidden(count) | Hand::Unknown(count) => usize::from(*count),
+    };
+    match count {
+        0 => "no cards".to_owned(),
+        1 => "1 card".to_owned(),
+        count => format!("{count} cards"),
+    }
+}
+
+/// A place.
+pub(super) fn ordinal(place: u8) -> String {
+    let ending = match place {
+        1 => "st",
+        2 => "nd",
+        3 => "rd",
+        _ => "th",
+    };
+    format!("{place}{ending}")
+}
+
+/// What the seat whose decision is open has to do.
+pub(super) fn to_decide(now: &Now) -> &'static str {
+    match now {
+        Now::Special(_) => "to declare?",
+        Now::Exchange(_) => "to give",
+        _ => "to play",
+    }
+}
+
+/// The cards of a play or a gift.
+pub(super) fn play(cards: &[Card]) -> String {
+    let jokers = cards.iter().filter(|card| **card == Card::Joker).count();
+    let golden = cards.iter().any(|card| matches!(card, Card::Golden(_)));
+    let jokers_too = match jokers {
+        0 => String::new(),
+        1 => " + joker".to_owned(),
+        jokers => format!(" + {jokers} jokers"),
+    };
+    let quantity = cards.len() - jokers;
+    match cards.first().and_then(|card| card.face()) {
+        None if jokers > 1 => format!("{jokers} jokers"),
+        None => "a joker".to_owned(),
+        Some(face) if golden => format!("{quantity} × {face}, Golden{jokers_too}"),
+        Some(face) => format!("{quantity} × {face}{jokers_too}"),
+    }
+}
+
+/// Cards that need not be of one face.
+fn gift(cards: &[Card]) -> String {
+    let words: Vec<String> = cards
+        .iter()
+        .map(|card| match card {
+            Card::Face(face) => face.to_string(),
+            Card::Golden(_) => "Golden".to_owned(),
+            Card::Joker => "joker".to_owned(),
+        })
+        .collect();
+    words.join(" and ")
+}
+
+/// What happened: who did it, and what.
+pub(super) fn happening(
+    painter: &Painter,
+    scene: &Scene,
+    happening: &Happening,
+) -> (Option<Seat>, String) {
+    let because = |cause: &Option<&str>| cause.map_or_else(String::new, |why| format!(" ({why})"));
+    match happening {
+        Happening::Dealt(shift) => (None, format!("Cards are dealt for Shift {shift}")),
+        Happening::Played { seat, cards, cause } => {
+            (Some(*seat), format!("{}{}", play(cards), because(cause)))
+        }
+        Happening::Passed { seat, cause } => (Some(*seat), format!("passes{}", because(cause))),
+        Happening::Finished { seat, place } => {
+            let place = ordinal(u8::try_from(*place).unwrap_or(u8::MAX));
+            (Some(*seat), format!("finishes {place}"))
+        }
+        Happening::PizzaDone { pizza, next } => {
+            let next = painter.fit(&name(scene, *next), 16.0, false, IN_A_LINE);
+            (None, format!("Pizza {pizza} done, {next} leads"))
+        }
+        Happening::Declared { seat, special } => (Some(*seat), format!("{}!", special.name())),
+        Happening::Gave {
+            giver,
+            receiver,
+            count,
+            cards,
+        } => {
+            let what = match cards {
+                Some(cards) => gift(cards),
+                None if *count == 1 => "a card".to_owned(),
+                None => format!("{count} cards"),
+            };
+            (
+                Some(*giver),
+                format!("{what} to {}", name(scene, *receiver)),
+            )
+        }
+        Happening::ShiftOver { shift, winner } => {
+            let winner = painter.fit(&name(scene, *winner), 16.0, false, IN_A_LINE);
+            (None, format!("Shift {shift} over, {winner} first"))
+        }
+        Happening::Expressed { seat, label } => (Some(*seat), format!("shows {label}")),
+    }
+}
+
+/// What the game waits for, or how it ended.
+pub(super) fn notice(painter: &Painter, scene: &Scene) -> Notice {
+    let seat = scene.seats.iter().position(|seat| seat.deciding);
+    let who = seat.map_or_else(String::new, |seat| {
+        painter.fit(&name(scene, Seat::new(seat)), 20.0, true, COLUMN - 150.0)
+    });
+    let (mut tiles, mut lines) = (Vec::new(), Vec::new());
+    let heading = match &scene.now {
+        Now::Dealt => {
+            lines.push("The cards have been dealt.".to_owned());
+            "Before the first pizza".to_owned()
+        }
+        Now::Special(special) => {
+            let role = scene.seats.get(special.index()).and_then(|seat| seat.role);
+            lines.extend(
+                if role == Some(Role::Dishwasher) {
+                    ["Both jokers: Food Fight", "would turn all roles around."]
+                } else {
+                    ["Both jokers: Dinner is Served", "would skip the exchange."]
+                }
+                .map(str::to_owned),
+            );
+            format!("{who} may declare")
+        }
+        Now::Exchange(giver) => {
+            if let Some(receiver) = receiver(scene, *giver) {
+                let receiver = painter.fit(&name(scene, receiver), 18.0, false, COLUMN - 160.0);
+                lines.push(format!("The exchange, to {receiver}."));
+            }
+            format!("{who} gives a card")
+        }
+        Now::Turn {
+            demand, may_pass, ..
+        } => {
+            tiles = demands(*demand);
+            lines.push(turn_line(*demand, *may_pass));
+            format!("{who} to play")
+        }
+        Now::ShiftOver { adjudicated, .. } => {
+            if *adjudicated {
+                lines.push("Ended by the limit of turns.".to_owned());
+            }
+            "Points of this Shift".to_owned()
+        }
+        Now::GameOver(_) => "Final table".to_owned(),
+        Now::Aborted => {
+            lines.push("There is no result.".to_owned());
+            "Given up".to_owned()
+        }
+    };
+    Notice {
+        heading,
+        seat: seat.filter(|_| !is_end(&scene.now)),
+        tiles,
+        lines,
+        rows: rows(painter, scene),
+    }
+}
+
+/// Who receives what a seat gives of its own choice.
+fn receiver(scene: &Scene, giver: Seat) -> Option<Seat> {
+    let other = match scene.seats.get(giver.index())?.role? {
+        Role::Chef => Role::Dishwasher,
+        Role::SousChef => Role::Waiter,
+        Role::Cook | Role::Waiter | Role::Dishwasher => return None,
+    };
+    let mut seats = scene.seats.iter();
+    seats
+        .position(|seat| seat.role == Some(other))
+        .map(Seat::new)
+}
+
+fn demands(demand: Demand) -> Vec<Tile> {
+    let tile = |sign, number: u8, text| Tile {
+        sign,
+        number: number.to_string(),
+        text,
+    };
+    match demand {
+        Demand::Anything | Demand::Beat { face: 0, .. } => Vec::new(),
+        Demand::Golden(face) => vec![tile("", face, "and the Golden one")],
+        Demand::Face(face) => vec![tile("", face, "and no other face")],
+        Demand::Beat { face, size } => vec![
+            tile("≤", face, if face == 1 { "face 1" } else { "face" }),
+            tile("≥", size, if size == 1 { "card" } else { "cards" }),
+        ],
+    }
+}
+
+fn turn_line(demand: Demand, may_pass: bool) -> String {
+    match (demand, may_pass) {
+        (Demand::Golden(_) | Demand::Face(_), false) => "Opens the Shift and may not pass.",
+        (Demand::Golden(_) | Demand::Face(_), true) => "Opens the Shift.",
+        (Demand::Anything, true) => "The board is empty: any play.",
+        (Demand::Anything, false) => "The board is empty: must play.",
+        (Demand::Beat { face: 0, .. }, _) => "Nothing is rarer: only a pass.",
+        (Demand::Beat { .. }, true) => "A rarer face, no fewer cards.",
+        (Demand::Beat { .. }, false) => "May not pass.",
+    }
+    .to_owned()
+}
+
+/// The lines of a result, best first.
+fn rows(painter: &Painter, scene: &Scene) -> Vec<Row> {
+    let row = |place: u8, seat: Seat, points: String| Row {
+        place: ordinal(place),
+        seat: seat.index(),
+        name: painter.fit(&name(scene, seat), 18.0, false, COLUMN - 158.0),
+        points,
+    };
+    match &scene.now {
+        Now::ShiftOver { points, .. } => {
+            let mut rows: Vec<(u8, Row)> = points
+                .iter()
+                .map(|(seat, points)| {
+                    let place = scene.seats.get(seat.index()).map_or(0, |seat| seat.place);
+                    (place, row(place, seat, format!("+{points}")))
+                })
+                .collect();
+            rows.sort_by_key(|(place, _)| *place);
+            rows.into_iter().map(|(_, row)| row).collect()
+        }
+        Now::GameOver(standings) => standings
+            .iter()
+            .map(|(place, seat, points)| row(place, seat, points.to_string()))
+            .collect(),
+        _ => Vec::new(),
+    }
+}

@@ -1,0 +1,269 @@
+//! Checking a decision's line against the game as it stood before it: whose it was, what was legal, how it can have come about, and what
+//! time it can have taken.
+
+use chefshat_engine::{Action, ActionSpace, DecisionKind, Game, Mask, Seat};
+use chefshat_proto::v1::{self, DecisionSource as Source};
+
+use super::header::Setup;
+use super::words::must_be;
+use crate::convert::seat_number;
+
+/// Invalid attempts after which the default is taken even where they are unlimited.
+const MAX_ATTEMPTS: u32 = 10_000;
+
+/// How a seat stands between its decisions.
+#[derive(Debug, Clone)]
+pub(super) struct SeatClock {
+    /// Decisions it has taken.
+    pub(super) decisions: u64,
+    /// What is left of its bank, milliseconds.
+    pub(super) bank_ms: u32,
+    /// Whether a built-in agent holds the seat.
+    pub(super) built_in: bool,
+    /// Whether a substitute plays for it.
+    pub(super) substituted: bool,
+}
+
+/// What a decision is checked against.
+pub(super) struct Asked<'a> {
+    pub(super) setup: &'a Setup,
+    pub(super) game: &'a Game,
+    pub(super) seat: Seat,
+    pub(super) kind: DecisionKind,
+    pub(super) clock: &'a SeatClock,
+    /// Whether the decision is one of those taken over from another record.
+    pub(super) taken_over: bool,
+    /// Whether its hand is known, and with it what was legal.
+    pub(super) hand_known: bool,
+    /// Milliseconds since the decision before, or since the game began.
+    pub(super) since_last_ms: u64,
+}
+
+impl Asked<'_> {
+    /// Checks everything but the action's own consequences, and gives the action.
+    ///
+    /// # Errors
+    /// The first field that does not fit, in words.
+    pub(super) fn check(&self, record: &v1::DecisionRecord) -> Result<Action, String> {
+        let seat = seat_number(self.seat);
+        if record.seat != seat {
+            return Err(must_be("seat", record.seat, seat));
+        }
+        let id = self.clock.decisions + 1;
+        if record.decision_id != id {
+            return Err(must_be("decisionId", record.decision_id, id));
+        }
+        let kind = kind_to_proto(self.kind);
+        if record.kind() != kind {
+            return Err(must_be(
+                "kind",
+                record.kind().as_str_name(),
+                kind.as_str_name(),
+            ));
+        }
+        let action = self.check_action(record)?;
+        self.check_attempts(record)?;
+        self.check_source(record, action)?;
+        self.check_times(record)?;
+        check_annotations(record.annotations.as_ref())?;
+        Ok(action)
+    }
+
+    fn check_action(&self, record: &v1::DecisionRecord) -> Result<Action, String> {
+        let space = self.setup.rules.actions();
+        let legal = self.game.legal_actions();
+        if self.hand_known {
+            check_mask(&record.action_mask, &legal, space)?;
+        } else if !record.action_mask.is_empty() {
+            return Err("actionMask is there, but nobody knows the hand".into());
+        }
+        let action = number(record.action);
+        let text = space.text(action).ok_or_else(|| {
+            format!(
+                "action is {}, but actions are numbered below {}",
+                record.action,
+                space.size()
+            )
+        })?;
+        if record.text != text {
+            return Err(must_be("text", record.text.as_str(), text));
+        }
+        if let Err(error) = self.game.clone().apply(action, |_| {}) {
+            return Err(format!("action is {}: {error}", record.action));
+        }
+        Ok(action)
+    }
+
+    fn check_attempts(&self, record: &v1::DecisionRecord) -> Result<(), String> {
+        let legal = self.game.legal_actions();
+        for (index, attempt) in record.invalid_attempts.iter().enumerate() {
+            if self.hand_known && legal.contains(number(*attempt)) {
+                return Err(format!(
+                    "invalidAttempts[{index}] is {attempt}, which was legal"
+                ));
+            }
+        }
+        let made = record.invalid_attempts.len();
+        let right = self
+            .setup
+            .scheme
+            .filter(|_| self.kind == DecisionKind::Turn && made > 0)
+            .map(|scheme| (0..made).map(|_| scheme.invalid()).sum::<f32>());
+        if record.invalid_reward == right {
+            return Ok(());
+        }
+        let shown =
+            |reward: Option<f32>| reward.map_or("left out".into(), |reward| reward.to_string());
+        Err(must_be(
+            "invalidReward",
+            shown(record.invalid_reward),
+            shown(right),
+        ))
+    }
+
+    fn check_source(&self, record: &v1::DecisionRecord, action: Action) -> Result<(), String> {
+        let source = Source::try_from(record.source).unwrap_or_default();
+        let name = source.as_str_name();
+        if self.taken_over != (source == Source::Recorded) {
+            return Err(if self.taken_over {
+                must_be("source", name, Source::Recorded.as_str_name())
+            } else {
+                format!(
+                    "source is {name}, but the decisions taken over from another record are over"
+                )
+            });
+        }
+        let SeatClock {
+            built_in,
+            substituted,
+            ..
+        } = *self.clock;
+        let by_server = substituted || built_in;
+        let possible = match source {
+            Source::Unspecified => false,
+            Source::Agent => !substituted,
+            Source::Timeout | Source::Disconnected => !by_server,
+            Source::Substitute => substituted,
+            Source::Invalid | Source::Recorded => true,
+        };
+        let real_table = self.setup.origin == v1::GameOrigin::Imported;
+        if !possible || (real_table && source != Source::Agent) {
+            let whose = match (real_table, built_in, substituted) {
+                (true, ..) => "at a real table every player decides",
+                (_, true, _) => "a built-in agent holds the seat",
+                (_, _, true) => "a substitute plays for the seat",
+                _ => "the seat's own agent plays",
+            };
+            return Err(format!("source is {name}, but {whose}"));
+        }
+        let limit = match self.setup.max_invalid_attempts {
+            0 => MAX_ATTEMPTS,
+            limit => limit,
+        };
+        let exhausted = record.invalid_attempts.len() >= limit as usize;
+        if record.invalid_attempts.len() > limit as usize
+            || exhausted != (source == Source::Invalid)
+        {
+            return Err(format!(
+                "source is {name} after {} invalid attempts; the default decision is taken after {limit}",
+                record.invalid_attempts.len()
+            ));
+        }
+        let by_default = matches!(
+            source,
+            Source::Timeout | Source::Disconnected | Source::Invalid
+        );
+        match self.game.default_action() {
+            Some(default) if by_default && default != action => Err(format!(
+                "action is {} and must be {default}, the default, because source is {name}",
+                record.action
+            )),
+            _ => Ok(()),
+        }
+    }
+
+    fn check_times(&self, record: &v1::DecisionRecord) -> Result<(), String> {
+        let time = record.decision_time_us;
+        let timed = matches!(
+            record.source(),
+            Source::Agent | Source::Timeout | Source::Disconnected | Source::Invalid
+        );
+        if time > 0 && (!timed || self.clock.built_in) {
+            return Err(must_be("decisionTimeUs", time, 0));
+        }
+        // Both ends of the span are cut to whole milliseconds.
+        let most = self.since_last_ms.saturating_add(1).saturating_mul(1000);
+        if time > most && self.setup.origin != v1::GameOrigin::Imported {
+            return Err(format!(
+                "decisionTimeUs is {time}, but only {} ms have passed since the decision before",
+                self.since_last_ms
+            ));
+        }
+        let beyond_us = time.saturating_sub(u64::from(self.setup.decision_time_ms) * 1000);
+        let bank_us = u64::from(self.clock.bank_ms) * 1000;
+        let left = bank_us.saturating_sub(beyond_us) / 1000;
+        // The time was cut to whole microseconds after the bank was counted.
+        let least = bank_us.saturating_sub(beyond_us + u64::from(beyond_us > 0)) / 1000;
+        if (least..=left).contains(&record.bank_left_ms.into()) {
+            Ok(())
+        } else {
+            Err(must_be("bankLeftMs", record.bank_left_ms, left))
+        }
+    }
+}
+
+/// What a kind of decision is called in messages.
+pub(crate) fn kind_to_proto(kind: DecisionKind) -> v1::DecisionKind {
+    match kind {
+        DecisionKind::Turn => v1::DecisionKind::Turn,
+        DecisionKind::Exchange => v1::DecisionKind::Exchange,
+        DecisionKind::SpecialAction => v1::DecisionKind::SpecialAction,
+    }
+}
+
+/// The action with a number; one that is out of every range, where the number is.
+pub(crate) fn number(action: u32) -> Action {
+    Action::new(u16::try_from(action).unwrap_or(u16::MAX))
+}
+
+fn check_mask(found: &[u8], legal: &Mask, space: ActionSpace) -> Result<(), String> {
+    let right = legal.to_bytes(space.size());
+    if found == right {
+        return Ok(());
+    }
+    if found.len() != right.len() {
+        return Err(format!(
+            "actionMask has {} bytes and must have {}",
+            found.len(),
+            right.len()
+        ));
+    }
+    let said = |action: u16| {
+        found
+            .get(usize::from(action / 8))
+            .is_some_and(|byte| byte >> (action % 8) & 1 == 1)
+    };
+    let wrong =
+        (0..space.size()).find(|&action| said(action) != legal.contains(Action::new(action)));
+    Err(match wrong {
+        Some(action) => format!(
+            "actionMask says that {} is {}legal, but it is{}",
+            space.text(Action::new(action)).unwrap_or_default(),
+            if said(action) { "" } else { "not " },
+            if said(action) { " not" } else { "" },
+        ),
+        None => "actionMask has bits beyond the last action".into(),
+    })
+}
+
+fn check_annotations(annotations: Option<&v1::Annotations>) -> Result<(), String> {
+    let finite = annotations.is_none_or(|said| {
+        let mut numbers = said.action_scores.iter().chain(&said.value_estimate);
+        numbers.all(|number| number.is_finite())
+    });
+    if finite {
+        Ok(())
+    } else {
+        Err("annotations hold a number that is not finite".into())
+    }
+}

@@ -1,0 +1,118 @@
+//! How the game of a record ended: its final table, what it reveals of its seed, the footer.
+
+use chefshat_engine::{Game, Seed};
+use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
+
+use super::game::Replay;
+use super::seed::{check_reveal, dealing_seed};
+use super::words::difference;
+use super::{Fault, final_table, reveal};
+
+const NOT_OVER: &str = "the footer stands here, but the game is not over";
+
+impl Replay<'_> {
+    /// The game's own seed, from the end of the record.
+    pub(super) fn dealing_seed(&self) -> Result<Seed, Fault> {
+        let Some(line) = self.reveal_line() else {
+            return Err(Fault {
+                line: Some(self.lines.len() + 1),
+                problem: "the record ends here, before the game does: it was cut off".into(),
+            });
+        };
+        reveal(&self.lines[line - 1])
+            .and_then(|reveal| dealing_seed(self.header, reveal))
+            .ok_or_else(|| Fault {
+                line: Some(line),
+                problem: match &self.lines[line - 1].line {
+                    Some(Line::Footer(_)) => NOT_OVER,
+                    _ => "the game's seed is not revealed: reveal.gameSeed is missing or not 32 bytes",
+                }
+                .into(),
+            })
+    }
+
+    /// The line of the game's end, which reveals the seed; where the footer stands at its place, that one.
+    pub(super) fn reveal_line(&self) -> Option<usize> {
+        let end = |line: &v1::RecordLine| match &line.line {
+            Some(Line::Event(event)) => {
+                matches!(event.kind, Some(Kind::GameEnded(_) | Kind::GameAborted(_)))
+            }
+            Some(Line::Footer(_)) => true,
+            _ => false,
+        };
+        self.lines.iter().position(end).map(|index| index + 1)
+    }
+
+    pub(super) fn game_ended(&mut self, ended: &v1::GameEnded) -> Result<(), Fault> {
+        self.nothing_missing()?;
+        let game = self
+            .game
+            .as_ref()
+            .ok_or("the game ends, but it has not begun")?;
+        let standings = game
+            .standings()
+            .ok_or("the game ends here, but by the rules it goes on")?;
+        self.check_reveal(ended.reveal.as_ref())?;
+        let right = v1::GameEnded {
+            standings: final_table(&standings),
+            reveal: ended.reveal.clone(),
+        };
+        if let Some(problem) = difference(ended, &right) {
+            return Err(format!("gameEnded.{problem}").into());
+        }
+        self.over = Some(v1::RoomState::Finished);
+        Ok(())
+    }
+
+    pub(super) fn game_aborted(&mut self, aborted: &v1::GameAborted) -> Result<(), Fault> {
+        use v1::AbortReason::{NeverStarted, Unspecified};
+        self.nothing_missing()?;
+        if self.game.as_ref().is_some_and(Game::is_over) {
+            return Err("the game is aborted, but the rules have ended it with a result".into());
+        }
+        let reason = v1::AbortReason::try_from(aborted.reason).unwrap_or(Unspecified);
+        if reason == Unspecified || (reason == NeverStarted && self.game.is_some()) {
+            return Err(format!(
+                "gameAborted.reason is {}, which it cannot be here",
+                reason.as_str_name()
+            )
+            .into());
+        }
+        match (&self.game, &aborted.reveal) {
+            (None, Some(_)) => Err("gameAborted.reveal is there, but nothing was dealt".into()),
+            (None, None) => Ok(()),
+            (Some(_), reveal) => self.check_reveal(reveal.as_ref()),
+        }?;
+        self.over = Some(v1::RoomState::Aborted);
+        Ok(())
+    }
+
+    fn check_reveal(&self, reveal: Option<&v1::SeedReveal>) -> Result<(), Fault> {
+        if self.table.is_some() {
+            return match reveal {
+                Some(_) => {
+                    Err("reveal is there, but no seed dealt the cards of a real table".into())
+                }
+                None => Ok(()),
+            };
+        }
+        let reveal = reveal.ok_or("reveal is missing, so that no deal can be checked")?;
+        Ok(check_reveal(self.header, reveal)?)
+    }
+
+    pub(super) fn end(&mut self, footer: &v1::RecordFooter) -> Result<(), Fault> {
+        self.nothing_missing()?;
+        let state = self.over.ok_or(NOT_OVER)?;
+        let right = v1::RecordFooter {
+            state: state.into(),
+            events: self.events,
+            decisions: self.decisions,
+        };
+        if let Some(problem) = difference(footer, &right) {
+            return Err(format!("footer.{problem}").into());
+        }
+        self.seats.end(self.header)?;
+        self.ended = true;
+        Ok(())
+    }
+}

@@ -1,0 +1,265 @@
+//! Checking a record's first line: its own form, and that its parts go together. What it says of the seed is checked where the seed is
+//! revealed.
+
+use std::ops::RangeInclusive;
+
+use chefshat_engine::{RULES_VERSION, RewardScheme, RuleSet, Script};
+use chefshat_proto::v1;
+
+use super::seed::Part;
+use super::words::{difference, must_be};
+use crate::convert::{
+    action_space, reward_scheme_from_proto, rules_from_proto, rules_to_proto, script_from_proto,
+};
+use crate::jsonl::FORMAT_VERSION;
+use crate::table::Beginning;
+
+/// Bytes of a seed commitment.
+const COMMITMENT_BYTES: usize = 32;
+/// Milliseconds of a day, the longest time a policy may name.
+const DAY_MS: u32 = 86_400_000;
+
+/// What a header says, checked.
+#[derive(Debug)]
+pub(super) struct Setup {
+    pub(super) rules: RuleSet,
+    pub(super) scheme: Option<RewardScheme>,
+    pub(super) origin: v1::GameOrigin,
+    /// Time for a decision before the bank is touched, milliseconds.
+    pub(super) decision_time_ms: u32,
+    /// The bank of each seat at the beginning, milliseconds.
+    pub(super) bank_ms: u32,
+    /// Invalid attempts at one decision after which the default is taken; 0: unlimited.
+    pub(super) max_invalid_attempts: u32,
+    /// The first Shift, where its hands were given.
+    pub(super) script: Option<Script>,
+    /// Where the game of a real table begins.
+    pub(super) table: Option<Beginning>,
+    /// What was taken over from the record that the game branched from.
+    pub(super) taken_over: Vec<Part>,
+}
+
+/// Checks a header.
+///
+/// # Errors
+/// The first field that cannot stand there, in words.
+pub(super) fn check(header: &v1::RecordHeader) -> Result<Setup, String> {
+    if header.format_version != FORMAT_VERSION {
+        return Err(format!(
+            "the record has form {}; this version reads form {FORMAT_VERSION}",
+            header.format_version
+        ));
+    }
+    if header.rules_version != RULES_VERSION {
+        return Err(format!(
+            "the game was played by version {} of the rules; this version knows version {RULES_VERSION}",
+            header.rules_version
+        ));
+    }
+    check_id("gameId", &header.game_id)?;
+    check_id("roomId", &header.room_id)?;
+    let said = header.rules.as_ref().ok_or("rules are missing")?;
+    let rules = rules_from_proto(said).map_err(|problem| format!("rules.{problem}"))?;
+    within("rules", difference(said, &rules_to_proto(&rules)))?;
+    let space = header.action_space.clone().unwrap_or_default();
+    within(
+        "actionSpace",
+        difference(&space, &action_space(&rules.actions())),
+    )?;
+    check_seats(&header.seats, rules.players())?;
+    let policy = header.policy.as_ref().ok_or("policy is missing")?;
+    check_policy(policy)?;
+    let origin = v1::GameOrigin::try_from(header.origin)
+        .ok()
+        .filter(|origin| *origin != v1::GameOrigin::Unspecified)
+        .ok_or("origin does not say where the game came from")?;
+    check_commitment(origin, header.seed_commitment.len())?;
+    let imported = origin == v1::GameOrigin::Imported;
+    let scripted = header
+        .start
+        .as_ref()
+        .and_then(|start| start.scripted.as_ref());
+    let table = imported
+        .then(|| Beginning::of(scripted, &rules))
+        .transpose()
+        .map_err(|problem| format!("start.scripted.{problem}"))?;
+    let (script, taken_over) = check_start(origin, header.start.as_ref(), &rules)?;
+    Ok(Setup {
+        rules,
+        scheme: reward_scheme_from_proto(policy.reward_scheme()),
+        origin,
+        decision_time_ms: policy.decision_time_ms(),
+        bank_ms: policy.bank_ms(),
+        max_invalid_attempts: policy.max_invalid_attempts(),
+        script,
+        table,
+        taken_over,
+    })
+}
+
+/// The bytes of an id; an error unless it is 32 hexadecimal digits, small ones.
+pub(super) fn check_id(field: &str, id: &str) -> Result<[u8; 16], String> {
+    let mut bytes = [0; 16];
+    match hex::decode_to_slice(id, &mut bytes) {
+        Ok(()) if hex::encode(bytes) == id => Ok(bytes),
+        _ => Err(must_be(field, id, "32 hexadecimal digits (0-9, a-f)")),
+    }
+}
+
+fn within(field: &str, problem: Option<String>) -> Result<(), String> {
+    problem.map_or(Ok(()), |problem| Err(format!("{field}.{problem}")))
+}
+
+fn check_seats(seats: &[v1::Participant], players: usize) -> Result<(), String> {
+    if seats.len() != players {
+        return Err(format!(
+            "seats are {}, but the rule set has {players} players",
+            seats.len()
+        ));
+    }
+    for (index, (seat, number)) in seats.iter().zip(0u32..).enumerate() {
+        if seat.seat != number {
+            return Err(must_be(&format!("seats[{index}].seat"), seat.seat, number));
+        }
+        for (field, kind) in [("kind", seat.kind), ("reservedFor", seat.reserved_for)] {
+            if v1::ParticipantKind::try_from(kind).is_err() {
+                return Err(format!(
+                    "seats[{index}].{field} is {kind}, which is not a kind of participant"
+                ));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn check_policy(policy: &v1::RoomPolicy) -> Result<(), String> {
+    let numbers: [(&str, Option<u32>, RangeInclusive<u32>); 7] = [
+        ("decisionTimeMs", policy.decision_time_ms, 10..=DAY_MS),
+        ("bankMs", policy.bank_ms, 0..=DAY_MS),
+        ("maxInvalidAttempts", policy.max_invalid_attempts, 0..=1000),
+        ("maxTimeouts", policy.max_timeouts, 1..=1000),
+        ("paceMs", policy.pace_ms, 0..=60_000),
+        ("waitingTimeMs", policy.waiting_time_ms, 1_000..=DAY_MS),
+        (
+            "spectatorDelayDecisions",
+            policy.spectator_delay_decisions,
+            0..=10_000,
+        ),
+    ];
+    for (field, value, range) in numbers {
+        if !value.is_some_and(|value| range.contains(&value)) {
+            let found = value.map_or("left out".to_owned(), |value| value.to_string());
+            return Err(format!(
+                "policy.{field} is {found} and must be in {}..={}",
+                range.start(),
+                range.end()
+            ));
+        }
+    }
+    let known = [
+        ("abort", v1::AbortPolicy::try_from(policy.abort).is_ok()),
+        (
+            "rewardScheme",
+            v1::RewardScheme::try_from(policy.reward_scheme).is_ok(),
+        ),
+        (
+            "durability",
+            v1::Durability::try_from(policy.durability).is_ok(),
+        ),
+        ("substitute", !policy.substitute.is_empty()),
+        ("spectators", policy.spectators.is_some()),
+        ("spectatorsSeeHands", policy.spectators_see_hands.is_some()),
+    ];
+    match known.iter().find(|(_, known)| !known) {
+        Some((field, _)) => Err(format!("policy.{field} is not set to anything it can be")),
+        None => Ok(()),
+    }
+}
+
+fn check_commitment(origin: v1::GameOrigin, bytes: usize) -> Result<(), String> {
+    let (committed, fixed) = match origin {
+        v1::GameOrigin::Dealt => (true, false),
+        v1::GameOrigin::FixedSeed | v1::GameOrigin::Imported => (false, true),
+        _ => (true, true),
+    };
+    match bytes {
+        COMMITMENT_BYTES if committed => Ok(()),
+        0 if fixed => Ok(()),
+        _ => {
+            let right = match (committed, fixed) {
+                (true, true) => "32, or left out",
+                (true, false) => "32",
+                (false, _) => "left out",
+            };
+            Err(format!(
+                "seedCommitment has {bytes} bytes; for {} it must be {right}",
+                origin.as_str_name()
+            ))
+        }
+    }
+}
+
+fn check_start(
+    origin: v1::GameOrigin,
+    start: Option<&v1::GameStart>,
+    rules: &RuleSet,
+) -> Result<(Option<Script>, Vec<Part>), String> {
+    use v1::GameOrigin::{Branched, Imported, Scripted};
+    let nothing = v1::GameStart::default();
+    let start = start.unwrap_or(&nothing);
+    let needs = |field: &str, there: bool, needed: bool, allowed: bool| match (there, needed) {
+        (false, true) => Err(format!(
+            "start.{field} is missing, but origin is {}",
+            origin.as_str_name()
+        )),
+        (true, false) if !allowed => Err(format!(
+            "start.{field} is there, but origin is {}",
+            origin.as_str_name()
+        )),
+        _ => Ok(()),
+    };
+    needs(
+        "scripted",
+        start.scripted.is_some(),
+        origin == Scripted,
+        matches!(origin, Branched | Imported),
+    )?;
+    needs(
+        "branchedFrom",
+        start.branched_from.is_some(),
+        origin == Branched,
+        false,
+    )?;
+    needs(
+        "takenOver",
+        !start.taken_over.is_empty(),
+        origin == Branched,
+        false,
+    )?;
+    let script = start
+        .scripted
+        .as_ref()
+        .filter(|_| origin != Imported)
+        .map(|script| script_from_proto(script, rules))
+        .transpose()
+        .map_err(|problem| format!("start.scripted.{problem}"))?;
+    let parts = start
+        .taken_over
+        .iter()
+        .map(|part| Part::new(part).ok_or("start.takenOver: a gameSeed is not 32 bytes"))
+        .collect::<Result<Vec<_>, _>>()?;
+    if let Some(point) = &start.branched_from {
+        check_id("start.branchedFrom.gameId", &point.game_id)?;
+        let taken_over = parts
+            .iter()
+            .try_fold(0u64, |sum, part| sum.checked_add(part.decisions))
+            .ok_or("start.takenOver adds up to too many decisions")?;
+        if point.decisions != taken_over {
+            return Err(format!(
+                "start.branchedFrom.decisions is {} and must be {taken_over}, as start.takenOver adds up",
+                point.decisions
+            ));
+        }
+    }
+    Ok((script, parts))
+}

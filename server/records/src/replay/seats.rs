@@ -1,0 +1,231 @@
+//! Checking the events of the room: who took which seat, who was lost and came back, what was expressed. Nothing of this changes the game.
+
+use chefshat_engine::{RuleSet, Seat};
+use chefshat_proto::v1::{self, game_event::Kind};
+
+use super::decision::SeatClock;
+use super::words::{difference, must_be};
+use crate::convert::{check_expression, seat_from_number};
+
+/// The seats of a recorded room, as its events so far tell of them.
+#[derive(Debug)]
+pub(super) struct Seats {
+    /// Name and kind of who sits there, where the events have told.
+    occupants: Vec<Option<(String, i32)>>,
+    clocks: Vec<SeatClock>,
+    begun: bool,
+}
+
+impl Seats {
+    pub(super) fn new(header: &v1::RecordHeader, bank_ms: u32) -> Self {
+        Self {
+            occupants: vec![None; header.seats.len()],
+            clocks: header
+                .seats
+                .iter()
+                .map(|seat| SeatClock {
+                    decisions: 0,
+                    bank_ms,
+                    built_in: !seat.built_in_agent.is_empty(),
+                    substituted: false,
+                })
+                .collect(),
+            begun: false,
+        }
+    }
+
+    pub(super) fn clock(&mut self, seat: Seat) -> &mut SeatClock {
+        &mut self.clocks[seat.index()]
+    }
+
+    /// Whether the game has begun.
+    pub(super) fn have_begun(&self) -> bool {
+        self.begun
+    }
+
+    /// Takes an event of the room; `false` if it is none.
+    pub(super) fn take(&mut self, kind: &Kind, header: &v1::RecordHeader) -> Result<bool, String> {
+        match kind {
+            Kind::Seated(seated) => {
+                let seat = self.before_the_game("seated", seated.seat)?;
+                if self.occupants[seat].is_some() {
+                    return Err(format!("seat {seat} is taken already"));
+                }
+                self.occupants[seat] = Some((seated.name.clone(), seated.kind));
+            }
+            Kind::Vacated(vacated) => {
+                let seat = self.before_the_game("vacated", vacated.seat)?;
+                if self.occupants[seat].take().is_none() {
+                    return Err(format!("seat {seat} becomes free, but nobody sits there"));
+                }
+            }
+            Kind::Disconnected(lost) => {
+                self.of_an_agent("disconnected", lost.seat)?;
+            }
+            Kind::Returned(returned) => {
+                let seat = self.of_an_agent("returned", returned.seat)?;
+                self.clocks[seat].substituted = false;
+            }
+            Kind::Substituted(substituted) => {
+                let seat = self.of_an_agent("substituted", substituted.seat)?;
+                let policy = header.policy.as_ref().map(|policy| &policy.substitute);
+                if !self.begun || self.clocks[seat].substituted {
+                    return Err(format!(
+                        "seat {seat} is substituted, but {}",
+                        if self.begun {
+                            "it was already"
+                        } else {
+                            "the game has not begun"
+                        }
+                    ));
+                }
+                if policy != Some(&substituted.built_in_agent) {
+                    return Err(must_be(
+                        "substituted.builtInAgent",
+                        substituted.built_in_agent.as_str(),
+                        policy.map_or("", String::as_str),
+                    ));
+                }
+                self.clocks[seat].substituted = true;
+            }
+            Kind::ServerRestarted(_) => {}
+            Kind::ExpressionShown(shown) => {
+                self.seat("expressionShown", shown.seat)?;
+                check_shown("expressionShown", shown.expression.as_ref(), false)?;
+            }
+            _ => return Ok(false),
+        }
+        Ok(true)
+    }
+
+    /// Takes an expression that was made for the record only.
+    pub(super) fn private(&self, private: &v1::PrivateExpression) -> Result<(), String> {
+        self.seat("privateExpression", private.seat)?;
+        check_shown("privateExpression", private.expression.as_ref(), true)
+    }
+
+    /// The game begins: what everybody was told of it must be what the header says.
+    pub(super) fn begin(
+        &mut self,
+        started: &v1::GameStarted,
+        header: &v1::RecordHeader,
+        rules: &RuleSet,
+    ) -> Result<(), String> {
+        self.check_occupants(header)?;
+        let right = game_started(header, rules);
+        self.begun = true;
+        match difference(started, &right) {
+            Some(problem) => Err(format!("gameStarted.{problem}, as in the header")),
+            None => Ok(()),
+        }
+    }
+
+    /// The record is over: the header must say of its seats what they were at the end.
+    pub(super) fn end(&self, header: &v1::RecordHeader) -> Result<(), String> {
+        if !self.begun {
+            self.check_occupants(header)?;
+        }
+        for (index, (seat, clock)) in header.seats.iter().zip(&self.clocks).enumerate() {
+            if seat.substituted != clock.substituted {
+                return Err(format!(
+                    "the header says that seat {index} was {}substituted at the end, but it was{}",
+                    if seat.substituted { "" } else { "not " },
+                    if seat.substituted { " not" } else { "" },
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_occupants(&self, header: &v1::RecordHeader) -> Result<(), String> {
+        for (index, (seat, occupant)) in header.seats.iter().zip(&self.occupants).enumerate() {
+            let said = (seat.name.as_str(), seat.kind);
+            let sits = match occupant {
+                Some((name, kind)) => (name.as_str(), *kind),
+                None if self.clocks[index].built_in => said,
+                None => ("", 0),
+            };
+            if said != sits {
+                return Err(format!(
+                    "the header has {:?} on seat {index}, but there {}",
+                    seat.name,
+                    match sits {
+                        ("", _) => "nobody took a seat".to_owned(),
+                        (name, _) if name == seat.name =>
+                            "a participant of another kind sits".into(),
+                        (name, _) => format!("{name:?} sits"),
+                    }
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    fn before_the_game(&self, event: &str, seat: u32) -> Result<usize, String> {
+        if self.begun {
+            return Err(format!("`{event}` after the game began"));
+        }
+        self.of_an_agent(event, seat)
+    }
+
+    fn of_an_agent(&self, event: &str, seat: u32) -> Result<usize, String> {
+        let seat = self.seat(event, seat)?;
+        if self.clocks[seat].built_in {
+            return Err(format!(
+                "{event}.seat is {seat}, which a built-in agent holds from the start"
+            ));
+        }
+        Ok(seat)
+    }
+
+    fn seat(&self, event: &str, seat: u32) -> Result<usize, String> {
+        seat_from_number(seat, self.clocks.len())
+            .map(Seat::index)
+            .ok_or_else(|| {
+                format!(
+                    "{event}.seat is {seat}, but the seats are 0..={}",
+                    self.clocks.len() - 1
+                )
+            })
+    }
+}
+
+fn check_shown(
+    event: &str,
+    expression: Option<&v1::Expression>,
+    record_only: bool,
+) -> Result<(), String> {
+    let expression = expression.ok_or_else(|| format!("{event} has no expression"))?;
+    check_expression(expression).map_err(|problem| format!("{event}.expression.{problem}"))?;
+    if expression.record_only == record_only {
+        Ok(())
+    } else {
+        Err(must_be(
+            &format!("{event}.expression.recordOnly"),
+            expression.record_only,
+            record_only,
+        ))
+    }
+}
+
+/// What everybody is told when a game begins.
+pub(crate) fn game_started(header: &v1::RecordHeader, rules: &RuleSet) -> v1::GameStarted {
+    v1::GameStarted {
+        game_id: header.game_id.clone(),
+        rules: header.rules.clone(),
+        rules_version: header.rules_version,
+        policy: header.policy.clone(),
+        seats: header
+            .seats
+            .iter()
+            .map(|seat| v1::Participant {
+                connected: true,
+                substituted: false,
+                ..seat.clone()
+            })
+            .collect(),
+        action_space: header.action_space.clone(),
+        hand_size: rules.hand_size().into(),
+        seed_commitment: header.seed_commitment.clone(),
+    }
+}

@@ -1,0 +1,60 @@
+//! The cells of one row: taken by the name of their column, with the words for those that make no sense.
+
+use std::collections::BTreeMap;
+
+use super::TranscriptError;
+
+/// The longest time a transcript may name, seconds: a hundred days.
+const MAX_SECONDS: f64 = 8_640_000.0;
+
+/// The cells of a row by column, those that are not empty.
+pub(super) struct Cells<'a> {
+    pub(super) line: usize,
+    pub(super) cells: BTreeMap<&'a str, &'a str>,
+}
+
+impl<'a> Cells<'a> {
+    pub(super) fn wrong(&self, problem: impl Into<String>) -> TranscriptError {
+        TranscriptError {
+            line: self.line,
+            problem: problem.into(),
+        }
+    }
+
+    pub(super) fn need(&self, column: &str) -> Result<&'a str, TranscriptError> {
+        self.cells
+            .get(column)
+            .copied()
+            .ok_or_else(|| self.wrong(format!("`{column}` is empty")))
+    }
+
+    pub(super) fn number(&self, column: &str) -> Result<u32, TranscriptError> {
+        let text = self.need(column)?;
+        text.parse()
+            .map_err(|_| self.wrong(format!("`{column}` is {text:?} and must be a whole number")))
+    }
+
+    pub(super) fn float(&self, column: &str) -> Result<Option<f64>, TranscriptError> {
+        let Some(text) = self.cells.get(column) else {
+            return Ok(None);
+        };
+        let number = text.parse().ok().filter(|number: &f64| number.is_finite());
+        number
+            .map(Some)
+            .ok_or_else(|| self.wrong(format!("`{column}` is {text:?} and must be a number")))
+    }
+
+    /// A time in seconds, counted in other units.
+    pub(super) fn seconds(&self, column: &str, units: f64) -> Result<Option<u64>, TranscriptError> {
+        match self.float(column)? {
+            None => Ok(None),
+            // The bound keeps the product far below what the integer holds.
+            Some(seconds) if (0.0..=MAX_SECONDS).contains(&seconds) => {
+                Ok(Some((seconds * units).round() as u64))
+            }
+            Some(seconds) => Err(self.wrong(format!(
+                "`{column}` is {seconds} and must be in 0..={MAX_SECONDS}"
+            ))),
+        }
+    }
+}

@@ -1,0 +1,217 @@
+//! What a request for a new room asks for, checked, with the recorded games it names looked up.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use chefshat_arena::RecordedPlayer;
+use chefshat_engine::{RuleSet, Stop};
+use chefshat_proto::v1::{self, create_room_request::Start};
+use chefshat_records::branch::{BranchError, branch_of};
+use chefshat_records::convert::{FieldProblem, rules_from_proto, script_from_proto, seat_number};
+use tonic::{Code, Status};
+
+use super::recorded::Recorded;
+use super::status::{field, status};
+use crate::config::{MAX_HOSTED_SHIFTS, MAX_NAME_CHARS};
+use crate::convert;
+use crate::ids::Id;
+use crate::room::policy::{Durability, Policy};
+use crate::rooms::NewRoom;
+use crate::store::journal::{Branch, Fill, GameStart};
+
+/// Rules, start and fixed game seed of a new room.
+struct Beginning {
+    rules: RuleSet,
+    start: GameStart,
+    game_seed: Option<[u8; 32]>,
+}
+
+/// Checks what is asked for.
+pub(super) async fn new_room(
+    recorded: &Recorded,
+    request: v1::CreateRoomRequest,
+) -> Result<NewRoom, Status> {
+    let name = request.name.trim().to_owned();
+    check_name(&name, 0).map_err(|problem| field("NAME_REFUSED", &problem))?;
+    let policy = kept_policy(recorded, &request.policy.unwrap_or_default())
+        .map_err(|problem| field("POLICY_REFUSED", &problem))?;
+    let game_seed = game_seed(&request.game_seed)?;
+    let beginning = match &request.start {
+        Some(Start::Branch(point)) => {
+            branched(recorded, point, request.rules.as_ref(), game_seed).await?
+        }
+        start => {
+            let rules = hosted_rules(&request.rules.unwrap_or_default())?;
+            let script = match start {
+                Some(Start::Scripted(script)) => Some(
+                    script_from_proto(script, &rules)
+                        .map_err(|problem| field("SCRIPT_REFUSED", &problem))?,
+                ),
+                _ => None,
+            };
+            Beginning {
+                rules,
+                start: GameStart {
+                    script,
+                    branch: None,
+                },
+                game_seed,
+            }
+        }
+    };
+    let fills = convert::fills_from_proto(&request.seats, &beginning.rules)
+        .map_err(|problem| field("SEATS_REFUSED", &problem))?;
+    Ok(NewRoom {
+        name,
+        recorded: recorded_players(recorded, &fills).await?,
+        rules: beginning.rules,
+        policy,
+        fills,
+        start: beginning.start,
+        game_seed: beginning.game_seed,
+    })
+}
+
+/// A policy that promises no more than the server's store can keep.
+fn kept_policy(recorded: &Recorded, message: &v1::RoomPolicy) -> Result<Policy, FieldProblem> {
+    let mut policy = convert::policy_from_proto(message)?;
+    if !recorded.rooms().store().outlives_server() {
+        if message.durability() == v1::Durability::Durable {
+            let problem = "this server keeps games in memory alone; leave it unset";
+            return Err(FieldProblem::new("durability", problem));
+        }
+        policy.durability = Durability::Ephemeral;
+    }
+    Ok(policy)
+}
+
+fn hosted_rules(message: &v1::RuleSet) -> Result<RuleSet, Status> {
+    let rules = rules_from_proto(message).map_err(|problem| field("RULE_SET_REFUSED", &problem))?;
+    check_length(&rules)?;
+    Ok(rules)
+}
+
+/// Checks that a game by these rules is not longer than one that is hosted may be.
+fn check_length(rules: &RuleSet) -> Result<(), Status> {
+    let (stop_field, length) = match rules.stop() {
+        Stop::Points(points) => ("target_points", points),
+        Stop::Shifts(shifts) => ("target_shifts", shifts),
+    };
+    if length <= MAX_HOSTED_SHIFTS {
+        return Ok(());
+    }
+    Err(status(
+        Code::InvalidArgument,
+        "RULE_SET_REFUSED",
+        format!(
+            "a hosted game ends after at most {MAX_HOSTED_SHIFTS} points or Shifts, not {length}"
+        ),
+        [
+            ("field", stop_field),
+            ("max_shifts", &MAX_HOSTED_SHIFTS.to_string()),
+        ],
+    ))
+}
+
+fn game_seed(bytes: &[u8]) -> Result<Option<[u8; 32]>, Status> {
+    if bytes.is_empty() {
+        return Ok(None);
+    }
+    bytes.try_into().map(Some).map_err(|_| {
+        let message = format!("{} bytes; give 32, or none", bytes.len());
+        field("SEED_REFUSED", &FieldProblem::new("game_seed", message))
+    })
+}
+
+/// A game that begins as a recorded one did.
+async fn branched(
+    recorded: &Recorded,
+    point: &v1::BranchPoint,
+    rules: Option<&v1::RuleSet>,
+    game_seed: Option<[u8; 32]>,
+) -> Result<Beginning, Status> {
+    let refused = |name: &'static str, message: String| {
+        field("BRANCH_REFUSED", &FieldProblem::new(name, message))
+    };
+    if rules.is_some_and(|rules| *rules != v1::RuleSet::default()) {
+        let message = "leave it unset: the rules are those of the recorded game";
+        return Err(refused("rules", message.to_owned()));
+    }
+    if point.same_deals && game_seed.is_some() {
+        let message = "with `same_deals` the recorded game's seed deals; leave one of them unset";
+        return Err(refused("game_seed", message.to_owned()));
+    }
+    let decisions = point.decisions;
+    let branch = recorded
+        .of_game(&point.game_id, move |lines| branch_of(&lines, decisions))
+        .await?
+        .map_err(|error| match error {
+            BranchError::TooFar { .. } | BranchError::Over(_) => {
+                refused("decisions", error.to_string())
+            }
+            error => refused("game_id", error.to_string()),
+        })?;
+    check_length(&branch.rules)?;
+    let game_seed = match (point.same_deals, branch.later_deals) {
+        (false, _) => game_seed,
+        (true, Some(seed)) => Some(seed.0),
+        (true, None) => {
+            let message = "the later Shifts of this game were not dealt from one seed";
+            return Err(refused("same_deals", message.to_owned()));
+        }
+    };
+    let game = Id::parse(&point.game_id).expect("a record was found by it");
+    Ok(Beginning {
+        rules: branch.rules,
+        start: GameStart {
+            script: branch.script,
+            branch: Some(Branch {
+                game,
+                same_deals: point.same_deals,
+                taken_over: branch.taken_over,
+            }),
+        },
+        game_seed,
+    })
+}
+
+/// The players of the seats that are filled by a recorded one.
+async fn recorded_players(
+    recorded: &Recorded,
+    fills: &[Fill],
+) -> Result<BTreeMap<usize, Arc<RecordedPlayer>>, Status> {
+    let mut players = BTreeMap::new();
+    for (index, fill) in fills.iter().enumerate() {
+        let Fill::Replay(seat) = fill else { continue };
+        let number = seat_number(seat.seat);
+        let player = recorded
+            .of_game(&seat.game.to_string(), move |lines| {
+                convert::recorded_player(&lines, number)
+            })
+            .await?
+            .map_err(|error| {
+                let problem = FieldProblem::new("seats", error.to_string());
+                field("SEATS_REFUSED", &problem)
+            })?;
+        players.insert(index, player);
+    }
+    Ok(players)
+}
+
+/// Checks a name of at least so many characters.
+pub(super) fn check_name(name: &str, least: usize) -> Result<(), FieldProblem> {
+    let length = name.chars().count();
+    if !(least..=MAX_NAME_CHARS).contains(&length) {
+        return Err(FieldProblem::new(
+            "name",
+            format!("{length} characters are not in {least}..={MAX_NAME_CHARS}"),
+        ));
+    }
+    if name.chars().any(char::is_control) {
+        return Err(FieldProblem::new(
+            "name",
+            "control characters cannot be shown",
+        ));
+    }
+    Ok(())
+}

@@ -1,0 +1,339 @@
+//! All rooms of a server: making them, finding them, closing them down. Going on with those of a server that ended is in `restore`.
+
+mod restore;
+mod table;
+
+use std::collections::{BTreeMap, HashSet};
+use std::sync::atomic::AtomicU64;
+use std::sync::{Arc, Mutex, MutexGuard, Weak};
+use std::time::Duration;
+
+use chefshat_arena::RecordedPlayer;
+use chefshat_engine::{RULES_VERSION, RuleSet};
+use chefshat_records::seeds::SeedPlan;
+use tokio::sync::Notify;
+use tokio_util::task::TaskTracker;
+
+use crate::config::ServerConfig;
+use crate::filing::Filing;
+use crate::ids::{Id, Token, join_code, normal_code, random_bytes};
+use crate::room::policy::{Durability, Policy};
+use crate::room::{Handle, RoomWatcher, TaskContext, since_epoch_ms, start};
+use crate::store::journal::{Fill, GameHeader, GameStart};
+use crate::store::{Store, StoreError};
+use table::{Entry, Table};
+
+/// What a new room is to be.
+#[derive(Debug)]
+pub struct NewRoom {
+    /// Name to show.
+    pub name: String,
+    /// The rules.
+    pub rules: RuleSet,
+    /// The policy.
+    pub policy: Policy,
+    /// What fills each seat.
+    pub fills: Vec<Fill>,
+    /// The recorded players of the seats that are filled by one, by seat.
+    pub recorded: BTreeMap<usize, Arc<RecordedPlayer>>,
+    /// How its game begins.
+    pub start: GameStart,
+    /// The game seed, if its creator fixes it.
+    pub game_seed: Option<[u8; 32]>,
+}
+
+/// A room that was made, with its secrets.
+#[derive(Debug)]
+pub struct Created {
+    /// How to reach it.
+    pub handle: Handle,
+    /// The join code.
+    pub join_code: String,
+    /// The owner's token.
+    pub owner: Token,
+}
+
+/// Why no room was made.
+#[derive(Debug, thiserror::Error)]
+pub enum CreateError {
+    /// The limit of rooms is reached.
+    #[error("the server holds {0} rooms already; close one or try later")]
+    TooMany(usize),
+    /// The server takes no new rooms.
+    #[error("the server is shutting down and takes no new rooms")]
+    ShuttingDown,
+    /// The store refused.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+}
+
+/// The rooms of a server.
+pub struct Rooms {
+    table: Mutex<Table>,
+    /// Notified when a game has ended or a room has gone.
+    changed: Notify,
+    context: TaskContext,
+    max_rooms: usize,
+}
+
+impl Rooms {
+    /// No rooms yet.
+    pub fn new(config: &ServerConfig, store: Arc<dyn Store>, tracker: TaskTracker) -> Arc<Self> {
+        Arc::new_cyclic(|rooms: &Weak<Self>| Self {
+            table: Mutex::default(),
+            changed: Notify::new(),
+            context: TaskContext {
+                filing: Filing::new(Arc::clone(&store), config.data_dir.clone(), tracker.clone()),
+                store,
+                retention: config.retention,
+                connections: Arc::new(AtomicU64::new(1)),
+                tracker,
+                watcher: Arc::new(Watcher(Weak::clone(rooms))),
+            },
+            max_rooms: config.max_rooms,
+        })
+    }
+
+    /// Makes a room.
+    ///
+    /// # Errors
+    /// The limit of rooms, a shutdown, or the store.
+    pub async fn create(self: &Arc<Self>, new: NewRoom) -> Result<Created, CreateError> {
+        let place = Place::reserve(self)?;
+        // Made to the end even if whoever asked for it goes away: what is half made would be kept and be nobody's.
+        let making = self.context.tracker.spawn(place.make(new));
+        making
+            .await
+            .map_err(|error| StoreError(format!("a room was not made: {error}")))?
+    }
+
+    /// A room by its id.
+    pub fn get(&self, id: Id) -> Option<Handle> {
+        let table = self.lock();
+        let number = table.numbers.get(&id)?;
+        table
+            .by_number
+            .get(number)
+            .map(|entry| entry.handle.clone())
+    }
+
+    /// A room by its join code.
+    pub fn by_code(&self, code: &str) -> Option<Handle> {
+        let table = self.lock();
+        let number = table.codes.get(&normal_code(code))?;
+        table
+            .by_number
+            .get(number)
+            .map(|entry| entry.handle.clone())
+    }
+
+    /// Whether `code` is the join code of a room.
+    pub fn code_is(&self, id: Id, code: &str) -> bool {
+        self.by_code(code).is_some_and(|handle| handle.id() == id)
+    }
+
+    /// At most `count` rooms made after the one numbered `after`, with their numbers.
+    pub fn list(&self, after: Option<u64>, count: usize) -> Vec<(u64, Handle)> {
+        let first = after.map_or(0, |number| number.saturating_add(1));
+        self.lock()
+            .by_number
+            .range(first..)
+            .take(count)
+            .map(|(number, entry)| (*number, entry.handle.clone()))
+            .collect()
+    }
+
+    /// Whether a game is being played or awaited here.
+    pub fn is_running(&self, game: Id) -> bool {
+        self.lock()
+            .by_number
+            .values()
+            .any(|entry| entry.game_id == game && !entry.over)
+    }
+
+    /// Rooms in which a game is being played or awaited.
+    pub fn open_count(&self) -> usize {
+        self.lock()
+            .by_number
+            .values()
+            .filter(|entry| entry.is_open())
+            .count()
+    }
+
+    /// Whether the server takes no new rooms.
+    pub fn is_shutting_down(&self) -> bool {
+        self.lock().shutting_down
+    }
+
+    /// Where games are kept.
+    pub fn store(&self) -> &Arc<dyn Store> {
+        &self.context.store
+    }
+
+    /// Writes records to files.
+    pub fn filing(&self) -> &Filing {
+        &self.context.filing
+    }
+
+    fn is_durable(&self, header: &GameHeader) -> bool {
+        self.context.store.outlives_server() && header.policy.durability == Durability::Durable
+    }
+
+    /// Takes no new rooms and lets running games go on for `grace`. What is left then is put down where it stands, to go on when the server
+    /// is back, or aborted if it cannot. Returns when no game is open any more.
+    pub async fn shut_down(&self, grace: Duration) {
+        self.lock().shutting_down = true;
+        let mut playing = HashSet::new();
+        for (handle, durable) in self.open() {
+            let waits = match handle.describe().await {
+                Ok(room) => room.state() == chefshat_proto::v1::RoomState::Waiting,
+                Err(_) => continue,
+            };
+            // Nobody is waited for who has not begun. Where that is lost it is said at once; else the agents stay as long as the server does.
+            match (waits, durable) {
+                (false, _) => drop(playing.insert(handle.id())),
+                (true, false) => handle.end(durable).await,
+                (true, true) => {}
+            }
+        }
+        // Both waits end: within the grace, or because every room does as it is told.
+        let over = self.until(|table| !table.any_open(|id| playing.contains(&id)));
+        let _ = tokio::time::timeout(grace, over).await;
+        // First those whose games are lost: putting a room down ends the streams on which others may still hear how theirs ended.
+        for durable in [false, true] {
+            for (handle, _) in self.open().into_iter().filter(|(_, it)| *it == durable) {
+                handle.end(durable).await;
+            }
+            self.until(|table| !table.any_open_of(durable)).await;
+        }
+        // With their handles gone, the rooms end that still show their games, and the tracker's tasks with them.
+        self.lock().remove_over();
+    }
+
+    /// The rooms whose games are not over, and whether they go on when the server is back.
+    fn open(&self) -> Vec<(Handle, bool)> {
+        (self.lock().by_number.values())
+            .filter(|entry| entry.is_open())
+            .map(|entry| (entry.handle.clone(), entry.durable))
+            .collect()
+    }
+
+    /// Waits until the table is as it is wanted.
+    async fn until(&self, wanted: impl Fn(&Table) -> bool) {
+        loop {
+            let changed = self.changed.notified();
+            if wanted(&self.lock()) {
+                return;
+            }
+            changed.await;
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Table> {
+        self.table
+            .lock()
+            .expect("nothing that holds this lock can panic")
+    }
+}
+
+impl std::fmt::Debug for Rooms {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter.debug_struct("Rooms").finish_non_exhaustive()
+    }
+}
+
+/// A place in the table for a room that is being made.
+struct Place(Arc<Rooms>);
+
+impl Place {
+    fn reserve(rooms: &Arc<Rooms>) -> Result<Self, CreateError> {
+        rooms.lock().reserve(rooms.max_rooms)?;
+        Ok(Self(Arc::clone(rooms)))
+    }
+
+    async fn make(self, new: NewRoom) -> Result<Created, CreateError> {
+        let rooms = &self.0;
+        let room_id = Id::random();
+        let owner = Token::random(room_id);
+        let header = Arc::new(GameHeader {
+            room_id,
+            game_id: Id::random(),
+            name: new.name,
+            rules: new.rules,
+            policy: new.policy,
+            rules_version: RULES_VERSION,
+            fills: new.fills,
+            recorded: new.recorded,
+            start: new.start,
+            seed: match new.game_seed {
+                Some(game_seed) => SeedPlan::Fixed { game_seed },
+                None => SeedPlan::Committed {
+                    server_seed: random_bytes(),
+                    nonce: random_bytes(),
+                },
+            },
+            created_at_ms: since_epoch_ms(),
+            join_code: join_code(),
+            owner: owner.hash(),
+        });
+        let mut journal = rooms.context.store.create(Arc::clone(&header)).await?;
+        // Looked at and entered under one lock, so that a shutdown cannot slip in between and miss the room.
+        if let Some(mut table) = Some(rooms.lock()).filter(|table| !table.shutting_down) {
+            table.make_space(rooms.max_rooms);
+            let handle = start(Arc::clone(&header), journal, rooms.context.clone());
+            table.enter(Entry {
+                handle: handle.clone(),
+                game_id: header.game_id,
+                join_code: header.join_code.clone(),
+                durable: rooms.is_durable(&header),
+                over: false,
+                put_down: false,
+            });
+            return Ok(Created {
+                handle,
+                join_code: header.join_code.clone(),
+                owner,
+            });
+        }
+        // Nobody has heard of it: it is not to be there when the server is back.
+        journal.finish(None).await?;
+        Err(CreateError::ShuttingDown)
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        self.0.lock().being_made -= 1;
+    }
+}
+
+struct Watcher(Weak<Rooms>);
+
+impl RoomWatcher for Watcher {
+    fn game_over(&self, room: Id) {
+        if let Some(rooms) = self.0.upgrade() {
+            let mut table = rooms.lock();
+            if let Some(number) = table.numbers.get(&room).copied()
+                && let Some(entry) = table.by_number.get_mut(&number)
+            {
+                entry.over = true;
+            }
+            drop(table);
+            rooms.changed.notify_waiters();
+        }
+    }
+
+    fn gone(&self, room: Id) {
+        if let Some(rooms) = self.0.upgrade() {
+            let mut table = rooms.lock();
+            if let Some(number) = table.numbers.get(&room).copied() {
+                match table.by_number.get_mut(&number) {
+                    Some(entry) if !entry.over => entry.put_down = true,
+                    _ => table.remove(number),
+                }
+            }
+            drop(table);
+            rooms.changed.notify_waiters();
+        }
+    }
+}

@@ -1,0 +1,128 @@
+//! Going on after the server ended: every game that was going on stands where its last kept decision left it, games that had just ended are
+//! still shown to those who have not heard of it, and records that were not written are.
+
+use std::collections::{BTreeMap, HashMap};
+use std::sync::Arc;
+use std::time::Duration;
+
+use chefshat_arena::RecordedPlayer;
+use chefshat_engine::RULES_VERSION;
+use chefshat_records::convert::seat_number;
+use tracing::{error, info, warn};
+
+use super::{Entry, Rooms};
+use crate::convert;
+use crate::ids::Id;
+use crate::room::core::Core;
+use crate::room::{RoomClock, go_on, since_epoch_ms};
+use crate::store::journal::Fill;
+use crate::store::{LeftGame, Store, StoreError};
+
+impl Rooms {
+    /// Takes up the games that were going on when the server ended, and says how many. One that cannot be gone on with is left as it is, and
+    /// logged.
+    ///
+    /// # Errors
+    /// The store's.
+    pub async fn restore(&self) -> Result<usize, StoreError> {
+        let retention = u64::try_from(self.context.retention.as_millis()).unwrap_or(u64::MAX);
+        let ended_since_ms = since_epoch_ms().saturating_sub(retention);
+        // Asked before any room is there that could write its record at the same time.
+        let unfiled = self.context.store.unfiled().await?;
+        let mut players = Players::default();
+        let mut restored = 0;
+        for game in self.context.store.left(ended_since_ms).await? {
+            let id = game.header.game_id;
+            let goes_on = !game.concluded;
+            match self.go_on_with(game, &mut players).await {
+                Ok(()) => restored += usize::from(goes_on),
+                Err(problem) => {
+                    error!(game = %id, %problem, "a game cannot be gone on with; it is left as it is");
+                }
+            }
+        }
+        if restored > 0 {
+            info!(games = restored, "games go on where they stood");
+        }
+        for game in unfiled {
+            self.context.filing.file(game);
+        }
+        Ok(restored)
+    }
+
+    async fn go_on_with(&self, game: LeftGame, players: &mut Players) -> Result<(), String> {
+        let mut header = game.header;
+        if header.rules_version != RULES_VERSION {
+            return Err(format!(
+                "it is played by version {} of the rules; this version of chefshat knows version {RULES_VERSION}",
+                header.rules_version
+            ));
+        }
+        header.recorded = players.of(&self.context.store, &header.fills).await;
+        let header = Arc::new(header);
+        let since_created = since_epoch_ms().saturating_sub(header.created_at_ms);
+        let last = game.entries.last().map_or(Duration::ZERO, |entry| entry.at);
+        // A clock that was set back does not make the room younger than its journal.
+        let age = Duration::from_millis(since_created).max(last);
+        let core = Core::revived(Arc::clone(&header), &game.entries, age)
+            .map_err(|problem| problem.to_string())?;
+        let clock = RoomClock::of_age(age);
+        let mut table = self.lock();
+        let over_since = game.concluded.then_some(age);
+        let handle = go_on(core, clock, over_since, game.journal, self.context.clone());
+        table.enter(Entry {
+            handle,
+            game_id: header.game_id,
+            join_code: header.join_code.clone(),
+            durable: true,
+            over: game.concluded,
+            put_down: false,
+        });
+        Ok(())
+    }
+}
+
+/// Recorded players that have been read: a player may sit in many rooms.
+#[derive(Default)]
+struct Players(HashMap<(Id, u32), Option<Arc<RecordedPlayer>>>);
+
+impl Players {
+    /// The recorded players of seats that are filled by one. Where a record is gone, the policy's substitute plays.
+    async fn of(
+        &mut self,
+        store: &Arc<dyn Store>,
+        fills: &[Fill],
+    ) -> BTreeMap<usize, Arc<RecordedPlayer>> {
+        let mut players = BTreeMap::new();
+        for (index, fill) in fills.iter().enumerate() {
+            let Fill::Replay(recorded) = fill else {
+                continue;
+            };
+            let key = (recorded.game, seat_number(recorded.seat));
+            if !self.0.contains_key(&key) {
+                let player = read(store, key).await.map_err(|problem| {
+                    warn!(game = %recorded.game, problem, "a recorded player cannot be read; the substitute plays");
+                });
+                self.0.insert(key, player.ok());
+            }
+            if let Some(Some(player)) = self.0.get(&key) {
+                players.insert(index, Arc::clone(player));
+            }
+        }
+        players
+    }
+}
+
+async fn read(
+    store: &Arc<dyn Store>,
+    (game, seat): (Id, u32),
+) -> Result<Arc<RecordedPlayer>, String> {
+    let kept = (store.finished(game).await)
+        .map_err(|error| error.to_string())?
+        .ok_or("there is no such record")?;
+    let reading = move || convert::recorded_player(&convert::lines_of(&kept), seat);
+    tokio::task::spawn_blocking(reading)
+        .await
+        .map_err(|error| error.to_string())?
+        .map_err(|error| error.to_string())
+}

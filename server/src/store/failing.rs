@@ -1,0 +1,140 @@
+//! A store that fails when told to, for tests: what a full disk would do.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use chefshat_proto::v1;
+use futures::FutureExt as _;
+use futures::future::{BoxFuture, ready};
+use tokio::sync::watch;
+
+use super::journal::{Entry, GameHeader};
+use super::{Journal, KeptGame, LeftGame, MemoryStore, Store, StoreError};
+use crate::ids::Id;
+
+/// A memory store whose appends fail from a certain one on.
+#[derive(Debug)]
+pub struct FailingStore {
+    inner: MemoryStore,
+    appends_left: Arc<AtomicU64>,
+    has_failed: watch::Sender<bool>,
+}
+
+impl FailingStore {
+    /// A store that takes `appends` appends and fails at every later one.
+    pub fn after(appends: u64) -> Self {
+        Self {
+            inner: MemoryStore::default(),
+            appends_left: Arc::new(AtomicU64::new(appends)),
+            has_failed: watch::Sender::new(false),
+        }
+    }
+}
+
+fn told_to() -> StoreError {
+    StoreError("the store was told to fail".into())
+}
+
+impl Store for FailingStore {
+    fn outlives_server(&self) -> bool {
+        false
+    }
+
+    fn create(
+        &self,
+        header: Arc<GameHeader>,
+    ) -> BoxFuture<'_, Result<Box<dyn Journal>, StoreError>> {
+        let appends_left = Arc::clone(&self.appends_left);
+        let has_failed = self.has_failed.clone();
+        let inner = self.inner.create(header);
+        async move {
+            let journal: Box<dyn Journal> = Box::new(FailingJournal {
+                inner: inner.await?,
+                appends_left,
+                has_failed,
+            });
+            Ok(journal)
+        }
+        .boxed()
+    }
+
+    fn left(&self, ended_since_ms: u64) -> BoxFuture<'_, Result<Vec<LeftGame>, StoreError>> {
+        self.inner.left(ended_since_ms)
+    }
+
+    fn finished(&self, game: Id) -> BoxFuture<'_, Result<Option<KeptGame>, StoreError>> {
+        self.inner.finished(game)
+    }
+
+    fn list<'a>(
+        &'a self,
+        filter: &'a v1::RecordFilter,
+        after: u64,
+        count: usize,
+    ) -> BoxFuture<'a, Result<Vec<(u64, v1::RecordSummary)>, StoreError>> {
+        self.inner.list(filter, after, count)
+    }
+
+    fn import(
+        &self,
+        game: Id,
+        summary: v1::RecordSummary,
+        lines: Arc<[v1::RecordLine]>,
+    ) -> BoxFuture<'_, Result<bool, StoreError>> {
+        self.inner.import(game, summary, lines)
+    }
+
+    fn unfiled(&self) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
+        self.inner.unfiled()
+    }
+
+    fn note_filed(&self, game: Id) -> BoxFuture<'_, Result<(), StoreError>> {
+        self.inner.note_filed(game)
+    }
+
+    fn failed(&self) -> BoxFuture<'static, StoreError> {
+        let mut has_failed = self.has_failed.subscribe();
+        async move {
+            // The sender lives as long as the store, for whose failure this waits.
+            let _ = has_failed.wait_for(|failed| *failed).await;
+            told_to()
+        }
+        .boxed()
+    }
+
+    fn close(&self) -> BoxFuture<'_, ()> {
+        self.inner.close()
+    }
+}
+
+struct FailingJournal {
+    inner: Box<dyn Journal>,
+    appends_left: Arc<AtomicU64>,
+    has_failed: watch::Sender<bool>,
+}
+
+impl Journal for FailingJournal {
+    fn append<'a>(
+        &'a mut self,
+        entries: &'a mut Vec<Entry>,
+    ) -> BoxFuture<'a, Result<(), StoreError>> {
+        let allowed = self
+            .appends_left
+            .fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| {
+                left.checked_sub(1)
+            })
+            .is_ok();
+        if allowed {
+            return self.inner.append(entries);
+        }
+        self.has_failed.send_replace(true);
+        ready(Err(told_to())).boxed()
+    }
+
+    fn finish(
+        &mut self,
+        summary: Option<Box<v1::RecordSummary>>,
+    ) -> BoxFuture<'_, Result<(), StoreError>> {
+        self.inner.finish(summary)
+    }
+}

@@ -1,0 +1,117 @@
+//! What stood about a game before it began.
+
+use std::collections::BTreeMap;
+
+use chefshat_engine::Action;
+use chefshat_proto::v1;
+use chefshat_records::convert::{FieldProblem, rules_from_proto, rules_to_proto};
+use chefshat_records::seeds::SeedPlan;
+use prost::Message;
+
+use super::{Unreadable, action, array};
+use crate::convert;
+use crate::ids::{Id, SecretHash};
+use crate::store::journal::GameHeader;
+
+#[derive(Clone, PartialEq, Message)]
+struct HeaderForm {
+    #[prost(bytes = "vec", tag = "1")]
+    room_id: Vec<u8>,
+    #[prost(bytes = "vec", tag = "2")]
+    game_id: Vec<u8>,
+    #[prost(string, tag = "3")]
+    name: String,
+    #[prost(message, optional, tag = "4")]
+    rules: Option<v1::RuleSet>,
+    #[prost(uint32, tag = "5")]
+    rules_version: u32,
+    #[prost(message, optional, tag = "6")]
+    policy: Option<v1::RoomPolicy>,
+    #[prost(message, repeated, tag = "7")]
+    seats: Vec<v1::SeatConfig>,
+    #[prost(bytes = "vec", tag = "8")]
+    server_seed: Vec<u8>,
+    #[prost(bytes = "vec", tag = "9")]
+    nonce: Vec<u8>,
+    #[prost(bytes = "vec", tag = "10")]
+    fixed_game_seed: Vec<u8>,
+    #[prost(uint64, tag = "11")]
+    created_at_ms: u64,
+    #[prost(string, tag = "12")]
+    join_code: String,
+    #[prost(bytes = "vec", tag = "13")]
+    owner: Vec<u8>,
+    #[prost(message, optional, tag = "14")]
+    start: Option<v1::GameStart>,
+    #[prost(uint32, repeated, tag = "15")]
+    actions_taken_over: Vec<u32>,
+}
+
+/// A header as a blob.
+pub(in crate::store::sqlite) fn header_to_bytes(header: &GameHeader) -> Vec<u8> {
+    let (server_seed, nonce, fixed_game_seed) = match header.seed {
+        SeedPlan::Committed { server_seed, nonce } => {
+            (server_seed.to_vec(), nonce.to_vec(), vec![])
+        }
+        SeedPlan::Fixed { game_seed } => (vec![], vec![], game_seed.to_vec()),
+    };
+    let taken_over = header.start.branch.iter().flat_map(|b| &b.taken_over);
+    HeaderForm {
+        room_id: header.room_id.0.to_vec(),
+        game_id: header.game_id.0.to_vec(),
+        name: header.name.clone(),
+        rules: Some(rules_to_proto(&header.rules)),
+        rules_version: header.rules_version,
+        policy: Some(convert::policy_to_proto(&header.policy)),
+        seats: header.fills.iter().map(convert::fill_to_proto).collect(),
+        server_seed,
+        nonce,
+        fixed_game_seed,
+        created_at_ms: header.created_at_ms,
+        join_code: header.join_code.clone(),
+        owner: header.owner.bytes().to_vec(),
+        start: convert::start_to_proto(&header.start, header.rules.faces()),
+        actions_taken_over: taken_over
+            .flat_map(|part| &part.actions)
+            .map(|action| action.index().into())
+            .collect(),
+    }
+    .encode_to_vec()
+}
+
+/// Reads a header.
+///
+/// # Errors
+/// What makes no sense in it.
+pub(in crate::store::sqlite) fn header_from_bytes(bytes: &[u8]) -> Result<GameHeader, Unreadable> {
+    let form = HeaderForm::decode(bytes)?;
+    let field = |problem: FieldProblem| Unreadable(problem.to_string());
+    let rules = rules_from_proto(&form.rules.unwrap_or_default()).map_err(field)?;
+    let actions = form.actions_taken_over.iter().copied().map(action);
+    let actions: Vec<Action> = actions.collect::<Result<_, _>>()?;
+    let start = form.start.unwrap_or_default();
+    Ok(GameHeader {
+        room_id: Id(array(&form.room_id, "the room's id")?),
+        game_id: Id(array(&form.game_id, "the game's id")?),
+        name: form.name,
+        rules_version: form.rules_version,
+        policy: convert::policy_from_proto(&form.policy.unwrap_or_default()).map_err(field)?,
+        fills: convert::fills_from_proto(&form.seats, &rules).map_err(field)?,
+        recorded: BTreeMap::new(),
+        start: convert::start_from_proto(&start, &actions, &rules).map_err(field)?,
+        rules,
+        seed: if form.fixed_game_seed.is_empty() {
+            SeedPlan::Committed {
+                server_seed: array(&form.server_seed, "the server's seed")?,
+                nonce: array(&form.nonce, "the nonce")?,
+            }
+        } else {
+            SeedPlan::Fixed {
+                game_seed: array(&form.fixed_game_seed, "the game seed")?,
+            }
+        },
+        created_at_ms: form.created_at_ms,
+        join_code: form.join_code,
+        owner: SecretHash::from_bytes(array(&form.owner, "the owner's hash")?),
+    })
+}

@@ -1,0 +1,111 @@
+//! The journals that rooms write through, and the way of their orders to the writer.
+
+use std::sync::Arc;
+
+use chefshat_proto::v1;
+use futures::FutureExt as _;
+use futures::future::{BoxFuture, ready};
+use tokio::sync::{mpsc, oneshot};
+
+use super::form;
+use super::writer::{Order, Pending, Row};
+use crate::store::journal::{Entry, GameHeader};
+use crate::store::{Journal, StoreError};
+
+/// The way to the writer.
+#[derive(Clone)]
+pub(super) struct Orders(pub(super) mpsc::Sender<Pending>);
+
+impl Orders {
+    /// Gives an order and waits until it is kept.
+    pub(super) async fn give(&self, order: Order) -> Result<(), StoreError> {
+        let gone = || StoreError("the database is closed".into());
+        let (reply, kept) = oneshot::channel();
+        self.0.send((order, reply)).await.map_err(|_| gone())?;
+        kept.await.map_err(|_| gone())?
+    }
+}
+
+/// The journal of a game that outlives the server.
+pub(super) struct DurableJournal {
+    pub(super) number: i64,
+    pub(super) position: i64,
+    pub(super) orders: Orders,
+}
+
+impl Journal for DurableJournal {
+    fn append<'a>(
+        &'a mut self,
+        entries: &'a mut Vec<Entry>,
+    ) -> BoxFuture<'a, Result<(), StoreError>> {
+        async move {
+            let row = Row {
+                game: self.number,
+                position: self.position,
+                entries: encode(entries),
+            };
+            self.orders.give(Order::Append(row)).await?;
+            self.position += 1;
+            Ok(())
+        }
+        .boxed()
+    }
+
+    fn finish(
+        &mut self,
+        summary: Option<Box<v1::RecordSummary>>,
+    ) -> BoxFuture<'_, Result<(), StoreError>> {
+        self.orders
+            .give(Order::Finish {
+                number: self.number,
+                // Only an aborted game can end before anything was dealt.
+                state: v1::RoomState::Aborted.into(),
+                summary,
+            })
+            .boxed()
+    }
+}
+
+/// The journal of a game that is kept when it is over.
+pub(super) struct EphemeralJournal {
+    pub(super) number: i64,
+    pub(super) header: Arc<GameHeader>,
+    pub(super) entries: Vec<Entry>,
+    pub(super) orders: Orders,
+}
+
+impl Journal for EphemeralJournal {
+    fn append<'a>(
+        &'a mut self,
+        entries: &'a mut Vec<Entry>,
+    ) -> BoxFuture<'a, Result<(), StoreError>> {
+        self.entries.append(entries);
+        ready(Ok(())).boxed()
+    }
+
+    fn finish(
+        &mut self,
+        summary: Option<Box<v1::RecordSummary>>,
+    ) -> BoxFuture<'_, Result<(), StoreError>> {
+        let Some(summary) = summary else {
+            return ready(Ok(())).boxed();
+        };
+        self.orders
+            .give(Order::Whole {
+                number: self.number,
+                game_id: self.header.game_id,
+                header: form::header_to_bytes(&self.header),
+                entries: encode(&mut self.entries),
+                summary,
+            })
+            .boxed()
+    }
+}
+
+fn encode(entries: &mut Vec<Entry>) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(entries.len() * 32);
+    for entry in entries.drain(..) {
+        form::put_entry(&entry, &mut bytes);
+    }
+    bytes
+}

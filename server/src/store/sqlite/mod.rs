@@ -1,0 +1,198 @@
+//! Games in an SQLite database, which outlives the server. Opening is in `open`, reading in `reader`, writing in `journals` and `writer`, the
+//! form of what is kept in `form`; here is the store that they make up.
+
+mod errors;
+mod form;
+mod journals;
+mod open;
+mod reader;
+#[cfg(test)]
+mod tests;
+mod writer;
+
+use std::fs::File;
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};
+use std::sync::{Arc, Mutex};
+
+use chefshat_proto::v1;
+use futures::FutureExt as _;
+use futures::future::{BoxFuture, ready};
+use tokio::sync::{mpsc, watch};
+use tokio::task::JoinHandle;
+use tracing::error;
+
+pub use open::OpenError;
+
+use super::journal::GameHeader;
+use super::{Journal, KeptGame, LeftGame, Store, StoreError};
+use crate::ids::Id;
+use crate::room::policy::Durability;
+use errors::explain;
+use journals::{DurableJournal, EphemeralJournal, Orders};
+use reader::Reader;
+use writer::Order;
+
+/// Keeps games in the database of a data directory.
+pub struct SqliteStore {
+    reader: Reader,
+    orders: Orders,
+    failed: watch::Receiver<Option<StoreError>>,
+    numbers: Arc<AtomicI64>,
+    writing: Mutex<Option<JoinHandle<()>>>,
+    closed: Arc<AtomicBool>,
+    /// Holds the data directory for this process.
+    _lock: File,
+}
+
+impl SqliteStore {
+    /// Opens the database of a data directory, `games.sqlite3`; makes it if there is none.
+    ///
+    /// # Errors
+    /// The directory cannot be used; nothing was changed in it.
+    pub async fn open(data_dir: &Path) -> Result<Self, OpenError> {
+        let opened = open::open(data_dir).await?;
+        let last: i64 = sqlx::query_scalar("SELECT coalesce(max(number), 0) FROM games")
+            .fetch_one(&opened.readers)
+            .await
+            .map_err(|error| OpenError::Other(data_dir.join(open::FILE), explain(&error)))?;
+        let (orders, queue) = mpsc::channel(writer::QUEUE);
+        let (has_failed, failed) = watch::channel(None);
+        let writing = tokio::spawn(writer::run(opened.writer, queue, has_failed));
+        Ok(Self {
+            reader: Reader(opened.readers),
+            orders: Orders(orders),
+            failed,
+            numbers: Arc::new(AtomicI64::new(last + 1)),
+            writing: Mutex::new(Some(writing)),
+            closed: Arc::new(AtomicBool::new(false)),
+            _lock: opened.lock,
+        })
+    }
+}
+
+impl Store for SqliteStore {
+    fn outlives_server(&self) -> bool {
+        true
+    }
+
+    fn create(
+        &self,
+        header: Arc<GameHeader>,
+    ) -> BoxFuture<'_, Result<Box<dyn Journal>, StoreError>> {
+        let number = self.numbers.fetch_add(1, Ordering::Relaxed);
+        let orders = self.orders.clone();
+        if header.policy.durability == Durability::Ephemeral {
+            let journal = EphemeralJournal {
+                number,
+                header,
+                entries: Vec::new(),
+                orders,
+            };
+            return ready(Ok(Box::new(journal) as Box<dyn Journal>)).boxed();
+        }
+        async move {
+            orders
+                .give(Order::Create {
+                    number,
+                    game_id: header.game_id,
+                    header: form::header_to_bytes(&header),
+                })
+                .await?;
+            let journal: Box<dyn Journal> = Box::new(DurableJournal {
+                number,
+                position: 0,
+                orders,
+            });
+            Ok(journal)
+        }
+        .boxed()
+    }
+
+    fn left(&self, ended_since_ms: u64) -> BoxFuture<'_, Result<Vec<LeftGame>, StoreError>> {
+        self.reader.left(ended_since_ms, &self.orders).boxed()
+    }
+
+    fn finished(&self, game: Id) -> BoxFuture<'_, Result<Option<KeptGame>, StoreError>> {
+        self.reader.finished(game).boxed()
+    }
+
+    fn list<'a>(
+        &'a self,
+        filter: &'a v1::RecordFilter,
+        after: u64,
+        count: usize,
+    ) -> BoxFuture<'a, Result<Vec<(u64, v1::RecordSummary)>, StoreError>> {
+        self.reader.list(filter, after, count).boxed()
+    }
+
+    fn import(
+        &self,
+        game: Id,
+        mut summary: v1::RecordSummary,
+        lines: Arc<[v1::RecordLine]>,
+    ) -> BoxFuture<'_, Result<bool, StoreError>> {
+        summary.added = true;
+        async move {
+            let number = self.numbers.fetch_add(1, Ordering::Relaxed);
+            self.orders
+                .give(Order::Import {
+                    number,
+                    game_id: game,
+                    record: form::lines_to_bytes(&lines),
+                    summary: Box::new(summary),
+                })
+                .await?;
+            // It has this number, unless a game of this id was there before.
+            Ok(self.reader.number(game).await? == Some(number))
+        }
+        .boxed()
+    }
+
+    fn unfiled(&self) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
+        self.reader.unfiled().boxed()
+    }
+
+    fn note_filed(&self, game_id: Id) -> BoxFuture<'_, Result<(), StoreError>> {
+        self.orders.give(Order::Filed { game_id }).boxed()
+    }
+
+    fn failed(&self) -> BoxFuture<'static, StoreError> {
+        let mut failed = self.failed.clone();
+        let closed = Arc::clone(&self.closed);
+        async move {
+            let failure = match failed.wait_for(Option::is_some).await {
+                Ok(failure) => failure.clone(),
+                Err(_) if closed.load(Ordering::Acquire) => None,
+                Err(_) => Some(StoreError(
+                    "the writer of the database has ended unexpectedly".into(),
+                )),
+            };
+            match failure {
+                Some(failure) => failure,
+                None => futures::future::pending().await,
+            }
+        }
+        .boxed()
+    }
+
+    fn close(&self) -> BoxFuture<'_, ()> {
+        async move {
+            self.closed.store(true, Ordering::Release);
+            self.reader.0.close().await;
+            // A writer that has failed says so elsewhere; here it is only waited for.
+            let _ = self.orders.give(Order::Close).await;
+            let writing = self
+                .writing
+                .lock()
+                .expect("nothing that holds this lock can panic")
+                .take();
+            if let Some(writing) = writing
+                && let Err(error) = writing.await
+            {
+                error!(%error, "the writer of the database did not end in good order");
+            }
+        }
+        .boxed()
+    }
+}

@@ -1,0 +1,240 @@
+//! Opening the database: that it is ours, that nobody else has it, that this version knows its form. What is not so is refused before
+//! anything is written.
+
+use std::fs::File;
+use std::os::unix::fs::OpenOptionsExt as _;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use sqlx::migrate::{MigrateError, Migration, MigrationType, Migrator};
+use sqlx::sqlite::{
+    SqliteConnectOptions, SqliteConnection, SqliteJournalMode, SqlitePool, SqlitePoolOptions,
+    SqliteSynchronous,
+};
+use sqlx::{Connection as _, SqlSafeStr as _};
+
+use super::errors::{explain, has_code};
+use crate::store::StoreError;
+
+/// Name of the database in the data directory.
+pub(super) const FILE: &str = "games.sqlite3";
+/// Name of the file that is locked while a server has the data directory.
+const LOCK_FILE: &str = "games.lock";
+/// What tells our databases from those of other programs: `PRAGMA application_id` of the first migration.
+const APPLICATION_ID: i64 = 0x4368_4874;
+/// How long a database that another program has locked is waited for.
+pub(super) const BUSY_LIMIT: Duration = Duration::from_secs(10);
+/// Connections that read.
+const READERS: u32 = 4;
+/// Statements that a connection keeps prepared.
+const STATEMENTS: usize = 64;
+/// The migrations, oldest first. Once released, one is never changed.
+const MIGRATIONS: [(i64, &str, &str); 1] =
+    [(1, "games", include_str!("migrations/0001_games.sql"))];
+/// SQLite's codes for a file that is no database, and for one that is damaged.
+const NOT_A_DATABASE: i32 = 26;
+const CORRUPT: i32 = 11;
+
+/// Why a data directory cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum OpenError {
+    /// The file system refused.
+    #[error("{path}: {source}; choose another folder with --data-dir")]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// Another server has it.
+    #[error("another chefshat server uses {0}; stop it, or choose another folder with --data-dir")]
+    InUse(PathBuf),
+    /// The file is no database of ours.
+    #[error(
+        "{0} is not a database of chefshat; nothing was changed: move it away, or choose another folder with --data-dir"
+    )]
+    NotOurs(PathBuf),
+    /// The database is damaged.
+    #[error(
+        "{0} is damaged ({1}); nothing was changed: put back a copy of it, or move it away to begin anew (records lie in records/)"
+    )]
+    Damaged(PathBuf, String),
+    /// The database was written by a newer version.
+    #[error(
+        "{0} was written by a newer version of chefshat; nothing was changed: use that version, or choose another folder with --data-dir"
+    )]
+    Newer(PathBuf),
+    /// Anything else.
+    #[error("{0}: {1}")]
+    Other(PathBuf, String),
+}
+
+/// An opened database.
+pub(super) struct Opened {
+    pub(super) writer: SqliteConnection,
+    pub(super) readers: SqlitePool,
+    /// Locked as long as it is open.
+    pub(super) lock: File,
+}
+
+/// Opens the database of a data directory, which is made if there is none.
+pub(super) async fn open(data_dir: &Path) -> Result<Opened, OpenError> {
+    let path = data_dir.join(FILE);
+    let lock = lock(data_dir)?;
+    check_log(&path)?;
+    let options = SqliteConnectOptions::new()
+        .filename(&path)
+        .busy_timeout(BUSY_LIMIT)
+        .statement_cache_capacity(STATEMENTS);
+    let failed = |error: sqlx::Error| {
+        if has_code(&error, NOT_A_DATABASE) {
+            OpenError::NotOurs(path.clone())
+        } else if has_code(&error, CORRUPT) {
+            OpenError::Damaged(path.clone(), error.to_string())
+        } else {
+            OpenError::Other(path.clone(), explain(&error))
+        }
+    };
+    if path.metadata().is_ok_and(|metadata| metadata.len() > 0) {
+        // Looked at before anything is set: setting the journal mode writes.
+        let mut looking = SqliteConnection::connect_with(&options.clone().read_only(true))
+            .await
+            .map_err(failed)?;
+        let id: i64 = sqlx::query_scalar("PRAGMA application_id")
+            .fetch_one(&mut looking)
+            .await
+            .map_err(failed)?;
+        let tables: i64 = sqlx::query_scalar("SELECT count(*) FROM sqlite_schema")
+            .fetch_one(&mut looking)
+            .await
+            .map_err(failed)?;
+        // A server that died in its very first moments leaves a database with nothing in it.
+        if id != APPLICATION_ID
+            && tables > 0
+            && !only_migrations(&mut looking).await.map_err(failed)?
+        {
+            return Err(OpenError::NotOurs(path));
+        }
+        looking.close().await.map_err(failed)?;
+    }
+    make_private(&path)?;
+    let options = options
+        .create_if_missing(true)
+        .journal_mode(SqliteJournalMode::Wal)
+        .synchronous(SqliteSynchronous::Full)
+        .foreign_keys(true);
+    let mut writer = SqliteConnection::connect_with(&options)
+        .await
+        .map_err(failed)?;
+    migrations()
+        .run(&mut writer)
+        .await
+        .map_err(|error| match error {
+            MigrateError::VersionMissing(_) | MigrateError::VersionMismatch(_) => {
+                OpenError::Newer(path.clone())
+            }
+            MigrateError::Execute(error) | MigrateError::ExecuteMigration(error, _) => {
+                failed(error)
+            }
+            error => OpenError::Other(path.clone(), error.to_string()),
+        })?;
+    // Games that were given up before anything was dealt leave nothing behind.
+    for forgotten in [
+        "DELETE FROM journal WHERE game IN (SELECT number FROM games WHERE state <> 0 AND summary IS NULL)",
+        "DELETE FROM games WHERE state <> 0 AND summary IS NULL",
+    ] {
+        sqlx::query(forgotten)
+            .execute(&mut writer)
+            .await
+            .map_err(failed)?;
+    }
+    let readers = SqlitePoolOptions::new()
+        .max_connections(READERS)
+        .connect_with(options.read_only(true).create_if_missing(false))
+        .await
+        .map_err(failed)?;
+    Ok(Opened {
+        writer,
+        readers,
+        lock,
+    })
+}
+
+/// Whether there is nothing but what the first migration makes before it is complete.
+async fn only_migrations(connection: &mut SqliteConnection) -> Result<bool, sqlx::Error> {
+    let others: i64 = sqlx::query_scalar(
+        "SELECT count(*) FROM sqlite_schema WHERE tbl_name <> '_sqlx_migrations'",
+    )
+    .fetch_one(connection)
+    .await?;
+    Ok(others == 0)
+}
+
+fn migrations() -> Migrator {
+    Migrator::with_migrations(
+        MIGRATIONS
+            .iter()
+            .map(|(version, name, sql)| {
+                Migration::new(
+                    *version,
+                    (*name).into(),
+                    MigrationType::Simple,
+                    (*sql).into_sql_str(),
+                    false,
+                )
+            })
+            .collect(),
+    )
+}
+
+/// Takes the data directory for this process. The system gives it back when the process ends, however it ends.
+fn lock(data_dir: &Path) -> Result<File, OpenError> {
+    let path = data_dir.join(LOCK_FILE);
+    let io = |source| OpenError::Io {
+        path: path.clone(),
+        source,
+    };
+    std::fs::create_dir_all(data_dir).map_err(io)?;
+    let file = File::options()
+        .create(true)
+        .truncate(false)
+        .write(true)
+        .open(&path)
+        .map_err(io)?;
+    match file.try_lock() {
+        Ok(()) => Ok(file),
+        Err(std::fs::TryLockError::WouldBlock) => Err(OpenError::InUse(data_dir.to_path_buf())),
+        Err(std::fs::TryLockError::Error(error)) => Err(io(error)),
+    }
+}
+
+/// Refuses a database of which only the log of writes is left: opened, it would begin anew, and what is in the log would be gone.
+fn check_log(path: &Path) -> Result<(), OpenError> {
+    let length = |path: &Path| path.metadata().map_or(0, |metadata| metadata.len());
+    let log = path.with_extension("sqlite3-wal");
+    if length(path) == 0 && length(&log) > 0 {
+        let problem = format!("it is empty or gone, but {} is there", log.display());
+        return Err(OpenError::Damaged(path.to_path_buf(), problem));
+    }
+    Ok(())
+}
+
+/// Makes the database file, if there is none, so that nobody else can read it: it holds the seeds of games that go on.
+fn make_private(path: &Path) -> Result<(), OpenError> {
+    File::options()
+        .create(true)
+        .append(true)
+        .mode(0o600)
+        .open(path)
+        .map(drop)
+        .map_err(|source| OpenError::Io {
+            path: path.to_path_buf(),
+            source,
+        })
+}
+
+impl From<OpenError> for StoreError {
+    fn from(error: OpenError) -> Self {
+        Self(error.to_string())
+    }
+}

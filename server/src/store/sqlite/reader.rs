@@ -1,0 +1,205 @@
+//! Reading the database. It goes over connections of its own, which cannot write, and never waits for the writer.
+
+use std::sync::Arc;
+
+use chefshat_proto::v1;
+use prost::Message as _;
+use sqlx::Row as _;
+use sqlx::sqlite::{SqlitePool, SqliteRow};
+use tracing::error;
+
+use super::errors::explain;
+use super::form::{self, FORM, Unreadable};
+use super::journals::{DurableJournal, Orders};
+use crate::ids::Id;
+use crate::store::journal::{Entry, GameHeader};
+use crate::store::{KeptGame, LeftGame, StoreError};
+
+/// Games that had ended of which the rooms are there again; the last ones, since of earlier ones everybody has heard.
+const MOST_ENDED: i64 = 256;
+
+/// Reads what is kept.
+pub(super) struct Reader(pub(super) SqlitePool);
+
+impl Reader {
+    /// See `Store::left`.
+    pub(super) async fn left(
+        &self,
+        ended_since_ms: u64,
+        orders: &Orders,
+    ) -> Result<Vec<LeftGame>, StoreError> {
+        let games = sqlx::query(
+            "SELECT number, form, header, state FROM games WHERE number IN (
+                 SELECT number FROM games WHERE state = 0
+                 UNION ALL
+                 SELECT * FROM (
+                     SELECT number FROM games WHERE ended_at_ms >= $1 AND header IS NOT NULL
+                     ORDER BY ended_at_ms DESC LIMIT $2))
+             ORDER BY number",
+        )
+        .bind(i64::try_from(ended_since_ms).unwrap_or(i64::MAX))
+        .bind(MOST_ENDED)
+        .fetch_all(&self.0)
+        .await
+        .map_err(failure)?;
+        let mut left = Vec::with_capacity(games.len());
+        for row in games {
+            let number: i64 = row.get(0);
+            let read = check_form(row.get(1)).and_then(|()| header_of(&row));
+            let entries = self.journal(number).await?;
+            match read.and_then(|header| Ok((header, entries?))) {
+                Ok((header, entries)) => left.push(LeftGame {
+                    journal: Box::new(DurableJournal {
+                        number,
+                        position: entries.rows,
+                        orders: orders.clone(),
+                    }),
+                    entries: entries.entries,
+                    concluded: row.get::<i64, _>(3) != 0,
+                    header,
+                }),
+                Err(problem) => {
+                    error!(number, %problem, "a game cannot be read; it is left as it is");
+                }
+            }
+        }
+        Ok(left)
+    }
+
+    /// See `Store::finished`.
+    pub(super) async fn finished(&self, game: Id) -> Result<Option<KeptGame>, StoreError> {
+        let row = sqlx::query(
+            "SELECT number, form, header, record FROM games LEFT JOIN added_records ON game = number
+             WHERE game_id = $1 AND summary IS NOT NULL",
+        )
+        .bind(game.0.as_slice())
+        .fetch_optional(&self.0)
+        .await
+        .map_err(failure)?;
+        let Some(row) = row else { return Ok(None) };
+        let unreadable =
+            |problem: Unreadable| StoreError(format!("game {game} cannot be read: {problem}"));
+        check_form(row.get(1)).map_err(unreadable)?;
+        let record: Option<Vec<u8>> = row.get(3);
+        if let Some(record) = record {
+            let lines = form::lines_from_bytes(&record).map_err(unreadable)?;
+            return Ok(Some(KeptGame::Imported(lines.into())));
+        }
+        let header = header_of(&row).map_err(unreadable)?;
+        let journal = self.journal(row.get(0)).await?.map_err(unreadable)?;
+        Ok(Some(KeptGame::Hosted(
+            Arc::new(header),
+            journal.entries.into(),
+        )))
+    }
+
+    /// The journal of a game; inside, why it cannot be read.
+    async fn journal(&self, number: i64) -> Result<Result<Read, Unreadable>, StoreError> {
+        let rows =
+            sqlx::query("SELECT position, entries FROM journal WHERE game = $1 ORDER BY position")
+                .bind(number)
+                .fetch_all(&self.0)
+                .await
+                .map_err(failure)?;
+        let mut read = Read::default();
+        for row in rows {
+            let position: i64 = row.get(0);
+            if position != read.rows {
+                let gap = format!("a part of its journal is missing at {}", read.rows);
+                return Ok(Err(Unreadable(gap)));
+            }
+            if let Err(problem) = form::read_entries(row.get(1), &mut read.entries) {
+                return Ok(Err(problem));
+            }
+            read.rows += 1;
+        }
+        Ok(Ok(read))
+    }
+
+    /// See `Store::list`.
+    pub(super) async fn list(
+        &self,
+        filter: &v1::RecordFilter,
+        after: u64,
+        count: usize,
+    ) -> Result<Vec<(u64, v1::RecordSummary)>, StoreError> {
+        let rows = sqlx::query(
+            "SELECT number, summary FROM games
+             WHERE summary IS NOT NULL AND number > $1
+               AND ($2 = 0 OR state = $2) AND ($3 = 0 OR origin = $3) AND ($4 = '' OR room_name = $4)
+               AND created_at_ms >= $5 AND ($6 = 0 OR created_at_ms < $6)
+               AND ($7 = 0 OR EXISTS (SELECT 1 FROM participants WHERE game = number AND kind = $7))
+               AND ($8 = '' OR number IN (SELECT game FROM participants WHERE name = $8))
+               AND NOT ($9 AND added)
+             ORDER BY number LIMIT $10",
+        )
+        .bind(i64::try_from(after).unwrap_or(i64::MAX))
+        .bind(filter.state)
+        .bind(filter.origin)
+        .bind(filter.room_name.as_str())
+        .bind(i64::try_from(filter.created_from_ms).unwrap_or(i64::MAX))
+        .bind(i64::try_from(filter.created_before_ms).unwrap_or(i64::MAX))
+        .bind(filter.kind)
+        .bind(filter.participant.as_str())
+        .bind(filter.hosted_here)
+        .bind(i64::try_from(count).unwrap_or(i64::MAX))
+        .fetch_all(&self.0)
+        .await
+        .map_err(failure)?;
+        rows.iter()
+            .map(|row| {
+                let number: i64 = row.get(0);
+                let summary = v1::RecordSummary::decode(row.get::<&[u8], _>(1))
+                    .map_err(|error| StoreError(format!("game number {number}: {error}")))?;
+                Ok((u64::try_from(number).unwrap_or_default(), summary))
+            })
+            .collect()
+    }
+
+    /// See `Store::unfiled`.
+    pub(super) async fn unfiled(&self) -> Result<Vec<Id>, StoreError> {
+        let ids: Vec<Vec<u8>> = sqlx::query_scalar(
+            "SELECT game_id FROM games WHERE filed = 0 AND summary IS NOT NULL ORDER BY number",
+        )
+        .fetch_all(&self.0)
+        .await
+        .map_err(failure)?;
+        let id = |bytes: Vec<u8>| bytes.try_into().ok().map(Id);
+        Ok(ids.into_iter().filter_map(id).collect())
+    }
+
+    /// The number under which a game is kept.
+    pub(super) async fn number(&self, game: Id) -> Result<Option<i64>, StoreError> {
+        sqlx::query_scalar("SELECT number FROM games WHERE game_id = $1")
+            .bind(game.0.as_slice())
+            .fetch_optional(&self.0)
+            .await
+            .map_err(failure)
+    }
+}
+
+/// A journal as it was read.
+#[derive(Default)]
+struct Read {
+    entries: Vec<Entry>,
+    rows: i64,
+}
+
+/// The header in the third column.
+fn header_of(row: &SqliteRow) -> Result<GameHeader, Unreadable> {
+    let bytes: Option<&[u8]> = row.get(2);
+    form::header_from_bytes(bytes.ok_or_else(|| Unreadable("its header is missing".into()))?)
+}
+
+fn failure(error: sqlx::Error) -> StoreError {
+    StoreError(explain(&error))
+}
+
+fn check_form(form: i64) -> Result<(), Unreadable> {
+    if form == FORM {
+        Ok(())
+    } else {
+        let problem = format!("it is kept in form {form}; this version knows form {FORM}");
+        Err(Unreadable(problem))
+    }
+}

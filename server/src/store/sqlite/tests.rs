@@ -1,0 +1,582 @@
+//! The database: what is kept is found again, what cannot be used is refused and left as it is.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+use chefshat_arena::AgentKind;
+use chefshat_engine::{Action, RULES_VERSION, RuleSetSpec, Seat, Seed};
+use chefshat_proto::v1;
+use chefshat_records::seeds::SeedPlan;
+use futures::FutureExt as _;
+use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
+use sqlx::{Connection as _, Executor as _};
+
+use super::{OpenError, SqliteStore, form, open};
+use crate::ids::{Id, SecretHash};
+use crate::room::policy::{Durability, Policy};
+use crate::store::journal::{
+    AbortReason, Branch, Change, Decided, Entry, Fill, GameHeader, GameStart, ParticipantKind,
+    RecordedSeat, SeatedParticipant, Source, TakenOver,
+};
+use crate::store::{KeptGame, Store};
+
+fn header(game: u8, durability: Durability) -> GameHeader {
+    GameHeader {
+        room_id: Id([game ^ 0xff; 16]),
+        game_id: Id([game; 16]),
+        name: "a room with ünïcode".into(),
+        rules: RuleSetSpec::default().validate().expect("the standard"),
+        rules_version: RULES_VERSION,
+        policy: Policy {
+            durability,
+            bank: Duration::from_millis(1_234),
+            ..Policy::default()
+        },
+        fills: vec![
+            Fill::Open { reserved_for: None },
+            Fill::Open {
+                reserved_for: Some(ParticipantKind::Robot),
+            },
+            Fill::BuiltIn(AgentKind::Greedy),
+            Fill::Replay(RecordedSeat {
+                game: Id([9; 16]),
+                seat: Seat::new(2),
+            }),
+        ],
+        recorded: BTreeMap::new(),
+        start: GameStart {
+            script: None,
+            branch: Some(Branch {
+                game: Id([8; 16]),
+                same_deals: true,
+                taken_over: vec![
+                    TakenOver {
+                        seed: Seed([1; 32]),
+                        actions: vec![Action::new(3), Action::new(199)],
+                    },
+                    TakenOver {
+                        seed: Seed([2; 32]),
+                        actions: vec![Action::new(7)],
+                    },
+                ],
+            }),
+        },
+        seed: SeedPlan::Committed {
+            server_seed: [4; 32],
+            nonce: [5; 32],
+        },
+        created_at_ms: 1_700_000_000_000,
+        join_code: "ABCDEFGH".into(),
+        owner: SecretHash::of(b"owner"),
+    }
+}
+
+/// One entry of every kind.
+fn entries() -> Vec<Entry> {
+    let seat = Seat::new(1);
+    let changes = [
+        Change::Seated {
+            seat,
+            participant: Box::new(SeatedParticipant {
+                name: "Ada".into(),
+                kind: ParticipantKind::Human,
+                ticket: SecretHash::of(b"ticket"),
+            }),
+        },
+        Change::Vacated(seat),
+        Change::Started {
+            entropy: vec![vec![], vec![1, 2, 3], vec![0; 32], vec![7]],
+        },
+        Change::Disconnected(seat),
+        Change::Returned(seat),
+        Change::Substituted(Seat::new(0)),
+        Change::Attempted {
+            seat,
+            action: u32::MAX,
+        },
+        Change::Decided(Decided {
+            seat,
+            action: Action::new(213),
+            source: Source::Recorded,
+            time_us: u64::MAX,
+            bank_left_ms: 17,
+            annotations: Some(Box::from([1, 2, 3])),
+        }),
+        Change::Expressed {
+            seat,
+            record_only: true,
+            expression: Box::from([4, 5]),
+        },
+        Change::ServerRestarted,
+        Change::Aborted(AbortReason::TooLong),
+    ];
+    (1..)
+        .zip(changes)
+        .map(|(step, change)| Entry {
+            at: Duration::from_micros(step * 1_000_001),
+            change,
+        })
+        .collect()
+}
+
+fn summary(header: &GameHeader) -> Box<v1::RecordSummary> {
+    Box::new(v1::RecordSummary {
+        game_id: header.game_id.to_string(),
+        room_name: header.name.clone(),
+        state: v1::RoomState::Finished.into(),
+        origin: v1::GameOrigin::Dealt.into(),
+        created_at_ms: header.created_at_ms,
+        ended_at_ms: header.created_at_ms + 1_000,
+        seats: vec![v1::Participant {
+            name: format!("player of {:?}", header.game_id.0[0]),
+            kind: v1::ParticipantKind::Robot.into(),
+            ..v1::Participant::default()
+        }],
+        ..v1::RecordSummary::default()
+    })
+}
+
+fn shown(value: &impl std::fmt::Debug) -> String {
+    format!("{value:?}")
+}
+
+async fn opened(folder: &Path) -> SqliteStore {
+    SqliteStore::open(folder).await.expect("the folder is fine")
+}
+
+#[tokio::test]
+async fn a_game_that_goes_on_is_found_as_it_was_left() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let header = Arc::new(header(1, Durability::Durable));
+    let entries = entries();
+    let store = opened(folder.path()).await;
+    let mut journal = store.create(Arc::clone(&header)).await.expect("kept");
+    // In parts, as a room hands them over.
+    for part in entries.chunks(3) {
+        let mut part = part.to_vec();
+        journal.append(&mut part).await.expect("kept");
+        assert!(part.is_empty());
+    }
+    // The process dies: nothing is closed.
+    drop(journal);
+    drop(store);
+    let store = opened(folder.path()).await;
+    let mut unfinished = store.left(u64::MAX).await.expect("readable");
+    assert_eq!(unfinished.len(), 1);
+    let mut game = unfinished.pop().expect("one");
+    assert_eq!(shown(&game.header), shown(&*header));
+    assert_eq!(shown(&game.entries), shown(&entries));
+    assert!(
+        store
+            .finished(header.game_id)
+            .await
+            .expect("readable")
+            .is_none(),
+        "it is not finished"
+    );
+    // It goes on where it stood, and ends.
+    let more = vec![entries[3].clone()];
+    game.journal.append(&mut more.clone()).await.expect("kept");
+    game.journal
+        .finish(Some(summary(&header)))
+        .await
+        .expect("kept");
+    store.close().await;
+    drop(store);
+    let store = opened(folder.path()).await;
+    assert!(store.left(u64::MAX).await.expect("readable").is_empty());
+    let kept = store.finished(header.game_id).await.expect("readable");
+    let Some(KeptGame::Hosted(kept, journal)) = kept else {
+        panic!("not kept: {kept:?}");
+    };
+    assert_eq!(shown(&*kept), shown(&*header));
+    assert_eq!(shown(&journal.to_vec()), shown(&[entries, more].concat()));
+    let ended_at_ms = summary(&header).ended_at_ms;
+    let left = store.left(ended_at_ms).await.expect("readable");
+    assert_eq!(left.len(), 1, "it is still shown for a while");
+    assert!(left[0].concluded);
+    assert_eq!(store.unfiled().await.expect("readable"), [header.game_id]);
+    store.note_filed(header.game_id).await.expect("kept");
+    assert!(store.unfiled().await.expect("readable").is_empty());
+}
+
+#[tokio::test]
+async fn an_ephemeral_game_is_kept_when_it_ends_and_not_before() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let store = opened(folder.path()).await;
+    let header = Arc::new(header(1, Durability::Ephemeral));
+    let mut journal = store.create(Arc::clone(&header)).await.expect("begun");
+    journal.append(&mut entries()).await.expect("in memory");
+    assert!(store.left(u64::MAX).await.expect("readable").is_empty());
+    journal.finish(Some(summary(&header))).await.expect("kept");
+    let kept = store.finished(header.game_id).await.expect("readable");
+    let Some(KeptGame::Hosted(_, journal)) = kept else {
+        panic!("not kept: {kept:?}");
+    };
+    assert_eq!(shown(&journal.to_vec()), shown(&entries()));
+}
+
+#[tokio::test]
+async fn many_rooms_share_the_writer() {
+    const ROOMS: u8 = 40;
+    let folder = tempfile::tempdir().expect("a folder");
+    let store = Arc::new(opened(folder.path()).await);
+    let playing = (0..ROOMS).map(|room| {
+        let store = Arc::clone(&store);
+        tokio::spawn(async move {
+            let header = Arc::new(header(room, Durability::Durable));
+            let mut journal = store.create(header).await.expect("kept");
+            for entry in entries() {
+                journal.append(&mut vec![entry]).await.expect("kept");
+            }
+        })
+    });
+    for room in playing.collect::<Vec<_>>() {
+        room.await.expect("no panic");
+    }
+    let unfinished = store.left(u64::MAX).await.expect("readable");
+    assert_eq!(unfinished.len(), usize::from(ROOMS));
+    for game in unfinished {
+        assert_eq!(shown(&game.entries), shown(&entries()));
+    }
+}
+
+#[tokio::test]
+async fn lists_are_filtered_and_paged() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let store = opened(folder.path()).await;
+    for game in 1..=5 {
+        let mut header = header(game, Durability::Durable);
+        header.created_at_ms = u64::from(game) * 1_000;
+        let header = Arc::new(header);
+        let mut journal = store.create(Arc::clone(&header)).await.expect("kept");
+        journal.finish(Some(summary(&header))).await.expect("kept");
+    }
+    let unheard_of = {
+        let mut journal = store
+            .create(Arc::new(header(6, Durability::Durable)))
+            .await
+            .expect("kept");
+        // Nothing was dealt in it: there is no record.
+        journal.finish(None).await
+    };
+    unheard_of.expect("kept");
+    let filter = v1::RecordFilter::default;
+    let robot = v1::ParticipantKind::Robot.into();
+    let human = v1::ParticipantKind::Human.into();
+    let finished = v1::RoomState::Finished.into();
+    let table = [
+        (filter(), 0, 9, vec![1, 2, 3, 4, 5]),
+        (filter(), 0, 2, vec![1, 2]),
+        (filter(), 2, 2, vec![3, 4]),
+        (filter(), 5, 2, vec![]),
+        (
+            v1::RecordFilter {
+                participant: "player of 3".into(),
+                ..filter()
+            },
+            0,
+            9,
+            vec![3],
+        ),
+        (
+            v1::RecordFilter {
+                participant: "player of".into(),
+                ..filter()
+            },
+            0,
+            9,
+            vec![],
+        ),
+        (
+            v1::RecordFilter {
+                kind: robot,
+                state: finished,
+                ..filter()
+            },
+            3,
+            9,
+            vec![4, 5],
+        ),
+        (
+            v1::RecordFilter {
+                kind: human,
+                ..filter()
+            },
+            0,
+            9,
+            vec![],
+        ),
+        (
+            v1::RecordFilter {
+                state: v1::RoomState::Aborted.into(),
+                ..filter()
+            },
+            0,
+            9,
+            vec![],
+        ),
+        (
+            v1::RecordFilter {
+                origin: v1::GameOrigin::Branched.into(),
+                ..filter()
+            },
+            0,
+            9,
+            vec![],
+        ),
+        (
+            v1::RecordFilter {
+                room_name: "another".into(),
+                ..filter()
+            },
+            0,
+            9,
+            vec![],
+        ),
+        (
+            v1::RecordFilter {
+                created_from_ms: 2_000,
+                created_before_ms: 4_000,
+                ..filter()
+            },
+            0,
+            9,
+            vec![2, 3],
+        ),
+    ];
+    for (filter, after, count, expected) in table {
+        let listed = store.list(&filter, after, count).await.expect("readable");
+        let numbers: Vec<u64> = listed.iter().map(|(number, _)| *number).collect();
+        assert_eq!(numbers, expected, "{filter:?}");
+        for (number, summary) in listed {
+            assert!(super::super::lets_through(&filter, &summary), "{number}");
+        }
+    }
+}
+
+#[tokio::test]
+async fn an_imported_game_is_kept_once() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let store = opened(folder.path()).await;
+    let header = header(1, Durability::Durable);
+    let lines: Arc<[v1::RecordLine]> = Arc::from([
+        v1::RecordLine {
+            line: Some(v1::record_line::Line::Header(v1::RecordHeader {
+                game_id: header.game_id.to_string(),
+                ..v1::RecordHeader::default()
+            })),
+        },
+        v1::RecordLine {
+            line: Some(v1::record_line::Line::Footer(v1::RecordFooter::default())),
+        },
+    ]);
+    let import = || store.import(header.game_id, *summary(&header), Arc::clone(&lines));
+    // Somebody asks, and goes away before it is answered; others ask meanwhile.
+    assert!(import().now_or_never().is_none());
+    let answers = tokio::join!(import(), import());
+    assert_eq!(answers, (Ok(false), Ok(false)), "the first was kept");
+    assert!(
+        store.failed().now_or_never().is_none(),
+        "that is no failure"
+    );
+    let listed = store.list(&v1::RecordFilter::default(), 0, 9).await;
+    let listed = listed.expect("readable");
+    assert!(listed.len() == 1 && listed[0].1.added);
+    let hosted_here = v1::RecordFilter {
+        hosted_here: true,
+        ..v1::RecordFilter::default()
+    };
+    let listed = store.list(&hosted_here, 0, 9).await.expect("readable");
+    assert!(listed.is_empty());
+    let kept = store.finished(header.game_id).await.expect("readable");
+    let Some(KeptGame::Imported(kept)) = kept else {
+        panic!("not kept: {kept:?}");
+    };
+    assert_eq!(kept, lines);
+    assert!(store.left(u64::MAX).await.expect("readable").is_empty());
+}
+
+#[tokio::test]
+async fn a_game_that_cannot_be_read_is_left_and_hinders_no_other() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let store = opened(folder.path()).await;
+    for game in 1..=4 {
+        let mut journal = store
+            .create(Arc::new(header(game, Durability::Durable)))
+            .await
+            .expect("kept");
+        for entry in entries() {
+            journal.append(&mut vec![entry]).await.expect("kept");
+        }
+    }
+    store.close().await;
+    drop(store);
+    let options = SqliteConnectOptions::new().filename(folder.path().join(open::FILE));
+    let mut connection = SqliteConnection::connect_with(&options)
+        .await
+        .expect("it opens");
+    for damage in [
+        "UPDATE journal SET entries = x'ff' WHERE game = 1 AND position = 2",
+        "DELETE FROM journal WHERE game = 2 AND position = 4",
+        "UPDATE games SET form = 99 WHERE number = 4",
+    ] {
+        let changed = connection.execute(damage).await.expect("it is done");
+        assert_eq!(changed.rows_affected(), 1, "{damage}");
+    }
+    connection.close().await.expect("it closes");
+    let store = opened(folder.path()).await;
+    let unfinished = store.left(u64::MAX).await.expect("readable");
+    let games: Vec<Id> = unfinished.iter().map(|game| game.header.game_id).collect();
+    assert_eq!(games, [Id([3; 16])]);
+}
+
+#[tokio::test]
+async fn what_cannot_be_used_is_refused_and_left_as_it_is() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join(open::FILE);
+    let refusal = async |what: &str| {
+        let before = std::fs::read(&file).expect("it is there");
+        let refused = SqliteStore::open(folder.path()).await;
+        let error = refused.err().unwrap_or_else(|| panic!("{what} was taken"));
+        assert_eq!(std::fs::read(&file).expect("still there"), before, "{what}");
+        error
+    };
+
+    std::fs::write(
+        &file,
+        "no database at all, and long enough to be taken for one".repeat(9),
+    )
+    .expect("written");
+    let error = refusal("a text").await;
+    assert!(matches!(error, OpenError::NotOurs(_)), "{error}");
+    std::fs::remove_file(&file).expect("removed");
+
+    let options = SqliteConnectOptions::new()
+        .filename(&file)
+        .create_if_missing(true);
+    let mut other = SqliteConnection::connect_with(&options)
+        .await
+        .expect("made");
+    other
+        .execute("CREATE TABLE recipes (name TEXT)")
+        .await
+        .expect("done");
+    other.close().await.expect("closed");
+    let error = refusal("another program's database").await;
+    assert!(matches!(error, OpenError::NotOurs(_)), "{error}");
+    std::fs::remove_file(&file).expect("removed");
+
+    opened(folder.path()).await.close().await;
+    let mut connection = SqliteConnection::connect_with(&options)
+        .await
+        .expect("ours");
+    connection
+        .execute(
+            "INSERT INTO _sqlx_migrations (version, description, success, checksum, execution_time)
+             VALUES (9999, 'of the future', 1, x'00', 0)",
+        )
+        .await
+        .expect("done");
+    connection.close().await.expect("closed");
+    let error = refusal("a database of a newer version").await;
+    assert!(matches!(error, OpenError::Newer(_)), "{error}");
+    assert!(error.to_string().contains("newer version"), "{error}");
+
+    // The first page is whole, so that it is known as ours; what it points to is not there.
+    let mut bytes = std::fs::read(&file).expect("readable");
+    bytes.truncate(4_096);
+    bytes.resize(8 * 4_096, 0xa5);
+    std::fs::write(&file, bytes).expect("written");
+    let error = refusal("a damaged database").await;
+    assert!(matches!(error, OpenError::Damaged(..)), "{error}");
+}
+
+#[tokio::test]
+async fn a_database_of_which_only_the_log_is_left_is_not_begun_anew() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let store = opened(folder.path()).await;
+    let header = Arc::new(header(1, Durability::Durable));
+    let mut journal = store.create(header).await.expect("kept");
+    journal.append(&mut entries()).await.expect("kept");
+    // The process dies with most of what it kept in the log of writes.
+    let copy = tempfile::tempdir().expect("a folder");
+    for name in ["games.sqlite3", "games.sqlite3-wal"] {
+        std::fs::copy(folder.path().join(name), copy.path().join(name)).expect("copied");
+    }
+    std::fs::write(copy.path().join(open::FILE), "").expect("cut off");
+    let log = std::fs::read(copy.path().join("games.sqlite3-wal")).expect("there");
+    assert!(!log.is_empty());
+    let refused = SqliteStore::open(copy.path()).await;
+    let error = refused.err().expect("it is damaged");
+    assert!(matches!(error, OpenError::Damaged(..)), "{error}");
+    let left = std::fs::read(copy.path().join("games.sqlite3-wal")).expect("there");
+    assert_eq!(left, log);
+}
+
+#[tokio::test]
+async fn what_was_given_up_before_a_deal_leaves_nothing_behind() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let store = opened(folder.path()).await;
+    for game in 1..=2 {
+        let header = Arc::new(header(game, Durability::Durable));
+        let mut journal = store.create(header).await.expect("kept");
+        journal.append(&mut entries()).await.expect("kept");
+        if game == 1 {
+            journal.finish(None).await.expect("kept");
+        }
+    }
+    store.close().await;
+    drop(store);
+    opened(folder.path()).await.close().await;
+    let options = SqliteConnectOptions::new().filename(folder.path().join(open::FILE));
+    let mut connection = SqliteConnection::connect_with(&options)
+        .await
+        .expect("ours");
+    for table in ["games", "journal"] {
+        let count = format!("SELECT count(*) FROM {table}");
+        let rows: i64 = sqlx::query_scalar(sqlx::AssertSqlSafe(count))
+            .fetch_one(&mut connection)
+            .await
+            .expect("readable");
+        assert_eq!(rows, 1, "{table}");
+    }
+}
+
+#[tokio::test]
+async fn one_server_has_a_folder_at_a_time() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let first = opened(folder.path()).await;
+    let second = SqliteStore::open(folder.path()).await;
+    let error = second.err().expect("it is in use");
+    assert!(matches!(error, OpenError::InUse(_)), "{error}");
+    first.close().await;
+    drop(first);
+    opened(folder.path()).await.close().await;
+}
+
+/// What this form looks like for good: games that were kept by any version since must be readable by every later one.
+#[test]
+fn the_form_of_what_is_kept_does_not_change() {
+    let header = header(1, Durability::Durable);
+    let mut journal = Vec::new();
+    for entry in entries() {
+        form::put_entry(&entry, &mut journal);
+    }
+    let written = format!(
+        "{}\n{}\n",
+        hex::encode(form::header_to_bytes(&header)),
+        hex::encode(&journal)
+    );
+    assert_eq!(written, include_str!("fixtures/form1.hex"));
+    let (first, second) = written.split_once('\n').expect("two lines");
+    let bytes = hex::decode(first).expect("hexadecimal digits");
+    let read = form::header_from_bytes(&bytes).expect("readable");
+    assert_eq!(shown(&read), shown(&header));
+    let bytes = hex::decode(second.trim()).expect("hexadecimal digits");
+    let mut read = Vec::new();
+    form::read_entries(&bytes, &mut read).expect("readable");
+    assert_eq!(shown(&read), shown(&entries()));
+}

@@ -1,0 +1,248 @@
+//! `chefshat export`, and the records of `chefshat simulate` that it is tried on: what is printed, what lies there afterwards, and errors
+//! that say what to do. What stands in the files is tested with the tables, in `chefshat-records` and in Python.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+use super::run::{Ended, chefshat};
+
+/// A folder with a data folder in it, whose records are simulated.
+struct Stage {
+    folder: TempDir,
+}
+
+impl Stage {
+    fn new(games: u32) -> Self {
+        let stage = Self {
+            folder: tempfile::tempdir().unwrap(),
+        };
+        let ended = simulate(games, &stage.path("data/records"));
+        assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+        stage
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    /// Exports the records of the data folder to `out`.
+    fn export(&self, flags: &str) -> Ended {
+        let (data, out) = (self.path("data"), self.path("out"));
+        let mut arguments = vec!["export", "--data-dir", text(&data), "--out", text(&out)];
+        arguments.extend(flags.split_whitespace());
+        chefshat(&arguments)
+    }
+
+    /// The files in `out`, by name.
+    fn out(&self) -> Vec<String> {
+        let mut names: Vec<String> = std::fs::read_dir(self.path("out"))
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort();
+        names
+    }
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+fn simulate(games: u32, records: &Path) -> Ended {
+    let games = games.to_string();
+    chefshat(&[
+        "simulate",
+        "--games",
+        &games,
+        "--seed",
+        "7",
+        "--agents",
+        "greedy,random_unmasked,random,random",
+        "--reward",
+        "paper",
+        "--max-invalid-attempts",
+        "20",
+        "--records",
+        text(records),
+    ])
+}
+
+fn contents(folder: &Path) -> Vec<(String, Vec<u8>)> {
+    let mut files: Vec<(String, Vec<u8>)> = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| {
+            let path = entry.unwrap().path();
+            let name = path.file_name().unwrap().to_str().unwrap().to_owned();
+            (name, std::fs::read(path).unwrap())
+        })
+        .collect();
+    files.sort();
+    files
+}
+
+#[test]
+fn simulated_games_have_records_that_verify() {
+    let stage = Stage::new(4);
+    let records = stage.path("data/records");
+    let first = contents(&records);
+    assert_eq!(first.len(), 4);
+    for (name, content) in &first {
+        let header = content.split(|byte| *byte == b'\n').next().unwrap();
+        let header: Value = serde_json::from_slice(header).unwrap();
+        let id = header["header"]["gameId"].as_str().unwrap();
+        assert_eq!(*name, format!("{id}.jsonl"));
+        assert!(String::from_utf8_lossy(content).contains("DECISION_SOURCE_INVALID"));
+    }
+    let verified = chefshat(&["verify", text(&records)]);
+    assert_eq!(verified.code, Some(0), "{verified:?}");
+    // The same batch has the same records, and prints the same with and without them.
+    let again = simulate(4, &stage.path("again"));
+    assert_eq!(contents(&stage.path("again")), first);
+    assert_eq!(simulate(4, &stage.path("more")), again);
+    let refused = chefshat(&[
+        "simulate",
+        "--max-invalid-attempts",
+        "1001",
+        "--records",
+        text(&stage.path("none")),
+    ]);
+    assert_eq!(refused.code, Some(1));
+    assert!(refused.stderr.contains("at most 1000"), "{refused:?}");
+    assert!(!stage.path("none").exists());
+}
+
+#[test]
+fn a_dataset_is_made_of_the_data_folder() {
+    let stage = Stage::new(2);
+    let ended = stage.export("");
+    assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+    assert_eq!(ended.stderr, "");
+    assert!(ended.stdout.contains(": 2 games, "), "{}", ended.stdout);
+    let standard = [
+        "README.md",
+        "SHA256SUMS",
+        "decisions.parquet",
+        "expressions.parquet",
+    ];
+    assert_eq!(stage.out(), standard);
+    let ended = stage.export("--format csv,jsonl --format csv --force --json --licence CC0-1.0");
+    assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+    let said: Value = serde_json::from_str(&ended.stdout).unwrap();
+    assert_eq!(said["games"], 2);
+    assert_eq!(said["finished"], 2);
+    assert_eq!(said["files"].as_array().unwrap().len(), 5);
+    let files = [
+        "README.md",
+        "SHA256SUMS",
+        "decisions.csv",
+        "decisions.jsonl",
+        "expressions.csv",
+        "expressions.jsonl",
+    ];
+    assert_eq!(stage.out(), files);
+    let rows = std::fs::read_to_string(stage.path("out/decisions.jsonl")).unwrap();
+    assert_eq!(
+        Some(rows.lines().count() as u64),
+        said["decisions"].as_u64()
+    );
+    let card = std::fs::read_to_string(stage.path("out/README.md")).unwrap();
+    assert!(card.contains("license: cc0-1.0\n") && card.contains("Licence: CC0-1.0."));
+}
+
+#[test]
+fn the_other_layout_has_a_file_for_each_game() {
+    let stage = Stage::new(2);
+    let ended = stage.export("--layout chefshatgym");
+    assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+    let mut expected: Vec<String> = contents(&stage.path("data/records"))
+        .into_iter()
+        .map(|(name, _)| name.trim_end_matches(".jsonl").to_owned())
+        .collect();
+    for game in &expected {
+        let file = stage.path("out").join(game).join("Dataset.pkl.csv");
+        assert!(file.is_file(), "{}", file.display());
+    }
+    expected.extend(["README.md".to_owned(), "SHA256SUMS".to_owned()]);
+    expected.sort();
+    assert_eq!(stage.out(), expected);
+}
+
+#[test]
+fn damaged_records_are_named_or_left_out() {
+    let stage = Stage::new(2);
+    let records = stage.path("data/records");
+    let (name, content) = contents(&records).swap_remove(0);
+    let cut = content.len() / 2;
+    std::fs::write(records.join(&name), &content[..cut]).unwrap();
+    let ended = stage.export("");
+    assert_eq!(ended.code, Some(1));
+    assert!(
+        ended.stderr.contains(&name) && ended.stderr.contains(": line "),
+        "{ended:?}"
+    );
+    assert!(ended.stderr.contains("--skip-damaged"), "{ended:?}");
+    assert!(!stage.path("out").exists());
+    let ended = stage.export("--skip-damaged");
+    assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+    assert!(ended.stderr.contains("left out: ") && ended.stderr.contains(&name));
+    assert!(ended.stdout.contains(": 1 game, "));
+    let ended = stage.export("--skip-damaged --force --json");
+    let said: Value = serde_json::from_str(&ended.stdout).unwrap();
+    assert!(
+        said["left_out"][0]["path"]
+            .as_str()
+            .unwrap()
+            .ends_with(&name)
+    );
+}
+
+#[test]
+fn mistakes_are_explained() {
+    let stage = Stage::new(1);
+    assert_eq!(stage.export("").code, Some(0));
+    let table = [
+        ("", "is not empty; choose another folder, or replace"),
+        ("--format xls", "possible values: parquet, jsonl, csv"),
+        ("--layout tensor", "possible values: tables, chefshatgym"),
+        ("--layout chefshatgym --format parquet", "CSV alone"),
+        (
+            "--with cat",
+            "possible values: agent, human, robot, built_in",
+        ),
+        (
+            "--force --with human",
+            "of 1 records none is left to export",
+        ),
+        (
+            "--force --room elsewhere",
+            "of 1 records none is left to export",
+        ),
+        ("missing", "missing: No such file"),
+    ];
+    for (flags, expected) in table {
+        let ended = stage.export(flags);
+        assert!(matches!(ended.code, Some(1 | 2)), "{flags}: {ended:?}");
+        assert!(ended.stderr.contains(expected), "{flags}: {}", ended.stderr);
+        assert_eq!(ended.stdout, "", "{flags}");
+    }
+    let (nothing, out) = (stage.path("nothing"), stage.path("other"));
+    let ended = chefshat(&["export", "--data-dir", text(&nothing), "--out", text(&out)]);
+    assert!(
+        ended.stderr.contains("there are no records in"),
+        "{ended:?}"
+    );
+    assert!(!nothing.exists() && !out.exists());
+}
+
+#[test]
+fn help_shows_an_example() {
+    let help = chefshat(&["export", "--help"]);
+    assert_eq!(help.code, Some(0));
+    assert!(
+        help.stdout.contains("chefshat export --out dataset"),
+        "{}",
+        help.stdout
+    );
+}

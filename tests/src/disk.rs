@@ -1,0 +1,118 @@
+//! A small disk of its own for a test, which can be filled up or made read-only without harm to anybody else.
+
+use std::ffi::OsString;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::Stdio;
+
+use tempfile::TempDir;
+use tokio::io::{AsyncBufReadExt as _, BufReader};
+use tokio::process::{Child, Command};
+
+/// Says, also where the output of tests is captured, that a test cannot be run here.
+pub fn skip(test: &str, why: &str) {
+    // If nobody can be told, nobody is told.
+    let _ = writeln!(std::io::stderr(), "SKIPPED {test}: {why}");
+}
+
+/// A file system in memory, mounted where only those see it who are let into its namespace; gone when dropped.
+#[derive(Debug)]
+pub struct SmallDisk {
+    holder: Child,
+    folder: TempDir,
+    as_user: bool,
+}
+
+impl SmallDisk {
+    /// A disk of so many KiB.
+    ///
+    /// # Errors
+    /// Why this machine allows none.
+    pub async fn new(kib: u32) -> Result<Self, String> {
+        // The right to mount is root's; others have it in a namespace of users of their own, where the system lets them make one.
+        match Self::make(kib, false).await {
+            Ok(disk) => Ok(disk),
+            Err(as_root) => Self::make(kib, true).await.map_err(|as_user| {
+                format!("no file system can be mounted: {as_root}; {as_user}")
+            }),
+        }
+    }
+
+    async fn make(kib: u32, as_user: bool) -> Result<Self, String> {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let mut unshare = Command::new("unshare");
+        unshare.args(["--mount", "--propagation", "private"]);
+        if as_user {
+            unshare.arg("--map-root-user");
+        }
+        let script = r#"mount -t tmpfs -o "size=$1k" tmpfs "$0" && echo mounted && exec sleep infinity"#;
+        let mut holder = unshare
+            .args(["sh", "-c", script])
+            .arg(folder.path())
+            .arg(kib.to_string())
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .kill_on_drop(true)
+            .spawn()
+            .map_err(|error| format!("unshare: {error}"))?;
+        let stdout = holder.stdout.take().expect("it is piped");
+        let mut line = String::new();
+        let said = BufReader::new(stdout).read_line(&mut line).await;
+        if said.is_ok() && line.trim() == "mounted" {
+            return Ok(Self {
+                holder,
+                folder,
+                as_user,
+            });
+        }
+        let output = holder.wait_with_output().await;
+        let stderr = output.map(|output| String::from_utf8_lossy(&output.stderr).into_owned());
+        Err(stderr.map_or_else(|error| error.to_string(), |text| text.trim().to_owned()))
+    }
+
+    /// Where it is mounted, for those who are in its namespace.
+    pub fn mounted_at(&self) -> &Path {
+        self.folder.path()
+    }
+
+    /// The program that lets another one in, with its arguments.
+    pub fn enter(&self) -> Vec<OsString> {
+        let target = format!("--target={}", self.id());
+        let mut words = vec!["nsenter".into(), target.into(), "--mount".into()];
+        if self.as_user {
+            words.extend(["--user".into(), "--preserve-credentials".into()]);
+        }
+        words
+    }
+
+    /// The way to it from outside.
+    pub fn path(&self) -> PathBuf {
+        let root = PathBuf::from(format!("/proc/{}/root", self.id()));
+        let inside = self.folder.path().strip_prefix("/").expect("an absolute path");
+        root.join(inside)
+    }
+
+    /// Fills it up with a file of this name.
+    pub fn fill(&self, name: &str) {
+        let mut file = std::fs::File::create(self.path().join(name)).expect("it is made");
+        let piece = [0xa5; 4096];
+        while file.write_all(&piece).is_ok() {}
+    }
+
+    /// From now on nothing can be written to it.
+    pub async fn make_read_only(&self) {
+        let mut enter = self.enter().into_iter();
+        let status = Command::new(enter.next().expect("the program"))
+            .args(enter)
+            .args(["mount", "-o", "remount,ro"])
+            .arg(self.folder.path())
+            .status()
+            .await;
+        assert!(status.expect("nsenter runs").success());
+    }
+
+    fn id(&self) -> u32 {
+        self.holder.id().expect("it sleeps for ever")
+    }
+}

@@ -1,0 +1,163 @@
+//! What clients sent and what they were told, kept apart from any server, so that it can be compared with what a server says it has kept.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::{Arc, Mutex};
+
+use chefshat_client::{Action, Agent, Outcome};
+use chefshat_proto::v1::{self, record_line::Line};
+use tokio::sync::watch;
+
+/// A decision: its game, its seat, its number.
+type Key = (String, u32, u64);
+
+/// Every answer of every agent, and every acknowledgement.
+#[derive(Debug, Default)]
+pub struct Ledger {
+    sent: Mutex<BTreeMap<Key, u32>>,
+    accepted: Mutex<BTreeMap<Key, u32>>,
+    surprises: Mutex<Vec<String>>,
+    count: watch::Sender<u64>,
+}
+
+impl Ledger {
+    /// An agent whose answers are noted here.
+    pub fn noting<A: Agent>(self: &Arc<Self>, agent: A) -> Noted<A> {
+        Noted {
+            agent,
+            game: String::new(),
+            seat: 0,
+            ledger: Arc::clone(self),
+        }
+    }
+
+    /// Decisions that were acknowledged so far.
+    pub fn count(&self) -> u64 {
+        *self.count.borrow()
+    }
+
+    /// Waits until so many decisions have been acknowledged.
+    pub async fn reaches(&self, count: u64) {
+        let mut counted = self.count.subscribe();
+        counted
+            .wait_for(|counted| *counted >= count)
+            .await
+            .expect("the ledger holds the sender");
+    }
+
+    /// Notes something that ought not to have happened.
+    pub fn surprise(&self, what: String) {
+        self.surprises.lock().expect("nobody panics").push(what);
+    }
+
+    /// Panics if something happened that ought not to.
+    ///
+    /// # Panics
+    /// That is what it is for.
+    pub fn assert_no_surprise(&self) {
+        let surprises = self.surprises.lock().expect("nobody panics");
+        assert!(surprises.is_empty(), "{surprises:#?}");
+    }
+
+    /// Compares the record of a game with what the clients know: every acknowledged decision stands in it once, as it was acknowledged, and
+    /// every decision that it says an agent of theirs took is one that the agent took. Gives the number of acknowledged decisions.
+    ///
+    /// # Panics
+    /// At the first difference.
+    pub fn assert_kept(&self, game: &str, record: &[v1::RecordLine]) -> usize {
+        let sent = self.sent.lock().expect("nobody panics");
+        let accepted = self.accepted.lock().expect("nobody panics");
+        let mut found = BTreeSet::new();
+        let mut acknowledged = 0;
+        for line in record {
+            let Some(Line::Decision(decision)) = &line.line else {
+                continue;
+            };
+            let key = (game.to_owned(), decision.seat, decision.decision_id);
+            if decision.source() == v1::DecisionSource::Agent
+                && let Some(action) = sent.get(&key)
+            {
+                assert_eq!(*action, decision.action, "{key:?} is not what was answered");
+            }
+            if let Some(action) = accepted.get(&key) {
+                assert_eq!(
+                    *action, decision.action,
+                    "{key:?} was acknowledged otherwise"
+                );
+                assert_eq!(decision.source(), v1::DecisionSource::Agent, "{key:?}");
+                acknowledged += 1;
+            }
+            assert!(found.insert(key), "a decision twice: {decision:?}");
+        }
+        let lost = (accepted.keys()).find(|key| key.0 == game && !found.contains(*key));
+        assert_eq!(lost, None, "an acknowledged decision is lost");
+        acknowledged
+    }
+}
+
+/// An agent whose answers and acknowledgements are noted.
+#[derive(Debug)]
+pub struct Noted<A> {
+    agent: A,
+    game: String,
+    seat: u32,
+    ledger: Arc<Ledger>,
+}
+
+impl<A> Noted<A> {
+    fn key(&self, decision: u64) -> Key {
+        (self.game.clone(), self.seat, decision)
+    }
+}
+
+impl<A: Agent> Agent for Noted<A> {
+    fn decide(&mut self, request: &v1::DecisionRequest) -> Action {
+        let action = self.agent.decide(request);
+        let key = self.key(request.decision_id);
+        let mut sent = self.ledger.sent.lock().expect("nobody panics");
+        let before = sent.insert(key.clone(), action.0);
+        drop(sent);
+        // An agent is asked again only if its answer was refused, and these are never.
+        if before.is_some() {
+            self.ledger.surprise(format!("{key:?} was asked for twice"));
+        }
+        action
+    }
+
+    fn annotate(&mut self) -> Option<v1::Annotations> {
+        self.agent.annotate()
+    }
+
+    fn on_attached(&mut self, attached: &v1::Attached) {
+        self.game.clone_from(&attached.game_id);
+        self.seat = attached.seat;
+        self.agent.on_attached(attached);
+    }
+
+    fn on_event(&mut self, event: &v1::GameEvent) {
+        self.agent.on_event(event);
+    }
+
+    fn on_result(&mut self, result: &v1::AnswerResult) {
+        self.agent.on_result(result);
+        let key = self.key(result.decision_id);
+        if result.status() != v1::AnswerStatus::Accepted {
+            let surprise = format!("{key:?} was answered with {result:?}");
+            return self.ledger.surprise(surprise);
+        }
+        let mut accepted = self.ledger.accepted.lock().expect("nobody panics");
+        let before = accepted.insert(key.clone(), result.action);
+        drop(accepted);
+        match before {
+            None => self.ledger.count.send_modify(|count| *count += 1),
+            Some(action) if action == result.action => {}
+            Some(action) => self.ledger.surprise(format!(
+                "{key:?} was acknowledged as {action} and as {}",
+                result.action
+            )),
+        }
+    }
+
+    fn on_game_over(&mut self, outcome: &Outcome) {
+        self.agent.on_game_over(outcome);
+    }
+}

@@ -1,0 +1,239 @@
+//! Rooms that are always being played, by agents of the SDK over real connections that find their way back by themselves: when a game
+//! ends, the next is made. What they were told stands in a `Ledger`.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use chefshat_client::{
+    Action, Agent, Backoff, Client, Ending, Error, Outcome, PlayError, PlayOptions, RandomAgent,
+};
+use chefshat_proto::v1::{self, seat_config::FilledBy};
+use futures::FutureExt as _;
+use rand::rngs::SmallRng;
+use rand::{RngExt as _, SeedableRng as _};
+use tokio::sync::watch;
+use tokio::task::JoinSet;
+use tonic::Code;
+
+use crate::{Ledger, PATIENCE, patiently};
+
+/// Wait before a call is made again that did not reach the server.
+const AGAIN_AFTER: Duration = Duration::from_millis(10);
+/// How the agents come back: soon, and as long as a test is patient.
+const BACKOFF: Backoff = Backoff {
+    first: Duration::from_millis(5),
+    max: Duration::from_millis(40),
+    give_up_after: PATIENCE,
+};
+
+/// What a regular's games are like.
+#[derive(Debug, Clone)]
+pub struct Habit {
+    /// The rules.
+    pub rules: v1::RuleSet,
+    /// The policy.
+    pub policy: v1::RoomPolicy,
+    /// Seats filled by built-in agents, the last ones; the others are played over connections.
+    pub built_in: usize,
+    /// Whether the seats share a stream.
+    pub one_stream: bool,
+    /// How events reach the seats.
+    pub delivery: v1::EventDelivery,
+    /// Longest time an agent thinks.
+    pub pace: Duration,
+}
+
+impl Default for Habit {
+    fn default() -> Self {
+        Self {
+            rules: v1::RuleSet::default(),
+            // Nobody is to be late.
+            policy: v1::RoomPolicy {
+                decision_time_ms: Some(3_600_000),
+                ..v1::RoomPolicy::default()
+            },
+            built_in: 0,
+            one_stream: false,
+            delivery: v1::EventDelivery::AtOnce,
+            pace: Duration::from_millis(2),
+        }
+    }
+}
+
+/// Rooms that are always being played.
+#[derive(Debug)]
+pub struct Regulars {
+    /// What they were told.
+    pub ledger: Arc<Ledger>,
+    leaving: watch::Sender<bool>,
+    rooms: JoinSet<Vec<String>>,
+}
+
+impl Regulars {
+    /// A room of each habit, on the server with this URL, which may be away at times.
+    pub fn come(url: &str, habits: Vec<Habit>) -> Self {
+        let ledger = Arc::new(Ledger::default());
+        let leaving = watch::Sender::new(false);
+        let mut rooms = JoinSet::new();
+        for (habit, number) in habits.into_iter().zip(0..) {
+            let room = Room {
+                url: url.to_owned(),
+                habit,
+                ledger: Arc::clone(&ledger),
+                random: SmallRng::seed_from_u64(number),
+            };
+            rooms.spawn(room.always_play(leaving.subscribe()));
+        }
+        Self {
+            ledger,
+            leaving,
+            rooms,
+        }
+    }
+
+    /// They play what they have begun to its end, and go. Gives the ids of all their games, each of which they saw finish.
+    pub async fn leave(self) -> Vec<String> {
+        self.leaving.send_replace(true);
+        let games = patiently("the last games to end", self.rooms.join_all()).await;
+        self.ledger.assert_no_surprise();
+        games.into_iter().flatten().collect()
+    }
+}
+
+struct Room {
+    url: String,
+    habit: Habit,
+    ledger: Arc<Ledger>,
+    random: SmallRng,
+}
+
+impl Room {
+    async fn always_play(mut self, leaving: watch::Receiver<bool>) -> Vec<String> {
+        let url = self.url.clone();
+        let client = again("connecting", || Client::connect(url.clone())).await;
+        let mut games = Vec::new();
+        while !*leaving.borrow() {
+            let Some((game, tickets)) = self.open(&client).await else {
+                continue;
+            };
+            for outcome in self.play(&client, tickets).await {
+                match outcome.map(|outcome| outcome.ending) {
+                    Ok(Ending::Finished(_)) => {}
+                    other => self.ledger.surprise(format!("{game} ended with {other:?}")),
+                }
+            }
+            games.push(game);
+        }
+        games
+    }
+
+    /// A room with all its tickets. `None` where a seat was taken and the ticket for it was lost with the connection.
+    async fn open(&self, client: &Client) -> Option<(String, Vec<String>)> {
+        let open = 4 - self.habit.built_in;
+        let request = v1::CreateRoomRequest {
+            rules: Some(self.habit.rules.clone()),
+            policy: Some(self.habit.policy.clone()),
+            seats: (0..4)
+                .map(|seat| v1::SeatConfig {
+                    filled_by: (seat >= open).then(|| FilledBy::BuiltInAgent("random".to_owned())),
+                })
+                .collect(),
+            ..v1::CreateRoomRequest::default()
+        };
+        let created = again("making a room", || client.create_room(request.clone())).await;
+        let room = created.room.expect("a room");
+        let mut tickets = Vec::new();
+        for seat in 0..open {
+            let request = v1::JoinRoomRequest {
+                join_code: created.join_code.clone(),
+                name: format!("agent {seat}"),
+                seat: u32::try_from(seat).ok(),
+                ..v1::JoinRoomRequest::default()
+            };
+            // A room that was acknowledged is there, whatever has happened since.
+            let joined = again("joining", || {
+                client.join(request.clone()).map(|joined| match joined {
+                    Err(error) if error.reason() == Some("SEAT_TAKEN") => Ok(None),
+                    joined => joined.map(Some),
+                })
+            })
+            .await;
+            let Some(joined) = joined else {
+                let (room, token) = (&room.room_id, &created.owner_token);
+                again("closing", || client.close_room(room.clone(), token.clone())).await;
+                return None;
+            };
+            tickets.push(joined.ticket);
+        }
+        Some((room.game_id, tickets))
+    }
+
+    async fn play(
+        &mut self,
+        client: &Client,
+        tickets: Vec<String>,
+    ) -> Vec<Result<Outcome, PlayError>> {
+        let options = PlayOptions {
+            delivery: self.habit.delivery,
+            backoff: BACKOFF,
+            ..PlayOptions::default()
+        };
+        let mut seats = Vec::new();
+        for ticket in tickets {
+            let agent = Paced {
+                agent: RandomAgent::new(self.random.random()),
+                pace: self.habit.pace,
+                random: SmallRng::seed_from_u64(self.random.random()),
+            };
+            seats.push((ticket, self.ledger.noting(agent)));
+        }
+        if self.habit.one_stream {
+            return client.play_many_with(seats, &options).await;
+        }
+        let mut playing = JoinSet::new();
+        for (ticket, agent) in seats {
+            let (client, options) = (client.clone(), options.clone());
+            playing.spawn(async move { client.play_with(ticket, agent, &options).await });
+        }
+        playing.join_all().await
+    }
+}
+
+/// Makes a call until it reaches the server.
+async fn again<T, F>(what: &str, call: impl Fn() -> F) -> T
+where
+    F: Future<Output = Result<T, Error>>,
+{
+    let reaching = async {
+        loop {
+            match call().await {
+                Ok(done) => return done,
+                // A broken connection has no reason; what is unavailable has one, and says that it may be tried again.
+                Err(error) if error.reason().is_none() || error.code() == Code::Unavailable => {
+                    tokio::time::sleep(AGAIN_AFTER).await;
+                }
+                Err(error) => panic!("{what} was refused: {error}"),
+            }
+        }
+    };
+    patiently(what, reaching).await
+}
+
+/// An agent that thinks for a while.
+struct Paced<A> {
+    agent: A,
+    pace: Duration,
+    random: SmallRng,
+}
+
+impl<A: Agent> Agent for Paced<A> {
+    fn decide(&mut self, request: &v1::DecisionRequest) -> Action {
+        let thinking = self.pace.mul_f64(self.random.random());
+        tokio::task::block_in_place(|| std::thread::sleep(thinking));
+        self.agent.decide(request)
+    }
+
+    fn on_event(&mut self, event: &v1::GameEvent) {
+        self.agent.on_event(event);
+    }
+}

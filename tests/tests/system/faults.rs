@@ -1,0 +1,302 @@
+//! Disks and databases that fail under the real binary: nothing is acknowledged that is not kept, the server ends and says what to do, and
+//! once the fault is gone every game goes on. Deaths of a server whose disk is well are in `restarts`.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+use chefshat_client::Client;
+use chefshat_proto::v1::{self, record_line::Line, seat_update::Update};
+use chefshat_records::{jsonl, replay};
+use chefshat_tests::{
+    Ended, Habit, Launch, Ledger, Process, Regulars, SmallDisk, StreamSeat, first_legal,
+    first_to_hear, is_legal, one_shift, patiently, room_of_four, skip,
+};
+use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
+use sqlx::{Connection as _, Executor as _};
+use tokio::process::Command;
+
+/// Name of the database in a data directory.
+const DATABASE: &str = "games.sqlite3";
+/// A disk that the write-ahead log of a few games does not fill by itself, KiB.
+const DISK_KIB: u32 = 16 * 1024;
+/// How long another program has the database locked for a while.
+const LOCKED_FOR: Duration = Duration::from_secs(3);
+/// Time for a decision meanwhile.
+const DECISION_TIME_MS: u32 = 2_000;
+/// Acknowledgements that four rooms may have on the way when the database is locked: one for each seat.
+const ON_THE_WAY: u64 = 16;
+
+fn rooms(count: usize, policy: v1::RoomPolicy) -> Vec<Habit> {
+    let habit = Habit {
+        rules: v1::RuleSet {
+            stop: Some(v1::rule_set::Stop::TargetShifts(2)),
+            ..v1::RuleSet::default()
+        },
+        policy,
+        ..Habit::default()
+    };
+    vec![habit; count]
+}
+
+fn unhurried() -> v1::RoomPolicy {
+    Habit::default().policy
+}
+
+/// Whoever is charged for a locked database is late.
+fn hurried() -> v1::RoomPolicy {
+    v1::RoomPolicy {
+        decision_time_ms: Some(DECISION_TIME_MS),
+        bank_ms: Some(0),
+        ..v1::RoomPolicy::default()
+    }
+}
+
+/// A server that has failed says so, and what to do.
+fn assert_failed(ended: &Ended, advice: &str) {
+    assert!(!ended.status.success(), "{ended:?}");
+    assert!(ended.said.contains(advice), "{advice:?} is not in {}", ended.said);
+    assert!(ended.said.contains("start the server again"), "{}", ended.said);
+}
+
+/// Plays on for a while, lets the games end, and finds every acknowledged decision in the records.
+async fn assert_goes_on(launch: &Launch, server: Process, regulars: Regulars, data_dir: &Path) {
+    let ledger = Arc::clone(&regulars.ledger);
+    patiently("decisions", ledger.reaches(ledger.count() + 100)).await;
+    let games = regulars.leave().await;
+    let client = Client::connect(launch.url()).await.expect("it listens");
+    let acknowledged = assert_kept(&client, &ledger, &games).await;
+    assert_eq!(u64::try_from(acknowledged), Ok(ledger.count()), "all of them");
+    let ended = server.stop().await;
+    assert!(ended.status.success(), "{ended:?}");
+    for game in &games {
+        jsonl::read(&jsonl::path_of(data_dir, game)).expect("the record is written");
+    }
+}
+
+/// Every game finished, every record replays, every acknowledged decision is in one; nobody was late. Gives their number.
+async fn assert_kept(client: &Client, ledger: &Ledger, games: &[String]) -> usize {
+    let mut acknowledged = 0;
+    for game in games {
+        let record = client.record(game).await.expect("it is kept");
+        let replayed = replay::replay(&record).unwrap_or_else(|error| panic!("{game}: {error}"));
+        assert_eq!(replayed.state, v1::RoomState::Finished, "{game}");
+        acknowledged += ledger.assert_kept(game, &record);
+        for line in &record {
+            if let Some(Line::Decision(decision)) = &line.line {
+                assert_eq!(decision.source(), v1::DecisionSource::Agent, "{decision:?}");
+            }
+        }
+    }
+    acknowledged
+}
+
+/// Another program that works on the database.
+async fn other_program(data_dir: &Path) -> SqliteConnection {
+    let options = SqliteConnectOptions::new().filename(data_dir.join(DATABASE));
+    SqliteConnection::connect_with(&options)
+        .await
+        .expect("there is a database")
+}
+
+async fn execute(connection: &mut SqliteConnection, statement: &'static str) {
+    connection.execute(statement).await.expect("it is done");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_full_disk_ends_the_server_and_loses_nothing() {
+    let disk = match SmallDisk::new(DISK_KIB).await {
+        Ok(disk) => disk,
+        Err(why) => return skip("a_full_disk_ends_the_server_and_loses_nothing", &why),
+    };
+    let mut launch = Launch::new(disk.mounted_at()).through(disk.enter());
+    let server = launch.start().await.expect("it starts");
+    let regulars = Regulars::come(&launch.url(), rooms(4, unhurried()));
+    patiently("decisions", regulars.ledger.reaches(50)).await;
+    disk.fill("filler");
+    assert_failed(&server.ended().await, "the disk is full: free some space");
+    // Started again too early, it fails again; what it needs at once may be there, and a little later it is not.
+    let ended = match launch.start().await {
+        Ok(server) => server.ended().await,
+        Err(ended) => ended,
+    };
+    assert_failed(&ended, "free some space");
+    std::fs::remove_file(disk.path().join("filler")).expect("it is removed");
+    let server = launch.start().await.expect("it starts again");
+    assert_goes_on(&launch, server, regulars, &disk.path()).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_database_that_is_locked_for_a_while_is_waited_for_and_nobody_is_late() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let mut launch = Launch::new(folder.path());
+    let server = launch.start().await.expect("it starts");
+    let regulars = Regulars::come(&launch.url(), rooms(4, hurried()));
+    patiently("decisions", regulars.ledger.reaches(50)).await;
+    let mut other = other_program(folder.path()).await;
+    execute(&mut other, "BEGIN IMMEDIATE").await;
+    let before = regulars.ledger.count();
+    tokio::time::sleep(LOCKED_FOR).await;
+    let meanwhile = regulars.ledger.count() - before;
+    execute(&mut other, "ROLLBACK").await;
+    assert!(meanwhile <= ON_THE_WAY, "{meanwhile} were acknowledged although nothing can be kept");
+    assert_goes_on(&launch, server, regulars, folder.path()).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_seat_that_waits_for_the_database_to_have_its_answer_refused_may_still_answer() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let mut launch = Launch::new(folder.path());
+    let server = launch.start().await.expect("it starts");
+    let client = Client::connect(launch.url()).await.expect("it listens");
+    let (_, tickets) = room_of_four(&client, one_shift(), hurried()).await;
+    let mut other = other_program(folder.path()).await;
+    let mut seats = Vec::new();
+    for ticket in tickets {
+        let mut seat = StreamSeat::open(client.channel()).await;
+        let attach = v1::Attach {
+            ticket,
+            delivery: v1::EventDelivery::AtOnce.into(),
+            ..v1::Attach::default()
+        };
+        seat.attach(attach).await;
+        assert!(matches!(seat.next().await, Update::Attached(_)));
+        seats.push(seat);
+    }
+    let (Update::Decision(decision), asked) = first_to_hear(&mut seats).await else {
+        panic!("the first thing told is a decision");
+    };
+    execute(&mut other, "BEGIN IMMEDIATE").await;
+    let wrong = (0..500).find(|action| !is_legal(&decision, *action));
+    let wrong = wrong.expect("not everything is legal");
+    seats[asked].answer(decision.decision_id, wrong).await;
+    tokio::time::sleep(LOCKED_FOR).await;
+    execute(&mut other, "ROLLBACK").await;
+    let refused = seats[asked].result().await;
+    assert_eq!(refused.status(), v1::AnswerStatus::Invalid);
+    let right = first_legal(&decision);
+    seats[asked].answer(decision.decision_id, right).await;
+    let result = seats[asked].result().await;
+    assert_eq!(result.status(), v1::AnswerStatus::Accepted);
+    let limit_us = u64::from(DECISION_TIME_MS) * 1_000;
+    assert!(result.decision_time_us < limit_us, "{result:?}");
+    server.kill().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_database_that_stays_locked_ends_the_server_and_loses_nothing() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let mut launch = Launch::new(folder.path());
+    let server = launch.start().await.expect("it starts");
+    let regulars = Regulars::come(&launch.url(), rooms(2, unhurried()));
+    patiently("decisions", regulars.ledger.reaches(50)).await;
+    let mut other = other_program(folder.path()).await;
+    execute(&mut other, "BEGIN IMMEDIATE").await;
+    let advice = "another program has had games.sqlite3 locked for more than 10 s";
+    assert_failed(&server.ended().await, advice);
+    execute(&mut other, "ROLLBACK").await;
+    other.close().await.expect("it is closed");
+    let server = launch.start().await.expect("it starts again");
+    assert_goes_on(&launch, server, regulars, folder.path()).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_disk_that_does_not_sync_ends_the_server_and_loses_nothing() {
+    let name = "a_disk_that_does_not_sync_ends_the_server_and_loses_nothing";
+    let mut tried = Command::new("strace");
+    match tried.args(["-o", "/dev/null", "true"]).output().await {
+        Ok(output) if output.status.success() => {}
+        Ok(output) => return skip(name, &String::from_utf8_lossy(&output.stderr)),
+        Err(error) => return skip(name, &format!("strace: {error}")),
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let log = folder.path().join("strace.log");
+    // Once some games are going on, nothing is synced any more. The tracer is a process apart: the server remains our child.
+    let strace = [
+        "strace".as_ref(),
+        "-D".as_ref(),
+        "-f".as_ref(),
+        "--seccomp-bpf".as_ref(),
+        "-o".as_ref(),
+        log.as_os_str(),
+        "--trace=fsync,fdatasync".as_ref(),
+        "--inject=fsync,fdatasync:error=EIO:when=150+".as_ref(),
+    ];
+    let data_dir = folder.path().join("data");
+    let mut launch = Launch::new(&data_dir).through(strace);
+    let server = launch.start().await.expect("it starts");
+    let regulars = Regulars::come(&launch.url(), rooms(2, unhurried()));
+    let ended = server.ended().await;
+    assert_failed(&ended, "the disk does not read or write as it should");
+    assert!(regulars.ledger.count() > 20, "in mid-game");
+    let log = std::fs::read_to_string(log).expect("strace wrote it");
+    assert!(log.contains("(INJECTED)"), "{log}");
+    launch.by_itself();
+    let server = launch.start().await.expect("it starts again");
+    assert_goes_on(&launch, server, regulars, &data_dir).await;
+}
+
+/// What a server says that does not start, and that it leaves the database as it is.
+async fn refusal(launch: &mut Launch, file: &Path) -> String {
+    let before = std::fs::read(file).expect("readable");
+    let ended = launch.start().await.expect_err("it does not start");
+    assert!(!ended.status.success(), "{ended:?}");
+    assert!(std::fs::read(file).expect("readable") == before, "left as it is");
+    ended.said
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_database_that_cannot_be_used_is_left_as_it_is() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let mut launch = Launch::new(folder.path());
+    let server = launch.start().await.expect("it starts");
+    let file = folder.path().join(DATABASE);
+
+    // A second server would listen elsewhere.
+    let said = refusal(&mut Launch::new(folder.path()), &file).await;
+    assert!(said.contains("another chefshat server uses"), "{said}");
+    assert!(said.contains("--data-dir"), "{said}");
+    assert!(server.stop().await.status.success());
+    let well = std::fs::read(&file).expect("readable");
+
+    let mut future = other_program(folder.path()).await;
+    execute(
+        &mut future,
+        "INSERT INTO _sqlx_migrations (version, description, success, checksum, execution_time)
+         VALUES (9999, 'of the future', 1, x'00', 0)",
+    )
+    .await;
+    future.close().await.expect("closed");
+    let said = refusal(&mut launch, &file).await;
+    assert!(said.contains("newer version"), "{said}");
+
+    // Its first page is whole, so that it is known as ours; what that points to is not there.
+    let mut damaged = well.clone();
+    damaged[4_096..].fill(0xa5);
+    std::fs::write(&file, damaged).expect("written");
+    let said = refusal(&mut launch, &file).await;
+    assert!(said.contains("damaged") && said.contains("copy"), "{said}");
+
+    std::fs::write(&file, "shopping list: flour, tomatoes".repeat(500)).expect("written");
+    let said = refusal(&mut launch, &file).await;
+    assert!(said.contains("not a database of chefshat"), "{said}");
+
+    std::fs::write(&file, well).expect("written");
+    let server = launch.start().await.expect("it is well again");
+    assert!(server.stop().await.status.success());
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_folder_that_cannot_be_written_is_named() {
+    let disk = match SmallDisk::new(DISK_KIB).await {
+        Ok(disk) => disk,
+        Err(why) => return skip("a_folder_that_cannot_be_written_is_named", &why),
+    };
+    let mut launch = Launch::new(disk.mounted_at()).through(disk.enter());
+    let server = launch.start().await.expect("it starts");
+    assert!(server.stop().await.status.success());
+    disk.make_read_only().await;
+    let said = refusal(&mut launch, &disk.path().join(DATABASE)).await;
+    assert!(said.contains("--data-dir"), "{said}");
+    assert!(said.contains(&*disk.mounted_at().to_string_lossy()), "{said}");
+}

@@ -1,0 +1,278 @@
+//! Records of games that have ended: listed, read, streamed, and carried from one server to another. The same over both stores.
+
+use std::sync::Arc;
+
+use chefshat_proto::v1::{self, record_line::Line, record_service_client::RecordServiceClient};
+use chefshat_server::store::{MemoryStore, SqliteStore, Store};
+use chefshat_tests::{TestServer, one_shift, patiently, play_out, room_of_four};
+use futures::TryStreamExt as _;
+use tempfile::TempDir;
+use tonic::transport::Channel;
+use tonic::{Code, Status};
+use tonic_types::StatusExt as _;
+
+const GAMES: usize = 5;
+
+/// A server with some finished games of one Shift, and their ids in the order in which they were made.
+async fn server_with_games(store: Arc<dyn Store>) -> (TestServer, Vec<String>) {
+    let server = TestServer::with(|config| config.allow_import = true, store).await;
+    let client = server.client().await;
+    let mut games = Vec::new();
+    for number in 0..GAMES {
+        let durability = match number % 2 {
+            0 => v1::Durability::Unspecified,
+            _ => v1::Durability::Ephemeral,
+        };
+        let policy = v1::RoomPolicy {
+            durability: durability.into(),
+            ..v1::RoomPolicy::default()
+        };
+        let (created, tickets) = room_of_four(&client, one_shift(), policy).await;
+        let room = created.room.expect("a room");
+        play_out(&server, tickets).await;
+        // The game is told to be over once it is kept.
+        games.push(room.game_id);
+    }
+    (server, games)
+}
+
+async fn stores() -> Vec<(Arc<dyn Store>, Option<TempDir>)> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let sqlite = SqliteStore::open(folder.path()).await.expect("a new one");
+    vec![
+        (Arc::new(MemoryStore::default()), None),
+        (Arc::new(sqlite), Some(folder)),
+    ]
+}
+
+async fn service(server: &TestServer) -> RecordServiceClient<Channel> {
+    RecordServiceClient::new(server.channel().await)
+}
+
+async fn record(
+    service: &mut RecordServiceClient<Channel>,
+    game_id: &str,
+) -> Result<Vec<v1::RecordLine>, Status> {
+    let request = v1::GetRecordRequest {
+        game_id: game_id.to_owned(),
+    };
+    let parts: Vec<_> = service
+        .get_record(request)
+        .await?
+        .into_inner()
+        .try_collect()
+        .await?;
+    Ok(parts.into_iter().flat_map(|part| part.lines).collect())
+}
+
+async fn import(
+    service: &mut RecordServiceClient<Channel>,
+    lines: &[v1::RecordLine],
+) -> Result<v1::RecordSummary, Status> {
+    let parts: Vec<_> = lines
+        .chunks(100)
+        .map(|lines| v1::ImportRecordRequest {
+            lines: lines.to_vec(),
+        })
+        .collect();
+    let imported = service
+        .import_record(futures::stream::iter(parts))
+        .await?
+        .into_inner();
+    Ok(imported.record.expect("a summary"))
+}
+
+fn reason(status: &Status) -> String {
+    status
+        .get_details_error_info()
+        .map(|info| info.reason)
+        .unwrap_or_default()
+}
+
+#[tokio::test]
+async fn records_are_listed_in_pages_and_streamed_whole() {
+    for (store, _folder) in stores().await {
+        let (server, games) = server_with_games(store).await;
+        let mut service = service(&server).await;
+        let mut listed = Vec::new();
+        let mut page_token = String::new();
+        loop {
+            let request = v1::ListRecordsRequest {
+                page_size: 2,
+                page_token,
+                ..v1::ListRecordsRequest::default()
+            };
+            let page = service.list_records(request).await.expect("a page");
+            let page = page.into_inner();
+            assert!(page.records.len() <= 2);
+            listed.extend(page.records);
+            page_token = page.next_page_token;
+            if page_token.is_empty() {
+                break;
+            }
+        }
+        let mut ids: Vec<String> = listed.iter().map(|it| it.game_id.clone()).collect();
+        let mut expected = games.clone();
+        ids.sort();
+        expected.sort();
+        assert_eq!(ids, expected, "each once");
+
+        let stream = service
+            .stream_records(v1::StreamRecordsRequest::default())
+            .await
+            .expect("a stream")
+            .into_inner();
+        let parts: Vec<_> = patiently("the stream to end", stream.try_collect())
+            .await
+            .expect("no error");
+        let streamed: Vec<v1::RecordLine> = parts
+            .into_iter()
+            .flat_map(|part: v1::StreamRecordsResponse| part.lines)
+            .collect();
+        let mut apart = Vec::new();
+        for summary in &listed {
+            let lines = record(&mut service, &summary.game_id).await.expect("held");
+            let replayed = chefshat_records::replay::replay(&lines).expect("it replays");
+            assert_eq!(replayed.standings, summary.standings);
+            assert_eq!(replayed.decisions, summary.decisions);
+            assert_eq!(summary.shifts, 1);
+            assert_eq!(summary.state(), v1::RoomState::Finished);
+            assert!(summary.ended_at_ms >= summary.created_at_ms);
+            apart.extend(lines);
+        }
+        assert_eq!(streamed, apart, "one after the other, as each alone");
+
+        for (filter, found) in [
+            (
+                v1::RecordFilter {
+                    participant: "agent 2".into(),
+                    ..v1::RecordFilter::default()
+                },
+                GAMES,
+            ),
+            (
+                v1::RecordFilter {
+                    participant: "nobody".into(),
+                    ..v1::RecordFilter::default()
+                },
+                0,
+            ),
+            (
+                v1::RecordFilter {
+                    origin: v1::GameOrigin::Dealt.into(),
+                    ..v1::RecordFilter::default()
+                },
+                GAMES,
+            ),
+            (
+                v1::RecordFilter {
+                    state: v1::RoomState::Aborted.into(),
+                    ..v1::RecordFilter::default()
+                },
+                0,
+            ),
+        ] {
+            let request = v1::ListRecordsRequest {
+                filter: Some(filter.clone()),
+                ..v1::ListRecordsRequest::default()
+            };
+            let page = service.list_records(request).await.expect("a page");
+            assert_eq!(page.into_inner().records.len(), found, "{filter:?}");
+        }
+        server.stop().await;
+    }
+}
+
+#[tokio::test]
+async fn a_record_is_carried_from_one_server_to_another() {
+    let (first, games) = server_with_games(Arc::new(MemoryStore::default())).await;
+    let lines = record(&mut service(&first).await, &games[0])
+        .await
+        .expect("held");
+    for (store, _folder) in stores().await {
+        let second = TestServer::with(|config| config.allow_import = true, store).await;
+        let mut service = service(&second).await;
+        let summary = import(&mut service, &lines).await.expect("it is taken");
+        assert_eq!(summary.game_id, games[0]);
+        assert_eq!(summary.seats.len(), 4);
+        assert_eq!(record(&mut service, &games[0]).await.expect("held"), lines);
+        let again = import(&mut service, &lines).await.expect_err("it is there");
+        assert_eq!(
+            (again.code(), reason(&again).as_str()),
+            (Code::AlreadyExists, "GAME_KNOWN")
+        );
+
+        let mut damaged = lines.clone();
+        let line = damaged
+            .iter()
+            .position(|line| matches!(line.line, Some(Line::Decision(_))))
+            .expect("there is a decision");
+        if let Some(Line::Decision(decision)) = &mut damaged[line].line {
+            decision.action_mask[0] ^= 1;
+        }
+        let refused = import(&mut service, &damaged).await.expect_err("damaged");
+        assert_eq!(reason(&refused), "RECORD_REFUSED");
+        assert!(
+            refused.message().contains(&format!("line {}", line + 1)),
+            "{refused}"
+        );
+        let folder = second.stop().await;
+        let file = chefshat_records::jsonl::path_of(folder.path(), &games[0]);
+        assert_eq!(
+            chefshat_records::jsonl::read(&file).expect("written"),
+            lines
+        );
+    }
+    first.stop().await;
+}
+
+#[tokio::test]
+async fn what_is_not_held_or_not_wanted_is_refused() {
+    let server = TestServer::start().await;
+    let client = server.client().await;
+    let (created, _) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
+    let waiting = created.room.expect("a room").game_id;
+    let mut service = service(&server).await;
+    for (game, expected) in [
+        (waiting.as_str(), (Code::FailedPrecondition, "GAME_RUNNING")),
+        (
+            "00112233445566778899aabbccddeeff",
+            (Code::NotFound, "GAME_UNKNOWN"),
+        ),
+        ("nonsense", (Code::NotFound, "GAME_UNKNOWN")),
+    ] {
+        let refused = record(&mut service, game).await.expect_err(game);
+        assert_eq!((refused.code(), reason(&refused).as_str()), expected);
+    }
+    let refused = import(&mut service, &[]).await.expect_err("it is off");
+    assert_eq!(
+        (refused.code(), reason(&refused).as_str()),
+        (Code::PermissionDenied, "IMPORT_OFF")
+    );
+    let promised = client
+        .create_room(v1::CreateRoomRequest {
+            policy: Some(v1::RoomPolicy {
+                durability: v1::Durability::Durable.into(),
+                ..v1::RoomPolicy::default()
+            }),
+            ..v1::CreateRoomRequest::default()
+        })
+        .await
+        .expect_err("a store in memory cannot keep that promise");
+    assert_eq!(promised.reason(), Some("POLICY_REFUSED"));
+    let request = v1::ListRecordsRequest {
+        page_token: "nonsense".into(),
+        ..v1::ListRecordsRequest::default()
+    };
+    let refused = service.list_records(request).await.expect_err("no token");
+    assert_eq!(reason(&refused), "PAGE_TOKEN_REFUSED");
+    let request = v1::StreamRecordsRequest {
+        filter: Some(v1::RecordFilter {
+            kind: 77,
+            ..v1::RecordFilter::default()
+        }),
+    };
+    let refused = service.stream_records(request).await.expect_err("no kind");
+    assert_eq!(reason(&refused), "FILTER_REFUSED");
+    server.stop().await;
+}
