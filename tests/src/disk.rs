@@ -32,9 +32,9 @@ impl SmallDisk {
         // The right to mount is root's; others have it in a namespace of users of their own, where the system lets them make one.
         match Self::make(kib, false).await {
             Ok(disk) => Ok(disk),
-            Err(as_root) => Self::make(kib, true).await.map_err(|as_user| {
-                format!("no file system can be mounted: {as_root}; {as_user}")
-            }),
+            Err(as_root) => Self::make(kib, true)
+                .await
+                .map_err(|as_user| format!("no file system can be mounted: {as_root}; {as_user}")),
         }
     }
 
@@ -45,7 +45,8 @@ impl SmallDisk {
         if as_user {
             unshare.arg("--map-root-user");
         }
-        let script = r#"mount -t tmpfs -o "size=$1k" tmpfs "$0" && echo mounted && exec sleep infinity"#;
+        let script =
+            r#"mount -t tmpfs -o "size=$1k" tmpfs "$0" && echo mounted && exec sleep infinity"#;
         let mut holder = unshare
             .args(["sh", "-c", script])
             .arg(folder.path())
@@ -89,7 +90,11 @@ impl SmallDisk {
     /// The way to it from outside.
     pub fn path(&self) -> PathBuf {
         let root = PathBuf::from(format!("/proc/{}/root", self.id()));
-        let inside = self.folder.path().strip_prefix("/").expect("an absolute path");
+        let inside = self
+            .folder
+            .path()
+            .strip_prefix("/")
+            .expect("an absolute path");
         root.join(inside)
     }
 

@@ -209,7 +209,11 @@ where
             match call().await {
                 Ok(done) => return done,
                 // A broken connection has no reason; what is unavailable has one, and says that it may be tried again.
-                Err(error) if error.reason().is_none() || error.code() == Code::Unavailable => {
+                Err(error)
+                    if error.reason().is_none()
+                        || error.code() == Code::Unavailable
+                        || error.reason() == Some("DISK_NEARLY_FULL") =>
+                {
                     tokio::time::sleep(AGAIN_AFTER).await;
                 }
                 Err(error) => panic!("{what} was refused: {error}"),

@@ -250,6 +250,8 @@ def test_rows_are_the_decisions_of_the_records(hosted: Dataset) -> None:
     assert built_in["decision_time_us"].null_count() == built_in.height > 0
     assert set(built_in["built_in_agent"]) == {"random", "greedy"}
     assert decisions["created_at"].null_count() == 0
+    # None was taken over from another game.
+    assert decisions["agent"].null_count() == decisions["agent_kind"].null_count() == 0
 
     refused = decisions.filter(polars.col("agent") == "Stubborn")
     assert refused.height > 0

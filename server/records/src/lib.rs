@@ -4,6 +4,7 @@
 pub mod branch;
 pub mod convert;
 pub mod dataset;
+pub mod files;
 pub mod jsonl;
 pub mod picture;
 pub mod players;
@@ -11,3 +12,4 @@ pub mod replay;
 pub mod seeds;
 pub mod summary;
 pub mod table;
+pub mod whole;

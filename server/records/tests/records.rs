@@ -9,7 +9,9 @@ mod records {
     mod branches;
     mod damage;
     mod dataset;
+    mod files;
     mod made;
     mod picture;
+    mod table;
     mod verify;
 }

@@ -4,14 +4,14 @@ use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use chefshat_records::dataset::{
-    Export as Exporter, Exported, Filter, Format, Layout, find_records,
-};
+use chefshat_records::dataset::{Export as Exporter, Exported, Filter, Format, Layout};
+use chefshat_records::files::find_records;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 
+use super::numbers::counted;
 use super::{CommandError, data_dir};
 
 const HELP: &str = "\
@@ -36,7 +36,7 @@ pub(super) struct Export {
     /// The folder to make; it must not exist, or be empty.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Replace an earlier dataset in that folder.
+    /// Replace an earlier dataset in that folder; a folder with anything else in it is left as it is.
     #[arg(long)]
     force: bool,
     /// What to write: two tables over all games, or the columns of the package chefshatgym, a CSV file for each game.
@@ -191,10 +191,4 @@ impl Export {
             "files": files,
         })
     }
-}
-
-/// `1 game`, `2 games`.
-fn counted(count: u64, what: &str) -> String {
-    let plural = if count == 1 { "" } else { "s" };
-    format!("{count} {what}{plural}")
 }

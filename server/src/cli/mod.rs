@@ -8,6 +8,7 @@ mod demo;
 mod export;
 mod import;
 mod narrator;
+mod numbers;
 mod records;
 mod remote;
 mod render;

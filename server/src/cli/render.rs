@@ -2,7 +2,6 @@
 //! in the modules below.
 
 mod reel;
-mod whole;
 
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
@@ -12,12 +11,12 @@ use std::time::Duration;
 use chefshat_proto::v1;
 use chefshat_records::jsonl;
 use chefshat_records::picture::{Eyes, Film, Frame, Painter, When, figure_at};
+use chefshat_records::whole::WholeFile;
 use clap::{Args, ValueEnum};
 use serde_json::json;
 
 use super::{CommandError, say};
 use reel::Reel;
-use whole::WholeFile;
 
 const HELP: &str = "\
 The name of FILE says what is made: .png or .svg show one moment, .gif and .mp4 a row of them (.mp4 needs the program ffmpeg). Moments are \

@@ -18,6 +18,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 
 use super::CommandError;
+use super::numbers::grouped;
 use super::rules_args::RulesArgs;
 
 const EXAMPLES: &str = "\
@@ -156,7 +157,7 @@ fn say_speed(table: &BatchTable, seconds: f64) {
     let answers = table.decisions + table.seats.values().map(|seat| seat.wrong).sum::<u64>();
     eprintln!(
         "{} answers of agents in {seconds:.1} s, {:.1} million a second",
-        report::grouped(answers),
+        grouped(answers),
         answers as f64 / seconds / 1e6
     );
 }

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use chefshat_proto::v1::{self, record_line::Line};
+use chefshat_records::files::find_records;
 use chefshat_records::jsonl::{self, RecordFileError};
 use chefshat_records::replay::{Replayed, replay};
 use clap::Args;
@@ -13,6 +14,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
+use super::numbers::counted;
 use super::{CommandError, data_dir};
 
 const HELP: &str = "\
@@ -64,7 +66,10 @@ impl Verify {
         } else {
             self.paths
         };
-        let files = files_in(&paths)?;
+        let files: Vec<PathBuf> = find_records(&paths)?
+            .into_iter()
+            .map(|file| file.path)
+            .collect();
         let bar = ProgressBar::new(files.len().try_into().unwrap_or(u64::MAX)).with_style(
             ProgressStyle::with_template(
                 "{bar:40} {human_pos} of {human_len} records, {eta} left",
@@ -93,7 +98,13 @@ impl Verify {
         if !self.json {
             let mut out = anstream::stdout().lock();
             match files.len() - fitting {
-                0 => writeln!(out, "{fitting} records fit, {decisions} decisions")?,
+                0 => writeln!(
+                    out,
+                    "{} {}, {}",
+                    counted(files.len() as u64, "record"),
+                    if fitting == 1 { "fits" } else { "fit" },
+                    counted(decisions, "decision")
+                )?,
                 wrong => writeln!(out, "{wrong} of {} records do not fit", files.len())?,
             }
         }
@@ -207,37 +218,4 @@ fn json_report(file: &Path, checked: &Result<Fits, Problem>) -> Value {
             "problem": problem,
         }),
     }
-}
-
-/// The records among paths, those of a folder in the order of their names.
-fn files_in(paths: &[PathBuf]) -> Result<Vec<PathBuf>, CommandError> {
-    let mut files = Vec::new();
-    for path in paths {
-        let name = path.display();
-        let told = |error: std::io::Error| format!("{name}: {error}");
-        if !std::fs::metadata(path).map_err(told)?.is_dir() {
-            files.push(path.clone());
-            continue;
-        }
-        let mut inside = Vec::new();
-        for entry in std::fs::read_dir(path).map_err(told)? {
-            let file = entry.map_err(told)?.path();
-            if file
-                .extension()
-                .is_some_and(|extension| extension == "jsonl")
-                && file.is_file()
-            {
-                inside.push(file);
-            }
-        }
-        if inside.is_empty() {
-            return Err(format!(
-                "{name} holds no records (*.jsonl); in a data folder they are in its folder `records`"
-            )
-            .into());
-        }
-        inside.sort();
-        files.append(&mut inside);
-    }
-    Ok(files)
 }

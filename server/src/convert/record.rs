@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use chefshat_engine::Viewer;
 use chefshat_proto::v1::{self, record_line::Line};
-use chefshat_records::convert::{action_space, rules_to_proto, seat_number};
+use chefshat_records::convert::{action_space, invalid_reward, rules_to_proto, seat_number};
 use chefshat_records::jsonl::FORMAT_VERSION;
 use prost::Message as _;
 
@@ -119,12 +119,7 @@ pub fn lines_of(kept: &KeptGame) -> Cow<'_, [v1::RecordLine]> {
 fn decision(core: &Core, entry: &Entry, decided: &Decided, attempts: &[u32]) -> v1::DecisionRecord {
     let rules = &core.header().rules;
     let open = core.open();
-    let invalid_reward = core
-        .header()
-        .policy
-        .reward_scheme
-        .filter(|_| core.open_is_turn() && !attempts.is_empty())
-        .map(|scheme| attempts.iter().map(|_| scheme.invalid()).sum());
+    let scheme = core.header().policy.reward_scheme;
     v1::DecisionRecord {
         seat: seat_number(decided.seat),
         decision_id: open.map_or(0, |open| open.id),
@@ -144,7 +139,8 @@ fn decision(core: &Core, entry: &Entry, decided: &Decided, attempts: &[u32]) -> 
             .as_ref()
             .and_then(|bytes| v1::Annotations::decode(bytes.as_ref()).ok()),
         action_mask: mask_bytes(&core.legal_actions(), rules),
-        invalid_reward,
+        invalid_reward: open
+            .and_then(|open| invalid_reward(scheme, open.decision.kind, attempts.len())),
         elapsed_ms: elapsed_ms(entry),
     }
 }

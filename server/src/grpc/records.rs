@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use chefshat_proto::v1::{self, record_service_server::RecordService};
 use chefshat_records::convert::FieldProblem;
+use chefshat_records::jsonl::excess;
 use chefshat_records::replay;
 use chefshat_records::summary::summary;
 use futures::Stream;
@@ -16,7 +17,7 @@ use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Code, Request, Response, Status, Streaming};
 
 use super::recorded::{Recorded, not_read, turn};
-use super::status::{field, status};
+use super::status::{disk_nearly_full, field, status};
 use crate::config::{
     IMPORT_TIMEOUT, MAX_IMPORT_BYTES, MAX_IMPORT_LINES, MAX_IMPORTS, MAX_RECORDS_SENT,
     RECORD_SEND_TIMEOUT,
@@ -170,6 +171,9 @@ impl RecordService for Records {
                 [],
             ));
         }
+        if !self.recorded.rooms().store().has_space() {
+            return Err(disk_nearly_full("the server's disk is nearly full"));
+        }
         let _turn = turn(&self.receiving).await;
         let lines = timeout(IMPORT_TIMEOUT, received(request.into_inner()))
             .await
@@ -241,9 +245,9 @@ async fn received(
                 [("max_bytes", &MAX_IMPORT_BYTES.to_string())],
             ));
         }
-        // A line takes more memory than it takes bytes, and an empty one takes next to none of these.
-        if let Some(empty) = request.lines.iter().position(|line| line.line.is_none()) {
-            return Err(refused(lines.len() + empty + 1, "the line is empty"));
+        // A line can take much more memory than it takes bytes.
+        for (number, line) in (lines.len() + 1..).zip(&request.lines) {
+            check_line(line).map_err(|problem| refused(number, &problem))?;
         }
         if lines.len() + request.lines.len() > MAX_IMPORT_LINES {
             return Err(status(
@@ -256,6 +260,18 @@ async fn received(
         lines.extend(request.lines);
     }
     Ok(lines)
+}
+
+/// Refuses a line that is no part of any record, before more of its kind gather.
+fn check_line(line: &v1::RecordLine) -> Result<(), String> {
+    let line = line.line.as_ref().ok_or("the line is empty")?;
+    match excess(line) {
+        None => Ok(()),
+        Some(list) => Err(format!(
+            "{} has more than {} entries",
+            list.field, list.most
+        )),
+    }
 }
 
 fn refused(line: usize, problem: &str) -> Status {

@@ -78,6 +78,11 @@ pub fn ticket_unknown() -> Status {
     )
 }
 
+/// There is no space for more games.
+pub fn disk_nearly_full(message: &str) -> Status {
+    status(Code::ResourceExhausted, "DISK_NEARLY_FULL", message, [])
+}
+
 /// The server's store failed, and the server stops.
 pub fn store_failed() -> Status {
     status(
@@ -178,6 +183,7 @@ impl From<CreateError> for Refusal {
                 [("max_rooms", &limit.to_string())],
             ),
             CreateError::ShuttingDown => shutting_down(),
+            CreateError::DiskNearlyFull => disk_nearly_full(&error.to_string()),
             CreateError::Store(error) => {
                 tracing::error!(%error, "a room was not made");
                 store_failed()

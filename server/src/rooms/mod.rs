@@ -62,6 +62,9 @@ pub enum CreateError {
     /// The server takes no new rooms.
     #[error("the server is shutting down and takes no new rooms")]
     ShuttingDown,
+    /// There is no space for more games.
+    #[error("the server's disk is nearly full; what is left is kept for games that go on")]
+    DiskNearlyFull,
     /// The store refused.
     #[error(transparent)]
     Store(#[from] StoreError),
@@ -100,6 +103,9 @@ impl Rooms {
     /// The limit of rooms, a shutdown, or the store.
     pub async fn create(self: &Arc<Self>, new: NewRoom) -> Result<Created, CreateError> {
         let place = Place::reserve(self)?;
+        if !self.context.store.has_space() {
+            return Err(CreateError::DiskNearlyFull);
+        }
         // Made to the end even if whoever asked for it goes away: what is half made would be kept and be nobody's.
         let making = self.context.tracker.spawn(place.make(new));
         making

@@ -99,15 +99,18 @@ impl Players {
                 continue;
             };
             let key = (recorded.game, seat_number(recorded.seat));
-            if !self.0.contains_key(&key) {
-                let player = read(store, key).await.map_err(|problem| {
-                    warn!(game = %recorded.game, problem, "a recorded player cannot be read; the substitute plays");
-                });
-                self.0.insert(key, player.ok());
-            }
-            if let Some(Some(player)) = self.0.get(&key) {
-                players.insert(index, Arc::clone(player));
-            }
+            let known = self.0.get(&key).cloned();
+            let player = match known {
+                Some(player) => player,
+                None => {
+                    let player = read(store, key).await.map_err(|problem| {
+                        warn!(game = %recorded.game, problem, "a recorded player cannot be read; the substitute plays");
+                    });
+                    self.0.insert(key, player.clone().ok());
+                    player.ok()
+                }
+            };
+            players.extend(player.map(|player| (index, player)));
         }
         players
     }

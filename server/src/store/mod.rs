@@ -48,6 +48,10 @@ pub struct LeftGame {
 pub trait Store: Send + Sync + 'static {
     /// Whether unfinished games are still there when the server has ended, however it ended.
     fn outlives_server(&self) -> bool;
+    /// Whether there is space for more games than those that go on, for which some is kept free.
+    fn has_space(&self) -> bool {
+        true
+    }
     /// Begins a game; its journal is written through what is returned.
     fn create(
         &self,

@@ -199,6 +199,44 @@ fn damaged_records_are_named_or_left_out() {
 }
 
 #[test]
+fn only_a_dataset_is_replaced() {
+    let stage = Stage::new(1);
+    assert_eq!(stage.export("").code, Some(0));
+    assert_eq!(stage.export("--force --format csv").code, Some(0));
+    let notes = stage.path("out/notes.txt");
+    std::fs::write(&notes, "kept").unwrap();
+    let before = contents(&stage.path("out"));
+    assert_eq!(before.len(), 5);
+    let ended = stage.export("--force");
+    assert_eq!((ended.code, ended.stdout.as_str()), (Some(1), ""));
+    assert!(
+        ended
+            .stderr
+            .contains("it is not replaced: notes.txt is in it, which SHA256SUMS does not list"),
+        "{ended:?}"
+    );
+    assert_eq!(contents(&stage.path("out")), before);
+    std::fs::remove_file(&notes).unwrap();
+    assert_eq!(stage.export("--force").code, Some(0));
+}
+
+#[test]
+fn a_folder_that_is_named_like_a_record_is_none() {
+    let stage = Stage::new(1);
+    std::fs::create_dir(stage.path("data/records/old.jsonl")).unwrap();
+    let ended = stage.export("");
+    assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+    assert!(ended.stdout.contains(": 1 game, "), "{}", ended.stdout);
+    let named = stage.path("data/records/old.jsonl");
+    let ended = stage.export(&format!("--force {}", text(&named)));
+    assert_eq!(ended.code, Some(1));
+    assert!(
+        ended.stderr.contains("old.jsonl holds no records"),
+        "{ended:?}"
+    );
+}
+
+#[test]
 fn mistakes_are_explained() {
     let stage = Stage::new(1);
     assert_eq!(stage.export("").code, Some(0));

@@ -90,6 +90,70 @@ fn pictures_are_of_the_size_asked_for() {
 }
 
 #[test]
+fn letters_that_the_font_lacks_are_no_reason_to_complain() {
+    let folder = TempDir::new().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (transcript, record) = (path("table.csv"), path("table.jsonl"));
+    let written = "shift,seat,what,value,label
+,,table,厨房 Kitchen,
+,,rules,paper players=2 faces=4 jokers=1 target_shifts=1,
+,0,human,料理長,
+,1,robot,Ορέστης 👩‍🍳,
+1,0,hand,1 3 3 4 G,
+1,0,plays,4 G,
+1,0,expresses,,驚き
+1,1,plays,2 2,
+1,0,passes,,
+1,1,plays,4 J,
+1,0,plays,3 3,
+1,1,passes,,
+1,0,plays,1,
+";
+    std::fs::write(&transcript, written).unwrap();
+    let imported = chefshat(&["import", &transcript, "--out", &record]);
+    assert_eq!((imported.code, imported.stderr.as_str()), (Some(0), ""));
+    for (name, flags) in [
+        ("film.gif", &[][..]),
+        ("seat.gif", &["--seat", "1"]),
+        ("end.svg", &[]),
+        ("figure.png", &["--at", "1", "--figure", "actions"]),
+    ] {
+        let mut arguments = vec!["render", &record, "--width", "160"];
+        arguments.extend(flags);
+        let out = path(name);
+        arguments.extend(["--out", &out]);
+        let ended = chefshat(&arguments);
+        assert_eq!((ended.code, ended.stderr.as_str()), (Some(0), ""), "{name}");
+    }
+}
+
+#[test]
+fn what_only_another_seat_knows_of_is_not_drawn() {
+    let folder = TempDir::new().unwrap();
+    let draw = |name: &str, flags: &[&str]| {
+        let out = folder.path().join(name);
+        let ended = render(&out, flags);
+        assert_eq!(
+            (ended.code, ended.stderr.as_str()),
+            (Some(0), ""),
+            "{flags:?}"
+        );
+        std::fs::read(&out).unwrap()
+    };
+    // Seat 1 alone knows of decision 59, whether to declare. To others it is the end of the Shift before.
+    for eyes in [&["--seat", "2"][..], &["--spectator"]] {
+        let with = |flags: &[&'static str]| [eyes, flags].concat();
+        let shift = draw("a.png", &with(&["--shift", "1"]));
+        assert_eq!(shift, draw("a.png", &with(&["--at", "59"])));
+        let film = draw("a.gif", &with(&["--from", "59", "--to", "59"]));
+        assert!(film.starts_with(b"GIF89a"));
+    }
+    let own = ["--seat", "1"];
+    let shift = draw("a.png", &[&own[..], &["--shift", "1"]].concat());
+    assert_ne!(shift, draw("a.png", &[&own[..], &["--at", "59"]].concat()));
+}
+
+#[test]
 fn a_film_lasts_as_long_as_its_decisions() {
     let folder = TempDir::new().unwrap();
     let out = folder.path().join("film.gif");

@@ -29,6 +29,7 @@ fn data_dir() -> tempfile::TempDir {
         .collect();
     std::fs::write(records.join("b.jsonl"), damaged.join("\n") + "\n").unwrap();
     std::fs::write(records.join("c.jsonl.part"), "half a li").unwrap();
+    std::fs::create_dir(records.join("d.jsonl")).unwrap();
     folder
 }
 
@@ -117,6 +118,15 @@ fn where_there_is_no_record_is_said() {
         assert_eq!((ended.code, ended.stdout.as_str()), (Some(1), ""));
         assert!(ended.stderr.contains(words), "{}", ended.stderr);
     }
+    // Named twice it is still one.
+    let fixed = fixture("fixed.jsonl");
+    let fixed = fixed.to_str().unwrap();
+    let ended = chefshat(&["verify", fixed, fixed]);
+    assert!(
+        ended.stdout.ends_with("1 record fits, 96 decisions\n"),
+        "{}",
+        ended.stdout
+    );
     let empty = folder.path().join("empty.jsonl");
     std::fs::write(&empty, "").unwrap();
     let ended = chefshat(&["verify", empty.to_str().unwrap()]);

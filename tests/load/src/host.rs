@@ -88,8 +88,9 @@ impl Host {
         };
         let policy = v1::RoomPolicy {
             decision_time_ms: Some(DECISION_TIME_MS),
+            // Left open it is durable, where the server keeps games on disk.
             durability: match self.plan.durable {
-                true => v1::Durability::Durable,
+                true => v1::Durability::Unspecified,
                 false => v1::Durability::Ephemeral,
             }
             .into(),

@@ -97,7 +97,11 @@ struct Goal {
 
 impl Report {
     /// The report of outcomes.
-    pub(crate) fn new(load: &Load, outcomes: &[Outcome], disk_syncs_per_second: Option<f64>) -> Self {
+    pub(crate) fn new(
+        load: &Load,
+        outcomes: &[Outcome],
+        disk_syncs_per_second: Option<f64>,
+    ) -> Self {
         let scenarios: Vec<Figures> = outcomes.iter().map(Figures::new).collect();
         Self {
             pinned: load.place.pin,

@@ -72,7 +72,11 @@ pub(crate) async fn measure(load: &Load, rooms: u64) -> Result<(), LoadError> {
     let rooms = usize::try_from(rooms).expect("bounded by the options");
     let folder = disk::folder(load)?;
     let disk_syncs_per_second = disk::syncs_per_second(load)?;
-    let mut enough = if load.smoke { SMOKE_DECISIONS } else { DECISIONS };
+    let mut enough = if load.smoke {
+        SMOKE_DECISIONS
+    } else {
+        DECISIONS
+    };
     let start = || ServerProcess::start(Kind::OnDisk(folder.path()), load.place);
     let mut server = start().await?;
     eprintln!("{rooms} rooms of {enough} decisions ...");
@@ -121,7 +125,13 @@ impl Report {
     fn to_text(&self, median: f64) -> String {
         let mut table = Table::new();
         table.load_style(presets::UTF8_BORDERS_ONLY);
-        table.set_header(["restart", "open s", "first decision s", "playable s", "played s"]);
+        table.set_header([
+            "restart",
+            "open s",
+            "first decision s",
+            "playable s",
+            "played s",
+        ]);
         for (number, times) in (1..).zip(&self.restarts) {
             let seconds = |value: f64| format!("{value:.3}");
             table.add_row([
@@ -364,8 +374,7 @@ impl Run {
         let first = (0u32..)
             .zip(&decision.action_mask)
             .find(|(_, byte)| **byte != 0);
-        let (index, byte) =
-            first.ok_or_else(|| LoadError::Protocol("no legal action".into()))?;
+        let (index, byte) = first.ok_or_else(|| LoadError::Protocol("no legal action".into()))?;
         Ok(Some(v1::Answer {
             decision_id: decision.decision_id,
             action: 8 * index + byte.trailing_zeros(),
@@ -375,9 +384,9 @@ impl Run {
 
     /// Counts something, and notes the time when it makes something complete.
     fn count(&self, what: impl FnOnce(&mut Counts)) {
-        let now = self.begun.elapsed().as_secs_f64();
         let (seats, rooms) = (self.tickets.len(), self.asked.len());
         self.counts.send_modify(|counts| {
+            let now = self.begun.elapsed().as_secs_f64();
             let before = *counts;
             what(counts);
             if before.asked == 0 && counts.asked > 0 {

@@ -44,6 +44,37 @@ fn a_moment_of_load_is_counted_on_both_sides() {
 }
 
 #[test]
+fn durable_rooms_are_measured_beside_ephemeral_ones() {
+    let output = run(&["--smoke", "--durability", "--json"]);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{errors}");
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let scenario = &report["scenarios"][0];
+    assert_eq!(scenario["beside"], "ephemeral rooms", "{report:#}");
+    let positive = |value: &Value| value.as_f64().is_some_and(|figure| figure > 0.0);
+    assert!(positive(&report["disk_syncs_per_second"]), "{report:#}");
+    assert!(positive(&scenario["checked"]["games"]), "{report:#}");
+    assert!(positive(&scenario["other_answers"]), "{report:#}");
+    assert!(
+        positive(&scenario["throughput_ratio"]["median"]),
+        "{report:#}"
+    );
+}
+
+#[test]
+fn a_restart_is_timed_and_its_games_are_played_on() {
+    let output = run(&["--smoke", "--restart", "5", "--json"]);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{errors}");
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(report["rooms"], 5, "{report:#}");
+    let times = &report["restarts"][0];
+    let order = ["open_s", "first_decision_s", "playable_s", "played_s"];
+    let times = order.map(|name| times[name].as_f64().unwrap_or_default());
+    assert!(times[0] > 0.0 && times.is_sorted(), "{report:#}");
+}
+
+#[test]
 fn a_server_that_is_not_there_is_an_error() {
     // Port 1 of the loopback needs privileges to listen on, and nobody does.
     let output = run(&["--server", "http://127.0.0.1:1", "--smoke"]);

@@ -55,8 +55,16 @@ fn hurried() -> v1::RoomPolicy {
 /// A server that has failed says so, and what to do.
 fn assert_failed(ended: &Ended, advice: &str) {
     assert!(!ended.status.success(), "{ended:?}");
-    assert!(ended.said.contains(advice), "{advice:?} is not in {}", ended.said);
-    assert!(ended.said.contains("start the server again"), "{}", ended.said);
+    assert!(
+        ended.said.contains(advice),
+        "{advice:?} is not in {}",
+        ended.said
+    );
+    assert!(
+        ended.said.contains("start the server again"),
+        "{}",
+        ended.said
+    );
 }
 
 /// Plays on for a while, lets the games end, and finds every acknowledged decision in the records.
@@ -66,7 +74,11 @@ async fn assert_goes_on(launch: &Launch, server: Process, regulars: Regulars, da
     let games = regulars.leave().await;
     let client = Client::connect(launch.url()).await.expect("it listens");
     let acknowledged = assert_kept(&client, &ledger, &games).await;
-    assert_eq!(u64::try_from(acknowledged), Ok(ledger.count()), "all of them");
+    assert_eq!(
+        u64::try_from(acknowledged),
+        Ok(ledger.count()),
+        "all of them"
+    );
     let ended = server.stop().await;
     assert!(ended.status.success(), "{ended:?}");
     for game in &games {
@@ -139,7 +151,10 @@ async fn a_database_that_is_locked_for_a_while_is_waited_for_and_nobody_is_late(
     tokio::time::sleep(LOCKED_FOR).await;
     let meanwhile = regulars.ledger.count() - before;
     execute(&mut other, "ROLLBACK").await;
-    assert!(meanwhile <= ON_THE_WAY, "{meanwhile} were acknowledged although nothing can be kept");
+    assert!(
+        meanwhile <= ON_THE_WAY,
+        "{meanwhile} were acknowledged although nothing can be kept"
+    );
     assert_goes_on(&launch, server, regulars, folder.path()).await;
 }
 
@@ -241,7 +256,10 @@ async fn refusal(launch: &mut Launch, file: &Path) -> String {
     let before = std::fs::read(file).expect("readable");
     let ended = launch.start().await.expect_err("it does not start");
     assert!(!ended.status.success(), "{ended:?}");
-    assert!(std::fs::read(file).expect("readable") == before, "left as it is");
+    assert!(
+        std::fs::read(file).expect("readable") == before,
+        "left as it is"
+    );
     ended.said
 }
 
@@ -298,5 +316,8 @@ async fn a_folder_that_cannot_be_written_is_named() {
     disk.make_read_only().await;
     let said = refusal(&mut launch, &disk.path().join(DATABASE)).await;
     assert!(said.contains("--data-dir"), "{said}");
-    assert!(said.contains(&*disk.mounted_at().to_string_lossy()), "{said}");
+    assert!(
+        said.contains(&*disk.mounted_at().to_string_lossy()),
+        "{said}"
+    );
 }

@@ -11,7 +11,11 @@ const MAX_LABEL: usize = 64;
 /// Longest reference to recorded media, bytes.
 const MAX_MEDIA: usize = 256;
 /// The years 1 to 9999, which alone a timestamp can be written for, in seconds since the Unix epoch.
-const SECONDS: RangeInclusive<i64> = -62_135_596_800..=253_402_300_799;
+const SECONDS: RangeInclusive<i64> = -62_135_596_800..=LAST_SECOND;
+/// The last second of the year 9999, since the Unix epoch.
+const LAST_SECOND: i64 = 253_402_300_799;
+/// The last millisecond of the year 9999, since the Unix epoch.
+pub(crate) const LAST_MS: u64 = LAST_SECOND as u64 * 1000 + 999;
 /// Nanoseconds within a second.
 const NANOS: RangeInclusive<i32> = 0..=999_999_999;
 

@@ -3,11 +3,14 @@
 
 mod events;
 mod expression;
+mod rewards;
 mod rules;
 mod start;
 
 pub use events::{By, event_kind, seat_cards, seat_number};
+pub(crate) use expression::LAST_MS;
 pub use expression::check_expression;
+pub use rewards::{invalid_reward, with_rewards};
 pub use rules::{
     FieldProblem, action_space, reward_scheme_from_proto, reward_scheme_to_proto, role_from_number,
     rules_from_proto, rules_to_proto,

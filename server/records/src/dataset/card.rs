@@ -13,6 +13,11 @@ use crate::jsonl::FORMAT_VERSION;
 /// Name of the file.
 pub(super) const FILE_NAME: &str = "README.md";
 
+/// The line of the front matter by which a card is known as one of ours.
+const NAME_LINE: &str = "pretty_name: Games of Chef's Hat";
+/// The line before and after the front matter.
+const FENCE: &str = "---";
+
 /// The paper whose game this is.
 const CITATION: &str = "\
 @article{barros2020chefshat,
@@ -65,7 +70,7 @@ pub(super) fn write(export: &Export, exported: &Exported) -> String {
 
 fn front_matter(export: &Export, exported: &Exported) -> String {
     let mut yaml = format!(
-        "---\nlicense: {}\npretty_name: Games of Chef's Hat\ntask_categories:\n- reinforcement-learning\ntags:\n- chefs-hat\n- card-game\n\
+        "{FENCE}\nlicense: {}\n{NAME_LINE}\ntask_categories:\n- reinforcement-learning\ntags:\n- chefs-hat\n- card-game\n\
          - multi-agent\n- games\nsize_categories:\n- {}\nconfigs:\n",
         quoted(&export.licence.to_lowercase()),
         size_category(exported.decisions)
@@ -96,7 +101,16 @@ fn front_matter(export: &Export, exported: &Exported) -> String {
             );
         }
     }
-    yaml + "---\n"
+    yaml + FENCE + "\n"
+}
+
+/// Whether a text begins with the front matter of a card that was written here.
+pub(super) fn is_ours(text: &str) -> bool {
+    let mut lines = text.lines();
+    lines.next() == Some(FENCE)
+        && lines
+            .take_while(|line| *line != FENCE)
+            .any(|line| line == NAME_LINE)
 }
 
 /// The format that hubs are pointed to.

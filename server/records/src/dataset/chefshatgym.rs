@@ -5,7 +5,7 @@
 use chefshat_engine::{Board, Cards, Game, Role, Seat, Viewer};
 use chefshat_proto::v1::{self, DecisionKind, game_event::Kind, record_line::Line};
 
-use super::gather::GameInfo;
+use super::game::GameInfo;
 use super::python;
 use super::sheet::{Row, Sheet};
 use crate::replay::{Moment, ReplayError, walk};

@@ -6,10 +6,14 @@ use std::sync::Arc;
 use chefshat_engine::{Cards, Mask, Observation, RewardScheme};
 
 use super::column::{Column, ColumnInfo, Type, Value};
-use super::gather::{GameInfo, LatestExpression};
+use super::game::{GameInfo, SeatInfo};
+use super::gather::LatestExpression;
 
 /// Rewards by scheme, in the order of [`RewardScheme::ALL`].
 pub(super) type Rewards = [f32; RewardScheme::ALL.len()];
+
+/// The source of decisions taken over from another game.
+pub(super) const RECORDED: &str = "recorded";
 
 /// One decision.
 #[derive(Debug, Clone)]
@@ -19,6 +23,7 @@ pub(super) struct DecisionRow {
     /// What the deciding seat could see. Its hand, and what it gave and received, count only where they are known.
     pub(super) seen: Observation,
     pub(super) hand_known: bool,
+    pub(super) golden_known: bool,
     pub(super) gave_known: bool,
     pub(super) received_known: bool,
     pub(super) number: u64,
@@ -46,6 +51,11 @@ pub(super) struct DecisionRow {
 impl DecisionRow {
     fn faces(&self) -> u8 {
         self.seen.faces
+    }
+
+    /// The seat's player, unless the decision was taken in another game, by whoever sat there.
+    fn player(&self) -> Option<&SeatInfo> {
+        (self.source != RECORDED).then(|| &*self.game.seats[self.seat])
     }
 
     fn known(&self, value: impl Into<Value>) -> Value {
@@ -157,20 +167,27 @@ pub(super) const COLUMNS: &[Column<DecisionRow>] = &[
         "Who decided: the number of the seat, from 0.",
         |row| Value::Uint(row.seat as u64),
     ),
-    Column::new("agent", Type::Text, "Name of the seat's player.", |row| {
-        (&row.game.seats[row.seat].name).into()
-    }),
+    Column::new(
+        "agent",
+        Type::Text,
+        "Name of the seat's player; null for a decision taken over from another game, where somebody else may have sat there.",
+        |row| row.player().map(|player| player.name.as_str()).into(),
+    ),
     Column::new(
         "agent_kind",
         Type::Text,
-        "What the player is: `agent` (a program), `human`, `robot` or `built_in` (an agent of the server).",
-        |row| row.game.seats[row.seat].kind.into(),
+        "What the player is: `agent` (a program), `human`, `robot` or `built_in` (an agent of the server); null as `agent` is.",
+        |row| row.player().map(|player| player.kind).into(),
     ),
     Column::new(
         "built_in_agent",
         Type::Text,
-        "Which built-in agent filled the seat; null for all others.",
-        |row| row.game.seats[row.seat].built_in.as_ref().into(),
+        "Which built-in agent filled the seat; null for all others, and as `agent` is.",
+        |row| {
+            row.player()
+                .and_then(|player| player.built_in.as_ref())
+                .into()
+        },
     ),
     Column::new(
         "decision_id",
@@ -193,8 +210,11 @@ pub(super) const COLUMNS: &[Column<DecisionRow>] = &[
     Column::new(
         "golden",
         Type::Bool,
-        "Whether the hand holds the Golden card; null where the hand is not known.",
-        |row| row.known(row.seen.hand.has_golden()),
+        "Whether the hand holds the Golden card; null where that is not known.",
+        |row| match row.golden_known {
+            true => row.known(row.seen.hand.has_golden()),
+            false => Value::Null,
+        },
     ),
     Column::new(
         "board_face",
@@ -340,7 +360,7 @@ pub(super) const COLUMNS: &[Column<DecisionRow>] = &[
     Column::new(
         "expressions",
         Type::List(&EXPRESSION),
-        "The latest expression of each seat before the decision, index = seat, null where there was none; `public` tells those that the room was told from those for the record only, `age_ms` is its age in milliseconds.",
+        "The latest expression of who sits on each seat, before the decision, index = seat, null where there was none; `public` tells those that the room was told from those for the record only, `age_ms` is its age in milliseconds.",
         |row| {
             Value::List(
                 row.expressions

@@ -12,9 +12,10 @@ use super::expressions::{self, ExpressionRow};
 use super::files::{FileSummary, SummedFile};
 use super::folder::{FolderError, NewFolder};
 use super::formats::{Format, Table};
-use super::gather::{GameInfo, GameRows, checked_info, gather};
-use super::inputs::RecordFile;
+use super::game::{GameInfo, checked_info};
+use super::gather::{GameRows, gather};
 use super::sheet::{self, Sheet};
+use crate::files::RecordFile;
 use crate::jsonl::{self, RecordFileError};
 
 /// Name of the table of decisions.

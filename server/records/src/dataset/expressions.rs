@@ -6,13 +6,16 @@ use std::sync::Arc;
 use chefshat_proto::v1::Expression;
 
 use super::column::{Column, ColumnInfo, Type, Value};
-use super::gather::{GameInfo, expression_source, moment_us};
+use super::game::{GameInfo, SeatInfo};
+use super::gather::{expression_source, moment_us};
 
 /// One expression.
 #[derive(Debug, Clone)]
 pub(super) struct ExpressionRow {
     pub(super) game: Arc<GameInfo>,
     pub(super) seat: usize,
+    /// Who sat there; nobody may have.
+    pub(super) player: Option<Arc<SeatInfo>>,
     pub(super) elapsed_ms: u64,
     pub(super) decisions_before: u64,
     pub(super) public: bool,
@@ -33,14 +36,17 @@ pub(super) const COLUMNS: &[Column<ExpressionRow>] = &[
         "Whose it was: the number of the seat, from 0.",
         |row| Value::Uint(row.seat as u64),
     ),
-    Column::new("agent", Type::Text, "Name of the seat's player.", |row| {
-        (&row.game.seats[row.seat].name).into()
-    }),
+    Column::new(
+        "agent",
+        Type::Text,
+        "Name of who sat there then, which before the game began may have been another than in the game; null if nobody did.",
+        |row| row.player.as_ref().map(|player| &player.name).into(),
+    ),
     Column::new(
         "agent_kind",
         Type::Text,
-        "What the player is: `agent`, `human`, `robot` or `built_in`.",
-        |row| row.game.seats[row.seat].kind.into(),
+        "What that player is: `agent`, `human`, `robot` or `built_in`; null if nobody sat there.",
+        |row| row.player.as_ref().map(|player| player.kind).into(),
     ),
     Column::new(
         "elapsed_ms",

@@ -1,11 +1,14 @@
-//! The folder of a dataset: made beside its place, whole or not at all, and moved there when it is complete.
+//! The folder of a dataset: made beside its place, whole or not at all, and moved there when it is complete. What may be replaced by it is
+//! decided in `earlier`.
 
 use std::io;
 use std::path::{Path, PathBuf};
 
+use super::earlier::EarlierDataset;
 use super::files::FileSummary;
+use crate::whole::sync_folder_of;
 
-/// The file that lists the SHA-256 of the others, in the form that `sha256sum --check` reads. It also marks a folder as a dataset's.
+/// The file that lists the SHA-256 of the others, in the form that `sha256sum --check` reads.
 pub(super) const CHECKSUMS: &str = "SHA256SUMS";
 
 /// Why a folder cannot be where a dataset goes.
@@ -20,11 +23,14 @@ pub enum FolderError {
     /// The folder holds something, and replacing was not asked for.
     #[error("{0} is not empty; choose another folder, or replace the dataset in it with --force")]
     NotEmpty(PathBuf),
-    /// Replacing was asked for, but what is there is no dataset.
-    #[error(
-        "{0} holds something else than a dataset (it has no file {CHECKSUMS}), so it is not replaced"
-    )]
-    NoDataset(PathBuf),
+    /// Replacing was asked for, but what is there is no dataset, or not only that.
+    #[error("{folder} holds something else than a dataset, so it is not replaced: {why}")]
+    NoDataset {
+        /// The folder.
+        folder: PathBuf,
+        /// What is missing in it, or the first foreign file.
+        why: String,
+    },
     /// The file system refused.
     #[error("{path}: {source}")]
     Io {
@@ -44,8 +50,16 @@ pub(super) struct NewFolder {
 }
 
 impl NewFolder {
-    /// A folder that will be `target`, which must be empty or not exist; with `replace` an earlier dataset may be there.
+    /// A folder that will be `target`, which must be empty or not exist; with `replace` an earlier dataset may be there. If `target` is a
+    /// link, what it leads to is meant.
     pub(super) fn begin(target: &Path, replace: bool) -> Result<Self, FolderError> {
+        let target = &match target.is_symlink() {
+            true => std::fs::canonicalize(target).map_err(|source| FolderError::Io {
+                path: target.to_path_buf(),
+                source,
+            })?,
+            false => target.to_path_buf(),
+        };
         let name = target
             .file_name()
             .ok_or_else(|| FolderError::NoName(target.to_path_buf()))?;
@@ -89,8 +103,14 @@ impl NewFolder {
         let name = self.target.file_name().expect("checked at the beginning");
         let old = beside(&self.target, name, "old");
         let replaced = self.target.exists();
+        let mut earlier = None;
         if replaced {
             std::fs::rename(&self.target, &old).map_err(io)?;
+            // What lies there now is what will be removed, and nobody finds it by its name any more.
+            earlier = contents(&old).or_else(|error| {
+                std::fs::rename(&old, &self.target).map_err(io)?;
+                Err(error)
+            })?;
         }
         if let Err(error) = std::fs::rename(&self.parts, &self.target) {
             if replaced {
@@ -100,13 +120,13 @@ impl NewFolder {
             return Err(io(error));
         }
         self.in_place = true;
-        if replaced {
-            std::fs::remove_dir_all(&old).map_err(io)?;
+        match earlier {
+            Some(earlier) => earlier.remove().map_err(io)?,
+            None if replaced => std::fs::remove_dir(&old).map_err(io)?,
+            None => {}
         }
-        if let Some(parent) = self.target.parent().filter(|path| path.is_dir()) {
-            // Not every system can sync a folder, and the files in it are safe already.
-            let _ = std::fs::File::open(parent).and_then(|folder| folder.sync_all());
-        }
+        // Not every file system can sync a folder, and the files in it are safe already.
+        let _ = sync_folder_of(&self.target);
         Ok(())
     }
 }
@@ -127,19 +147,30 @@ fn check_target(target: &Path, replace: bool) -> Result<(), FolderError> {
     if !target.is_dir() {
         return Err(FolderError::NotAFolder(target.to_path_buf()));
     }
-    let empty = std::fs::read_dir(target)
-        .map_err(|source| FolderError::Io {
-            path: target.to_path_buf(),
-            source,
-        })?
-        .next()
-        .is_none();
-    match (empty, replace) {
-        (true, _) => Ok(()),
-        (false, false) => Err(FolderError::NotEmpty(target.to_path_buf())),
-        (false, true) if target.join(CHECKSUMS).is_file() => Ok(()),
-        (false, true) => Err(FolderError::NoDataset(target.to_path_buf())),
+    if replace {
+        contents(target).map(|_| ())
+    } else if is_empty(target)? {
+        Ok(())
+    } else {
+        Err(FolderError::NotEmpty(target.to_path_buf()))
     }
+}
+
+/// The dataset in a folder; `None` if the folder is empty.
+fn contents(folder: &Path) -> Result<Option<EarlierDataset>, FolderError> {
+    if is_empty(folder)? {
+        Ok(None)
+    } else {
+        EarlierDataset::of(folder).map(Some)
+    }
+}
+
+fn is_empty(folder: &Path) -> Result<bool, FolderError> {
+    let mut entries = std::fs::read_dir(folder).map_err(|source| FolderError::Io {
+        path: folder.to_path_buf(),
+        source,
+    })?;
+    Ok(entries.next().is_none())
 }
 
 /// A hidden name beside the target that no other process uses.

@@ -7,44 +7,14 @@
 
 use std::sync::Arc;
 
-use chefshat_engine::{Action, BySeat, Game, Move, RewardScheme, RuleSet, Seat, Viewer};
+use chefshat_engine::{Action, BySeat, Game, Move, RewardScheme, Seat, Viewer};
 use chefshat_proto::v1::{self, DecisionKind, DecisionSource, game_event::Kind, record_line::Line};
 
 use super::column::Value;
-use super::decisions::{DecisionRow, Rewards};
+use super::decisions::{DecisionRow, RECORDED, Rewards};
 use super::expressions::ExpressionRow;
-use crate::convert::rules_from_proto;
-use crate::replay::{Moment, ReplayError, replay, walk};
-
-/// The origin of games of real tables.
-const IMPORTED: &str = "imported";
-
-/// What all rows of a game share.
-#[derive(Debug)]
-pub(super) struct GameInfo {
-    pub(super) game_id: String,
-    pub(super) room_name: String,
-    pub(super) origin: &'static str,
-    pub(super) rules: String,
-    pub(super) rule_set: RuleSet,
-    pub(super) rules_version: u32,
-    /// Microseconds since the Unix epoch; `None` for a game that no clock saw.
-    pub(super) created_at: Option<i64>,
-    pub(super) finished: bool,
-    pub(super) players: u8,
-    /// Size of the action space.
-    pub(super) actions: u16,
-    pub(super) server_version: String,
-    pub(super) seats: Vec<SeatInfo>,
-}
-
-/// Who sat where.
-#[derive(Debug)]
-pub(super) struct SeatInfo {
-    pub(super) name: String,
-    pub(super) kind: &'static str,
-    pub(super) built_in: Option<String>,
-}
+use super::game::{GameInfo, IMPORTED, SeatInfo, checked_info};
+use crate::replay::{Moment, ReplayError, walk};
 
 /// A seat's latest expression.
 #[derive(Debug, Clone)]
@@ -95,82 +65,6 @@ pub(super) fn gather(lines: &[v1::RecordLine]) -> Result<GameRows, ReplayError> 
     }
 }
 
-/// What the header and the footer say of a game, before it is replayed.
-///
-/// # Errors
-/// The first line that does not fit, where these lines are not as they must be.
-pub(super) fn checked_info(lines: &[v1::RecordLine]) -> Result<GameInfo, ReplayError> {
-    // What a replay says of a line that makes no sense is more to the point.
-    game_info(lines).or_else(|error| replay(lines).and(Err(error)))
-}
-
-fn game_info(lines: &[v1::RecordLine]) -> Result<GameInfo, ReplayError> {
-    let at_header = |problem: String| ReplayError { line: 1, problem };
-    let Some(Line::Header(header)) = lines.first().and_then(|line| line.line.as_ref()) else {
-        return Err(at_header("the first line must be the header".into()));
-    };
-    // It becomes the name of a folder.
-    if hex::decode_to_slice(&header.game_id, &mut [0; 16]).is_err() {
-        return Err(at_header(format!(
-            "the game id {:?} is not 32 hexadecimal digits",
-            header.game_id
-        )));
-    }
-    let rules = header
-        .rules
-        .as_ref()
-        .ok_or_else(|| at_header("the header has no rule set".into()))?;
-    let rule_set = rules_from_proto(rules).map_err(|error| at_header(error.to_string()))?;
-    if header.seats.len() != rule_set.players() {
-        return Err(at_header(format!(
-            "the header names {} seats, but the rule set has {} players",
-            header.seats.len(),
-            rule_set.players()
-        )));
-    }
-    let finished = matches!(
-        lines.last().and_then(|line| line.line.as_ref()),
-        Some(Line::Footer(footer)) if footer.state() == v1::RoomState::Finished
-    );
-    Ok(GameInfo {
-        game_id: header.game_id.clone(),
-        room_name: header.room_name.clone(),
-        origin: match header.origin() {
-            v1::GameOrigin::Unspecified | v1::GameOrigin::Dealt => "dealt",
-            v1::GameOrigin::FixedSeed => "fixed_seed",
-            v1::GameOrigin::Scripted => "scripted",
-            v1::GameOrigin::Branched => "branched",
-            v1::GameOrigin::Imported => IMPORTED,
-        },
-        rules: serde_json::to_string(rules).map_err(|error| at_header(error.to_string()))?,
-        rules_version: header.rules_version,
-        created_at: i64::try_from(header.created_at_ms)
-            .ok()
-            .filter(|at| *at > 0)
-            .and_then(|at| at.checked_mul(1000)),
-        finished,
-        players: u8::try_from(rule_set.players()).expect("at most six players"),
-        actions: rule_set.actions().size(),
-        rule_set,
-        server_version: header.server_version.clone(),
-        seats: header.seats.iter().map(seat_info).collect(),
-    })
-}
-
-fn seat_info(seat: &v1::Participant) -> SeatInfo {
-    let built_in = Some(&seat.built_in_agent).filter(|name| !name.is_empty());
-    SeatInfo {
-        name: seat.name.clone(),
-        kind: match (built_in, seat.kind()) {
-            (Some(_), _) => "built_in",
-            (None, v1::ParticipantKind::Human) => "human",
-            (None, v1::ParticipantKind::Robot) => "robot",
-            (None, v1::ParticipantKind::Agent | v1::ParticipantKind::Unspecified) => "agent",
-        },
-        built_in: built_in.cloned(),
-    }
-}
-
 /// What is known of a seat's part in an exchange.
 #[derive(Debug, Clone, Copy, Default)]
 struct Told {
@@ -189,6 +83,8 @@ struct Gatherer {
     finished: u8,
     /// Whose gifts, and whose gains, of this Shift's exchange are known.
     told: BySeat<Told>,
+    /// Who sits where by now: before the game begins seats may change hands.
+    sitting: Vec<Option<Arc<SeatInfo>>>,
     latest: Vec<Option<LatestExpression>>,
     problem: Option<ReplayError>,
 }
@@ -196,7 +92,9 @@ struct Gatherer {
 impl Gatherer {
     fn new(game: Arc<GameInfo>) -> Self {
         let players = game.seats.len();
+        let from_the_start = |seat: &Arc<SeatInfo>| seat.built_in.is_some().then(|| seat.clone());
         Self {
+            sitting: game.seats.iter().map(from_the_start).collect(),
             rows: GameRows {
                 game,
                 decisions: Vec::new(),
@@ -215,10 +113,15 @@ impl Gatherer {
         match moment.entry {
             Line::Decision(record) => {
                 if let Some(game) = moment.game {
-                    self.decision(record, game, &moment.hands_known);
+                    self.decision(record, game, &moment);
                 }
             }
             Line::Event(event) => match &event.kind {
+                Some(Kind::Seated(seated)) => {
+                    let info = SeatInfo::new(&seated.name, seated.kind(), "");
+                    self.sit(seated.seat, Some(info));
+                }
+                Some(Kind::Vacated(vacated)) => self.sit(vacated.seat, None),
                 Some(Kind::ShiftStarted(_)) => {
                     // Where hands are dealt nothing is hidden from the record.
                     let all = self.rows.game.origin != IMPORTED;
@@ -255,7 +158,18 @@ impl Gatherer {
         }
     }
 
-    fn decision(&mut self, record: &v1::DecisionRecord, game: &Game, hands_known: &BySeat<bool>) {
+    /// Somebody takes a seat or leaves it. What was expressed on it before was another's.
+    fn sit(&mut self, seat: u32, who: Option<SeatInfo>) {
+        let seat = seat as usize;
+        if let (Some(sitting), Some(latest)) =
+            (self.sitting.get_mut(seat), self.latest.get_mut(seat))
+        {
+            *sitting = who.map(Arc::new);
+            *latest = None;
+        }
+    }
+
+    fn decision(&mut self, record: &v1::DecisionRecord, game: &Game, moment: &Moment<'_>) {
         let info = Arc::clone(&self.rows.game);
         let rules = info.rule_set;
         let seat = Seat::new(record.seat as usize);
@@ -289,7 +203,8 @@ impl Gatherer {
             );
         self.rows.decisions.push(DecisionRow {
             game: info,
-            hand_known: hands_known[seat],
+            hand_known: moment.hands_known[seat],
+            golden_known: moment.golden_known[seat],
             gave_known: self.told[seat].gave,
             received_known: self.told[seat].received,
             number: self.rows.decisions.len() as u64 + 1,
@@ -391,6 +306,7 @@ impl Gatherer {
         self.rows.expressions.push(ExpressionRow {
             game: Arc::clone(&self.rows.game),
             seat,
+            player: self.sitting[seat].clone(),
             elapsed_ms,
             decisions_before: self.rows.decisions.len() as u64,
             public,
@@ -406,7 +322,7 @@ fn source_name(source: DecisionSource) -> &'static str {
         DecisionSource::Invalid => "invalid",
         DecisionSource::Disconnected => "disconnected",
         DecisionSource::Substitute => "substitute",
-        DecisionSource::Recorded => "recorded",
+        DecisionSource::Recorded => RECORDED,
     }
 }
 

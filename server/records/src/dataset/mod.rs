@@ -5,13 +5,14 @@ mod card;
 mod chefshatgym;
 mod column;
 mod decisions;
+mod earlier;
 mod export;
 mod expressions;
 mod files;
 mod folder;
 mod formats;
+mod game;
 mod gather;
-mod inputs;
 mod parquet;
 mod python;
 mod sheet;
@@ -21,7 +22,6 @@ pub use export::{Export, ExportError, Exported, Filter, Layout, LeftOut};
 pub use files::FileSummary;
 pub use folder::FolderError;
 pub use formats::Format;
-pub use inputs::{FindError, RecordFile, find_records};
 
 /// Version of the tables' columns. It grows when a column changes its meaning or type, or goes; new columns at the end do not change it.
 pub const TABLES_VERSION: u32 = 1;

@@ -1,4 +1,5 @@
 //! A record as a row of scenes: one for each decision while it is open, one for the end of each Shift, one for the end of the game.
+//! Decisions that the viewer may not know of have none.
 //! Replaying is `crate::replay`'s affair, drawing that of the modules beside this one.
 
 mod cut;
@@ -10,7 +11,7 @@ use chefshat_engine::{Seat, Viewer};
 use chefshat_proto::v1::{self, record_line::Line};
 
 use super::figure::Figure;
-use super::scene::{Now, Scene};
+use super::scene::Scene;
 use crate::convert::{rules_from_proto, seat_from_number};
 use crate::replay::{ReplayError, walk};
 use cut::{Cut, chronicle_of};
@@ -98,15 +99,13 @@ pub enum FilmError {
         /// The seat.
         seat: Seat,
     },
-    /// The decision is another seat's.
+    /// The decision is another seat's; it is not said whose, for that may be hidden too.
     #[error(
-        "decision {decision} is seat {seat}'s: no other viewer knows what is possible with its hand"
+        "decision {decision} is another seat's: no other viewer knows what is possible with its hand"
     )]
     HandNotSeen {
         /// The decision.
         decision: u64,
-        /// The seat whose decision it is.
-        seat: Seat,
     },
 }
 
@@ -122,8 +121,8 @@ pub enum Eyes {
 }
 
 impl Film {
-    /// Replays a record and makes a scene of each of its moments. A moment that the viewer may not know of (another seat may declare a
-    /// special action) shows a Shift whose cards have just been dealt.
+    /// Replays a record and makes a scene of each of its moments. A decision that the viewer may not know of (another seat may declare a
+    /// special action) makes none.
     ///
     /// # Errors
     /// If the record does not replay, has no such seat, or ended before cards were dealt.
@@ -151,35 +150,39 @@ impl Film {
         self.decisions
     }
 
-    /// The frame of a moment.
+    /// The frame of a moment. Of a decision that the viewer may not know of, it is the frame before: for that viewer the moment before
+    /// lasts until the next decision.
     ///
     /// # Errors
     /// If there is no such moment.
     pub fn at(&self, when: When) -> Result<&Frame, FilmError> {
-        let missing = match when {
-            When::Decision(decision) => FilmError::NoDecision {
-                decision,
-                last: self.decisions,
-            },
+        let (index, missing) = match when {
+            When::Decision(decision) => (Some(self.index(decision)?), FilmError::Empty),
             When::ShiftEnd(shift) if (1..=self.shifts).contains(&shift) => {
-                FilmError::NoShiftEnd { shift }
+                (self.position(when), FilmError::NoShiftEnd { shift })
             }
-            When::ShiftEnd(shift) => self.no_shift(shift),
-            When::End => FilmError::Empty,
+            When::ShiftEnd(shift) => (None, self.no_shift(shift)),
+            When::End => (self.position(when), FilmError::Empty),
         };
-        self.frames
-            .iter()
-            .find(|frame| frame.when == when)
+        index
+            .and_then(|index| self.frames.get(index))
             .ok_or(missing)
     }
 
-    /// The frames of a Shift, its end included; without moments that the viewer may not know of.
+    /// The frames of a Shift, its end included. Of a Shift that was given up before its first decision it is the end of the game.
     ///
     /// # Errors
     /// If there is no such Shift.
     pub fn shift(&self, shift: u32) -> Result<Vec<&Frame>, FilmError> {
-        let of_it = |frame: &&Frame| frame.scene.shift == shift && frame.when != When::End;
-        let frames: Vec<&Frame> = self.known().filter(of_it).collect();
+        let of_it = || {
+            self.frames
+                .iter()
+                .filter(|frame| frame.scene.shift == shift)
+        };
+        let mut frames: Vec<&Frame> = of_it().filter(|frame| frame.when != When::End).collect();
+        if frames.is_empty() {
+            frames = of_it().collect();
+        }
         if frames.is_empty() {
             return Err(self.no_shift(shift));
         }
@@ -187,30 +190,47 @@ impl Film {
     }
 
     /// The frames from one decision to another, both included, with the ends of Shifts between them; to the end of the game if the last
-    /// decision is the game's last. Without moments that the viewer may not know of.
+    /// decision is the game's last. For a decision that the viewer may not know of stands the frame before it, as in [`Film::at`]: there is
+    /// always something to show.
     ///
     /// # Errors
     /// If one of the decisions does not exist.
     pub fn range(&self, decisions: RangeInclusive<u64>) -> Result<Vec<&Frame>, FilmError> {
         let (from, to) = (*decisions.start(), *decisions.end());
-        for decision in [from, to] {
-            self.at(When::Decision(decision))?;
+        let first = self.index(from)?;
+        let mut last = self.index(to)?;
+        if to == self.decisions {
+            last = self.frames.len() - 1;
         }
-        let mut last = 0;
-        let within = |frame: &&Frame| {
-            if let When::Decision(decision) = frame.when {
-                last = decision;
-                return (from..=to).contains(&decision);
-            }
-            // What follows a decision belongs to it, but not to the last one asked for, unless nothing else follows.
-            (from..to).contains(&last) || (last == to && to == self.decisions)
-        };
-        Ok(self.known().filter(within).collect())
+        Ok(self
+            .frames
+            .get(first..=last)
+            .unwrap_or_default()
+            .iter()
+            .collect())
     }
 
-    fn known(&self) -> impl Iterator<Item = &Frame> {
-        let known = |frame: &&Frame| frame.scene.now != Now::Dealt;
-        self.frames.iter().filter(known)
+    fn position(&self, when: When) -> Option<usize> {
+        self.frames.iter().position(|frame| frame.when == when)
+    }
+
+    /// Where a decision's frame is, or the one before it if it has none.
+    fn index(&self, decision: u64) -> Result<usize, FilmError> {
+        let last = self.decisions;
+        if !(1..=last).contains(&decision) {
+            return Err(FilmError::NoDecision { decision, last });
+        }
+        if let Some(index) = self.position(When::Decision(decision)) {
+            return Ok(index);
+        }
+        let later = |frame: &Frame| match frame.when {
+            When::Decision(number) => number > decision,
+            When::ShiftEnd(_) => false,
+            When::End => true,
+        };
+        // A game may begin with such a decision; the viewer's first moment is then the one after it.
+        let after = self.frames.iter().position(later);
+        Ok(after.unwrap_or(self.frames.len()).saturating_sub(1))
     }
 
     fn no_shift(&self, shift: u32) -> FilmError {
@@ -241,18 +261,23 @@ pub fn figure_at(lines: &[v1::RecordLine], eyes: Eyes, decision: u64) -> Result<
             if count == decision
                 && let (Some(chronicle), Some(open)) = (&chronicle, game.decision())
             {
-                figure = Some(if !moment.hands_known[open.seat] {
+                let sees = [Viewer::Everything, Viewer::Seat(open.seat)].contains(&viewer);
+                figure = Some(if !sees {
+                    Err(FilmError::HandNotSeen { decision })
+                } else if !moment.hands_known[open.seat] {
                     Err(FilmError::HandNotKnown {
                         decision,
                         seat: open.seat,
                     })
-                } else if viewer != Viewer::Everything && viewer != Viewer::Seat(open.seat) {
-                    Err(FilmError::HandNotSeen {
-                        decision,
-                        seat: open.seat,
-                    })
                 } else {
-                    Figure::of(game, chronicle).ok_or(FilmError::NothingOpen { last: count })
+                    Figure::of(game, chronicle)
+                        .map(|mut figure| {
+                            if !moment.golden_known[open.seat] {
+                                figure.hand.iter_mut().for_each(|card| *card = card.plain());
+                            }
+                            figure
+                        })
+                        .ok_or(FilmError::NothingOpen { last: count })
                 });
             }
         }

@@ -1,7 +1,7 @@
 //! From the templates to SVG and from SVG to pixels: the embedded drawings and fonts, text that is made to fit, PNG. What a picture shows
 //! and where is decided by the modules beside this one.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use minijinja::value::Serde;
@@ -9,6 +9,9 @@ use minijinja::{AutoEscape, Environment, UndefinedBehavior};
 use resvg::tiny_skia::{Color, Pixmap, Transform};
 use resvg::usvg::{self, fontdb};
 use serde::Serialize;
+use skrifa::{FontRef, MetadataProvider as _};
+use unicode_normalization::UnicodeNormalization as _;
+use unicode_normalization::char::is_combining_mark;
 
 /// Family of the embedded font.
 const FONT: &str = "Atkinson Hyperlegible Next";
@@ -25,6 +28,9 @@ pub const MAX_WIDTH: u32 = 8000;
 
 /// Most letters of a name that are looked at.
 const MAX_LETTERS: usize = 200;
+
+/// Stands for a letter that the font lacks.
+const LACKING: char = '?';
 
 /// Most widths that are kept.
 const MAX_WIDTHS: usize = 4096;
@@ -85,6 +91,8 @@ pub enum PaintError {
 pub struct Painter {
     environment: Environment<'static>,
     options: usvg::Options<'static>,
+    /// The letters that the font has.
+    letters: BTreeSet<char>,
     /// Widths that have been measured: most words of a film come again.
     widths: Mutex<HashMap<(String, u32, bool), f32>>,
 }
@@ -140,6 +148,7 @@ impl Painter {
         Self {
             environment,
             options,
+            letters: letters(),
             widths: Mutex::default(),
         }
     }
@@ -205,11 +214,12 @@ impl Painter {
             .map_err(|error| PaintError::Png(error.to_string()))
     }
 
-    /// A name or label as it can be shown: nothing that steers, and cut with an ellipsis where it is wider than `width`.
+    /// A name or label as it can be shown: no letters but those of the font, and cut with an ellipsis where it is wider than `width`.
     pub(super) fn fit(&self, text: &str, size: f32, bold: bool, width: f32) -> String {
         let letters: Vec<char> = text
             .chars()
             .filter(|&letter| !steers(letter))
+            .flat_map(|letter| self.in_font(letter))
             .take(MAX_LETTERS)
             .collect();
         let whole: String = letters.iter().collect();
@@ -230,6 +240,24 @@ impl Painter {
             }
         }
         cut(fits)
+    }
+
+    /// A letter as the font can show it: itself, or without marks that the font lacks, or what stands for it.
+    fn in_font(&self, letter: char) -> Vec<char> {
+        let has = |letter: &char| self.letters.contains(letter);
+        if has(&letter) {
+            return vec![letter];
+        }
+        if letter.is_whitespace() {
+            return vec![' '];
+        }
+        let mut parts: Vec<char> = [letter].into_iter().nfd().collect();
+        let base_lacks = parts.first().is_none_or(|base| !has(base));
+        parts.retain(has);
+        if base_lacks && !is_combining_mark(letter) {
+            return vec![LACKING];
+        }
+        parts
     }
 
     /// How wide a line of text is.
@@ -283,8 +311,20 @@ fn symbol(name: &str) -> Result<minijinja::Value, minijinja::Error> {
     Ok(minijinja::Value::from_safe_string(inner.to_owned()))
 }
 
-/// Control characters, which no SVG may hold, and those that turn the direction of writing or join what stands around them.
+/// The letters of the embedded fonts, which have the same.
+fn letters() -> BTreeSet<char> {
+    let font = FontRef::new(REGULAR).expect("the embedded font is well-formed");
+    let known = font.charmap();
+    let letters = known.mappings().filter(|(_, glyph)| glyph.to_u32() > 0);
+    letters
+        .filter_map(|(letter, _)| char::from_u32(letter))
+        .collect()
+}
+
+/// Control characters, which no SVG may hold, and those that are not seen themselves: they turn the direction of writing, or join or vary
+/// what stands around them.
 fn steers(letter: char) -> bool {
     letter.is_control()
-        || matches!(letter, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}' | '\u{fffe}' | '\u{ffff}')
+        || matches!(letter, '\u{ad}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}')
+        || matches!(letter, '\u{fe00}'..='\u{fe0f}' | '\u{feff}' | '\u{fffe}' | '\u{ffff}' | '\u{e0000}'..='\u{e0fff}')
 }

@@ -15,7 +15,8 @@ pub struct Scene {
     pub caption: String,
     /// Whose eyes it is seen with.
     pub viewer: Viewer,
-    /// Number of the open decision over the whole game, from 1, where that is known.
+    /// Number of the open decision over the whole game, from 1. Only with all hands open: to others a gap in the numbers would tell that a
+    /// special action was declined.
     pub decision: Option<u64>,
     /// Number of faces F of the deck.
     pub faces: u8,
@@ -88,6 +89,11 @@ impl Card {
             Card::Face(face) | Card::Golden(face) => Some(face),
             Card::Joker => None,
         }
+    }
+
+    /// The card as one of its face, whether it is the Golden one or not.
+    pub(super) fn plain(self) -> Card {
+        self.face().map_or(Card::Joker, Card::Face)
     }
 }
 
@@ -194,6 +200,20 @@ impl Scene {
                 .collect(),
             now: now(game, viewer),
             log: chronicle.log().cloned().collect(),
+        }
+    }
+
+    /// Does not show the Golden card in the hands of which nobody knows whether they hold it.
+    pub(super) fn hide_golden(&mut self, known: &BySeat<bool>) {
+        for (shown, _) in self
+            .seats
+            .iter_mut()
+            .zip(known.values())
+            .filter(|(_, known)| !**known)
+        {
+            if let Hand::Open(cards) = &mut shown.hand {
+                cards.iter_mut().for_each(|card| *card = card.plain());
+            }
         }
     }
 }

@@ -34,8 +34,14 @@ const BOARD_WIDTH: f32 = 470.0;
 const BOARD_ROW: usize = 9;
 /// Width of the columns beside the board.
 const COLUMN: f32 = 302.0;
-/// Most widths a name beside points, chip and number may take, by the width of its panel.
+/// What a panel needs beside a name: number, chip and points.
 const BESIDE_NAME: f32 = 218.0;
+/// What a panel needs beside the line below the name, without the role: the kind's sign before it, the points after it.
+const BESIDE_LABEL: f32 = 76.0 + 66.0;
+/// Width of a space between words; at the edge of a text it is not measured.
+const SPACE: f32 = 5.0;
+/// Where the name of the game begins.
+const CAPTION: f32 = 182.0;
 
 #[derive(Serialize)]
 struct Table {
@@ -131,11 +137,13 @@ impl Painter {
             .chain(&board.cards)
             .map(|placed| placed.drawn)
             .collect();
+        let title = words::title(scene);
+        let beside_title = (WIDTH - self.width(&title, 24.0, true)) / 2.0 - CAPTION - 2.0 * GAP;
         let table = Table {
             width: WIDTH,
             height: HEIGHT,
-            caption: self.fit(&scene.caption, 20.0, false, 320.0),
-            title: words::title(scene),
+            caption: self.fit(&scene.caption, 18.0, false, beside_title),
+            title,
             eyes: words::eyes(self, scene),
             cards: cards.into_iter().map(Drawn::drawing).collect(),
             seats,
@@ -182,11 +190,10 @@ fn panel(
     (x, y, width): (f32, f32, f32),
 ) -> Panel {
     let name = words::name(scene, Seat::new(number));
-    let (kind, label) = kind(shown);
     let (cards, counts) = hand::lay_out(&shown.hand, width - 2.0 * hand::MARGIN);
-    let held = words::held(&shown.hand);
     let role = shown.role.map(|role| role_badge(painter, role));
-    let beside = role.as_ref().map_or(0.0, |role| role.width + 16.0);
+    let beside = role.as_ref().map_or(0.0, |role| role.width + 10.0);
+    let (kind, label) = label(painter, shown, width - BESIDE_LABEL - beside);
     Panel {
         x,
         y,
@@ -195,12 +202,7 @@ fn panel(
         number,
         name: painter.fit(&name, 22.0, true, width - BESIDE_NAME),
         kind,
-        label: painter.fit(
-            &format!("{label} · {held}"),
-            15.0,
-            false,
-            width - 120.0 - beside,
-        ),
+        label,
         role,
         points: shown.points,
         chip: chip(painter, scene, shown),
@@ -218,20 +220,38 @@ fn panel(
     }
 }
 
-fn kind(shown: &SeatScene) -> (&'static str, String) {
+/// What somebody is and how many cards are held, with the sign of the kind. Where that is too wide, shorter words say what somebody is.
+fn label(painter: &Painter, shown: &SeatScene, width: f32) -> (&'static str, String) {
     let participant = &shown.participant;
-    let (symbol, label) = match &participant.sort {
-        Sort::Unsaid => ("kind-open", "player".to_owned()),
-        Sort::Person => ("kind-person", "person".to_owned()),
-        Sort::Robot => ("kind-robot", "robot".to_owned()),
-        Sort::Agent => ("kind-agent", "agent".to_owned()),
-        Sort::BuiltIn(agent) => ("kind-built-in", format!("built-in {agent}")),
+    let (symbol, what, short) = match &participant.sort {
+        Sort::Unsaid => ("kind-open", "player".to_owned(), "player"),
+        Sort::Person => ("kind-person", "person".to_owned(), "person"),
+        Sort::Robot => ("kind-robot", "robot".to_owned(), "robot"),
+        Sort::Agent => ("kind-agent", "agent".to_owned(), "agent"),
+        Sort::BuiltIn(agent) => ("kind-built-in", format!("built-in {agent}"), agent.as_str()),
     };
-    match &participant.presence {
-        Presence::Here => (symbol, label),
-        Presence::Away => (symbol, format!("{label}, not connected")),
-        Presence::Substituted(agent) => ("kind-built-in", format!("{agent} for a lost {label}")),
-    }
+    let (symbol, long, short) = match &participant.presence {
+        Presence::Here => (symbol, what, short.to_owned()),
+        Presence::Away => (
+            symbol,
+            format!("{what}, not connected"),
+            format!("{short}, away"),
+        ),
+        Presence::Substituted(agent) => (
+            "kind-built-in",
+            format!("{agent} for a lost {what}"),
+            format!("{agent}, {short} lost"),
+        ),
+    };
+    let held = format!(" · {}", words::held(&shown.hand));
+    let room = width - painter.width(&held, 15.0, false) - SPACE;
+    let long = painter.fit(&long, 15.0, false, f32::INFINITY);
+    let what = if painter.width(&long, 15.0, false) <= room {
+        long
+    } else {
+        painter.fit(&short, 15.0, false, room)
+    };
+    (symbol, what + &held)
 }
 
 fn role_badge(painter: &Painter, role: Role) -> RoleBadge {
@@ -274,7 +294,7 @@ fn board(painter: &Painter, scene: &Scene) -> Board {
         (cards, Some(by)) => {
             let play = words::play(cards);
             let room = 300.0 - painter.width(&play, 18.0, true);
-            let name = painter.fit(&words::name(scene, by), 18.0, true, room);
+            let name = words::told(painter, scene, by, (18.0, true), room);
             format!("{play} · {name}")
         }
     };
@@ -302,7 +322,7 @@ fn log(painter: &Painter, scene: &Scene) -> Vec<Line> {
             let used = if name.is_empty() {
                 0.0
             } else {
-                painter.width(&name, 16.0, true) + 5.0
+                painter.width(&name, 16.0, true) + SPACE
             };
             Line {
                 seat: seat.map(Seat::index),
@@ -336,4 +356,68 @@ fn played(scene: &Scene) -> Vec<Played> {
 /// Whether the picture is of a moment at which nobody decides any more.
 fn is_end(now: &Now) -> bool {
     matches!(now, Now::ShiftOver { .. } | Now::GameOver(_) | Now::Aborted)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::chronicle::Participant;
+    use super::super::scene::Hand;
+    use super::*;
+
+    #[test]
+    fn what_a_seat_is_never_runs_into_its_role_or_its_points() {
+        let painter = Painter::new();
+        let sorts = [
+            Sort::Unsaid,
+            Sort::Robot,
+            Sort::BuiltIn("random".to_owned()),
+            Sort::BuiltIn("a built-in agent of a long name".to_owned()),
+        ];
+        let presences = [
+            Presence::Here,
+            Presence::Away,
+            Presence::Substituted("greedy".to_owned()),
+        ];
+        let roles = [
+            None,
+            Some(Role::Chef),
+            Some(Role::SousChef),
+            Some(Role::Dishwasher),
+        ];
+        // Three, two and one in a row.
+        for (panel, sort, presence, role, cards) in [408.0, 619.0, 1252.0]
+            .into_iter()
+            .flat_map(|panel| sorts.iter().map(move |sort| (panel, sort)))
+            .flat_map(|(panel, sort)| presences.iter().map(move |there| (panel, sort, there)))
+            .flat_map(|(panel, sort, there)| roles.map(|role| (panel, sort, there, role)))
+            .flat_map(|(panel, sort, there, role)| {
+                [0, 22].map(|cards| (panel, sort, there, role, cards))
+            })
+        {
+            let badge = role.map(|role| role_badge(&painter, role));
+            let beside = badge.as_ref().map_or(0.0, |badge| badge.width + 10.0);
+            let shown = SeatScene {
+                participant: Participant {
+                    name: String::new(),
+                    sort: sort.clone(),
+                    presence: presence.clone(),
+                },
+                role,
+                points: 0,
+                hand: Hand::Hidden(cards),
+                passed: false,
+                place: 0,
+                deciding: false,
+            };
+            let (_, text) = label(&painter, &shown, panel - BESIDE_LABEL - beside);
+            let right = 76.0 + painter.width(&text, 15.0, false);
+            let role_begins = panel - 66.0 - badge.map_or(0.0, |badge| badge.width);
+            assert!(right <= role_begins, "{panel}: {text} {role:?}");
+            let held = words::held(&shown.hand);
+            assert!(text.ends_with(&held), "{text}");
+            if *presence == Presence::Here && *sort == Sort::BuiltIn("random".to_owned()) {
+                assert!(!text.contains('…'), "{panel}: {text}");
+            }
+        }
+    }
 }

@@ -6,7 +6,7 @@ use chefshat_proto::v1::{self, DecisionSource as Source};
 
 use super::header::Setup;
 use super::words::must_be;
-use crate::convert::seat_number;
+use crate::convert::{invalid_reward, seat_number};
 
 /// Invalid attempts after which the default is taken even where they are unlimited.
 const MAX_ATTEMPTS: u32 = 10_000;
@@ -104,11 +104,7 @@ impl Asked<'_> {
             }
         }
         let made = record.invalid_attempts.len();
-        let right = self
-            .setup
-            .scheme
-            .filter(|_| self.kind == DecisionKind::Turn && made > 0)
-            .map(|scheme| (0..made).map(|_| scheme.invalid()).sum::<f32>());
+        let right = invalid_reward(self.setup.scheme, self.kind, made);
         if record.invalid_reward == right {
             return Ok(());
         }

@@ -11,7 +11,7 @@ use super::seats::Seats;
 use super::seed::Seeds;
 use super::words::{difference, kind_name, must_be};
 use super::{Fault, Replayed, final_table};
-use crate::convert::{By, event_kind, seat_number};
+use crate::convert::{By, LAST_MS, event_kind, with_rewards};
 use crate::table::{Table, facts_of_record};
 
 /// How nobody decided: the deal at the beginning.
@@ -69,10 +69,14 @@ impl<'a> Replay<'a> {
         self.game.as_ref()
     }
 
-    pub(super) fn hands_known(&self) -> BySeat<bool> {
+    /// Whose hands are known, and of whom it is known whether it holds the Golden card.
+    pub(super) fn known(&self) -> (BySeat<bool>, BySeat<bool>) {
         match (&self.table, &self.game) {
-            (Some(table), Some(game)) => table.hands_known(game),
-            (table, _) => BySeat::filled(self.setup.rules.players(), table.is_none()),
+            (Some(table), Some(game)) => (table.hands_known(game), table.golden_known(game)),
+            (table, _) => {
+                let all = BySeat::filled(self.setup.rules.players(), table.is_none());
+                (all, all)
+            }
         }
     }
 
@@ -117,7 +121,7 @@ impl<'a> Replay<'a> {
         self.nothing_missing()?;
         self.time(record.elapsed_ms)?;
         self.fits_table(line)?;
-        let known = self.hands_known();
+        let (known, _) = self.known();
         let game = self
             .game
             .as_mut()
@@ -172,18 +176,7 @@ impl<'a> Replay<'a> {
 
     fn expect(&mut self, events: &[Event], by: By) {
         let space = self.setup.rules.actions();
-        for (position, event) in events.iter().enumerate() {
-            let mut rewards = Vec::new();
-            if let Some(scheme) = self.setup.scheme {
-                scheme.of_events(&self.setup.rules, events, |seat, value, bringer| {
-                    if bringer == position {
-                        rewards.push(v1::SeatReward {
-                            seat: seat_number(seat),
-                            value,
-                        });
-                    }
-                });
-            }
+        for (event, rewards) in with_rewards(events, &self.setup.rules, self.setup.scheme) {
             let told = match &self.table {
                 Some(table) => table.as_told(*event),
                 None => *event,
@@ -307,6 +300,13 @@ impl<'a> Replay<'a> {
             return Err(format!(
                 "elapsedMs is {elapsed_ms}, earlier than the {} of a line before",
                 self.elapsed_ms
+            )
+            .into());
+        }
+        let since_epoch_ms = self.header.created_at_ms.saturating_add(elapsed_ms);
+        if since_epoch_ms > LAST_MS {
+            return Err(format!(
+                "elapsedMs is {elapsed_ms}, which with the header's createdAtMs is after the year 9999"
             )
             .into());
         }

@@ -9,7 +9,8 @@ use chefshat_proto::v1;
 use super::seed::Part;
 use super::words::{difference, must_be};
 use crate::convert::{
-    action_space, reward_scheme_from_proto, rules_from_proto, rules_to_proto, script_from_proto,
+    LAST_MS, action_space, reward_scheme_from_proto, rules_from_proto, rules_to_proto,
+    script_from_proto,
 };
 use crate::jsonl::FORMAT_VERSION;
 use crate::table::Beginning;
@@ -58,6 +59,12 @@ pub(super) fn check(header: &v1::RecordHeader) -> Result<Setup, String> {
     }
     check_id("gameId", &header.game_id)?;
     check_id("roomId", &header.room_id)?;
+    if header.created_at_ms > LAST_MS {
+        return Err(format!(
+            "createdAtMs is {}, after the year 9999",
+            header.created_at_ms
+        ));
+    }
     let said = header.rules.as_ref().ok_or("rules are missing")?;
     let rules = rules_from_proto(said).map_err(|problem| format!("rules.{problem}"))?;
     within("rules", difference(said, &rules_to_proto(&rules)))?;

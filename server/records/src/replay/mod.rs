@@ -54,6 +54,9 @@ pub struct Moment<'a> {
     pub game: Option<&'a Game>,
     /// Whose hand is known: everybody's, but in an imported game. A hand that is not known stands in `game` as one that would fit.
     pub hands_known: BySeat<bool>,
+    /// Of whose hand, which is known, it is known as well whether it holds the Golden card: of everybody's, but in an imported game. Where it
+    /// is not, the hand may stand in `game` with the Golden card instead of another of the top face, or the other way round.
+    pub golden_known: BySeat<bool>,
 }
 
 /// Replays a record: seeds, deals, masks, decisions, events, rewards, scores and counts.
@@ -82,31 +85,32 @@ pub fn walk(
             .line
             .as_ref()
             .ok_or_else(|| at("the line is empty".into()))?;
-        let mut show = |game: Option<&Game>, hands_known| {
+        let mut show = |game: Option<&Game>, (hands_known, golden_known)| {
             visit(Moment {
                 line,
                 entry,
                 game,
                 hands_known,
+                golden_known,
             });
         };
         match (&mut replay, entry) {
             (None, Line::Header(header)) => {
                 let begun = Replay::new(header, lines).map_err(at)?;
-                show(None, begun.hands_known());
+                show(None, begun.known());
                 replay = Some(begun);
             }
             (None, _) => return Err(at("the first line must be the header".into())),
             (Some(_), Line::Header(_)) => return Err(at("a second header".into())),
             (Some(replay), Line::Decision(decision)) => {
                 let before = replay.game().cloned();
-                let known = replay.hands_known();
+                let known = replay.known();
                 replay.decide(line, decision).map_err(at)?;
                 show(before.as_ref(), known);
             }
             (Some(replay), entry) => {
                 replay.take(line, entry).map_err(at)?;
-                show(replay.game(), replay.hands_known());
+                show(replay.game(), replay.known());
             }
         }
     }

@@ -175,3 +175,30 @@ pub(super) fn counts_of(cards: Cards, faces: u8) -> Counts {
     counts[JOKER] = cards.jokers();
     counts
 }
+
+/// Whether all cards of the one are among the other.
+pub(super) fn contains(all: &Counts, some: &Counts) -> bool {
+    all.iter().zip(some).all(|(all, some)| all >= some)
+}
+
+/// Adds cards.
+pub(super) fn add(sum: &mut Counts, more: &Counts) {
+    for (sum, more) in sum.iter_mut().zip(more) {
+        *sum = sum.saturating_add(*more);
+    }
+}
+
+/// Takes cards away; `None` if they are not there.
+pub(super) fn take(from: &mut Counts, cards: &Counts) -> Option<()> {
+    for (from, cards) in from.iter_mut().zip(cards) {
+        *from = from.checked_sub(*cards)?;
+    }
+    Some(())
+}
+
+/// Of each kind the greater count.
+pub(super) fn at_least(counts: &mut Counts, least: &Counts) {
+    for (count, least) in counts.iter_mut().zip(least) {
+        *count = (*count).max(*least);
+    }
+}

@@ -4,7 +4,7 @@
 
 use chefshat_engine::{RuleSet, Seat, SeatOrder};
 
-use super::facts::{Counts, JOKER, Tally, counts_of};
+use super::facts::{Counts, JOKER, Tally, contains, counts_of};
 
 /// Two seats that exchange cards.
 #[derive(Debug, Clone, Copy)]
@@ -15,6 +15,13 @@ pub(super) struct Pair {
     pub(super) forced: Seat,
     /// How many cards each gives.
     pub(super) size: u8,
+}
+
+impl Pair {
+    /// Whether a seat is one of them.
+    pub(super) fn has(&self, seat: Seat) -> bool {
+        seat == self.chooser || seat == self.forced
+    }
 }
 
 /// What the seats of a pair gave each other.
@@ -49,34 +56,52 @@ pub(super) fn pairs(rules: &RuleSet, order: Option<SeatOrder>, tally: &Tally) ->
         .collect()
 }
 
-/// Every pair of gifts that what is told of the pair leaves open, the rarest cards first.
-pub(super) fn candidates(rules: &RuleSet, tally: &Tally, pair: &Pair) -> Vec<Gifts> {
+/// Every pair of gifts that what is told of the pair leaves open, in the order in which they leave the forced giver the widest choice of
+/// what it keeps. `room` holds the cards that seats outside the pair do not hold for certain.
+pub(super) fn candidates(
+    rules: &RuleSet,
+    tally: &Tally,
+    pair: &Pair,
+    room: &Counts,
+) -> impl Iterator<Item = Gifts> + use<> {
     let faces = rules.faces();
-    let whole = |seat: Seat| tally.given[seat].map(|cards| counts_of(cards, faces));
-    let mut all = Vec::new();
+    let gifts_of = |seat: Seat, size: u8, kinds: &[usize]| {
+        let whole = tally.given[seat].map(|cards| counts_of(cards, faces));
+        let hand = tally.dealt[seat].map(|cards| counts_of(cards, faces));
+        let mut gifts = choices(whole, size, kinds);
+        gifts.retain(|gift| {
+            contains(room, gift)
+                && hand.is_none_or(|hand| contains(&hand, gift))
+                && (seat != pair.chooser || contains(gift, &tally.gives[seat]))
+        });
+        gifts
+    };
     // A hand may hold fewer ingredient cards than its seat has to give: all others are then jokers.
     let least = rules
         .hand_size()
         .saturating_sub(rules.jokers())
         .min(pair.size);
+    let mut sizes = Vec::new();
     for size in (least.max(1)..=pair.size).rev() {
-        let short = size < pair.size;
-        let of_face = kinds(faces, false);
-        let any = kinds(faces, true);
-        for forced in choices(whole(pair.forced), size, &of_face) {
-            for chosen in choices(whole(pair.chooser), size, &any) {
-                let told = &tally.gives[pair.chooser];
-                if chosen.iter().zip(told).all(|(chosen, told)| chosen >= told) {
-                    all.push(Gifts {
-                        chosen,
-                        forced,
-                        short,
-                    });
-                }
-            }
-        }
+        let mut forced = gifts_of(pair.forced, size, &kinds(faces, false));
+        forced.sort_by_key(highest);
+        let chosen = gifts_of(pair.chooser, size, &kinds(faces, true));
+        sizes.push((size < pair.size, forced, chosen));
     }
-    all
+    sizes.into_iter().flat_map(|(short, forced, chosen)| {
+        forced.into_iter().flat_map(move |forced| {
+            chosen.clone().into_iter().map(move |chosen| Gifts {
+                chosen,
+                forced,
+                short,
+            })
+        })
+    })
+}
+
+/// Where the highest kind of a gift is counted.
+pub(super) fn highest(gift: &Counts) -> Option<usize> {
+    gift.iter().rposition(|&count| count > 0)
 }
 
 /// How many cards are counted.

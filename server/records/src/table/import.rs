@@ -5,11 +5,14 @@ use chefshat_engine::{ActionSpace, BySeat, DecisionKind, Event, Game, Move, Role
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 use sha2::{Digest as _, Sha256};
 
+use super::checks::Ruled;
 use super::head::header;
 use super::play::{Beginning, Table};
 use super::shifts::{shifts_of, wrong};
 use super::transcript::{Row, Seen, Transcript, TranscriptError, read};
-use crate::convert::{By, event_kind, reward_scheme_from_proto, seat_number};
+use crate::convert::{
+    By, event_kind, invalid_reward, reward_scheme_from_proto, seat_number, with_rewards,
+};
 use crate::replay::{final_table, game_started, kind_to_proto, number, replay};
 
 /// The record of a game of which a transcript tells. The same transcript gives the same record.
@@ -48,8 +51,7 @@ struct Importing {
     /// Cards that seats gave by their own choice and that the engine has not asked for yet.
     gifts: Vec<(Seat, Move, u64)>,
     attempts: Vec<(Seat, u32)>,
-    /// The places taken in each Shift.
-    places: Vec<(u32, BySeat<u8>)>,
+    ruled: Ruled,
 }
 
 impl Importing {
@@ -69,7 +71,7 @@ impl Importing {
             elapsed_ms: 0,
             gifts: Vec::new(),
             attempts: Vec::new(),
-            places: Vec::new(),
+            ruled: Ruled::default(),
         })
     }
 
@@ -154,9 +156,9 @@ impl Importing {
                 self.is_current(row)?;
                 self.decide(row.line, row.seat, *turn, row.took_us)
             }
-            Seen::Role(name) => self.check_role(row.seat, name).map_err(at),
-            Seen::Points(points) => self.check_points(row, *points).map_err(at),
-            Seen::Finishes(place) => self.check_place(row, *place).map_err(at),
+            Seen::Role(_) | Seen::Points(_) | Seen::Finishes(_) => {
+                self.ruled.check(row, game).map_err(at)
+            }
             Seen::Expresses(_) if over => Err(at("the game was over before this line".into())),
             Seen::Expresses(expression) => {
                 self.room_event(Kind::ExpressionShown(Box::new(v1::ExpressionShown {
@@ -227,8 +229,7 @@ impl Importing {
         game.apply(action, |event| events.push(event))
             .map_err(|error| at(error.to_string()))?;
         self.decisions[seat] += 1;
-        let scheme = reward_scheme_from_proto(self.told.scheme)
-            .filter(|_| open.kind == DecisionKind::Turn && !attempts.is_empty());
+        let scheme = reward_scheme_from_proto(self.told.scheme);
         let record = v1::DecisionRecord {
             seat: seat_number(seat),
             decision_id: self.decisions[seat],
@@ -237,7 +238,7 @@ impl Importing {
             text: space.text(action).unwrap_or_default(),
             source: v1::DecisionSource::Agent.into(),
             decision_time_us: took_us,
-            invalid_reward: scheme.map(|scheme| attempts.iter().map(|_| scheme.invalid()).sum()),
+            invalid_reward: invalid_reward(scheme, open.kind, attempts.len()),
             invalid_attempts: attempts.into_iter().map(|(_, tried)| tried).collect(),
             action_mask: if known[seat] {
                 legal.to_bytes(space.size())
@@ -264,79 +265,11 @@ impl Importing {
             decision_time_us: took_us,
         };
         let scheme = reward_scheme_from_proto(self.told.scheme);
-        for (position, event) in events.iter().enumerate() {
-            self.note_places(event);
-            let mut rewards = Vec::new();
-            if let Some(scheme) = scheme {
-                scheme.of_events(&rules, events, |seat, value, bringer| {
-                    if bringer == position {
-                        rewards.push(v1::SeatReward {
-                            seat: seat_number(seat),
-                            value,
-                        });
-                    }
-                });
-            }
+        for (event, rewards) in with_rewards(events, &rules, scheme) {
+            self.ruled.note(event);
             if let Some(kind) = event_kind(&self.table.as_told(*event), space, by) {
                 self.event(kind, rewards);
             }
-        }
-    }
-
-    fn note_places(&mut self, event: &Event) {
-        match *event {
-            Event::ShiftStarted { shift, ref hands } => {
-                self.places.push((shift, BySeat::filled(hands.len(), 0)));
-            }
-            Event::SeatFinished { seat, place } => {
-                if let Some((_, places)) = self.places.last_mut() {
-                    places[seat] = place;
-                }
-            }
-            Event::ShiftEnded { ref order, .. } => {
-                if let Some((_, places)) = self.places.last_mut() {
-                    for (place, seat) in (1..).zip(order.as_slice()) {
-                        places[*seat] = place;
-                    }
-                }
-            }
-            _ => {}
-        }
-    }
-
-    fn check_role(&self, seat: Seat, name: &str) -> Result<(), String> {
-        let role = self.game.as_ref().and_then(|game| game.roles()[seat]);
-        match role {
-            Some(role) if role.name() == name => Ok(()),
-            Some(role) => Err(format!(
-                "seat {seat} is {} by the rules, not {name}",
-                role.name()
-            )),
-            None => Err("in the first Shift there are no roles".into()),
-        }
-    }
-
-    fn check_points(&self, row: &Row, points: u64) -> Result<(), String> {
-        let score = self.game.as_ref().map_or(0, |game| game.scores()[row.seat]);
-        if score == points {
-            Ok(())
-        } else {
-            Err(format!(
-                "seat {} has {score} points by the rules, not {points}",
-                row.seat
-            ))
-        }
-    }
-
-    fn check_place(&self, row: &Row, place: u8) -> Result<(), String> {
-        let shift = self.places.iter().find(|(shift, _)| *shift == row.shift);
-        match shift.map_or(0, |(_, places)| places[row.seat]) {
-            found if found == place => Ok(()),
-            0 => Err(format!("seat {} has not finished by the rules", row.seat)),
-            found => Err(format!(
-                "seat {} has place {found} by the rules, not {place}",
-                row.seat
-            )),
         }
     }
 

@@ -1,9 +1,11 @@
 //! What cannot be at a real table and is seen at once, so that it can be said in plain words: too many cards of a kind, a hand of the wrong
 //! size, a gift of somebody who gives nothing.
 
-use super::complete::{Puzzle, add, contains};
-use super::facts::{JOKER, counts_of};
+use chefshat_engine::Cards;
+
+use super::facts::{JOKER, add, contains, counts_of};
 use super::gifts::size_of;
+use super::puzzle::Puzzle;
 
 impl Puzzle<'_> {
     /// What can be said in plain words when it is wrong.
@@ -29,10 +31,17 @@ impl Puzzle<'_> {
                     size_of(counts)
                 ));
             }
-            // What was given away may be played by another seat: it would be counted twice.
-            let dealt = tally.dealt[seat].filter(|_| self.pairs.is_empty());
-            let hand = dealt.map_or(*counts, |cards| counts_of(cards, rules.faces()));
-            add(&mut seen, &hand);
+            if self.partner(seat).is_none() {
+                let dealt = tally.dealt[seat];
+                add(
+                    &mut seen,
+                    &dealt.map_or(*counts, |cards| counts_of(cards, rules.faces())),
+                );
+            }
+        }
+        // What was given away may be played by another seat: it would be counted twice.
+        for pair in &self.pairs {
+            add(&mut seen, &self.sure_of(pair));
         }
         let tellings = [("dealt to", &dealt), ("dealt to or played by", &seen)];
         for (what, counts) in tellings {
@@ -47,6 +56,15 @@ impl Puzzle<'_> {
                 ));
             }
         }
+        for (seat, gift) in tally.given.iter() {
+            if let (Some(gift), Some(hand)) = (gift, tally.dealt[seat])
+                && !self.can_give(hand, *gift)
+            {
+                return Err(format!(
+                    "seat {seat} cannot have given these cards of its hand (the Golden card is written G, and goes last of its face)"
+                ));
+            }
+        }
         for seat in tally.given.seats() {
             if tally.given[seat].is_some() && self.partner(seat).is_none() {
                 return Err(format!("seat {seat} gives no cards in this exchange"));
@@ -58,6 +76,21 @@ impl Puzzle<'_> {
                 return Err(format!("seat {seat} does not hold these cards"));
             }
         }
+        if !self.golden.values().any(|may| *may) {
+            return Err(
+                "by what is told up to here nobody can have been dealt the Golden card (in hands and gifts it is written G)"
+                    .into(),
+            );
+        }
         Ok(())
+    }
+
+    /// Whether a seat with this hand may give these cards: of the top face the Golden card last.
+    fn can_give(&self, hand: Cards, gift: Cards) -> bool {
+        let faces = self.rules.faces();
+        let (hand_counts, gift_counts) = (counts_of(hand, faces), counts_of(gift, faces));
+        let all_of_top = hand_counts[self.top] == gift_counts[self.top];
+        let golden_goes = hand.has_golden() && all_of_top && gift_counts[self.top] > 0;
+        contains(&hand_counts, &gift_counts) && gift.has_golden() == golden_goes
     }
 }

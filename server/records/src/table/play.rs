@@ -7,8 +7,9 @@ use chefshat_engine::{
 };
 use chefshat_proto::v1;
 
-use super::complete::{Misfit, Plan, complete};
+use super::complete::{Completer, Misfit, Plan};
 use super::facts::{Fact, JOKER, ShiftFacts, index};
+use super::known::Known;
 use crate::convert::{FieldProblem, script_from_proto};
 
 /// No cards come from it: it stands where the engine wants a seed.
@@ -62,6 +63,7 @@ impl Beginning {
 pub(crate) struct Table {
     rules: RuleSet,
     shifts: Vec<ShiftFacts>,
+    completer: Completer,
     /// How many Shifts have begun.
     begun: usize,
     plan: Option<Plan>,
@@ -92,6 +94,7 @@ impl Table {
         Self {
             rules,
             shifts,
+            completer: Completer::default(),
             begun: 0,
             plan: None,
             misfit: None,
@@ -166,13 +169,36 @@ impl Table {
         }
     }
 
-    /// Whose hand is known as it stands in the game.
+    /// Whose hand is known as it stands in the game, but for which card of the top face is the Golden one.
     pub(crate) fn hands_known(&self, game: &Game) -> BySeat<bool> {
-        match &self.plan {
-            None => BySeat::filled(self.rules.players(), false),
-            Some(plan) if before_first_turn(game) => plan.dealt_known,
-            Some(plan) => plan.held_known,
-        }
+        self.known(game)
+            .map_or_else(|| self.all(false), |known| known.hands)
+    }
+
+    /// Whose hand is known, the Golden card in it too, if it is there.
+    pub(crate) fn golden_known(&self, game: &Game) -> BySeat<bool> {
+        let Some(known) = self.known(game) else {
+            return self.all(false);
+        };
+        let top = Face::new(self.rules.faces());
+        BySeat::from_fn(known.hands.len(), |seat| {
+            let without = top.is_some_and(|top| game.hands()[seat].count(top) == 0);
+            known.hands[seat] && (known.golden || without)
+        })
+    }
+
+    fn known(&self, game: &Game) -> Option<Known> {
+        self.plan.as_ref().map(|plan| {
+            if before_first_turn(game) {
+                plan.dealt_known
+            } else {
+                plan.held_known
+            }
+        })
+    }
+
+    fn all(&self, known: bool) -> BySeat<bool> {
+        BySeat::filled(self.rules.players(), known)
     }
 
     /// An event with what nobody wrote down left out.
@@ -220,7 +246,9 @@ impl Table {
             return Ok(None);
         };
         self.begun += 1;
-        let (plan, misfit) = complete(&self.rules, last_order, &told.facts);
+        let (plan, misfit) = self
+            .completer
+            .complete(&self.rules, last_order, &told.facts);
         self.misfit = misfit;
         self.told = told_decisions(&told.facts, &plan);
         let script = Script {

@@ -114,6 +114,8 @@ fn damages() -> Vec<(&'static str, Damage, usize, &'static str)> {
         ("the commitment", Set(1, "/header/seedCommitment", json!("AAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAA=")), 4, "gameStarted.seedCommitment"),
         ("a start", Set(1, "/header/start", json!({"branchedFrom": {"gameId": "22b73f3bba773c1120e1858de68cd801"}})), 1, "start.branchedFrom is there"),
         ("substituted at the end", Unset(1, "/header/seats/2", "substituted"), 493, "seat 2 was not substituted"),
+        ("the day it was made", Set(1, "/header/createdAtMs", json!("253402300800000")), 1, "createdAtMs is 253402300800000, after the year 9999"),
+        ("too many seats", Set(1, "/header/seats", json!([{}, {}, {}, {}, {}, {}, {}])), 1, "has more than 6 entries in `seats`"),
         // Seats.
         ("a seat that is not there", Set(2, "/event/seated/seat", json!(4)), 2, "seated.seat is 4, but the seats are 0..=3"),
         ("a built-in agent's seat", Set(2, "/event/seated/seat", json!(1)), 2, "which a built-in agent holds"),
@@ -122,6 +124,8 @@ fn damages() -> Vec<(&'static str, Damage, usize, &'static str)> {
         // The deal.
         ("a hand", Set(5, "/event/shiftStarted/hands/1/cards/0", json!(2)), 5, "shiftStarted.hands[1].cards"),
         ("the Golden card", Set(5, "/event/shiftStarted/hands/1/golden", json!(true)), 5, "shiftStarted.hands[1].golden is true and must be false"),
+        ("a long hand", Set(5, "/event/shiftStarted/hands/1/cards", json!(vec![1; 123])), 5, "has more than 122 entries in `cards`"),
+        ("too many hands", Set(5, "/event/shiftStarted/hands", json!(vec![json!({}); 1000])), 5, "has more than 6 entries in `hands`"),
         ("a hand left out", Set(5, "/event/shiftStarted/hands", json!([])), 5, "shiftStarted.hands is [] and must be a list of 4"),
         ("a later hand", Set(171, "/event/shiftStarted/hands/3/cards/16", json!(11)), 171, "shiftStarted.hands[3].cards"),
         ("a role", Set(172, "/event/rolesAssigned/roles/1", json!("ROLE_COOK")), 172, "rolesAssigned.roles"),
@@ -146,6 +150,9 @@ fn damages() -> Vec<(&'static str, Damage, usize, &'static str)> {
         ("a built-in agent's time", Set(12, "/decision/decisionTimeUs", json!("5")), 12, "decisionTimeUs is 5 and must be 0"),
         ("the bank", Set(14, "/decision/bankLeftMs", json!(30)), 14, "bankLeftMs is 30 and must be 18"),
         ("the clock", Set(14, "/decision/elapsedMs", json!("3")), 14, "elapsedMs is 3, earlier than the 40"),
+        ("a clock of another age", Set(14, "/decision/elapsedMs", json!("253402300799999")), 14, "is after the year 9999"),
+        ("endless attempts", Set(8, "/decision/invalidAttempts", json!(vec![4711; 10_001])), 8, "has more than 10000 entries in `invalidAttempts`"),
+        ("endless scores", Set(8, "/decision/annotations", json!({"actionScores": vec![1; 1025]})), 8, "has more than 1024 entries in `actionScores`"),
         ("annotations", Set(8, "/decision/annotations", json!({"valueEstimate": "NaN"})), 8, "not finite"),
         // Events.
         ("a sequence number", Set(9, "/event/sequence", json!("7")), 9, "sequence is 7 and must be 6"),
@@ -157,6 +164,7 @@ fn damages() -> Vec<(&'static str, Damage, usize, &'static str)> {
         ("an event's time", Set(22, "/event/pass/decisionTimeUs", json!("1")), 22, "pass.decisionTimeUs"),
         ("a reward", Set(9, "/event/rewards/0/value", json!(0.5)), 9, "rewards[0].value is 0.5"),
         ("no reward", Unset(9, "/event", "rewards"), 9, "rewards is [] and must be a list of 1"),
+        ("rewards for nobody", Set(9, "/event/rewards", json!(vec![json!({}); 7])), 9, "has more than 6 entries in `rewards`"),
         ("a reward for nothing", Set(51, "/event/rewards", json!([{"seat": 2, "value": 1.0}])), 51, "this event brings none"),
         ("another event", Set(11, "/event", json!({"sequence": "7", "elapsedMs": "40", "seatFinished": {"place": 1}})), 11, "the event is `seatFinished` and must be `pass`"),
         ("an event of no kind", Unset(11, "/event", "pass"), 11, "does not say what happened"),
@@ -171,13 +179,14 @@ fn damages() -> Vec<(&'static str, Damage, usize, &'static str)> {
         ("a short nonce", Set(492, "/event/gameEnded/reveal/nonce", json!("mY7l")), 492, "reveal.nonce has 3 bytes and must have 32"),
         ("a byte of the game seed", Set(492, "/event/gameEnded/reveal/gameSeed", json!("5cfvpVRBjZkKjKJuMEg/mDII9UnBd79z5rKVnYts940=")), 492, "reveal.gameSeed"),
         ("a seat's bytes", Set(492, "/event/gameEnded/reveal/seatEntropy/2", json!("AAAA")), 5, "revealed on line 492"),
+        ("bytes of seats that are not there", Set(492, "/event/gameEnded/reveal/seatEntropy", json!(vec![""; 7])), 492, "has more than 6 entries in `seatEntropy`"),
         ("a seat's bytes left out", Set(492, "/event/gameEnded/reveal/seatEntropy", json!([])), 492, "seatEntropy has 0 entries"),
         ("aborted instead", Set(492, "/event", json!({"sequence": "284", "elapsedMs": "207", "gameAborted": {"reason": "ABORT_REASON_CLOSED"}})), 492, "reveal.gameSeed is missing"),
         ("the footer's count", Set(493, "/footer/decisions", json!("206")), 493, "footer.decisions is \"206\" and must be \"207\""),
         ("how it ended", Set(493, "/footer/state", json!("ROOM_STATE_ABORTED")), 493, "footer.state"),
         // Lines.
         ("no header", Drop(1), 1, "the first line must be the header"),
-        ("two headers", Double(1), 2, "a second header"),
+        ("two headers", Double(1), 2, "is a second header: a file holds one record"),
         ("a decision dropped", Drop(8), 8, "`play` follows from no decision"),
         ("an event dropped", Drop(9), 9, "`play` must come here"),
         ("the game's end dropped", Drop(492), 492, "the footer stands here, but the game is not over"),
@@ -196,7 +205,7 @@ fn damages() -> Vec<(&'static str, Damage, usize, &'static str)> {
         ("no JSON", Bytes(40, b"{\"event\": }".to_vec()), 40, "is not JSON: expected value (column 11)"),
         ("other JSON", Bytes(40, b"{\"match\":1}".to_vec()), 40, "is not a line of a record: unknown field `match`"),
         ("no text", Bytes(40, b"{\"event\":\"\xff\"}".to_vec()), 40, "is not UTF-8 text (at byte 11"),
-        ("a line without end", Bytes(40, vec![b' '; MAX_LINE_BYTES]), 40, "is longer than 1048576 bytes"),
+        ("a line without end", Bytes(40, vec![b' '; MAX_LINE_BYTES]), 40, "is longer than 262144 bytes"),
     ]
 }
 

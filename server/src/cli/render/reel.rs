@@ -7,11 +7,11 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use chefshat_records::picture::{Frame, GifWriter, Painter, Palette, Pixels};
+use chefshat_records::whole::WholeFile;
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 
 use super::CommandError;
-use super::whole::WholeFile;
 
 /// Frames painted before they are written: as many at a time keep all cores busy without filling the memory.
 const AT_A_TIME: usize = 32;

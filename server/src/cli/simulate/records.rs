@@ -4,9 +4,11 @@
 use std::path::Path;
 
 use chefshat_arena::{Batch, Listener};
-use chefshat_engine::{Action, BySeat, Decision, DecisionKind, Event, Game, RULES_VERSION};
+use chefshat_engine::{Action, BySeat, Decision, Event, Game, RULES_VERSION};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
-use chefshat_records::convert::{By, action_space, event_kind, rules_to_proto, seat_number};
+use chefshat_records::convert::{
+    By, action_space, event_kind, invalid_reward, rules_to_proto, seat_number, with_rewards,
+};
 use chefshat_records::jsonl::{self, FORMAT_VERSION, RecordFileError};
 use sha2::{Digest as _, Sha256};
 
@@ -135,10 +137,6 @@ impl Writer {
             } else {
                 v1::DecisionSource::Agent
             };
-            let invalid_reward = batch
-                .scheme()
-                .filter(|_| open.kind == DecisionKind::Turn && !attempts.is_empty())
-                .map(|scheme| attempts.iter().map(|_| scheme.invalid()).sum());
             self.line(Line::Decision(v1::DecisionRecord {
                 seat: seat_number(open.seat),
                 decision_id: numbers[open.seat],
@@ -149,7 +147,7 @@ impl Writer {
                 bank_left_ms: crate::convert::millis(Policy::default().bank),
                 invalid_attempts: attempts.clone(),
                 action_mask: game.legal_actions().to_bytes(rules.actions().size()),
-                invalid_reward,
+                invalid_reward: invalid_reward(batch.scheme(), open.kind, attempts.len()),
                 ..v1::DecisionRecord::default()
             }));
             events.clear();
@@ -186,18 +184,7 @@ impl Writer {
             source,
             decision_time_us: 0,
         };
-        for (position, event) in events.iter().enumerate() {
-            let mut rewards = Vec::new();
-            if let Some(scheme) = batch.scheme() {
-                scheme.of_events(batch.rules(), events, |seat, value, bringer| {
-                    if bringer == position {
-                        rewards.push(v1::SeatReward {
-                            seat: seat_number(seat),
-                            value,
-                        });
-                    }
-                });
-            }
+        for (event, rewards) in with_rewards(events, batch.rules(), batch.scheme()) {
             if let Some(kind) = event_kind(event, batch.rules().actions(), by) {
                 self.event(kind, rewards);
             }

@@ -1,6 +1,7 @@
 //! The journals that rooms write through, and the way of their orders to the writer.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicI64, Ordering};
 
 use chefshat_proto::v1;
 use futures::FutureExt as _;
@@ -14,14 +15,29 @@ use crate::store::{Journal, StoreError};
 
 /// The way to the writer.
 #[derive(Clone)]
-pub(super) struct Orders(pub(super) mpsc::Sender<Pending>);
+pub(super) struct Orders {
+    pub(super) queue: mpsc::Sender<Pending>,
+    /// The number of the next row of the journal.
+    pub(super) next_row: Arc<AtomicI64>,
+}
 
 impl Orders {
+    /// A number for a row of the journal.
+    fn new_row(&self) -> i64 {
+        self.next_row.fetch_add(1, Ordering::Relaxed)
+    }
+
+    /// Below every number that a row will have from now on.
+    pub(super) fn first_row(&self) -> i64 {
+        self.next_row.load(Ordering::Relaxed)
+    }
+
     /// Gives an order and waits until it is kept.
     pub(super) async fn give(&self, order: Order) -> Result<(), StoreError> {
         let gone = || StoreError("the database is closed".into());
         let (reply, kept) = oneshot::channel();
-        self.0.send((order, reply)).await.map_err(|_| gone())?;
+        let order = self.queue.send((order, reply));
+        order.await.map_err(|_| gone())?;
         kept.await.map_err(|_| gone())?
     }
 }
@@ -30,6 +46,8 @@ impl Orders {
 pub(super) struct DurableJournal {
     pub(super) number: i64,
     pub(super) position: i64,
+    /// Its last row so far.
+    pub(super) last_row: Option<i64>,
     pub(super) orders: Orders,
 }
 
@@ -39,13 +57,17 @@ impl Journal for DurableJournal {
         entries: &'a mut Vec<Entry>,
     ) -> BoxFuture<'a, Result<(), StoreError>> {
         async move {
+            let number = self.orders.new_row();
             let row = Row {
+                number,
                 game: self.number,
                 position: self.position,
+                previous: self.last_row,
                 entries: encode(entries),
             };
             self.orders.give(Order::Append(row)).await?;
             self.position += 1;
+            self.last_row = Some(number);
             Ok(())
         }
         .boxed()
@@ -60,6 +82,7 @@ impl Journal for DurableJournal {
                 number: self.number,
                 // Only an aborted game can end before anything was dealt.
                 state: v1::RoomState::Aborted.into(),
+                last_row: self.last_row,
                 summary,
             })
             .boxed()
@@ -95,6 +118,7 @@ impl Journal for EphemeralJournal {
                 number: self.number,
                 game_id: self.header.game_id,
                 header: form::header_to_bytes(&self.header),
+                row: self.orders.new_row(),
                 entries: encode(&mut self.entries),
                 summary,
             })

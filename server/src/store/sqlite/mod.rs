@@ -11,7 +11,7 @@ mod tests;
 mod writer;
 
 use std::fs::File;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};
 use std::sync::{Arc, Mutex};
 
@@ -33,8 +33,13 @@ use journals::{DurableJournal, EphemeralJournal, Orders};
 use reader::Reader;
 use writer::Order;
 
+/// Space on the disk that is left to games that go on: new ones are refused before it is used. Of a small disk this is a share.
+const MAX_RESERVE_BYTES: u64 = 64 * 1024 * 1024;
+const RESERVE_SHARE: u64 = 50;
+
 /// Keeps games in the database of a data directory.
 pub struct SqliteStore {
+    data_dir: PathBuf,
     reader: Reader,
     orders: Orders,
     failed: watch::Receiver<Option<StoreError>>,
@@ -52,16 +57,22 @@ impl SqliteStore {
     /// The directory cannot be used; nothing was changed in it.
     pub async fn open(data_dir: &Path) -> Result<Self, OpenError> {
         let opened = open::open(data_dir).await?;
-        let last: i64 = sqlx::query_scalar("SELECT coalesce(max(number), 0) FROM games")
-            .fetch_one(&opened.readers)
-            .await
-            .map_err(|error| OpenError::Other(data_dir.join(open::FILE), explain(&error)))?;
+        let (last, last_row): (i64, i64) = sqlx::query_as(
+            "SELECT (SELECT coalesce(max(number), 0) FROM games), (SELECT coalesce(max(row), 0) FROM journal)",
+        )
+        .fetch_one(&opened.readers)
+        .await
+        .map_err(|error| OpenError::Other(data_dir.join(open::FILE), explain(&error)))?;
         let (orders, queue) = mpsc::channel(writer::QUEUE);
         let (has_failed, failed) = watch::channel(None);
         let writing = tokio::spawn(writer::run(opened.writer, queue, has_failed));
         Ok(Self {
+            data_dir: data_dir.to_path_buf(),
             reader: Reader(opened.readers),
-            orders: Orders(orders),
+            orders: Orders {
+                queue: orders,
+                next_row: Arc::new(AtomicI64::new(last_row + 1)),
+            },
             failed,
             numbers: Arc::new(AtomicI64::new(last + 1)),
             writing: Mutex::new(Some(writing)),
@@ -74,6 +85,17 @@ impl SqliteStore {
 impl Store for SqliteStore {
     fn outlives_server(&self) -> bool {
         true
+    }
+
+    fn has_space(&self) -> bool {
+        match rustix::fs::statvfs(&self.data_dir) {
+            Ok(disk) => {
+                let reserve = MAX_RESERVE_BYTES.min(disk.f_blocks * disk.f_frsize / RESERVE_SHARE);
+                disk.f_bavail * disk.f_frsize >= reserve
+            }
+            // A disk that says nothing of itself is tried.
+            Err(_) => true,
+        }
     }
 
     fn create(
@@ -97,11 +119,13 @@ impl Store for SqliteStore {
                     number,
                     game_id: header.game_id,
                     header: form::header_to_bytes(&header),
+                    first_row: orders.first_row(),
                 })
                 .await?;
             let journal: Box<dyn Journal> = Box::new(DurableJournal {
                 number,
                 position: 0,
+                last_row: None,
                 orders,
             });
             Ok(journal)

@@ -140,7 +140,11 @@ pub(super) async fn open(data_dir: &Path) -> Result<Opened, OpenError> {
         })?;
     // Games that were given up before anything was dealt leave nothing behind.
     for forgotten in [
-        "DELETE FROM journal WHERE game IN (SELECT number FROM games WHERE state <> 0 AND summary IS NULL)",
+        "WITH RECURSIVE forgotten (row) AS (
+             SELECT last_row FROM games WHERE state <> 0 AND summary IS NULL
+             UNION ALL
+             SELECT previous FROM forgotten JOIN journal USING (row))
+         DELETE FROM journal WHERE row IN forgotten",
         "DELETE FROM games WHERE state <> 0 AND summary IS NULL",
     ] {
         sqlx::query(forgotten)

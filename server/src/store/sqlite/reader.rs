@@ -1,8 +1,10 @@
 //! Reading the database. It goes over connections of its own, which cannot write, and never waits for the writer.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use chefshat_proto::v1;
+use futures::TryStreamExt as _;
 use prost::Message as _;
 use sqlx::Row as _;
 use sqlx::sqlite::{SqlitePool, SqliteRow};
@@ -29,7 +31,7 @@ impl Reader {
         orders: &Orders,
     ) -> Result<Vec<LeftGame>, StoreError> {
         let games = sqlx::query(
-            "SELECT number, form, header, state FROM games WHERE number IN (
+            "SELECT number, form, header, state, last_row FROM games WHERE number IN (
                  SELECT number FROM games WHERE state = 0
                  UNION ALL
                  SELECT * FROM (
@@ -42,20 +44,26 @@ impl Reader {
         .fetch_all(&self.0)
         .await
         .map_err(failure)?;
+        let mut going_on = self.going_on().await?;
         let mut left = Vec::with_capacity(games.len());
         for row in games {
             let number: i64 = row.get(0);
-            let read = check_form(row.get(1)).and_then(|()| header_of(&row));
-            let entries = self.journal(number).await?;
-            match read.and_then(|header| Ok((header, entries?))) {
-                Ok((header, entries)) => left.push(LeftGame {
+            let concluded = row.get::<i64, _>(3) != 0;
+            let header = check_form(row.get(1)).and_then(|()| header_of(&row));
+            let read = match concluded {
+                true => self.journal(number, row.get(4)).await?,
+                false => going_on.remove(&number).unwrap_or(Ok(Read::default())),
+            };
+            match header.and_then(|header| Ok((header, read?))) {
+                Ok((header, read)) => left.push(LeftGame {
                     journal: Box::new(DurableJournal {
                         number,
-                        position: entries.rows,
+                        position: read.rows,
+                        last_row: read.last_row,
                         orders: orders.clone(),
                     }),
-                    entries: entries.entries,
-                    concluded: row.get::<i64, _>(3) != 0,
+                    entries: read.entries,
+                    concluded,
                     header,
                 }),
                 Err(problem) => {
@@ -69,7 +77,8 @@ impl Reader {
     /// See `Store::finished`.
     pub(super) async fn finished(&self, game: Id) -> Result<Option<KeptGame>, StoreError> {
         let row = sqlx::query(
-            "SELECT number, form, header, record FROM games LEFT JOIN added_records ON game = number
+            "SELECT number, form, header, record, last_row
+             FROM games LEFT JOIN added_records ON game = number
              WHERE game_id = $1 AND summary IS NOT NULL",
         )
         .bind(game.0.as_slice())
@@ -86,34 +95,61 @@ impl Reader {
             return Ok(Some(KeptGame::Imported(lines.into())));
         }
         let header = header_of(&row).map_err(unreadable)?;
-        let journal = self.journal(row.get(0)).await?.map_err(unreadable)?;
+        let journal = self.journal(row.get(0), row.get(4)).await?;
+        let journal = journal.map_err(unreadable)?;
         Ok(Some(KeptGame::Hosted(
             Arc::new(header),
             journal.entries.into(),
         )))
     }
 
-    /// The journal of a game; inside, why it cannot be read.
-    async fn journal(&self, number: i64) -> Result<Result<Read, Unreadable>, StoreError> {
-        let rows =
-            sqlx::query("SELECT position, entries FROM journal WHERE game = $1 ORDER BY position")
-                .bind(number)
-                .fetch_all(&self.0)
-                .await
-                .map_err(failure)?;
-        let mut read = Read::default();
-        for row in rows {
-            let position: i64 = row.get(0);
-            if position != read.rows {
-                let gap = format!("a part of its journal is missing at {}", read.rows);
-                return Ok(Err(Unreadable(gap)));
+    /// The journals of all games that go on, by the games' numbers; inside, why one cannot be read. They are found by looking through all
+    /// that was kept since the oldest of them began.
+    async fn going_on(&self) -> Result<HashMap<i64, Result<Read, Unreadable>>, StoreError> {
+        let mut rows = sqlx::query(
+            "SELECT row, position, entries, game FROM journal
+             WHERE row >= (SELECT min(first_row) FROM games WHERE state = 0)
+               AND game IN (SELECT number FROM games WHERE state = 0)
+             ORDER BY row",
+        )
+        .fetch(&self.0);
+        let mut journals = HashMap::new();
+        while let Some(row) = rows.try_next().await.map_err(failure)? {
+            let journal = journals.entry(row.get(3)).or_insert(Ok(Read::default()));
+            if let Ok(read) = journal
+                && let Err(problem) = read.add(&row)
+            {
+                *journal = Err(problem);
             }
-            if let Err(problem) = form::read_entries(row.get(1), &mut read.entries) {
-                return Ok(Err(problem));
-            }
-            read.rows += 1;
         }
-        Ok(Ok(read))
+        Ok(journals)
+    }
+
+    /// The journal of a game that has ended, from its last row back to its first; inside, why it cannot be read.
+    async fn journal(
+        &self,
+        number: i64,
+        last_row: Option<i64>,
+    ) -> Result<Result<Read, Unreadable>, StoreError> {
+        let rows = sqlx::query(
+            "WITH RECURSIVE own (row, position, entries, previous) AS (
+                 SELECT row, position, entries, previous FROM journal WHERE row = $1 AND game = $2
+                 UNION ALL
+                 SELECT journal.row, journal.position, journal.entries, journal.previous
+                 FROM own JOIN journal ON journal.row = own.previous
+                 WHERE journal.row < own.row AND journal.game = $2)
+             SELECT row, position, entries FROM own ORDER BY row",
+        )
+        .bind(last_row)
+        .bind(number)
+        .fetch_all(&self.0)
+        .await
+        .map_err(failure)?;
+        let mut read = Read::default();
+        if rows.is_empty() && last_row.is_some() {
+            return Ok(Err(Unreadable("its journal is missing".into())));
+        }
+        Ok(rows.iter().try_for_each(|row| read.add(row)).map(|()| read))
     }
 
     /// See `Store::list`.
@@ -183,6 +219,21 @@ impl Reader {
 struct Read {
     entries: Vec<Entry>,
     rows: i64,
+    last_row: Option<i64>,
+}
+
+impl Read {
+    /// Adds the next row: its number, its position, its entries.
+    fn add(&mut self, row: &SqliteRow) -> Result<(), Unreadable> {
+        if row.get::<i64, _>(1) != self.rows {
+            let gap = format!("a part of its journal is missing at {}", self.rows);
+            return Err(Unreadable(gap));
+        }
+        form::read_entries(row.get(2), &mut self.entries)?;
+        self.rows += 1;
+        self.last_row = Some(row.get(0));
+        Ok(())
+    }
 }
 
 /// The header in the third column.

@@ -220,7 +220,8 @@ async fn an_ephemeral_game_is_kept_when_it_ends_and_not_before() {
 
 #[tokio::test]
 async fn many_rooms_share_the_writer() {
-    const ROOMS: u8 = 40;
+    // More than one statement takes, and no round number.
+    const ROOMS: u8 = 201;
     let folder = tempfile::tempdir().expect("a folder");
     let store = Arc::new(opened(folder.path()).await);
     let playing = (0..ROOMS).map(|room| {
@@ -431,6 +432,50 @@ async fn a_game_that_cannot_be_read_is_left_and_hinders_no_other() {
     let unfinished = store.left(u64::MAX).await.expect("readable");
     let games: Vec<Id> = unfinished.iter().map(|game| game.header.game_id).collect();
     assert_eq!(games, [Id([3; 16])]);
+}
+
+#[tokio::test]
+async fn a_part_that_is_missing_of_a_finished_game_is_noticed() {
+    let rows = i64::try_from(entries().len()).expect("few");
+    for missing in [0, rows / 2, rows - 1] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let store = opened(folder.path()).await;
+        let headers = [1, 2].map(|game| Arc::new(header(game, Durability::Durable)));
+        let mut journals = Vec::new();
+        for header in &headers {
+            journals.push(store.create(Arc::clone(header)).await.expect("kept"));
+        }
+        // The rows of the two lie among each other.
+        for entry in entries() {
+            for journal in &mut journals {
+                let mut entry = vec![entry.clone()];
+                journal.append(&mut entry).await.expect("kept");
+            }
+        }
+        for (journal, header) in journals.iter_mut().zip(&headers) {
+            journal.finish(Some(summary(header))).await.expect("kept");
+        }
+        store.close().await;
+        drop(store);
+        let options = SqliteConnectOptions::new().filename(folder.path().join(open::FILE));
+        let mut connection = SqliteConnection::connect_with(&options)
+            .await
+            .expect("it opens");
+        sqlx::query("DELETE FROM journal WHERE game = 1 AND position = $1")
+            .bind(missing)
+            .execute(&mut connection)
+            .await
+            .expect("it is done");
+        connection.close().await.expect("it closes");
+        let store = opened(folder.path()).await;
+        let error = store.finished(headers[0].game_id).await.expect_err("a gap");
+        assert!(error.to_string().contains("missing"), "{error}");
+        let kept = store.finished(headers[1].game_id).await.expect("readable");
+        let Some(KeptGame::Hosted(_, journal)) = kept else {
+            panic!("not kept: {kept:?}");
+        };
+        assert_eq!(shown(&journal.to_vec()), shown(&entries()));
+    }
 }
 
 #[tokio::test]

@@ -1,6 +1,7 @@
 //! The one writer of the database. Rooms hand it what they want kept and wait; it takes all that has come meanwhile into one transaction,
 //! so that many rooms share one sync of the disk. While a transaction is being synced, the next one gathers: nobody waits for others to
-//! come.
+//! come. A transaction is mostly rows of the journal and nothing else; those are written by one call, because every call goes to the
+//! database's own thread and back.
 
 use chefshat_proto::v1;
 use prost::Message as _;
@@ -19,8 +20,8 @@ use crate::store::StoreError;
 pub(super) const QUEUE: usize = 1_024;
 /// Orders in one transaction.
 const MOST_IN_ONE: usize = 1_024;
-/// Rows of the journal in one statement; what is left over goes in smaller ones, so that few statements need to be known.
-const ROWS: [usize; 4] = [64, 16, 4, 1];
+/// Rows of the journal that one statement takes at most. There are only these, so that few statements need to be known.
+const ROWS: [usize; 5] = [1, 4, 16, 32, 64];
 
 /// Something to be kept.
 pub(super) enum Order {
@@ -29,6 +30,8 @@ pub(super) enum Order {
         number: i64,
         game_id: Id,
         header: Vec<u8>,
+        /// Its rows come from here on.
+        first_row: i64,
     },
     /// A game goes on.
     Append(Row),
@@ -36,6 +39,7 @@ pub(super) enum Order {
     Finish {
         number: i64,
         state: i32,
+        last_row: Option<i64>,
         summary: Option<Box<v1::RecordSummary>>,
     },
     /// A game that was kept in memory until it was over.
@@ -43,6 +47,7 @@ pub(super) enum Order {
         number: i64,
         game_id: Id,
         header: Vec<u8>,
+        row: i64,
         entries: Vec<u8>,
         summary: Box<v1::RecordSummary>,
     },
@@ -61,8 +66,13 @@ pub(super) enum Order {
 
 /// A row of the journal.
 pub(super) struct Row {
+    /// Its number, in the order of all games' rows, or nearly so.
+    pub(super) number: i64,
     pub(super) game: i64,
+    /// Its number in its game, from 0.
     pub(super) position: i64,
+    /// The number of the game's row before it.
+    pub(super) previous: Option<i64>,
     pub(super) entries: Vec<u8>,
 }
 
@@ -104,18 +114,21 @@ pub(super) async fn run(
 }
 
 async fn keep(connection: &mut SqliteConnection, pending: &mut [Pending]) -> sqlx::Result<()> {
-    connection.execute("BEGIN IMMEDIATE").await?;
     let written = write(connection, pending).await;
-    if let Err(cause) = written {
+    if written.is_err() {
         // The transaction is given up in any case, at the latest when the file is opened again.
         let _ = connection.execute("ROLLBACK").await;
-        return Err(cause);
     }
-    connection.execute("COMMIT").await.map(drop)
+    written
 }
 
+/// Writes orders in one transaction.
 async fn write(connection: &mut SqliteConnection, pending: &mut [Pending]) -> sqlx::Result<()> {
     let mut rows = Vec::with_capacity(pending.len());
+    let rows_alone = (pending.iter()).all(|(order, _)| matches!(order, Order::Append(_)));
+    if !rows_alone {
+        connection.execute("BEGIN IMMEDIATE").await?;
+    }
     // A game has one order at a time, so that those of different kinds may go in any order.
     for (order, _) in pending {
         match order {
@@ -125,18 +138,23 @@ async fn write(connection: &mut SqliteConnection, pending: &mut [Pending]) -> sq
                 number,
                 game_id,
                 header,
-            } => create(connection, *number, *game_id, header).await?,
+                first_row,
+            } => create(connection, *number, *game_id, header, *first_row).await?,
             Order::Finish {
                 number,
                 state,
+                last_row,
                 summary,
             } => {
-                sqlx::query("UPDATE games SET state = $2, ended_at_ms = $3 WHERE number = $1")
-                    .bind(*number)
-                    .bind(*state)
-                    .bind(i64::try_from(since_epoch_ms()).unwrap_or(i64::MAX))
-                    .execute(&mut *connection)
-                    .await?;
+                sqlx::query(
+                    "UPDATE games SET state = $2, ended_at_ms = $3, last_row = $4 WHERE number = $1",
+                )
+                .bind(*number)
+                .bind(*state)
+                .bind(i64::try_from(since_epoch_ms()).unwrap_or(i64::MAX))
+                .bind(*last_row)
+                .execute(&mut *connection)
+                .await?;
                 if let Some(summary) = summary {
                     summarise(connection, *number, summary).await?;
                 }
@@ -145,16 +163,24 @@ async fn write(connection: &mut SqliteConnection, pending: &mut [Pending]) -> sq
                 number,
                 game_id,
                 header,
+                row,
                 entries,
                 summary,
             } => {
-                create(connection, *number, *game_id, header).await?;
-                let row = Row {
-                    game: *number,
-                    position: 0,
-                    entries: std::mem::take(entries),
-                };
-                append(connection, &[&row]).await?;
+                create(connection, *number, *game_id, header, *row).await?;
+                sqlx::query("UPDATE games SET last_row = $2 WHERE number = $1")
+                    .bind(*number)
+                    .bind(*row)
+                    .execute(&mut *connection)
+                    .await?;
+                sqlx::query(
+                    "INSERT INTO journal (row, game, position, entries) VALUES ($1, $2, 0, $3)",
+                )
+                .bind(*row)
+                .bind(*number)
+                .bind(entries.as_slice())
+                .execute(&mut *connection)
+                .await?;
                 summarise(connection, *number, summary).await?;
             }
             Order::Import {
@@ -190,13 +216,38 @@ async fn write(connection: &mut SqliteConnection, pending: &mut [Pending]) -> sq
             }
         }
     }
-    let mut rest: Vec<&Row> = rows.into_iter().map(|row| &*row).collect();
-    for count in ROWS {
-        while rest.len() >= count {
-            append(connection, &rest.split_off(rest.len() - count)).await?;
-        }
+    let begin = if rows_alone { "BEGIN IMMEDIATE; " } else { "" };
+    rows.sort_by_key(|row| row.number);
+    // Nothing but places for values is put into the text.
+    let text = format!("{begin}{}COMMIT", insert(rows.len()));
+    let mut query = sqlx::query(AssertSqlSafe(text));
+    for row in rows {
+        query = query
+            .bind(row.number)
+            .bind(row.game)
+            .bind(row.position)
+            .bind(row.previous)
+            .bind(row.entries.as_slice());
     }
-    Ok(())
+    query.execute(connection).await.map(drop)
+}
+
+/// Statements that put so many rows into the journal. Places of the last one for which there is no row are left empty, which SQLite reads
+/// as NULL. Should one fail, the whole transaction is given up: there need be no notes on how to undo the statement alone.
+fn insert(mut rows: usize) -> String {
+    let mut text = String::new();
+    while rows > 0 {
+        let places = (ROWS.into_iter())
+            .find(|places| *places >= rows)
+            .unwrap_or(ROWS[ROWS.len() - 1]);
+        let values = vec!["(?, ?, ?, ?, ?)"; places].join(", ");
+        text.push_str(&format!(
+            "INSERT OR ROLLBACK INTO journal (row, game, position, previous, entries)
+             SELECT * FROM (VALUES {values}) WHERE column1 IS NOT NULL; "
+        ));
+        rows = rows.saturating_sub(places);
+    }
+    text
 }
 
 async fn create(
@@ -204,36 +255,20 @@ async fn create(
     number: i64,
     game_id: Id,
     header: &[u8],
+    first_row: i64,
 ) -> sqlx::Result<()> {
     sqlx::query(
-        "INSERT INTO games (number, game_id, form, header, state) VALUES ($1, $2, $3, $4, 0)",
+        "INSERT INTO games (number, game_id, form, header, first_row, state)
+         VALUES ($1, $2, $3, $4, $5, 0)",
     )
     .bind(number)
     .bind(game_id.0.as_slice())
     .bind(FORM)
     .bind(header)
+    .bind(first_row)
     .execute(connection)
     .await
     .map(drop)
-}
-
-async fn append(connection: &mut SqliteConnection, rows: &[&Row]) -> sqlx::Result<()> {
-    let places: Vec<String> = (0..rows.len())
-        .map(|row| format!("(${}, ${}, ${})", 3 * row + 1, 3 * row + 2, 3 * row + 3))
-        .collect();
-    let text = format!(
-        "INSERT INTO journal (game, position, entries) VALUES {}",
-        places.join(", ")
-    );
-    // Nothing but numbered places is put into the text.
-    let mut query = sqlx::query(AssertSqlSafe(text));
-    for row in rows {
-        query = query
-            .bind(row.game)
-            .bind(row.position)
-            .bind(row.entries.as_slice());
-    }
-    query.execute(connection).await.map(drop)
 }
 
 /// Notes how a game ended, and by what it is to be found.

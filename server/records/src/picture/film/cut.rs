@@ -31,6 +31,8 @@ pub(super) struct Cut {
     pub(super) shifts: u32,
     /// The play that the last decision brought, if it was one.
     last_play: Option<v1::Play>,
+    /// Whether a Shift has been dealt that has not ended.
+    dealt: bool,
 }
 
 impl Cut {
@@ -43,6 +45,7 @@ impl Cut {
             decisions: 0,
             shifts: 0,
             last_play: None,
+            dealt: false,
         }
     }
 
@@ -55,7 +58,7 @@ impl Cut {
                 self.last_play = None;
                 let when = When::Decision(self.decisions);
                 let time = Duration::from_micros(decision.decision_time_us);
-                self.shoot(when, game, &moment.hands_known, time);
+                self.shoot(when, game, moment, time);
             }
             (Line::Event(event), game) => {
                 let Some(kind) = &event.kind else { return };
@@ -64,18 +67,16 @@ impl Cut {
                 }
                 match (kind, game) {
                     (Kind::Play(play), _) => self.last_play = Some(*play),
-                    (Kind::ShiftStarted(started), _) => self.shifts = started.shift,
-                    (Kind::ShiftEnded(ended), Some(game)) => self.end_shift(ended, game),
-                    (Kind::GameEnded(_), Some(game)) => self.end_game(game),
-                    (Kind::GameAborted(_), Some(game)) => {
-                        self.shoot(When::End, game, &moment.hands_known, Duration::ZERO);
-                        if let Some(last) = self.frames.last_mut() {
-                            last.scene.now = Now::Aborted;
-                            for seat in &mut last.scene.seats {
-                                seat.deciding = false;
-                            }
-                        }
+                    (Kind::ShiftStarted(started), _) => {
+                        self.shifts = started.shift;
+                        self.dealt = true;
                     }
+                    (Kind::ShiftEnded(ended), Some(game)) => {
+                        self.end_shift(ended, game);
+                        self.dealt = false;
+                    }
+                    (Kind::GameEnded(_), Some(game)) => self.end_game(game),
+                    (Kind::GameAborted(_), Some(game)) => self.abort(game, moment),
                     _ => {}
                 }
             }
@@ -83,18 +84,38 @@ impl Cut {
         }
     }
 
-    fn shoot(&mut self, when: When, game: &Game, known: &BySeat<bool>, decision_time: Duration) {
+    /// A decision that the viewer may not know of makes no frame, and its number is in none: a gap would tell that somebody declined.
+    fn shoot(&mut self, when: When, game: &Game, moment: &Moment<'_>, decision_time: Duration) {
         if let Some(chronicle) = &self.chronicle {
-            let mut scene = Scene::of(game, chronicle, self.viewer, known);
-            scene.decision = match when {
-                When::Decision(decision) => Some(decision),
-                When::ShiftEnd(_) | When::End => None,
-            };
+            let mut scene = Scene::of(game, chronicle, self.viewer, &moment.hands_known);
+            scene.hide_golden(&moment.golden_known);
+            if let When::Decision(decision) = when {
+                if scene.now == Now::Dealt {
+                    return;
+                }
+                scene.decision = Some(decision).filter(|_| self.viewer == Viewer::Everything);
+            }
             self.frames.push(Frame {
                 when,
                 scene,
                 decision_time,
             });
+        }
+    }
+
+    /// The rules deal the next Shift as soon as one has ended; at a real table nobody may have dealt it.
+    fn abort(&mut self, game: &Game, moment: &Moment<'_>) {
+        if self.dealt {
+            self.shoot(When::End, game, moment, Duration::ZERO);
+        } else if let Some(mut last) = self.frames.last().cloned() {
+            last.when = When::End;
+            self.frames.push(last);
+        }
+        if let Some(last) = self.frames.last_mut() {
+            last.scene.now = Now::Aborted;
+            for seat in &mut last.scene.seats {
+                seat.deciding = false;
+            }
         }
     }
 

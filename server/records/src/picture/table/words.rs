@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::super::chronicle::Happening;
 use super::super::paint::Painter;
 use super::super::scene::{Card, Demand, Hand, Now, Scene};
-use super::{COLUMN, is_end};
+use super::{COLUMN, SPACE, is_end};
 
 /// Width of a name within what happened.
 const IN_A_LINE: f32 = 92.0;
@@ -46,6 +46,27 @@ pub(super) fn name(scene: &Scene, seat: Seat) -> String {
     }
 }
 
+/// What a seat is called where its number does not stand beside it: with the number if another is called the same.
+pub(super) fn told(
+    painter: &Painter,
+    scene: &Scene,
+    seat: Seat,
+    (size, bold): (f32, bool),
+    width: f32,
+) -> String {
+    let called = name(scene, seat);
+    let mut others = (0..scene.seats.len())
+        .map(Seat::new)
+        .filter(|other| *other != seat);
+    let number = if others.any(|other| name(scene, other) == called) {
+        format!(" ({seat})")
+    } else {
+        String::new()
+    };
+    let room = width - painter.width(&number, size, bold) - SPACE;
+    painter.fit(&called, size, bold, room) + &number
+}
+
 /// Where the game stands.
 pub(super) fn title(scene: &Scene) -> String {
     let shift = scene.shift;
@@ -61,13 +82,13 @@ pub(super) fn title(scene: &Scene) -> String {
     }
 }
 
-/// With whose eyes the scene is seen, and by which number it is found.
+/// With whose eyes the scene is seen, and by which number it is found where that is no secret.
 pub(super) fn eyes(painter: &Painter, scene: &Scene) -> String {
     let eyes = match scene.viewer {
         Viewer::Everything => "all hands open".to_owned(),
         Viewer::Spectator => "as spectators see it".to_owned(),
         Viewer::Seat(seat) => {
-            let name = painter.fit(&name(scene, seat), 18.0, true, 170.0);
+            let name = told(painter, scene, seat, (18.0, false), 170.0);
             format!("as {name} sees it")
         }
     };
@@ -138,7 +159,7 @@ fn gift(cards: &[Card]) -> String {
             Card::Joker => "joker".to_owned(),
         })
         .collect();
-    words.join(" and ")
+    words.join(", ")
 }
 
 /// What happened: who did it, and what.
@@ -159,7 +180,7 @@ pub(super) fn happening(
             (Some(*seat), format!("finishes {place}"))
         }
         Happening::PizzaDone { pizza, next } => {
-            let next = painter.fit(&name(scene, *next), 16.0, false, IN_A_LINE);
+            let next = told(painter, scene, *next, (16.0, false), IN_A_LINE);
             (None, format!("Pizza {pizza} done, {next} leads"))
         }
         Happening::Declared { seat, special } => (Some(*seat), format!("{}!", special.name())),
@@ -174,13 +195,11 @@ pub(super) fn happening(
                 None if *count == 1 => "a card".to_owned(),
                 None => format!("{count} cards"),
             };
-            (
-                Some(*giver),
-                format!("{what} to {}", name(scene, *receiver)),
-            )
+            let receiver = told(painter, scene, *receiver, (16.0, false), IN_A_LINE);
+            (Some(*giver), format!("gives {what} to {receiver}"))
         }
         Happening::ShiftOver { shift, winner } => {
-            let winner = painter.fit(&name(scene, *winner), 16.0, false, IN_A_LINE);
+            let winner = told(painter, scene, *winner, (16.0, false), IN_A_LINE);
             (None, format!("Shift {shift} over, {winner} first"))
         }
         Happening::Expressed { seat, label } => (Some(*seat), format!("shows {label}")),
@@ -213,7 +232,7 @@ pub(super) fn notice(painter: &Painter, scene: &Scene) -> Notice {
         }
         Now::Exchange(giver) => {
             if let Some(receiver) = receiver(scene, *giver) {
-                let receiver = painter.fit(&name(scene, receiver), 18.0, false, COLUMN - 160.0);
+                let receiver = told(painter, scene, receiver, (18.0, false), COLUMN - 160.0);
                 lines.push(format!("The exchange, to {receiver}."));
             }
             format!("{who} gives a card")

@@ -1,6 +1,8 @@
 //! The cells of one row: taken by the name of their column, with the words for those that make no sense.
 
 use std::collections::BTreeMap;
+use std::num::{IntErrorKind, ParseIntError};
+use std::str::FromStr;
 
 use super::TranscriptError;
 
@@ -28,10 +30,19 @@ impl<'a> Cells<'a> {
             .ok_or_else(|| self.wrong(format!("`{column}` is empty")))
     }
 
-    pub(super) fn number(&self, column: &str) -> Result<u32, TranscriptError> {
+    /// A whole number that is not below zero.
+    pub(super) fn number<T>(&self, column: &str) -> Result<T, TranscriptError>
+    where
+        T: FromStr<Err = ParseIntError>,
+    {
         let text = self.need(column)?;
         text.parse()
-            .map_err(|_| self.wrong(format!("`{column}` is {text:?} and must be a whole number")))
+            .map_err(|error: ParseIntError| match error.kind() {
+                IntErrorKind::PosOverflow => {
+                    self.wrong(format!("`{column}` is {text}, which is too large"))
+                }
+                _ => self.wrong(format!("`{column}` is {text:?} and must be a whole number")),
+            })
     }
 
     pub(super) fn float(&self, column: &str) -> Result<Option<f64>, TranscriptError> {

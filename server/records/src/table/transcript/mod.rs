@@ -147,7 +147,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Transcript, TranscriptError> {
 #[derive(Default)]
 struct Settings {
     table: String,
-    rules: v1::RuleSet,
+    rules: Option<RuleSet>,
     began_ms: u64,
     scheme: v1::RewardScheme,
     players: BTreeMap<u32, Player>,
@@ -159,7 +159,13 @@ impl Settings {
         let value = || cells.need("value");
         match cells.need("what")? {
             "table" => self.table = value()?.to_owned(),
-            "rules" => self.rules = rules(value()?).map_err(|problem| cells.wrong(problem))?,
+            "rules" => {
+                let told = rules(value()?).map_err(|problem| cells.wrong(problem))?;
+                let checked = rules_from_proto(&told);
+                let checked =
+                    checked.map_err(|problem| cells.wrong(format!("rules: {problem}")))?;
+                self.rules = Some(checked);
+            }
             "rewards" => {
                 let scheme = RewardScheme::from_name(value()?);
                 let known = RewardScheme::ALL.map(RewardScheme::name);
@@ -168,19 +174,9 @@ impl Settings {
                 })?;
                 self.scheme = reward_scheme_to_proto(Some(scheme));
             }
-            "began" => {
-                let time: Option<chefshat_proto::Timestamp> =
-                    serde_json::from_value(value()?.into()).ok();
-                self.began_ms = time
-                    .and_then(|time| {
-                        let seconds = u64::try_from(time.seconds).ok()?;
-                        let millis = u64::try_from(time.nanos).ok()? / 1_000_000;
-                        seconds.checked_mul(1000)?.checked_add(millis)
-                    })
-                    .ok_or_else(|| cells.wrong("a time is written like 2026-03-14T15:00:00Z"))?;
-            }
+            "began" => self.began_ms = moment(value()?).map_err(|problem| cells.wrong(problem))?,
             kind @ ("agent" | "human" | "robot") => {
-                let seat = cells.number("seat")?;
+                let seat: u32 = cells.number("seat")?;
                 let player = Player {
                     name: value()?.to_owned(),
                     kind: match kind {
@@ -204,8 +200,11 @@ impl Settings {
     /// The rule set, once it is settled that everybody is named.
     fn rules(&self, line: usize) -> Result<RuleSet, TranscriptError> {
         let at = |problem: String| TranscriptError { line, problem };
-        let rules =
-            rules_from_proto(&self.rules).map_err(|problem| at(format!("rules: {problem}")))?;
+        let rules = match self.rules {
+            Some(rules) => rules,
+            None => rules_from_proto(&v1::RuleSet::default())
+                .map_err(|problem| at(format!("rules: {problem}")))?,
+        };
         let players = rules.players();
         let named = self.players.keys().copied().eq((0..).take(players));
         if !named {
@@ -216,6 +215,17 @@ impl Settings {
         }
         Ok(rules)
     }
+}
+
+/// A date and time, in milliseconds since 1970.
+fn moment(text: &str) -> Result<u64, String> {
+    let time: chefshat_proto::Timestamp = serde_json::from_value(text.into())
+        .map_err(|_| "a time is written like 2026-03-14T15:00:00Z".to_owned())?;
+    let seconds = u64::try_from(time.seconds)
+        .map_err(|_| "records know no times before the year 1970".to_owned())?;
+    // The text has a year of four digits, and so few milliseconds.
+    let millis = u64::try_from(time.nanos / 1_000_000).unwrap_or(0);
+    Ok(seconds.saturating_mul(1000).saturating_add(millis))
 }
 
 fn line_of(error: &csv::Error) -> usize {

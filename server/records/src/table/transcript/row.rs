@@ -49,14 +49,14 @@ pub(super) fn row(cells: &Cells<'_>, rules: &RuleSet) -> Result<Row, TranscriptE
     let wrong = |problem: String| cells.wrong(problem);
     let what = cells.need("what")?;
     let shift = cells.number("shift")?;
-    let number = cells.number("seat")?;
+    let number: u32 = cells.number("seat")?;
     let seat = seat_from_number(number, rules.players())
         .ok_or_else(|| wrong(format!("there is no seat {number}")))?;
     let faces = rules.faces();
     let seen = match what {
         "hand" => Seen::Hand(cards(cells.need("value")?, faces).map_err(wrong)?),
         "role" => Seen::Role(cells.need("value")?.to_owned()),
-        "points" => Seen::Points(u64::from(cells.number("value")?)),
+        "points" => Seen::Points(cells.number("value")?),
         "declares" => Seen::Special(true),
         "declines" => Seen::Special(false),
         "gives" => Seen::Gives(match cells.cells.get("value") {
@@ -77,7 +77,7 @@ pub(super) fn row(cells: &Cells<'_>, rules: &RuleSet) -> Result<Row, TranscriptE
         "plays" => Seen::Turn(play(cells.need("value")?, faces).map_err(wrong)?),
         "passes" => Seen::Turn(Move::Pass),
         "finishes" => Seen::Finishes(
-            u8::try_from(cells.number("value")?)
+            u8::try_from(cells.number::<u32>("value")?)
                 .map_err(|_| wrong("there is no such place".into()))?,
         ),
         "expresses" => Seen::Expresses(Box::new(expression(cells)?)),

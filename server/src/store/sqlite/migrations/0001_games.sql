@@ -23,7 +23,11 @@ CREATE TABLE games (
     -- chefshat.v1.RecordSummary of a finished game in which something was dealt.
     summary BLOB,
     -- What stood before the game began; NULL for a game that was played elsewhere.
-    header BLOB
+    header BLOB,
+    -- No row of its journal comes before this one.
+    first_row INTEGER,
+    -- The last row of its journal; NULL while it goes on.
+    last_row INTEGER
 );
 
 CREATE INDEX games_going_on ON games (number) WHERE state = 0;
@@ -31,14 +35,17 @@ CREATE INDEX games_given_up ON games (number) WHERE state <> 0 AND summary IS NU
 CREATE INDEX games_by_end ON games (ended_at_ms);
 CREATE INDEX games_unfiled ON games (number) WHERE filed = 0 AND summary IS NOT NULL;
 
--- What happened, each row what one room kept at a time.
+-- What happened, each row what one room kept at a time. The rows of all games stand in the order in which they were kept, so that what many
+-- rooms keep at once goes into one page of the file, not into one for each; the rows of a game are found from the last to the first.
 CREATE TABLE journal (
-    game INTEGER NOT NULL REFERENCES games (number),
+    row INTEGER PRIMARY KEY,
+    game INTEGER NOT NULL,
     -- Number of the row in its game, from 0.
     position INTEGER NOT NULL,
-    entries BLOB NOT NULL,
-    PRIMARY KEY (game, position)
-) WITHOUT ROWID;
+    -- The row of the game before this one; NULL for its first.
+    previous INTEGER,
+    entries BLOB NOT NULL
+);
 
 -- Records of games that were played elsewhere.
 CREATE TABLE added_records (

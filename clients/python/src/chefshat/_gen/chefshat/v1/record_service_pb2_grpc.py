@@ -85,7 +85,8 @@ class RecordServiceServicer:
 
     def ImportRecord(self, request_iterator, context):
         """Adds the record of a game played elsewhere: on another server, or at a real table. It is verified first. INVALID_ARGUMENT
-        (RECORD_REFUSED) names the first line that does not fit; ALREADY_EXISTS (GAME_KNOWN); RESOURCE_EXHAUSTED (RECORD_TOO_LARGE);
+        (RECORD_REFUSED) names the first line that does not fit; ALREADY_EXISTS (GAME_KNOWN); RESOURCE_EXHAUSTED (RECORD_TOO_LARGE,
+        DISK_NEARLY_FULL); DEADLINE_EXCEEDED (IMPORT_TOO_SLOW);
         PERMISSION_DENIED (IMPORT_OFF) where the server's host has not switched it on.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)

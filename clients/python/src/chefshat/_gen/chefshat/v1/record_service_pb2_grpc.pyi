@@ -43,7 +43,8 @@ class RecordServiceStub:
     """All records that a filter lets through, oldest first, one whole record after the other. INVALID_ARGUMENT (FILTER_REFUSED)."""
     ImportRecord: _grpc.StreamUnaryMultiCallable[_record_service_pb2.ImportRecordRequest, _record_service_pb2.ImportRecordResponse]
     """Adds the record of a game played elsewhere: on another server, or at a real table. It is verified first. INVALID_ARGUMENT
-    (RECORD_REFUSED) names the first line that does not fit; ALREADY_EXISTS (GAME_KNOWN); RESOURCE_EXHAUSTED (RECORD_TOO_LARGE);
+    (RECORD_REFUSED) names the first line that does not fit; ALREADY_EXISTS (GAME_KNOWN); RESOURCE_EXHAUSTED (RECORD_TOO_LARGE,
+    DISK_NEARLY_FULL); DEADLINE_EXCEEDED (IMPORT_TOO_SLOW);
     PERMISSION_DENIED (IMPORT_OFF) where the server's host has not switched it on.
     """
 
@@ -62,7 +63,8 @@ class RecordServiceAsyncStub(RecordServiceStub):
     """All records that a filter lets through, oldest first, one whole record after the other. INVALID_ARGUMENT (FILTER_REFUSED)."""
     ImportRecord: _aio.StreamUnaryMultiCallable[_record_service_pb2.ImportRecordRequest, _record_service_pb2.ImportRecordResponse]  # type: ignore[assignment]
     """Adds the record of a game played elsewhere: on another server, or at a real table. It is verified first. INVALID_ARGUMENT
-    (RECORD_REFUSED) names the first line that does not fit; ALREADY_EXISTS (GAME_KNOWN); RESOURCE_EXHAUSTED (RECORD_TOO_LARGE);
+    (RECORD_REFUSED) names the first line that does not fit; ALREADY_EXISTS (GAME_KNOWN); RESOURCE_EXHAUSTED (RECORD_TOO_LARGE,
+    DISK_NEARLY_FULL); DEADLINE_EXCEEDED (IMPORT_TOO_SLOW);
     PERMISSION_DENIED (IMPORT_OFF) where the server's host has not switched it on.
     """
 
@@ -102,7 +104,8 @@ class RecordServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_record_service_pb2.ImportRecordResponse, _abc.Awaitable[_record_service_pb2.ImportRecordResponse]]:
         """Adds the record of a game played elsewhere: on another server, or at a real table. It is verified first. INVALID_ARGUMENT
-        (RECORD_REFUSED) names the first line that does not fit; ALREADY_EXISTS (GAME_KNOWN); RESOURCE_EXHAUSTED (RECORD_TOO_LARGE);
+        (RECORD_REFUSED) names the first line that does not fit; ALREADY_EXISTS (GAME_KNOWN); RESOURCE_EXHAUSTED (RECORD_TOO_LARGE,
+        DISK_NEARLY_FULL); DEADLINE_EXCEEDED (IMPORT_TOO_SLOW);
         PERMISSION_DENIED (IMPORT_OFF) where the server's host has not switched it on.
         """
 

@@ -69,7 +69,8 @@ class RoomServiceServicer:
     def CreateRoom(self, request, context):
         """Makes a room. INVALID_ARGUMENT (RULE_SET_REFUSED, POLICY_REFUSED, SEATS_REFUSED, SEED_REFUSED, NAME_REFUSED, SCRIPT_REFUSED,
         BRANCH_REFUSED) names the field at fault; for a recorded game that is named NOT_FOUND (GAME_UNKNOWN) or FAILED_PRECONDITION
-        (GAME_RUNNING); RESOURCE_EXHAUSTED (TOO_MANY_ROOMS); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
+        (GAME_RUNNING); RESOURCE_EXHAUSTED (TOO_MANY_ROOMS, DISK_NEARLY_FULL); UNAVAILABLE
+        (SHUTTING_DOWN, STORE_FAILED).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

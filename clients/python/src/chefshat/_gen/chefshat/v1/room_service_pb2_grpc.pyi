@@ -36,7 +36,8 @@ class RoomServiceStub:
     CreateRoom: _grpc.UnaryUnaryMultiCallable[_room_service_pb2.CreateRoomRequest, _room_service_pb2.CreateRoomResponse]
     """Makes a room. INVALID_ARGUMENT (RULE_SET_REFUSED, POLICY_REFUSED, SEATS_REFUSED, SEED_REFUSED, NAME_REFUSED, SCRIPT_REFUSED,
     BRANCH_REFUSED) names the field at fault; for a recorded game that is named NOT_FOUND (GAME_UNKNOWN) or FAILED_PRECONDITION
-    (GAME_RUNNING); RESOURCE_EXHAUSTED (TOO_MANY_ROOMS); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
+    (GAME_RUNNING); RESOURCE_EXHAUSTED (TOO_MANY_ROOMS, DISK_NEARLY_FULL); UNAVAILABLE
+    (SHUTTING_DOWN, STORE_FAILED).
     """
     GetRoom: _grpc.UnaryUnaryMultiCallable[_room_service_pb2.GetRoomRequest, _room_service_pb2.GetRoomResponse]
     """One room. NOT_FOUND (ROOM_UNKNOWN)."""
@@ -60,7 +61,8 @@ class RoomServiceAsyncStub(RoomServiceStub):
     CreateRoom: _aio.UnaryUnaryMultiCallable[_room_service_pb2.CreateRoomRequest, _room_service_pb2.CreateRoomResponse]  # type: ignore[assignment]
     """Makes a room. INVALID_ARGUMENT (RULE_SET_REFUSED, POLICY_REFUSED, SEATS_REFUSED, SEED_REFUSED, NAME_REFUSED, SCRIPT_REFUSED,
     BRANCH_REFUSED) names the field at fault; for a recorded game that is named NOT_FOUND (GAME_UNKNOWN) or FAILED_PRECONDITION
-    (GAME_RUNNING); RESOURCE_EXHAUSTED (TOO_MANY_ROOMS); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
+    (GAME_RUNNING); RESOURCE_EXHAUSTED (TOO_MANY_ROOMS, DISK_NEARLY_FULL); UNAVAILABLE
+    (SHUTTING_DOWN, STORE_FAILED).
     """
     GetRoom: _aio.UnaryUnaryMultiCallable[_room_service_pb2.GetRoomRequest, _room_service_pb2.GetRoomResponse]  # type: ignore[assignment]
     """One room. NOT_FOUND (ROOM_UNKNOWN)."""
@@ -87,7 +89,8 @@ class RoomServiceServicer(metaclass=_abc_1.ABCMeta):
     ) -> _typing.Union[_room_service_pb2.CreateRoomResponse, _abc.Awaitable[_room_service_pb2.CreateRoomResponse]]:
         """Makes a room. INVALID_ARGUMENT (RULE_SET_REFUSED, POLICY_REFUSED, SEATS_REFUSED, SEED_REFUSED, NAME_REFUSED, SCRIPT_REFUSED,
         BRANCH_REFUSED) names the field at fault; for a recorded game that is named NOT_FOUND (GAME_UNKNOWN) or FAILED_PRECONDITION
-        (GAME_RUNNING); RESOURCE_EXHAUSTED (TOO_MANY_ROOMS); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
+        (GAME_RUNNING); RESOURCE_EXHAUSTED (TOO_MANY_ROOMS, DISK_NEARLY_FULL); UNAVAILABLE
+        (SHUTTING_DOWN, STORE_FAILED).
         """
 
     @_abc_1.abstractmethod
