@@ -139,6 +139,39 @@ async fn a_full_disk_ends_the_server_and_loses_nothing() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_disk_that_is_nearly_full_is_left_to_games_that_go_on() {
+    let disk = match SmallDisk::new(DISK_KIB).await {
+        Ok(disk) => disk,
+        Err(why) => {
+            return skip(
+                "a_disk_that_is_nearly_full_is_left_to_games_that_go_on",
+                &why,
+            );
+        }
+    };
+    let mut launch = Launch::new(disk.mounted_at()).through(disk.enter());
+    let server = launch.start().await.expect("it starts");
+    let client = Client::connect(launch.url()).await.expect("it listens");
+    client
+        .create_room(v1::CreateRoomRequest::default())
+        .await
+        .expect("there is space");
+    disk.fill("filler");
+    let refused = client
+        .create_room(v1::CreateRoomRequest::default())
+        .await
+        .expect_err("there is no space");
+    assert_eq!(refused.reason(), Some("DISK_NEARLY_FULL"), "{refused}");
+    std::fs::remove_file(disk.path().join("filler")).expect("it is removed");
+    client
+        .create_room(v1::CreateRoomRequest::default())
+        .await
+        .expect("there is space again");
+    let ended = server.stop().await;
+    assert!(ended.status.success(), "{ended:?}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_database_that_is_locked_for_a_while_is_waited_for_and_nobody_is_late() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let mut launch = Launch::new(folder.path());
