@@ -10,7 +10,7 @@ pub const FIRST_DELAY: Duration = Duration::from_millis(100);
 /// Standard longest wait between two attempts.
 pub const MAX_DELAY: Duration = Duration::from_secs(5);
 /// Standard time without a connection after which the seats are given up.
-pub const GIVE_UP_AFTER: Duration = Duration::from_secs(60);
+pub const GIVE_UP_AFTER: Duration = Duration::from_secs(600);
 
 /// How a lost connection is made anew: waits that double from `first` to `max`, each shortened at random by up to a half so that many
 /// clients do not come back at the same instant.

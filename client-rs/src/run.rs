@@ -48,7 +48,11 @@ pub(crate) async fn run<A: Agent>(channel: Channel, session: &mut Session<A>, ba
         }
         match outage.failed(backoff, Instant::now()) {
             Ok(delay) => {
-                tracing::info!(?delay, "connection lost: {}", lost.status);
+                tracing::warn!(
+                    "connection lost, trying again in {:.1} s: {}",
+                    delay.as_secs_f32(),
+                    lost.status
+                );
                 sleep(delay).await;
             }
             Err(outage) => {

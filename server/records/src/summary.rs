@@ -25,8 +25,10 @@ pub fn summary(lines: &[v1::RecordLine], replayed: &Replayed) -> Option<v1::Reco
             }
             Line::Event(event) => {
                 summary.ended_at_ms = summary.created_at_ms.saturating_add(event.elapsed_ms);
-                if let Some(Kind::ShiftStarted(shift)) = &event.kind {
-                    summary.shifts = shift.shift;
+                match &event.kind {
+                    Some(Kind::ShiftStarted(shift)) => summary.shifts = shift.shift,
+                    Some(Kind::GameAborted(aborted)) => summary.abort_reason = aborted.reason,
+                    _ => {}
                 }
             }
             _ => {}

@@ -171,6 +171,11 @@ impl AgentCommand {
             free => format!("waits for {free} other seats to be taken, then "),
         };
         anstream::eprintln!("{name} has seat {}; {waits}plays to the end", joined.seat);
+        // Whoever has it has the seat: it is told to the one who started the agent alone.
+        anstream::eprintln!(
+            "should this agent end before its game, another goes on in its seat with --ticket {}",
+            joined.ticket
+        );
         Ok(joined.ticket)
     }
 }

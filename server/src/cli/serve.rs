@@ -64,21 +64,22 @@ impl Serve {
             }
             (false, data_dir) => Some(data_dir::prepare(data_dir)?),
         };
-        let store: Arc<dyn Store> = match &data_dir {
-            Some(folder) => Arc::new(SqliteStore::open(folder).await?),
-            None => Arc::new(MemoryStore::default()),
-        };
         let listener = TcpListener::bind(&self.listen).await.map_err(|error| {
             format!(
                 "cannot listen on {}: {error}; choose another address with --listen",
                 self.listen
             )
         })?;
+        let store: Arc<dyn Store> = match &data_dir {
+            Some(folder) => Arc::new(SqliteStore::open(folder).await?),
+            None => Arc::new(MemoryStore::default()),
+        };
         let address = listener.local_addr()?;
         // Before anybody is told where to connect, so that a stop that comes at once is heard.
         let mut terminate = signal(SignalKind::terminate())?;
         let mut interrupt = signal(SignalKind::interrupt())?;
         let kept_in = data_dir.clone();
+        let grace = self.grace;
         let config = ServerConfig {
             data_dir,
             max_rooms: self.max_rooms,
@@ -110,7 +111,8 @@ impl Serve {
                 _ = interrupt.recv() => {}
             }
             eprintln!(
-                "stopping: no new rooms; running games may end within the grace; stop again to end at once"
+                "stopping: no new rooms; running games may end within {grace} s, after that durable ones are put down and go on at the next \
+                 start; stop again to end at once"
             );
             tokio::spawn(async move {
                 tokio::select! {
@@ -124,6 +126,7 @@ impl Serve {
             });
         };
         server.serve(listener, stop).await?;
+        eprintln!("stopped");
         Ok(ExitCode::SUCCESS)
     }
 }

@@ -114,14 +114,7 @@ fn kind(core: &Core, happening: &Happening, viewer: Viewer) -> Kind {
             reveal: reveal(core),
         })),
         Happening::GameAborted(reason) => Kind::GameAborted(Box::new(v1::GameAborted {
-            reason: match reason {
-                AbortReason::Closed => v1::AbortReason::Closed,
-                AbortReason::Shutdown => v1::AbortReason::Shutdown,
-                AbortReason::ParticipantsLost => v1::AbortReason::ParticipantsLost,
-                AbortReason::NeverStarted => v1::AbortReason::NeverStarted,
-                AbortReason::TooLong => v1::AbortReason::TooLong,
-            }
-            .into(),
+            reason: abort_reason(*reason).into(),
             reveal: reveal(core),
         })),
         Happening::ServerRestarted => Kind::ServerRestarted(v1::ServerRestarted {}),
@@ -131,6 +124,17 @@ fn kind(core: &Core, happening: &Happening, viewer: Viewer) -> Kind {
                 expression: v1::Expression::decode(expression.as_ref()).ok(),
             }))
         }
+    }
+}
+
+/// The protocol's name for why a game has no result.
+pub(super) fn abort_reason(reason: AbortReason) -> v1::AbortReason {
+    match reason {
+        AbortReason::Closed => v1::AbortReason::Closed,
+        AbortReason::Shutdown => v1::AbortReason::Shutdown,
+        AbortReason::ParticipantsLost => v1::AbortReason::ParticipantsLost,
+        AbortReason::NeverStarted => v1::AbortReason::NeverStarted,
+        AbortReason::TooLong => v1::AbortReason::TooLong,
     }
 }
 

@@ -12,7 +12,7 @@ use prost::Message as _;
 use super::decision::{decision_kind, mask_bytes, source_to_proto};
 use super::log::{standings, view};
 use super::policy::policy_to_proto;
-use super::room::{participants, state_to_proto};
+use super::room::{aborted_because, participants, state_to_proto};
 use super::start::{origin, start_to_proto};
 use crate::room::core::Core;
 use crate::store::KeptGame;
@@ -104,6 +104,7 @@ pub fn summary(core: &Core) -> v1::RecordSummary {
         shifts: core.game().map_or(0, |game| game.shift()),
         decisions: core.decisions(),
         added: false,
+        abort_reason: aborted_because(core.state()).into(),
     }
 }
 

@@ -5,6 +5,7 @@ use chefshat_engine::{MAX_SEATS, RuleSet, Seat};
 use chefshat_proto::v1::{self, seat_config::FilledBy};
 use chefshat_records::convert::{FieldProblem, rules_to_proto, seat_number};
 
+use super::log::abort_reason;
 use super::policy::{agent, policy_to_proto};
 use super::start::{branch_point, origin};
 use crate::ids::Id;
@@ -125,6 +126,15 @@ pub fn describe(core: &Core) -> v1::Room {
         created_at_ms: header.created_at_ms,
         origin: origin(header).into(),
         branched_from: header.start.branch.as_ref().map(branch_point),
+        abort_reason: aborted_because(core.state()).into(),
+    }
+}
+
+/// Why the game has no result, if it has none.
+pub(super) fn aborted_because(state: State) -> v1::AbortReason {
+    match state {
+        State::Aborted(reason) => abort_reason(reason),
+        _ => v1::AbortReason::Unspecified,
     }
 }
 
@@ -151,10 +161,15 @@ pub fn participants(core: &Core) -> Vec<v1::Participant> {
             let participant = standing.participant;
             v1::Participant {
                 seat: seat_number(seat),
-                name: participant.map_or_else(
-                    || built_in.unwrap_or_default().to_owned(),
-                    |participant| participant.name.clone(),
-                ),
+                name: match (participant, standing.fill) {
+                    (Some(participant), _) => participant.name.clone(),
+                    // Told apart by whom they play as, which is what whoever reads their games wants to know.
+                    (None, Fill::Replay(player)) => {
+                        let game = player.game.to_string();
+                        format!("{} {}:{}", BuiltInAgent::REPLAY, &game[..8], player.seat)
+                    }
+                    (None, _) => built_in.unwrap_or_default().to_owned(),
+                },
                 kind: kind_to_proto(
                     participant
                         .map(|participant| participant.kind)

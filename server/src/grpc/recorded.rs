@@ -46,7 +46,9 @@ impl Recorded {
             status(
                 Code::NotFound,
                 "GAME_UNKNOWN",
-                format!("the server holds no game {game_id:?}; ListRecords tells which it holds"),
+                format!(
+                    "the server holds no game {game_id:?}; list its records to see which it holds"
+                ),
                 [("field", "game_id")],
             )
         };

@@ -117,5 +117,8 @@ fn lets_through(filter: &v1::RecordFilter, summary: &v1::RecordSummary) -> bool 
         && (filter.created_before_ms == 0 || summary.created_at_ms < filter.created_before_ms)
         && (filter.kind == unset || summary.seats.iter().any(|seat| seat.kind == filter.kind))
         && (filter.participant.is_empty()
-            || (summary.seats.iter()).any(|seat| seat.name == filter.participant))
+            || summary
+                .seats
+                .iter()
+                .any(|seat| [&seat.name, &seat.built_in_agent].contains(&&filter.participant)))
 }

@@ -16,13 +16,13 @@ class Backoff:
         factor: by how much each wait is longer than the one before.
         max_s: seconds no wait exceeds.
         attempts: how many failures in a row without any progress in between are borne; the next one is raised. The standard waits
-            for about a minute, as long as a server that was restarted waits for its seats.
+            for about ten minutes: a server may be away for a while, and its games go on when it is back.
     """
 
     first_s: float = 0.1
     factor: float = 2.0
     max_s: float = 5.0
-    attempts: int = 20
+    attempts: int = 160
 
     def delay_s(self, failures: int, chance: random.Random) -> float:
         """Seconds to wait after so many failures in a row (from 1): between half and all of the nominal wait, drawn at random."""

@@ -6,7 +6,7 @@ use chefshat_client::{Error, v1};
 use clap::Args;
 
 use super::super::connect::ServerArg;
-use super::super::narrator::clean;
+use super::super::narrator::{abort_reason, clean};
 use super::super::{CommandError, say};
 use super::filter::FilterArgs;
 use super::service;
@@ -93,8 +93,12 @@ pub(super) fn in_a_line(summary: &v1::RecordSummary) -> String {
         "" => String::new(),
         room => format!("  ({})", clean(room, 30)),
     };
+    let why = match summary.abort_reason() {
+        v1::AbortReason::Unspecified => String::new(),
+        reason => format!("  aborted: {}", abort_reason(reason)),
+    };
     format!(
-        "{}  {state:<8}  {:>3} Shifts  {:>6} decisions  {}{room}",
+        "{}  {state:<8}  {:>3} Shifts  {:>6} decisions  {}{room}{why}",
         clean(&summary.game_id, 32),
         summary.shifts,
         summary.decisions,

@@ -6,7 +6,7 @@ use chefshat_client::v1;
 use clap::{Args, ValueEnum};
 
 use super::super::connect::ServerArg;
-use super::super::narrator::clean;
+use super::super::narrator::{abort_reason, clean};
 use super::super::{CommandError, say};
 
 /// Rooms asked for at a time.
@@ -136,7 +136,11 @@ fn in_full(room: &v1::Room) -> String {
     if !room.name.is_empty() {
         out.push_str(&format!("name  {}\n", clean(&room.name, 64)));
     }
-    out.push_str(&format!("state {}\n", state(room.state())));
+    let why = match room.abort_reason() {
+        v1::AbortReason::Unspecified => String::new(),
+        reason => format!(": {}", abort_reason(reason)),
+    };
+    out.push_str(&format!("state {}{why}\n", state(room.state())));
     if let Some(words) = beginning(room) {
         out.push_str(&format!("start {words}\n"));
     }

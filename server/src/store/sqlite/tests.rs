@@ -131,6 +131,7 @@ fn summary(header: &GameHeader) -> Box<v1::RecordSummary> {
         ended_at_ms: header.created_at_ms + 1_000,
         seats: vec![v1::Participant {
             name: format!("player of {:?}", header.game_id.0[0]),
+            built_in_agent: format!("agent of {:?}", header.game_id.0[0]),
             kind: v1::ParticipantKind::Robot.into(),
             ..v1::Participant::default()
         }],
@@ -281,6 +282,15 @@ async fn lists_are_filtered_and_paged() {
             0,
             9,
             vec![3],
+        ),
+        (
+            v1::RecordFilter {
+                participant: "agent of 4".into(),
+                ..filter()
+            },
+            0,
+            9,
+            vec![4],
         ),
         (
             v1::RecordFilter {

@@ -292,11 +292,13 @@ async fn summarise(
     .await?;
     for seat in &summary.seats {
         sqlx::query(
-            "INSERT OR REPLACE INTO participants (game, seat, name, kind) VALUES ($1, $2, $3, $4)",
+            "INSERT OR REPLACE INTO participants (game, seat, name, agent, kind)
+             VALUES ($1, $2, $3, $4, $5)",
         )
         .bind(number)
         .bind(seat.seat)
         .bind(seat.name.as_str())
+        .bind(seat.built_in_agent.as_str())
         .bind(seat.kind)
         .execute(&mut *connection)
         .await?;

@@ -86,6 +86,12 @@ pub(super) fn read(bytes: &[u8]) -> Result<Transcript, TranscriptError> {
         .headers()
         .map_err(|error| at(line_of(&error), words(&error)))?
         .clone();
+    if headers.len() == 1 && headers.iter().any(|name| name.contains([';', '\t'])) {
+        return Err(at(
+            1,
+            "columns are separated by commas here; save the table as CSV with commas".to_owned(),
+        ));
+    }
     for name in &headers {
         if !COLUMNS.contains(&name) {
             return Err(at(

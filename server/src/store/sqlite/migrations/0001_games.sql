@@ -58,8 +58,11 @@ CREATE TABLE participants (
     game INTEGER NOT NULL REFERENCES games (number),
     seat INTEGER NOT NULL,
     name TEXT NOT NULL,
+    -- Name of the built-in agent, or empty.
+    agent TEXT NOT NULL,
     kind INTEGER NOT NULL,
     PRIMARY KEY (game, seat)
 ) WITHOUT ROWID;
 
 CREATE INDEX participants_by_name ON participants (name, game);
+CREATE INDEX participants_by_agent ON participants (agent, game);

@@ -64,42 +64,6 @@ DECISION_SOURCE_RECORDED: DecisionSource.ValueType  # 6
 """Taken over from the recorded game that this one branched from."""
 Global___DecisionSource: _TypeAlias = DecisionSource  # noqa: Y015
 
-class _AbortReason:
-    ValueType = _typing.NewType("ValueType", _builtins.int)
-    V: _TypeAlias = ValueType  # noqa: Y015
-
-class _AbortReasonEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_AbortReason.ValueType], _builtins.type):
-    DESCRIPTOR: _descriptor.EnumDescriptor
-    ABORT_REASON_UNSPECIFIED: _AbortReason.ValueType  # 0
-    """Not set."""
-    ABORT_REASON_CLOSED: _AbortReason.ValueType  # 1
-    """The room was closed by its owner."""
-    ABORT_REASON_SHUTDOWN: _AbortReason.ValueType  # 2
-    """The server shut down."""
-    ABORT_REASON_PARTICIPANTS_LOST: _AbortReason.ValueType  # 3
-    """Participants were lost, and the policy says so."""
-    ABORT_REASON_NEVER_STARTED: _AbortReason.ValueType  # 4
-    """The room waited too long for its seats."""
-    ABORT_REASON_TOO_LONG: _AbortReason.ValueType  # 5
-    """The game grew beyond the server's limit of events."""
-
-class AbortReason(_AbortReason, metaclass=_AbortReasonEnumTypeWrapper):
-    """Why a game has no result."""
-
-ABORT_REASON_UNSPECIFIED: AbortReason.ValueType  # 0
-"""Not set."""
-ABORT_REASON_CLOSED: AbortReason.ValueType  # 1
-"""The room was closed by its owner."""
-ABORT_REASON_SHUTDOWN: AbortReason.ValueType  # 2
-"""The server shut down."""
-ABORT_REASON_PARTICIPANTS_LOST: AbortReason.ValueType  # 3
-"""Participants were lost, and the policy says so."""
-ABORT_REASON_NEVER_STARTED: AbortReason.ValueType  # 4
-"""The room waited too long for its seats."""
-ABORT_REASON_TOO_LONG: AbortReason.ValueType  # 5
-"""The game grew beyond the server's limit of events."""
-Global___AbortReason: _TypeAlias = AbortReason  # noqa: Y015
-
 @_typing.final
 class GameEvent(_message.Message):
     """One event."""
@@ -896,7 +860,7 @@ class GameAborted(_message.Message):
 
     REASON_FIELD_NUMBER: _builtins.int
     REVEAL_FIELD_NUMBER: _builtins.int
-    reason: Global___AbortReason.ValueType
+    reason: _room_pb2.AbortReason.ValueType
     """Why."""
     @_builtins.property
     def reveal(self) -> Global___SeedReveal:
@@ -905,7 +869,7 @@ class GameAborted(_message.Message):
     def __init__(
         self,
         *,
-        reason: Global___AbortReason.ValueType = ...,
+        reason: _room_pb2.AbortReason.ValueType = ...,
         reveal: Global___SeedReveal | None = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["reveal", b"reveal"]  # noqa: Y015

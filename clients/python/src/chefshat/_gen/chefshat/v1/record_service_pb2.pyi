@@ -91,6 +91,7 @@ class RecordSummary(_message.Message):
     SHIFTS_FIELD_NUMBER: _builtins.int
     DECISIONS_FIELD_NUMBER: _builtins.int
     ADDED_FIELD_NUMBER: _builtins.int
+    ABORT_REASON_FIELD_NUMBER: _builtins.int
     game_id: _builtins.str
     """Identifies the game."""
     room_id: _builtins.str
@@ -111,6 +112,8 @@ class RecordSummary(_message.Message):
     """Number of decisions."""
     added: _builtins.bool
     """Added with ImportRecord: the game was played elsewhere, and all that is known of it is that its record fits together."""
+    abort_reason: _room_pb2.AbortReason.ValueType
+    """For a game without a result: why."""
     @_builtins.property
     def rules(self) -> _rules_pb2.RuleSet:
         """The rule set, every field set."""
@@ -139,10 +142,11 @@ class RecordSummary(_message.Message):
         shifts: _builtins.int = ...,
         decisions: _builtins.int = ...,
         added: _builtins.bool = ...,
+        abort_reason: _room_pb2.AbortReason.ValueType = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["rules", b"rules"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["added", b"added", "created_at_ms", b"created_at_ms", "decisions", b"decisions", "ended_at_ms", b"ended_at_ms", "game_id", b"game_id", "origin", b"origin", "room_id", b"room_id", "room_name", b"room_name", "rules", b"rules", "seats", b"seats", "shifts", b"shifts", "standings", b"standings", "state", b"state"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["abort_reason", b"abort_reason", "added", b"added", "created_at_ms", b"created_at_ms", "decisions", b"decisions", "ended_at_ms", b"ended_at_ms", "game_id", b"game_id", "origin", b"origin", "room_id", b"room_id", "room_name", b"room_name", "rules", b"rules", "seats", b"seats", "shifts", b"shifts", "standings", b"standings", "state", b"state"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

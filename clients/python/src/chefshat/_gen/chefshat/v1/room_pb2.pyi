@@ -204,6 +204,42 @@ ROOM_STATE_ABORTED: RoomState.ValueType  # 4
 """The game has ended without a result."""
 Global___RoomState: _TypeAlias = RoomState  # noqa: Y015
 
+class _AbortReason:
+    ValueType = _typing.NewType("ValueType", _builtins.int)
+    V: _TypeAlias = ValueType  # noqa: Y015
+
+class _AbortReasonEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_AbortReason.ValueType], _builtins.type):
+    DESCRIPTOR: _descriptor.EnumDescriptor
+    ABORT_REASON_UNSPECIFIED: _AbortReason.ValueType  # 0
+    """Not set."""
+    ABORT_REASON_CLOSED: _AbortReason.ValueType  # 1
+    """The room was closed by its owner."""
+    ABORT_REASON_SHUTDOWN: _AbortReason.ValueType  # 2
+    """The server shut down."""
+    ABORT_REASON_PARTICIPANTS_LOST: _AbortReason.ValueType  # 3
+    """Participants were lost, and the policy says so."""
+    ABORT_REASON_NEVER_STARTED: _AbortReason.ValueType  # 4
+    """The room waited too long for its seats."""
+    ABORT_REASON_TOO_LONG: _AbortReason.ValueType  # 5
+    """The game grew beyond the server's limit of events."""
+
+class AbortReason(_AbortReason, metaclass=_AbortReasonEnumTypeWrapper):
+    """Why a game has no result."""
+
+ABORT_REASON_UNSPECIFIED: AbortReason.ValueType  # 0
+"""Not set."""
+ABORT_REASON_CLOSED: AbortReason.ValueType  # 1
+"""The room was closed by its owner."""
+ABORT_REASON_SHUTDOWN: AbortReason.ValueType  # 2
+"""The server shut down."""
+ABORT_REASON_PARTICIPANTS_LOST: AbortReason.ValueType  # 3
+"""Participants were lost, and the policy says so."""
+ABORT_REASON_NEVER_STARTED: AbortReason.ValueType  # 4
+"""The room waited too long for its seats."""
+ABORT_REASON_TOO_LONG: AbortReason.ValueType  # 5
+"""The game grew beyond the server's limit of events."""
+Global___AbortReason: _TypeAlias = AbortReason  # noqa: Y015
+
 @_typing.final
 class SeatConfig(_message.Message):
     """How one seat is to be filled."""
@@ -479,6 +515,7 @@ class Room(_message.Message):
     CREATED_AT_MS_FIELD_NUMBER: _builtins.int
     ORIGIN_FIELD_NUMBER: _builtins.int
     BRANCHED_FROM_FIELD_NUMBER: _builtins.int
+    ABORT_REASON_FIELD_NUMBER: _builtins.int
     room_id: _builtins.str
     """Identifies the room: 32 hexadecimal digits."""
     game_id: _builtins.str
@@ -497,6 +534,8 @@ class Room(_message.Message):
     """Milliseconds since the Unix epoch when the room was created."""
     origin: Global___GameOrigin.ValueType
     """Where its game comes from."""
+    abort_reason: Global___AbortReason.ValueType
+    """For a game without a result: why."""
     @_builtins.property
     def rules(self) -> _rules_pb2.RuleSet:
         """The rule set, every field set."""
@@ -528,10 +567,11 @@ class Room(_message.Message):
         created_at_ms: _builtins.int = ...,
         origin: Global___GameOrigin.ValueType = ...,
         branched_from: Global___BranchPoint | None = ...,
+        abort_reason: Global___AbortReason.ValueType = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["branched_from", b"branched_from", "policy", b"policy", "rules", b"rules"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["branched_from", b"branched_from", "created_at_ms", b"created_at_ms", "game_id", b"game_id", "name", b"name", "origin", b"origin", "policy", b"policy", "room_id", b"room_id", "rules", b"rules", "seats", b"seats", "seed_commitment", b"seed_commitment", "seed_fixed", b"seed_fixed", "state", b"state"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["abort_reason", b"abort_reason", "branched_from", b"branched_from", "created_at_ms", b"created_at_ms", "game_id", b"game_id", "name", b"name", "origin", b"origin", "policy", b"policy", "room_id", b"room_id", "rules", b"rules", "seats", b"seats", "seed_commitment", b"seed_commitment", "seed_fixed", b"seed_fixed", "state", b"state"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
