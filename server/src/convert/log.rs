@@ -1,9 +1,11 @@
 //! The log of a room as events of the protocol, as a viewer may see them. What of the engine's events a viewer may see is decided by
 //! `Event::seen_by`; rewards are withheld here, because only rooms have them.
 
-use chefshat_engine::{Event, Seat, Viewer};
+use chefshat_engine::{Event, Game, Seat, Viewer};
 use chefshat_proto::v1::{self, game_event::Kind};
-use chefshat_records::convert::{By, action_space, event_kind, rules_to_proto, seat_number};
+use chefshat_records::convert::{
+    By, action_space, event_kind, final_table, rules_to_proto, seat_number,
+};
 use chefshat_records::seeds::SeedPlan;
 use prost::Message as _;
 
@@ -164,22 +166,9 @@ pub fn game_started(core: &Core) -> v1::GameStarted {
 }
 
 pub(super) fn standings(core: &Core) -> Vec<v1::Standing> {
-    let Some(game) = core.game() else {
-        return Vec::new();
-    };
-    let Some(standings) = game.standings() else {
-        return Vec::new();
-    };
-    standings
-        .as_slice()
-        .iter()
-        .zip(1..)
-        .map(|(seat, place)| v1::Standing {
-            seat: seat_number(*seat),
-            points: game.scores()[*seat],
-            place,
-        })
-        .collect()
+    core.game()
+        .and_then(Game::standings)
+        .map_or_else(Vec::new, |standings| final_table(&standings))
 }
 
 fn reveal(core: &Core) -> Option<v1::SeedReveal> {

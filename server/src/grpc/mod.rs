@@ -2,6 +2,7 @@
 
 mod info;
 mod new_room;
+mod pages;
 mod play;
 mod recorded;
 mod records;

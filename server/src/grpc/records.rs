@@ -16,6 +16,7 @@ use tokio::time::timeout;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Code, Request, Response, Status, Streaming};
 
+use super::pages;
 use super::recorded::{Recorded, not_read, turn};
 use super::status::{disk_nearly_full, field, status};
 use crate::config::{
@@ -27,8 +28,6 @@ use crate::ids::Id;
 /// Lines in one message, and bytes, but for a single line of more: well below what gRPC clients accept.
 const LINES_PER_MESSAGE: usize = 512;
 const BYTES_PER_MESSAGE: usize = 1024 * 1024;
-const STANDARD_PAGE: u32 = 50;
-const MAX_PAGE: u32 = 100;
 /// Summaries read at a time while many records are streamed.
 const STREAM_PAGE: usize = 100;
 
@@ -102,18 +101,8 @@ impl RecordService for Records {
     ) -> Result<Response<v1::ListRecordsResponse>, Status> {
         let request = request.into_inner();
         let filter = checked(request.filter)?;
-        let after = match request.page_token.as_str() {
-            "" => 0,
-            token => token.parse().map_err(|_| {
-                let problem = FieldProblem::new("page_token", "not a token of this server");
-                field("PAGE_TOKEN_REFUSED", &problem)
-            })?,
-        };
-        let size = match request.page_size {
-            0 => STANDARD_PAGE,
-            size => size.min(MAX_PAGE),
-        };
-        let size = usize::try_from(size).unwrap_or(usize::MAX);
+        let after = pages::after(&request.page_token)?.unwrap_or(0);
+        let size = pages::page_size(request.page_size);
         // One more than asked for tells whether there is another page.
         let mut found = self.page(&filter, after, size + 1).await?;
         let more = found.len() > size;

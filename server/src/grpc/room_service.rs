@@ -7,6 +7,7 @@ use chefshat_records::convert::{FieldProblem, seat_number};
 use tonic::{Code, Request, Response, Status};
 
 use super::new_room::{check_name, new_room};
+use super::pages;
 use super::recorded::Recorded;
 use super::status::{self, Refusal, field, room_unknown};
 use crate::convert;
@@ -15,8 +16,6 @@ use crate::room::{Handle, JoinRequest};
 use crate::rooms::Rooms;
 use crate::store::journal::ParticipantKind;
 
-const STANDARD_PAGE: u32 = 50;
-const MAX_PAGE: u32 = 100;
 /// Rooms looked at for one page.
 const ROOMS_LOOKED_AT: usize = 200;
 
@@ -75,19 +74,8 @@ impl RoomService for RoomCalls {
         request: Request<v1::ListRoomsRequest>,
     ) -> Result<Response<v1::ListRoomsResponse>, Status> {
         let request = request.into_inner();
-        let page_size = match request.page_size {
-            0 => STANDARD_PAGE,
-            size => size.min(MAX_PAGE),
-        };
-        let after = match request.page_token.as_str() {
-            "" => None,
-            token => Some(token.parse().map_err(|_| {
-                field(
-                    "PAGE_TOKEN_REFUSED",
-                    &FieldProblem::new("page_token", "not a token of this server"),
-                )
-            })?),
-        };
+        let page_size = pages::page_size(request.page_size);
+        let after = pages::after(&request.page_token)?;
         if v1::RoomState::try_from(request.state).is_err() {
             let problem = FieldProblem::new("state", "not a value of this enum");
             return Err(field("STATE_REFUSED", &problem));
@@ -98,7 +86,7 @@ impl RoomService for RoomCalls {
         let mut rest = looked_at.len() == ROOMS_LOOKED_AT;
         let mut last = after;
         for (number, handle) in looked_at {
-            if response.rooms.len() == to_usize(page_size) {
+            if response.rooms.len() == page_size {
                 rest = true;
                 break;
             }
@@ -189,8 +177,4 @@ fn join_code_wrong() -> Status {
         "no room here has this join code; ask the room's creator for it",
         [("field", "join_code")],
     )
-}
-
-fn to_usize(number: u32) -> usize {
-    usize::try_from(number).unwrap_or(usize::MAX)
 }

@@ -1,7 +1,7 @@
 //! Events of the engine as events of the protocol. What a viewer may see was decided before, by `Event::seen_by`: here everything that
 //! is present is written, and nothing else.
 
-use chefshat_engine::{ActionSpace, BySeat, Cards, Event, Role, Seat, SpecialAction};
+use chefshat_engine::{ActionSpace, BySeat, Cards, Event, Role, Seat, SpecialAction, Standings};
 use chefshat_proto::v1::{self, game_event::Kind};
 
 /// How the decision behind an event came about.
@@ -133,6 +133,18 @@ fn special_to_proto(special: SpecialAction) -> v1::SpecialAction {
 
 fn ascending(cards: Cards, faces: u8) -> Vec<u32> {
     cards.ascending(faces).map(u32::from).collect()
+}
+
+/// The final table as messages write it, best first.
+pub fn final_table(standings: &Standings) -> Vec<v1::Standing> {
+    standings
+        .iter()
+        .map(|(place, seat, points)| v1::Standing {
+            seat: seat_number(seat),
+            points,
+            place: place.into(),
+        })
+        .collect()
 }
 
 /// The number of a seat as messages write it.

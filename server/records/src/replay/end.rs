@@ -6,7 +6,8 @@ use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 use super::game::Replay;
 use super::seed::{check_reveal, dealing_seed};
 use super::words::difference;
-use super::{Fault, final_table, reveal};
+use super::{Fault, reveal};
+use crate::convert::final_table;
 
 const NOT_OVER: &str = "the footer stands here, but the game is not over";
 

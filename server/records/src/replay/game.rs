@@ -10,8 +10,8 @@ use super::header::{Setup, check};
 use super::seats::Seats;
 use super::seed::Seeds;
 use super::words::{difference, kind_name, must_be};
-use super::{Fault, Replayed, final_table};
-use crate::convert::{By, LAST_MS, event_kind, with_rewards};
+use super::{Fault, Replayed};
+use crate::convert::{By, LAST_MS, event_kind, final_table, with_rewards};
 use crate::table::{Table, facts_of_record};
 
 /// How nobody decided: the deal at the beginning.

@@ -12,10 +12,9 @@ mod seats;
 mod seed;
 mod words;
 
-use chefshat_engine::{BySeat, Game, Standings};
+use chefshat_engine::{BySeat, Game};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 
-use crate::convert::seat_number;
 pub(crate) use decision::{kind_to_proto, number};
 use game::Replay;
 pub(crate) use seats::game_started;
@@ -158,15 +157,4 @@ impl From<&str> for Fault {
     fn from(problem: &str) -> Self {
         problem.to_owned().into()
     }
-}
-
-pub(crate) fn final_table(standings: &Standings) -> Vec<v1::Standing> {
-    standings
-        .iter()
-        .map(|(place, seat, points)| v1::Standing {
-            seat: seat_number(seat),
-            points,
-            place: place.into(),
-        })
-        .collect()
 }

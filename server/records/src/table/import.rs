@@ -11,9 +11,10 @@ use super::play::{Beginning, Table};
 use super::shifts::{shifts_of, wrong};
 use super::transcript::{Row, Seen, Transcript, TranscriptError, read};
 use crate::convert::{
-    By, event_kind, invalid_reward, reward_scheme_from_proto, seat_number, with_rewards,
+    By, event_kind, final_table, invalid_reward, reward_scheme_from_proto, seat_number,
+    with_rewards,
 };
-use crate::replay::{final_table, game_started, kind_to_proto, number, replay};
+use crate::replay::{game_started, kind_to_proto, number, replay};
 
 /// The record of a game of which a transcript tells. The same transcript gives the same record.
 ///

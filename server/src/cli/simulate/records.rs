@@ -7,7 +7,8 @@ use chefshat_arena::{Batch, Listener};
 use chefshat_engine::{Action, BySeat, Decision, Event, Game, RULES_VERSION};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 use chefshat_records::convert::{
-    By, action_space, event_kind, invalid_reward, rules_to_proto, seat_number, with_rewards,
+    By, action_space, event_kind, final_table, invalid_reward, rules_to_proto, seat_number,
+    with_rewards,
 };
 use chefshat_records::jsonl::{self, FORMAT_VERSION, RecordFileError};
 use sha2::{Digest as _, Sha256};
@@ -157,14 +158,7 @@ impl Writer {
         }
         let standings = game.standings().expect("the game has ended");
         let ended = v1::GameEnded {
-            standings: standings
-                .iter()
-                .map(|(place, seat, points)| v1::Standing {
-                    seat: seat_number(seat),
-                    points,
-                    place: place.into(),
-                })
-                .collect(),
+            standings: final_table(&standings),
             reveal: Some(v1::SeedReveal {
                 game_seed: seed.0.to_vec(),
                 ..v1::SeedReveal::default()

@@ -131,9 +131,7 @@ impl Core {
             && recalled
             && open.start.is_none()
         {
-            open.released = now;
-            open.told = false;
-            open.look_again = Duration::ZERO;
+            open.release_anew(now);
         }
     }
 

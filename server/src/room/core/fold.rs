@@ -92,10 +92,7 @@ impl Core {
             }
         }
         if let Some(open) = &mut self.open {
-            open.released = at;
-            open.told = false;
-            open.start = None;
-            open.look_again = Duration::ZERO;
+            open.release_anew(at);
         }
         self.log.push(at, Happening::ServerRestarted);
     }

@@ -153,6 +153,16 @@ pub struct OpenDecision {
     attempts: u32,
 }
 
+impl OpenDecision {
+    /// Opens it once more, with all its time.
+    fn release_anew(&mut self, at: Duration) {
+        self.released = at;
+        self.told = false;
+        self.start = None;
+        self.look_again = Duration::ZERO;
+    }
+}
+
 impl Core {
     /// A room whose seats are free.
     pub fn new(header: Arc<GameHeader>) -> Self {
