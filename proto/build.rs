@@ -29,6 +29,15 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         .boxed(".chefshat.v1.GameEvent.kind.cards_exchanged")
         .boxed(".chefshat.v1.GameEvent.kind.seated")
         .boxed(".chefshat.v1.SeatUpdate.update.snapshot")
+        // Columns are sent and viewed as they are, without copies.
+        .bytes(".chefshat.v1.VectorActions")
+        .bytes(".chefshat.v1.VectorBatch")
+        .bytes(".chefshat.v1.ObservationColumns")
+        .bytes(".chefshat.v1.EpisodeEndings")
+        .bytes(".chefshat.v1.GameBeginnings")
+        .bytes(".chefshat.v1.ShiftStatistics")
+        .boxed(".chefshat.v1.RunResponse.response.batch")
+        .boxed(".chefshat.v1.RunRequest.request.setup")
         .compile_fds(descriptors)?;
     pbjson_build::Builder::new()
         .register_descriptors(&encoded)?

@@ -16,14 +16,16 @@ mod run;
 mod seat;
 mod session;
 mod spectate;
+mod vector;
 
 pub use agent::{Action, Agent};
 pub use backoff::{Backoff, FIRST_DELAY, GIVE_UP_AFTER, MAX_DELAY};
 pub use chefshat_proto::v1;
 pub use client::Client;
 pub use error::{Error, PlayError};
-pub use mask::{is_legal, legal_actions, legal_count, nth_legal};
+pub use mask::{count_in, is_legal, legal_actions, legal_count, nth_in, nth_legal};
 pub use options::{ENTROPY_BYTES, Entropy, PlayOptions};
 pub use outcome::{Ending, Outcome};
 pub use random::RandomAgent;
 pub use spectate::Spectator;
+pub use vector::VectorGames;

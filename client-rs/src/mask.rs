@@ -19,25 +19,43 @@ pub fn legal_actions(request: &v1::DecisionRequest) -> impl Iterator<Item = Acti
 
 /// The number of legal actions of a decision.
 pub fn legal_count(request: &v1::DecisionRequest) -> usize {
-    let ones = |byte: &u8| byte.count_ones() as usize;
-    request.action_mask.iter().map(ones).sum()
+    count_in(&request.action_mask)
 }
 
 /// The legal action with `n` legal ones below it; `None` if there are not that many.
 pub fn nth_legal(request: &v1::DecisionRequest, n: usize) -> Option<Action> {
+    nth_in(&request.action_mask, n)
+}
+
+/// The number of actions of a mask, for instance of a row of [`v1::VectorBatch::action_masks`].
+pub fn count_in(mask: &[u8]) -> usize {
+    words(mask).map(|word| word.count_ones() as usize).sum()
+}
+
+/// The action of a mask with `n` of its actions below it; `None` if there are not that many.
+pub fn nth_in(mask: &[u8], n: usize) -> Option<Action> {
     let mut left = n;
-    for (index, &byte) in (0u32..).zip(&request.action_mask) {
-        let ones = byte.count_ones() as usize;
+    for (index, word) in (0u32..).zip(words(mask)) {
+        let ones = word.count_ones() as usize;
         if left < ones {
-            let mut rest = byte;
+            let mut rest = word;
             for _ in 0..left {
                 rest &= rest - 1;
             }
-            return Some(Action(8 * index + rest.trailing_zeros()));
+            return Some(Action(64 * index + rest.trailing_zeros()));
         }
         left -= ones;
     }
     None
+}
+
+/// A mask by eight bytes at a time, the last filled up with zeros.
+fn words(mask: &[u8]) -> impl Iterator<Item = u64> + '_ {
+    let (whole, rest) = mask.as_chunks::<8>();
+    let mut last = [0; 8];
+    last[..rest.len()].copy_from_slice(rest);
+    let whole = whole.iter().map(|bytes| u64::from_le_bytes(*bytes));
+    whole.chain((!rest.is_empty()).then(|| u64::from_le_bytes(last)))
 }
 
 /// Whether an action is legal in a decision.

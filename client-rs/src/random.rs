@@ -3,7 +3,7 @@
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
-use crate::{Action, Agent, legal_count, nth_legal, v1};
+use crate::{Action, Agent, count_in, nth_in, v1};
 
 /// Actions of a turn in the standard numbering, until the start of the game names another.
 const STANDARD_TURN_ACTIONS: u32 = 200;
@@ -29,6 +29,12 @@ impl RandomAgent {
         }
     }
 
+    /// One of the actions of a mask; `None` if it has none.
+    pub fn choose(&mut self, mask: &[u8]) -> Option<Action> {
+        let n = self.below(u32::try_from(count_in(mask)).unwrap_or(u32::MAX));
+        nth_in(mask, n as usize)
+    }
+
     /// A number below `n`, by multiplication: of a bias nobody can measure at these sizes, and the same in every version.
     fn below(&mut self, n: u32) -> u32 {
         let product = u64::from(self.rng.next_u32()) * u64::from(n);
@@ -38,17 +44,14 @@ impl RandomAgent {
 
 impl Agent for RandomAgent {
     fn decide(&mut self, request: &v1::DecisionRequest) -> Action {
-        let legal = u32::try_from(legal_count(request)).unwrap_or(u32::MAX);
-        if legal == 0 {
-            return if request.kind() == v1::DecisionKind::Turn {
+        self.choose(&request.action_mask).unwrap_or_else(|| {
+            if request.kind() == v1::DecisionKind::Turn {
                 Action(self.below(self.turn_actions))
             } else {
                 let others = self.actions.saturating_sub(self.turn_actions);
                 Action(self.turn_actions.saturating_add(self.below(others)))
-            };
-        }
-        let n = self.below(legal);
-        nth_legal(request, n as usize).expect("n is below the number of legal actions")
+            }
+        })
     }
 
     fn on_event(&mut self, event: &v1::GameEvent) {

@@ -15,6 +15,10 @@ pub const MAX_SEATS_PER_WATCH: usize = 64;
 pub const MAX_COMMANDS_PER_MESSAGE: usize = 1_024;
 /// Messages that wait for one room.
 pub const ROOM_MAILBOX: usize = 256;
+/// Largest message of a client that steps games of its own, bytes: room for seeds given one by one.
+pub const MAX_VECTOR_MESSAGE_BYTES: usize = 1024 * 1024;
+/// Streams of clients' own games at a time.
+pub const MAX_VECTOR_STREAMS: usize = 64;
 /// Largest record that may be imported, bytes as encoded.
 pub const MAX_IMPORT_BYTES: usize = 64 * 1024 * 1024;
 /// Most lines of a record that may be imported.
@@ -47,6 +51,8 @@ pub struct ServerConfig {
     pub max_rooms: usize,
     /// Most connections at a time.
     pub max_connections: usize,
+    /// Threads that step the games of clients' own; 0: one for each core.
+    pub vector_threads: usize,
     /// How long an ended room is still shown.
     pub retention: Duration,
     /// How long running games may go on after a shutdown was asked for.
@@ -65,6 +71,7 @@ impl Default for ServerConfig {
             data_dir: None,
             max_rooms: 10_000,
             max_connections: 10_000,
+            vector_threads: 0,
             retention: Duration::from_secs(600),
             grace: Duration::from_secs(30),
             first_byte_timeout: Duration::from_secs(10),

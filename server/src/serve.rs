@@ -18,7 +18,10 @@ use tonic::transport::server::Connected;
 use tower_http::cors::{AllowOrigin, Any, CorsLayer};
 use tracing::{info, warn};
 
-use crate::config::{DRAIN_LIMIT, MAX_MESSAGE_BYTES, MAX_STREAMS_PER_CONNECTION, ServerConfig};
+use crate::config::{
+    DRAIN_LIMIT, MAX_MESSAGE_BYTES, MAX_STREAMS_PER_CONNECTION, MAX_VECTOR_MESSAGE_BYTES,
+    ServerConfig,
+};
 use crate::connections::{self, Limits};
 use crate::grpc;
 use crate::rooms::Rooms;
@@ -40,6 +43,9 @@ pub enum ServeError {
         "{0}; every decision that was acknowledged is kept, and durable games go on when the server is started again"
     )]
     Store(#[from] StoreError),
+    /// There are no threads to step games with.
+    #[error("the threads that step clients' own games were not started: {0}")]
+    Threads(#[from] rayon::ThreadPoolBuildError),
     /// A web origin is not one.
     #[error("{0:?} is not a web origin; write for instance https://example.org")]
     Origin(String),
@@ -131,7 +137,7 @@ impl Server {
         } = self;
         let closing = CancellationToken::new();
         let (health, health_service) = tonic_health::server::health_reporter();
-        let routes = routes(&rooms, &config, &closing)
+        let routes = routes(&rooms, &config, &closing)?
             .add_service(health_service)
             .add_service(reflection());
         health
@@ -182,14 +188,20 @@ impl Server {
     }
 }
 
-fn routes(rooms: &Arc<Rooms>, config: &ServerConfig, closing: &CancellationToken) -> Routes {
+fn routes(
+    rooms: &Arc<Rooms>,
+    config: &ServerConfig,
+    closing: &CancellationToken,
+) -> Result<Routes, ServeError> {
     use crate::wire::service::play_service_server::PlayServiceServer;
     use v1::record_service_server::RecordServiceServer;
     use v1::room_service_server::RoomServiceServer;
     use v1::server_service_server::ServerServiceServer;
     use v1::spectator_service_server::SpectatorServiceServer;
+    use v1::vector_service_server::VectorServiceServer;
     let recorded = grpc::Recorded::new(Arc::clone(rooms));
-    Routes::new(
+    let vectors = grpc::Vectors::new(recorded.clone(), config.vector_threads, closing.clone())?;
+    let routes = Routes::new(
         PlayServiceServer::new(grpc::Play::new(Arc::clone(rooms), closing.clone()))
             .max_decoding_message_size(MAX_MESSAGE_BYTES),
     )
@@ -206,9 +218,13 @@ fn routes(rooms: &Arc<Rooms>, config: &ServerConfig, closing: &CancellationToken
             .max_decoding_message_size(MAX_MESSAGE_BYTES),
     )
     .add_service(
+        VectorServiceServer::new(vectors).max_decoding_message_size(MAX_VECTOR_MESSAGE_BYTES),
+    )
+    .add_service(
         ServerServiceServer::new(grpc::Info::new(Arc::clone(rooms), config))
             .max_decoding_message_size(MAX_MESSAGE_BYTES),
-    )
+    );
+    Ok(routes)
 }
 
 fn reflection() -> tonic_reflection::server::v1::ServerReflectionServer<

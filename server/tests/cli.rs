@@ -7,8 +7,10 @@
 
 mod cli {
     mod branching;
+    mod compare;
     mod conformance;
     mod demo;
+    mod experiment;
     mod export;
     mod import;
     mod render;

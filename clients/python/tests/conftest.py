@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from fake_server import FakeServer
+from fake_vector import FakeVector
 from real_server import RealServer
 from stage import Stage, attached
 
@@ -17,6 +18,13 @@ BINARY = "CHEFSHAT_BIN"
 def fake() -> Iterator[FakeServer]:
     """A fake server on a free port, stopped after the test."""
     with FakeServer() as server:
+        yield server
+
+
+@pytest.fixture
+def toy() -> Iterator[FakeVector]:
+    """A fake server of the vector service's toy alone, which notes what it is asked."""
+    with FakeVector() as server:
         yield server
 
 

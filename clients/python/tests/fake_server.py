@@ -8,8 +8,8 @@ from typing import NoReturn, Self, TypeAlias
 
 import grpc
 from fake_game import QUESTIONS, SIZE, FakeGame, FakeSeat, Outbox
-from google.protobuf import any_pb2
-from google.rpc import error_details_pb2, status_pb2
+from fake_vector import ToyVector
+from refusing import Context, refuse
 
 from chefshat import pb
 from chefshat._gen.chefshat.v1 import play_service_pb2_grpc as play_grpc
@@ -17,22 +17,10 @@ from chefshat._gen.chefshat.v1 import record_service_pb2_grpc as record_grpc
 from chefshat._gen.chefshat.v1 import room_service_pb2_grpc as room_grpc
 from chefshat._gen.chefshat.v1 import server_service_pb2_grpc as server_grpc
 from chefshat._gen.chefshat.v1 import spectator_service_pb2_grpc as spectator_grpc
+from chefshat._gen.chefshat.v1 import vector_service_pb2_grpc as vector_grpc
 
 # Bytes a message to the server may have, as on the real one.
 MAX_MESSAGE_BYTES = 64 * 1024
-
-Context = grpc.ServicerContext
-
-
-def refuse(context: Context, code: grpc.StatusCode, reason: str, message: str, **metadata: str) -> NoReturn:
-    """Ends a call the way the protocol says: with google.rpc.ErrorInfo."""
-    detail = any_pb2.Any()
-    detail.Pack(error_details_pb2.ErrorInfo(reason=reason, domain="chefshat", metadata=metadata))
-    status = status_pb2.Status(code=code.value[0], message=message, details=[detail])
-    context.set_trailing_metadata((("grpc-status-details-bin", status.SerializeToString()),))
-    context.abort(code, message)
-    raise AssertionError("abort always raises")
-
 
 # The seats of a stream by handle: every Attach has a number, a refused one too.
 Handles: TypeAlias = list[tuple[FakeGame, FakeSeat] | None]
@@ -63,6 +51,7 @@ class FakeServer(
         server_grpc.add_ServerServiceServicer_to_server(self, self._server)
         record_grpc.add_RecordServiceServicer_to_server(self, self._server)
         spectator_grpc.add_SpectatorServiceServicer_to_server(_Spectators(self), self._server)
+        vector_grpc.add_VectorServiceServicer_to_server(ToyVector(), self._server)
         self.address = f"127.0.0.1:{self._server.add_insecure_port('127.0.0.1:0')}"
 
     def __enter__(self) -> Self:

@@ -1,5 +1,6 @@
 //! The built-in agents. Each is a function of what its seat may know and of its own generator or its own past, and of nothing else. Who asks
-//! them, and what follows from an answer, is decided in `play` (offline) and by the server's rooms; what `replay` does is in `recorded`.
+//! them, and what follows from an answer, is decided in `play` (offline) and by the server's rooms; what `replay` does is in `recorded`, how a
+//! network decides in `network`.
 
 use std::sync::Arc;
 
@@ -7,7 +8,7 @@ use chefshat_engine::{Action, ActionSpace, DecisionKind, Mask, Move, Observation
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
 
-use crate::RecordedPlayer;
+use crate::{Network, RecordedPlayer};
 
 /// Which built-in agent, of those that need nothing but a seed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
@@ -56,11 +57,15 @@ enum Mind {
     Kind(AgentKind, Chance),
     /// One that plays as a recorded player.
     Replay(Arc<RecordedPlayer>),
+    /// One that plays from a network file.
+    Network(Arc<Network>),
 }
 
 impl BuiltInAgent {
     /// Name of the agents that [`BuiltInAgent::replay`] makes.
     pub const REPLAY: &str = "replay";
+    /// Name of the agents that [`BuiltInAgent::network`] makes.
+    pub const NETWORK: &str = "network";
 
     /// An agent whose choices follow from `seed` alone.
     pub fn new(kind: AgentKind, seed: [u8; 32]) -> Self {
@@ -76,19 +81,27 @@ impl BuiltInAgent {
         }
     }
 
+    /// An agent that plays by a network. Its choices follow from what it sees alone.
+    pub fn network(network: Arc<Network>) -> Self {
+        Self {
+            mind: Mind::Network(network),
+        }
+    }
+
     /// The name by which people and messages call it.
     pub fn name(&self) -> &'static str {
         match &self.mind {
             Mind::Kind(kind, _) => kind.name(),
             Mind::Replay(_) => Self::REPLAY,
+            Mind::Network(_) => Self::NETWORK,
         }
     }
 
     /// Whether its choices depend on how often it was asked before. Otherwise they follow from what it sees alone.
     pub fn has_generator(&self) -> bool {
         match &self.mind {
-            Mind::Kind(kind, _) => *kind != AgentKind::Greedy,
-            Mind::Replay(_) => false,
+            Mind::Kind(kind, _) => matches!(kind, AgentKind::Random | AgentKind::RandomUnmasked),
+            Mind::Replay(_) | Mind::Network(_) => false,
         }
     }
 
@@ -108,6 +121,7 @@ impl BuiltInAgent {
             }
             Mind::Kind(AgentKind::Greedy, _) => greedy(observation, legal, space),
             Mind::Replay(player) => player.decide(observation, legal),
+            Mind::Network(network) => network.decide(observation, legal),
         }
     }
 }
@@ -135,7 +149,7 @@ impl Chance {
 
 /// Prefers, in this order: no jokers, the least rare face, many cards; a pass only when nothing can be played. Gives its least rare
 /// card. Declares where an exchange would cost it cards.
-fn greedy(observation: &Observation, legal: &Mask, space: ActionSpace) -> Action {
+pub(crate) fn greedy(observation: &Observation, legal: &Mask, space: ActionSpace) -> Action {
     let role = observation.seat.and_then(|seat| observation.roles[seat]);
     legal
         .iter()

@@ -7,16 +7,14 @@ use chefshat_engine::{
     Action, BySeat, Decision, Event, MAX_SEATS, MetricsRecorder, RewardScheme, RuleSet, Seat, Seed,
     ShiftMetrics, Standings,
 };
-use rayon::prelude::*;
 use thiserror::Error;
 
+use crate::fold::fold_in_order;
 use crate::play::is_wrong_action;
 use crate::{AgentKind, BatchTable, BuiltInAgent, Listener, agent_seed, game_seed, play};
 
 /// Games that one thread plays at a time. Part of the result: it decides in which groups rewards and scores are summed.
 const CHUNK: u64 = 32;
-/// Chunks whose results are held at a time.
-const WAVE: u64 = 1024;
 
 /// A number of games of built-in agents under one rule set.
 #[derive(Copy, Clone, PartialEq, Debug)]
@@ -166,23 +164,9 @@ impl Batch {
         &self,
         empty: impl Fn() -> T + Sync,
         add: impl Fn(&mut T, u64) + Sync,
-        mut merge: impl FnMut(&mut T, T),
+        merge: impl FnMut(&mut T, T),
     ) -> T {
-        let chunks = self.games.div_ceil(CHUNK);
-        let mut all = empty();
-        for first in (0..chunks).step_by(WAVE as usize) {
-            let wave: Vec<T> = (first..chunks.min(first + WAVE))
-                .into_par_iter()
-                .map(|chunk| {
-                    let mut part = empty();
-                    let games = chunk * CHUNK..self.games.min(chunk.saturating_add(1) * CHUNK);
-                    games.for_each(|index| add(&mut part, index));
-                    part
-                })
-                .collect();
-            wave.into_iter().for_each(|part| merge(&mut all, part));
-        }
-        all
+        fold_in_order(self.games, CHUNK, empty, add, merge)
     }
 
     fn add_game(&self, table: &mut BatchTable, index: u64) {

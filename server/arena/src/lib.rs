@@ -1,4 +1,5 @@
-//! Chef's Hat offline: built-in agents, single games, batches of games on all cores with tables of metrics, and checking an engine
+//! Chef's Hat offline: built-in agents, single games, batches of games on all cores with tables of metrics, comparisons of two
+//! agents on duplicate deals, the paper's experiment on the game's mechanics, agents that play from a network file, and checking an engine
 //! against test vectors. Nothing here knows of rooms, clocks or the protocol.
 //!
 //! ```
@@ -16,16 +17,27 @@
 mod agents;
 mod batch;
 pub mod conformance;
+mod duplicate;
+mod fold;
+pub mod mechanics;
+mod network;
 mod play;
 mod recorded;
 mod rules_form;
 mod seeds;
+mod statistics;
 mod table;
+pub mod vector;
 
 pub use agents::{AgentKind, BuiltInAgent};
 pub use batch::{Batch, BatchError};
+pub use duplicate::{Comparison, Contender, Duplicate, DuplicateError, Figure, SeatPlan, Seating};
+pub use network::{
+    MAX_FILE_BYTES, Network, NetworkError, NetworkInfo, NetworkInput, NetworkOutput, table_features,
+};
 pub use play::{Listener, play};
 pub use recorded::{MAX_MODELS, RecordedDecision, RecordedPlayer};
 pub use rules_form::{OpeningName, PassScopeName, RulesForm, RulesFormError};
 pub use seeds::{agent_seed, game_seed};
+pub use statistics::{Interval, Moments, wilson95};
 pub use table::{BatchTable, SeatTable};

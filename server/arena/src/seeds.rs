@@ -1,7 +1,7 @@
 //! Where chance in offline games comes from: one number for a batch, from it a seed for each game, from that a seed for each agent.
 //! How a game deals from its seed is the engine's affair.
 
-use chefshat_engine::{Seat, Seed};
+use chefshat_engine::{MAX_SEATS, Seat, Seed};
 use rand_chacha::ChaCha20Rng;
 use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
 
@@ -22,7 +22,14 @@ pub fn game_seed(batch: u64, index: u64) -> Seed {
 /// The seed of the agent on a seat of a game: the first 32 bytes of stream 2^32 + seat of ChaCha20, keyed with the game's seed. No deal
 /// uses these streams.
 pub fn agent_seed(game: Seed, seat: Seat) -> [u8; 32] {
-    first_bytes(game.0, AGENT_STREAMS + seat.index() as u64)
+    seating_agent_seed(game, 0, seat)
+}
+
+/// The seed of the agent on a seat of a game that is played in several seatings: stream 2^32 + 6 * seating + seat, so that agents draw anew
+/// in each.
+pub(crate) fn seating_agent_seed(game: Seed, seating: usize, seat: Seat) -> [u8; 32] {
+    let number = seating * MAX_SEATS + seat.index();
+    first_bytes(game.0, AGENT_STREAMS + number as u64)
 }
 
 fn first_bytes(key: [u8; 32], stream: u64) -> [u8; 32] {

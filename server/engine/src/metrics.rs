@@ -1,7 +1,7 @@
 //! What the paper and this project count in each Shift, gathered from events. How games are
 //! averaged and printed is not decided here.
 
-use crate::{BySeat, Event, RewardScheme, RuleSet, Seat, SeatOrder, SpecialAction};
+use crate::{BySeat, Event, Game, RewardScheme, RuleSet, Seat, SeatOrder, SpecialAction, Viewer};
 
 /// What one seat did in one Shift.
 #[derive(Copy, Clone, PartialEq, Debug, Default)]
@@ -80,6 +80,16 @@ impl MetricsRecorder {
             finished: 0,
             shifts: 0,
             performance_sum: BySeat::filled(players, 0.0),
+        }
+    }
+
+    /// A recorder that is fed from where a game stands: what happened before in its Shift is not counted.
+    pub fn joining(game: &Game, scheme: Option<RewardScheme>) -> MetricsRecorder {
+        let places = game.observe(Viewer::Spectator).places;
+        let finished = places.values().filter(|place| **place > 0).count();
+        MetricsRecorder {
+            finished: finished as u8,
+            ..MetricsRecorder::new(*game.rules(), scheme)
         }
     }
 

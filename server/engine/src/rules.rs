@@ -283,6 +283,11 @@ impl RuleSet {
         self.stop
     }
 
+    /// The same rules, except for when a game ends. The number is at least 1.
+    pub(crate) fn with_stop(self, stop: Stop) -> RuleSet {
+        RuleSet { stop, ..self }
+    }
+
     /// Points of a place, from 1; 0 for places that there are not.
     pub fn points(&self, place: u8) -> u32 {
         usize::from(place)

@@ -1,10 +1,12 @@
 //! The command line of `chefshat`: what it understands, and one module for each command. What the commands do is elsewhere.
 
 mod agent;
+mod compare;
 mod conformance;
 mod connect;
 mod data_dir;
 mod demo;
+mod experiment;
 mod export;
 mod import;
 mod narrator;
@@ -15,7 +17,9 @@ mod render;
 mod room;
 mod rules_args;
 mod serve;
+mod sheet;
 mod simulate;
+mod threads;
 mod verify;
 
 use std::fmt::Display;
@@ -61,6 +65,10 @@ enum Command {
     Render(render::Render),
     /// Play many games offline and print what they add up to.
     Simulate(simulate::Simulate),
+    /// Compare two agents on duplicate deals: the same deals for both, in all seats.
+    Compare(compare::Compare),
+    /// Repeat an experiment of the paper and print its table next to ours.
+    Experiment(experiment::ExperimentCommand),
     /// Check the rule engine against test vectors.
     Conformance(conformance::Conformance),
     /// Replay records and name the first line that does not fit.
@@ -81,6 +89,8 @@ pub fn main() -> ExitCode {
         Command::Export(command) => command.run(),
         Command::Render(command) => command.run(),
         Command::Simulate(command) => command.run(),
+        Command::Compare(command) => command.run(),
+        Command::Experiment(command) => command.run(),
         Command::Conformance(command) => command.run(),
         Command::Verify(command) => command.run(),
         Command::Import(command) => command.run(),

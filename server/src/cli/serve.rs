@@ -7,8 +7,10 @@ use std::time::Duration;
 
 use clap::Args;
 use clap::builder::{FalseyValueParser, RangedU64ValueParser};
+use futures::future::OptionFuture;
 use tokio::net::TcpListener;
 use tokio::signal::unix::{SignalKind, signal};
+use tokio::sync::oneshot;
 
 use super::{CommandError, data_dir, say};
 use crate::config::ServerConfig;
@@ -37,6 +39,9 @@ pub(super) struct Serve {
     /// Most rooms at a time.
     #[arg(long, env = "CHEFSHAT_MAX_ROOMS", default_value_t = 10_000, value_parser = RangedU64ValueParser::<usize>::new().range(1..))]
     max_rooms: usize,
+    /// Threads that step the games of learning agents; 0: one for each core. Rooms have threads of their own.
+    #[arg(long, env = "CHEFSHAT_VECTOR_THREADS", default_value_t = 0, value_parser = RangedU64ValueParser::<usize>::new().range(..=256))]
+    vector_threads: usize,
     /// Seconds that running games may go on after the server was told to stop.
     #[arg(long, env = "CHEFSHAT_GRACE", default_value_t = 30)]
     grace: u64,
@@ -49,6 +54,9 @@ pub(super) struct Serve {
         value_parser = origin
     )]
     allowed_origins: Vec<String>,
+    /// Stop when standard input ends: for a program that starts a server of its own and may itself end in any way.
+    #[arg(long)]
+    until_stdin_closes: bool,
     /// Say where the server listens as a JSON line on standard output.
     #[arg(long)]
     json: bool,
@@ -83,6 +91,7 @@ impl Serve {
         let config = ServerConfig {
             data_dir,
             max_rooms: self.max_rooms,
+            vector_threads: self.vector_threads,
             allow_import: self.allow_import,
             grace: Duration::from_secs(self.grace),
             allowed_origins: (self.allowed_origins.into_iter())
@@ -105,10 +114,12 @@ impl Serve {
             }))?;
         }
         eprintln!("listening on http://{address}");
+        let input_ends = self.until_stdin_closes.then(end_of_input);
         let stop = async move {
             tokio::select! {
                 _ = terminate.recv() => {}
                 _ = interrupt.recv() => {}
+                Some(_) = OptionFuture::from(input_ends) => {}
             }
             eprintln!(
                 "stopping: no new rooms; running games may end within {grace} s, after that durable ones are put down and go on at the next \
@@ -129,6 +140,17 @@ impl Serve {
         eprintln!("stopped");
         Ok(ExitCode::SUCCESS)
     }
+}
+
+/// Resolves when standard input has ended. Read in a thread of its own, which nobody waits for: tokio would wait for one of its threads.
+fn end_of_input() -> oneshot::Receiver<()> {
+    let (tell, told) = oneshot::channel();
+    std::thread::spawn(move || {
+        // An input that cannot be read has ended, too.
+        let _ = std::io::copy(&mut std::io::stdin().lock(), &mut std::io::sink());
+        let _ = tell.send(());
+    });
+    told
 }
 
 /// Checks the form of an address; whether there is such a host is found out when it is used.

@@ -17,9 +17,10 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 
-use super::CommandError;
 use super::numbers::grouped;
 use super::rules_args::RulesArgs;
+use super::{CommandError, threads};
+use crate::convert::MAX_RECORDED_ATTEMPTS;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -29,9 +30,6 @@ Examples:
   chefshat simulate --games 10000 --preset original2020 --no-exchange --no-special-actions --json
 
 The same seed gives the same output, on any number of threads.";
-
-/// Most threads; more than any machine has cores for.
-const MAX_THREADS: usize = 256;
 
 /// Play many games offline, on all cores, and print what they add up to.
 #[derive(Debug, Args)]
@@ -78,9 +76,7 @@ fn schemes() -> impl TypedValueParser<Value = RewardScheme> {
 impl Simulate {
     pub(super) fn run(self) -> Result<ExitCode, CommandError> {
         let batch = self.batch()?;
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads_for(self.threads, batch.games()))
-            .build()?;
+        let pool = threads::pool(self.threads, batch.games())?;
         let bar = ProgressBar::new(batch.games()).with_style(ProgressStyle::with_template(
             "{bar:40} {human_pos} of {human_len} games, {eta} left",
         )?);
@@ -121,10 +117,10 @@ impl Simulate {
             batch = batch.with_rewards(scheme);
         }
         if let Some(attempts) = self.max_invalid_attempts {
-            if self.records.is_some() && attempts.get() > records::MAX_INVALID_ATTEMPTS {
+            if self.records.is_some() && attempts.get() > MAX_RECORDED_ATTEMPTS {
                 return Err(format!(
                     "--max-invalid-attempts: with --records at most {}",
-                    records::MAX_INVALID_ATTEMPTS
+                    MAX_RECORDED_ATTEMPTS
                 )
                 .into());
             }
@@ -146,12 +142,6 @@ fn write_records(batch: &Batch, folder: &Path) -> Result<(), CommandError> {
     Ok(())
 }
 
-/// Threads to start for so many games; 0 leaves it to the number of cores. Threads without a game would only be started and ended.
-fn threads_for(asked: usize, games: u64) -> usize {
-    let games = usize::try_from(games).unwrap_or(usize::MAX);
-    asked.min(MAX_THREADS).min(games)
-}
-
 /// For people who watch: to standard error, because it is never the same twice.
 fn say_speed(table: &BatchTable, seconds: f64) {
     let answers = table.decisions + table.seats.values().map(|seat| seat.wrong).sum::<u64>();
@@ -160,17 +150,4 @@ fn say_speed(table: &BatchTable, seconds: f64) {
         grouped(answers),
         answers as f64 / seconds / 1e6
     );
-}
-
-#[cfg(test)]
-mod tests {
-    use super::threads_for;
-
-    #[test]
-    fn threads_are_no_more_than_are_of_use() {
-        assert_eq!(threads_for(0, 1000), 0, "the cores decide");
-        assert_eq!(threads_for(3, 1000), 3);
-        assert_eq!(threads_for(3, 2), 2);
-        assert_eq!(threads_for(20_000, 1_000_000), 256);
-    }
 }

@@ -3,19 +3,25 @@
 
 mod decision;
 mod log;
+mod played;
 mod players;
 mod policy;
 mod record;
 mod room;
 mod start;
+mod vector;
 
 pub use decision::{
     annotations_from_proto, answer_result, decision_kind, expression_from_proto,
     observation_from_proto, observation_to_proto,
 };
 pub use log::{game_started, view};
+pub use played::{MAX_RECORDED_ATTEMPTS, Played};
 pub use players::recorded_player;
 pub use policy::{millis, policy_from_proto, policy_to_proto};
 pub use record::{lines_of, record_lines, summary};
 pub use room::{describe, fill_to_proto, fills_from_proto, kind_from_proto, participants};
 pub use start::{start_from_proto, start_to_proto};
+pub use vector::{
+    batch_to_proto, reset_from_proto, setup_from_proto, setup_seeds, started_to_proto,
+};

@@ -143,6 +143,6 @@ fn in_range(
     }
 }
 
-fn unknown(field: &'static str, value: i32) -> FieldProblem {
+pub(super) fn unknown(field: &'static str, value: i32) -> FieldProblem {
     FieldProblem::new(field, format!("{value} is not a value of this enum"))
 }

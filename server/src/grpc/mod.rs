@@ -9,6 +9,7 @@ mod records;
 mod room_service;
 mod spectate;
 pub mod status;
+mod vector;
 
 pub use info::Info;
 pub use play::Play;
@@ -16,3 +17,4 @@ pub use recorded::Recorded;
 pub use records::Records;
 pub use room_service::RoomCalls;
 pub use spectate::Spectate;
+pub use vector::Vectors;

@@ -145,12 +145,7 @@ async fn branched(
     let branch = recorded
         .of_game(&point.game_id, move |lines| branch_of(&lines, decisions))
         .await?
-        .map_err(|error| match error {
-            BranchError::TooFar { .. } | BranchError::Over(_) => {
-                refused("decisions", error.to_string())
-            }
-            error => refused("game_id", error.to_string()),
-        })?;
+        .map_err(|error| branch_refused(&error))?;
     check_length(&branch.rules)?;
     let game_seed = match (point.same_deals, branch.later_deals) {
         (false, _) => game_seed,
@@ -173,6 +168,18 @@ async fn branched(
         },
         game_seed,
     })
+}
+
+/// What a client is told that names a point from which no game can go on.
+pub(super) fn branch_refused(error: &BranchError) -> Status {
+    let name = match error {
+        BranchError::TooFar { .. } | BranchError::Over(_) => "decisions",
+        _ => "game_id",
+    };
+    field(
+        "BRANCH_REFUSED",
+        &FieldProblem::new(name, error.to_string()),
+    )
 }
 
 /// The players of the seats that are filled by a recorded one.

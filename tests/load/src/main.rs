@@ -15,6 +15,7 @@ mod restart;
 mod scenario;
 mod server;
 mod tally;
+mod vector;
 mod wire;
 
 use std::process::ExitCode;
@@ -49,6 +50,9 @@ fn main() -> ExitCode {
 async fn measure(load: &Load) -> Result<(), LoadError> {
     if let Some(rooms) = load.restart {
         return restart::measure(load, rooms).await;
+    }
+    if load.vector {
+        return vector::measure(load).await;
     }
     let disk_syncs = (load.durability.then(|| disk::syncs_per_second(load))).transpose()?;
     let mut outcomes = Vec::new();

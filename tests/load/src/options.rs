@@ -17,7 +17,7 @@ const MAX_SECONDS: f64 = 600.0;
 #[command(
     name = "chefshat-load",
     version,
-    after_help = "Examples:\n  chefshat-load                        the standard scenarios\n  chefshat-load --pin --rounds 7       the same with both sides on one core\n  chefshat-load --rooms 16 --streams 8 one scenario of your own\n  chefshat-load --durability           durable rooms beside ephemeral ones\n  chefshat-load --restart 1000         a restart with so many unfinished games\n  chefshat-load --server http://127.0.0.1:50051 --rooms 16 --streams 64"
+    after_help = "Examples:\n  chefshat-load                        the standard scenarios\n  chefshat-load --pin --rounds 7       the same with both sides on one core\n  chefshat-load --rooms 16 --streams 8 one scenario of your own\n  chefshat-load --durability           durable rooms beside ephemeral ones\n  chefshat-load --restart 1000         a restart with so many unfinished games\n  chefshat-load --vector               batches of a client's own games\n  chefshat-load --server http://127.0.0.1:50051 --rooms 16 --streams 64"
 )]
 pub(crate) struct Options {
     #[command(subcommand)]
@@ -101,6 +101,9 @@ pub(crate) struct Load {
     /// Measure how long a server that was killed takes until so many unfinished games can be played again.
     #[arg(long, value_name = "ROOMS", conflicts_with_all = ["rooms", "server", "durability"], value_parser = clap::value_parser!(u64).range(1..=MAX_ROOMS))]
     pub(crate) restart: Option<u64>,
+    /// Measure games of a client's own, stepped in batches of 1, 64 and 1,024 on one stream and on two.
+    #[arg(long, conflicts_with_all = ["rooms", "server", "durability", "restart"])]
+    pub(crate) vector: bool,
     /// Folder for what --durability and --restart keep on disk; it must lie on the disk that is meant. Standard: the temporary folder.
     #[arg(long, value_name = "FOLDER")]
     pub(crate) disk: Option<PathBuf>,

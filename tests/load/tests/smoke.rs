@@ -51,7 +51,6 @@ fn durable_rooms_are_measured_beside_ephemeral_ones() {
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
     let scenario = &report["scenarios"][0];
     assert_eq!(scenario["beside"], "ephemeral rooms", "{report:#}");
-    let positive = |value: &Value| value.as_f64().is_some_and(|figure| figure > 0.0);
     assert!(positive(&report["disk_syncs_per_second"]), "{report:#}");
     assert!(positive(&scenario["checked"]["games"]), "{report:#}");
     assert!(positive(&scenario["other_answers"]), "{report:#}");
@@ -72,6 +71,24 @@ fn a_restart_is_timed_and_its_games_are_played_on() {
     let order = ["open_s", "first_decision_s", "playable_s", "played_s"];
     let times = order.map(|name| times[name].as_f64().unwrap_or_default());
     assert!(times[0] > 0.0 && times.is_sorted(), "{report:#}");
+}
+
+fn positive(value: &Value) -> bool {
+    value.as_f64().is_some_and(|value| value > 0.0)
+}
+
+#[test]
+fn games_of_a_client_are_stepped_and_counted() {
+    let output = run(&["--smoke", "--vector", "--json"]);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{errors}");
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let scenarios = report["scenarios"].as_array().unwrap();
+    assert_eq!(scenarios.len(), 6, "{report:#}");
+    for scenario in scenarios {
+        assert!(positive(&scenario["decisions"]), "{report:#}");
+        assert!(positive(&scenario["bytes_per_decision"]), "{report:#}");
+    }
 }
 
 #[test]

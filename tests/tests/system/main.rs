@@ -14,4 +14,5 @@ mod rooms;
 mod spectators;
 mod stops;
 mod stranger;
+mod vectors;
 mod web;

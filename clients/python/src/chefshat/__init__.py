@@ -3,6 +3,9 @@
 Subclass `Agent` with one method, `decide`, and give it to `play`, or to a `Client` (blocking) or `aio.Client` (asyncio), which also
 make and find rooms, watch them and fetch records. The messages of the protocol are in `pb`. The package knows no rules: the server
 says what is legal.
+
+To learn, `make` an environment: `VectorEnv` steps many games at once in columns, `envs` has the interfaces of Gymnasium and
+PettingZoo, `replay` learns from games that were played before.
 """
 
 from chefshat import aio, pb
@@ -11,23 +14,33 @@ from chefshat.backoff import Backoff
 from chefshat.client import Client
 from chefshat.decision import Decision, SeatInfo
 from chefshat.errors import ChefsHatError
+from chefshat.local_server import LocalServer
+from chefshat.making import make
 from chefshat.result import SeatResult, Standing
 from chefshat.session import PlayOptions
+from chefshat.transitions import Transitions
+from chefshat.vector import Batch, VectorEnv, sample_legal
 
 __all__ = [
     "Agent",
     "Backoff",
+    "Batch",
     "ChefsHatError",
     "Client",
     "Decision",
+    "LocalServer",
     "PlayOptions",
     "RandomAgent",
     "SeatInfo",
     "SeatResult",
     "Standing",
+    "Transitions",
+    "VectorEnv",
     "aio",
+    "make",
     "pb",
     "play",
+    "sample_legal",
 ]
 
 

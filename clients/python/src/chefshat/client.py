@@ -48,12 +48,7 @@ class Client:
             address: "host:port", "http://host:port" or, for TLS, "https://host:port".
             backoff: the waits between attempts to connect while playing or watching.
         """
-        where = requests.target(address)
-        if where.tls:
-            credentials = grpc.ssl_channel_credentials()
-            self._channel = grpc.secure_channel(where.authority, credentials, requests.CHANNEL_OPTIONS)
-        else:
-            self._channel = grpc.insecure_channel(where.authority, requests.CHANNEL_OPTIONS)
+        self._channel = requests.channel(address)
         self._backoff = backoff or Backoff()
         self._chance = random.Random()
         self._rooms = RoomServiceStub(self._channel)

@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from typing import NamedTuple, TypeAlias
 
+import grpc
+
 from chefshat import pb
 
 # Times in milliseconds. Waits between attempts to connect are `Backoff`'s business, so the channel's own are kept short. (But not
@@ -37,6 +39,15 @@ def target(address: str) -> Target:
     if scheme not in ("http", "https"):
         raise ValueError(f"the address {address!r} begins with neither http:// nor https://")
     return Target(rest.rstrip("/"), tls=scheme == "https")
+
+
+def channel(address: str, options: Sequence[tuple[str, int]] = ()) -> grpc.Channel:
+    """A blocking channel to the server at the address; options are added to `CHANNEL_OPTIONS`."""
+    where = target(address)
+    together = [*CHANNEL_OPTIONS, *options]
+    if where.tls:
+        return grpc.secure_channel(where.authority, grpc.ssl_channel_credentials(), together)
+    return grpc.insecure_channel(where.authority, together)
 
 
 def create_room(

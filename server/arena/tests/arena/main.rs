@@ -8,5 +8,10 @@
 mod agents;
 mod batch;
 mod conformance;
+mod duplicate;
+mod mechanics;
+mod network;
+mod network_file;
 mod play;
 mod recorded;
+mod vector;

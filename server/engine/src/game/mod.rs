@@ -18,7 +18,7 @@ pub use script::{Script, ScriptError};
 
 use crate::{
     Action, BySeat, Cards, Deal, Event, Move, Role, RuleSet, Seat, SeatOrder, Seed, SpecialAction,
-    Standings,
+    Standings, Stop,
 };
 use table::Table;
 
@@ -215,6 +215,15 @@ impl Game {
     /// was branched from. The Shift being played stays as it was dealt.
     pub fn reseed(&mut self, seed: Seed) {
         self.seed = seed;
+    }
+
+    /// The same game, except that it ends with this Shift, whatever the rule set says: to look at how the
+    /// Shift ends after an action, which here the deal of the next one wipes away.
+    pub fn closing_copy(&self) -> Game {
+        Game {
+            rules: self.rules.with_stop(Stop::Shifts(self.shift)),
+            ..self.clone()
+        }
     }
 
     /// The rule set.

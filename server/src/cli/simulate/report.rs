@@ -1,20 +1,15 @@
 //! The result of `chefshat simulate` as a text for people and as JSON for programs. Both depend on the batch alone: no times, no
 //! number of threads.
 
-use std::fmt::Write as _;
-
-use anstyle::Style;
 use chefshat_arena::{Batch, BatchTable, RulesForm};
-use chefshat_engine::{Opening, PassScope, RewardScheme, RuleSetSpec, Stop};
-use comfy_table::{CellAlignment, LineStyle, Table, TableStyle};
+use chefshat_engine::RewardScheme;
 use serde_json::{Value, json};
 
 use super::super::numbers::{counted, grouped};
+use super::super::sheet::{self, heading, line, percent};
 
-/// A line below the header and nothing else, so that tables stay narrow.
-const STYLE: TableStyle = TableStyle::new().header_separator(LineStyle::none().fill('─'));
-/// The column that holds words; the others hold numbers.
-const WORD_COLUMN: &str = "Agent";
+/// The column that holds the agents; the others hold numbers.
+const AGENT_COLUMN: usize = 1;
 
 /// The result as one JSON object: what was played, sums and means over all, the same for each seat.
 pub(super) fn json(batch: &Batch, table: &BatchTable) -> Value {
@@ -66,78 +61,37 @@ pub(super) fn text(batch: &Batch, table: &BatchTable) -> String {
         &mut text,
         &format!("{} games, seed {}", grouped(batch.games()), batch.seed()),
     );
-    for line in rules_lines(batch) {
-        line_of(&mut text, &line);
+    for words in rules_lines(batch) {
+        line(&mut text, &words);
     }
     text.push('\n');
     heading(&mut text, "Overall");
     for (what, value) in overall(table) {
-        line_of(&mut text, &format!("{what:<17}{value}"));
+        line(&mut text, &format!("{what:<17}{value}"));
     }
     text.push('\n');
     heading(&mut text, "Results");
-    text.push_str(&results(batch, table));
+    results(&mut text, batch, table);
     text.push('\n');
     heading(
         &mut text,
         "Actions at turns (valid: plays and passes; wrong: invalid attempts)",
     );
-    text.push_str(&actions(batch, table));
+    actions(&mut text, batch, table);
     text
 }
 
 /// The rule set: its size and end, then what differs from the standard.
 fn rules_lines(batch: &Batch) -> Vec<String> {
-    let spec = batch.rules().spec();
-    let standard = RuleSetSpec::default();
-    let stop = match spec.stop {
-        Stop::Points(points) => format!("to {points} points"),
-        Stop::Shifts(shifts) => format!("of {}", counted(u64::from(shifts), "Shift")),
-    };
-    let points: Vec<String> = spec.points.iter().map(u32::to_string).collect();
-    let mut lines = vec![format!(
-        "{} players, {} faces, {}, {stop}; {} points by place",
-        spec.players,
-        spec.faces,
-        counted(u64::from(spec.jokers), "joker"),
-        points.join(", ")
-    )];
-    let mut variations = Vec::new();
-    if !spec.exchange {
-        variations.push("no exchange".to_owned());
-    }
-    if !spec.special_actions {
-        variations.push("no special actions".to_owned());
-    }
-    if spec.opening == Opening::AnyTopFace {
-        variations.push("opening any_top_face".to_owned());
-    }
-    if spec.opening_pass {
-        variations.push("opening pass allowed".to_owned());
-    }
-    if spec.pass_scope == PassScope::Turn {
-        variations.push("a pass binds for one turn".to_owned());
-    }
-    if spec.max_idle_pizzas != standard.max_idle_pizzas {
-        variations.push(format!(
-            "at most {} idle",
-            counted(u64::from(spec.max_idle_pizzas), "pizza")
-        ));
-    }
-    if spec.max_turns != standard.max_turns {
-        variations.push(format!(
-            "at most {} a Shift",
-            counted(u64::from(spec.max_turns), "turn")
-        ));
-    }
+    let mut variations = sheet::variations(batch.rules());
     if let Some(attempts) = batch.max_invalid_attempts() {
         variations.push(format!(
             "default decision after {}",
             counted(u64::from(attempts.get()), "invalid attempt")
         ));
     }
-    // Three to a line keep within 100 columns.
-    lines.extend(variations.chunks(3).map(|some| some.join(", ")));
+    let mut lines = vec![sheet::rules_in_short(batch.rules())];
+    lines.extend(sheet::variation_lines(&variations));
     lines
 }
 
@@ -182,10 +136,10 @@ fn overall(table: &BatchTable) -> Vec<(&'static str, String)> {
     ]
 }
 
-fn results(batch: &Batch, table: &BatchTable) -> String {
+fn results(text: &mut String, batch: &Batch, table: &BatchTable) {
     let header = [
         "Seat",
-        WORD_COLUMN,
+        "Agent",
         "Games\nwon",
         "%",
         "Shifts\nwon",
@@ -207,13 +161,13 @@ fn results(batch: &Batch, table: &BatchTable) -> String {
             format!("{:.3}", table.performance(seat)),
         ]
     });
-    table_of(&header, rows)
+    sheet::table(text, &header, &[AGENT_COLUMN], rows);
 }
 
-fn actions(batch: &Batch, table: &BatchTable) -> String {
+fn actions(text: &mut String, batch: &Batch, table: &BatchTable) {
     let mut header = vec![
         "Seat",
-        WORD_COLUMN,
+        "Agent",
         "Valid",
         "Wrong",
         "Plays\na Shift",
@@ -240,40 +194,5 @@ fn actions(batch: &Batch, table: &BatchTable) -> String {
         }));
         row
     });
-    table_of(&header, rows)
-}
-
-fn table_of(header: &[&str], rows: impl Iterator<Item = Vec<String>>) -> String {
-    let mut table = Table::new();
-    table.load_style(STYLE).set_header(header);
-    rows.for_each(|row| {
-        table.add_row(row);
-    });
-    for (column, name) in table.column_iter_mut().zip(header) {
-        if *name != WORD_COLUMN {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
-    }
-    let mut text = String::new();
-    for line in table.lines() {
-        // Every cell is preceded by a space.
-        line_of(
-            &mut text,
-            line.trim_end().strip_prefix(' ').unwrap_or(&line),
-        );
-    }
-    text
-}
-
-fn heading(text: &mut String, words: &str) {
-    let bold = Style::new().bold();
-    writeln!(text, "{bold}{words}{bold:#}").expect("a String takes everything");
-}
-
-fn line_of(text: &mut String, words: &str) {
-    writeln!(text, "  {words}").expect("a String takes everything");
-}
-
-fn percent(share: f64) -> String {
-    format!("{:.1} %", 100.0 * share)
+    sheet::table(text, &header, &[AGENT_COLUMN], rows);
 }

@@ -1,0 +1,117 @@
+//! Games of one's own, stepped in batches: the stream of `VectorService`, and nothing of what is done with the columns. Where the service
+//! stands in what is measured, as in the load program, this is the whole client.
+
+use tokio::sync::mpsc;
+use tokio_stream::wrappers::ReceiverStream;
+use tonic::Streaming;
+
+use crate::client::MAX_RESPONSE_BYTES;
+use crate::v1::run_request::Request;
+use crate::v1::run_response::Response;
+use crate::v1::vector_service_client::VectorServiceClient;
+use crate::{Action, Client, Error, v1};
+
+/// Games that a server steps for this client.
+#[derive(Debug)]
+pub struct VectorGames {
+    requests: mpsc::Sender<v1::RunRequest>,
+    responses: Streaming<v1::RunResponse>,
+    started: v1::VectorStarted,
+    records: Vec<v1::VectorRecord>,
+}
+
+impl Client {
+    /// Begins games of one's own and gives their first batch.
+    ///
+    /// # Errors
+    /// `SETUP_REFUSED`, `RULE_SET_REFUSED`, `SCRIPT_REFUSED`, `BRANCH_REFUSED`, `SEED_REFUSED`, `GAME_UNKNOWN` with the field at fault in
+    /// the metadata; `TOO_MANY_VECTOR_STREAMS`.
+    pub async fn vector(
+        &self,
+        setup: v1::VectorSetup,
+    ) -> Result<(VectorGames, Box<v1::VectorBatch>), Error> {
+        // One answer is on its way at a time.
+        let (requests, stream) = mpsc::channel(1);
+        send(&requests, Request::Setup(Box::new(setup))).await;
+        let mut service = VectorServiceClient::new(self.channel())
+            .max_decoding_message_size(MAX_RESPONSE_BYTES)
+            .max_encoding_message_size(MAX_RESPONSE_BYTES);
+        let mut responses = service.run(ReceiverStream::new(stream)).await?.into_inner();
+        let Some(Response::Started(started)) = next(&mut responses).await? else {
+            return Err(Error::incomplete("started"));
+        };
+        let mut games = VectorGames {
+            requests,
+            responses,
+            started,
+            records: Vec::new(),
+        };
+        let batch = games.batch().await?;
+        Ok((games, batch))
+    }
+}
+
+impl VectorGames {
+    /// What the server made of the setup.
+    pub fn started(&self) -> &v1::VectorStarted {
+        &self.started
+    }
+
+    /// Answers each row of the last batch, in its order, and gives the next batch.
+    ///
+    /// # Errors
+    /// `ACTIONS_REFUSED`, and `ILLEGAL_ACTION` where that is an error; either ends the games.
+    pub async fn step(
+        &mut self,
+        actions: impl IntoIterator<Item = Action>,
+    ) -> Result<Box<v1::VectorBatch>, Error> {
+        // An action beyond 16 bits is as illegal as the largest of them.
+        let column: Vec<u8> = (actions.into_iter())
+            .flat_map(|action| u16::try_from(action.0).unwrap_or(u16::MAX).to_le_bytes())
+            .collect();
+        let actions = v1::VectorActions {
+            actions: column.into(),
+        };
+        send(&self.requests, Request::Actions(actions)).await;
+        self.batch().await
+    }
+
+    /// Gives up games and begins them anew; gives the next batch.
+    ///
+    /// # Errors
+    /// `RESET_REFUSED`, which ends the games.
+    pub async fn reset(&mut self, reset: v1::VectorReset) -> Result<Box<v1::VectorBatch>, Error> {
+        send(&self.requests, Request::Reset(reset)).await;
+        self.batch().await
+    }
+
+    /// The parts of records that have come since this was last called, in order, if the setup asked for records.
+    pub fn take_records(&mut self) -> Vec<v1::VectorRecord> {
+        std::mem::take(&mut self.records)
+    }
+
+    async fn batch(&mut self) -> Result<Box<v1::VectorBatch>, Error> {
+        loop {
+            match next(&mut self.responses).await? {
+                Some(Response::Batch(batch)) => return Ok(batch),
+                Some(Response::Record(record)) => self.records.push(record),
+                Some(Response::Started(_)) | None => return Err(Error::incomplete("batch")),
+            }
+        }
+    }
+}
+
+async fn send(requests: &mpsc::Sender<v1::RunRequest>, request: Request) {
+    let request = v1::RunRequest {
+        request: Some(request),
+    };
+    // If the stream has ended, the next response says why.
+    let _ = requests.send(request).await;
+}
+
+async fn next(responses: &mut Streaming<v1::RunResponse>) -> Result<Option<Response>, Error> {
+    Ok(responses
+        .message()
+        .await?
+        .and_then(|message| message.response))
+}

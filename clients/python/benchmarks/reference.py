@@ -1,0 +1,100 @@
+"""Decisions per second of the reference implementation, chefshatgym 2.4.0.4 from PyPI: `ChefsHatEnv.step` in process, logs off.
+
+All four seats are played by a random masked policy: a legal action out of the mask in the observation. The cards of the exchange,
+which is not part of `step`, are those that the package's own random agent would give. Run it in an environment of its own, see the
+README.
+"""
+
+import contextlib
+import importlib.metadata
+import logging
+import os
+import random
+import sys
+import tempfile
+from typing import Any
+
+import measure
+import numpy as np
+import numpy.typing as npt
+from ChefsHatGym.env import ChefsHatEnv as reference
+
+# The last part of an observation.
+TURN_ACTIONS = 200
+NAMES = ["Ada", "Ben", "Cleo", "Dan"]
+
+
+class Games:
+    """Games to 15 points or of so many Shifts, one after another.
+
+    Attributes:
+        env: the package's environment.
+    """
+
+    def __init__(self, folder: str, seed: int, *, shifts: int | None = None, exchange: bool = True) -> None:
+        # The package draws its deals from Python's own generator.
+        random.seed(seed)
+        self._chance = np.random.default_rng(seed)
+        self._exchanges = exchange
+        self.env = reference.ChefsHatEnv()
+        # A folder is needed, although nothing is written with the logs off.
+        self.env.startExperiment(
+            gameType=reference.GAMETYPE["POINTS" if shifts is None else "MATCHES"],
+            stopCriteria=15 if shifts is None else shifts,
+            playerNames=NAMES,
+            logDirectory=os.path.join(folder, "games"),
+            verbose=0,
+            saveLog=False,
+            saveDataset=False,
+        )
+        self._observation = self._begin()
+
+    def step(self) -> int:
+        """Takes one decision and returns 1; begins the next Shift or game where one has ended."""
+        self.act()
+        return 1
+
+    def act(self) -> dict[str, Any] | None:
+        """As `step`; returns what the package tells of the turn if it ended a Shift."""
+        # Plays with two jokers are marked with a 2 there, but refused.
+        legal = np.flatnonzero(self._observation[-TURN_ACTIONS:] == 1)
+        action = np.zeros(TURN_ACTIONS)
+        action[legal[self._chance.integers(len(legal))]] = 1
+        self._observation, _, shift_over, _, info = self.env.step(action)
+        if not info["Action_Valid"]:
+            raise AssertionError("a legal action was refused")
+        if self.env.gameFinished:
+            self._observation = self._begin()
+        elif shift_over:
+            self._exchange()
+            self._observation = self.env.getObservation()
+        return info if shift_over else None
+
+    def _begin(self) -> npt.NDArray[np.float32]:
+        # It prints where it would log to.
+        with contextlib.redirect_stdout(None):
+            observation: npt.NDArray[np.float32] = self.env.reset()[0]
+        return observation
+
+    def _exchange(self) -> None:
+        if not self._exchanges:
+            # What is left of beginning a Shift.
+            self.env.start_match_define_order()
+            return
+        _, dishwasher_cards, _, waiter_card, _, sous_chef_hand, _, chef_hand = self.env.get_chef_souschef_roles_cards()
+        self.env.exchange_cards(sorted(chef_hand[-2:]), sous_chef_hand[-1], waiter_card, dishwasher_cards, False, -1)
+
+
+def main() -> int:
+    """Measures and prints."""
+    options = measure.parser(__doc__.split("\n\n")[0], "python benchmarks/reference.py --rounds 5 --json").parse_args()
+    logging.disable(logging.CRITICAL)
+    with tempfile.TemporaryDirectory() as folder:
+        games = Games(folder, options.seed)
+        measured = measure.measure("chefshatgym, ChefsHatEnv.step", games.step, options)
+    measure.show([measured], options, chefshatgym=importlib.metadata.version("chefshatgym"))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

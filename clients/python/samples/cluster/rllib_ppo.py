@@ -1,0 +1,155 @@
+"""Self-play training on a Ray cluster, with RLlib: its runners play batches of games, its algorithm learns by masked PPO in JAX.
+
+    pip install 'chefshat[ray]'
+    python samples/cluster/rllib_ppo.py --iterations 3
+    python samples/cluster/rllib_ppo.py --ray auto --runners 32 --iterations 1000 --out strong.safetensors
+
+The last line is for a cluster. Every runner is an actor of Ray, on whichever machine Ray puts it, and starts a server there by
+itself (the program `chefshat` must be on the PATH, or named by CHEFSHAT_BIN); with --address all of them play on one server. The
+networks and the loss are those of `python -m chefshat.learn ppo`: RLlib's own learners need torch, whose wheels for Linux bring
+gigabytes of CUDA along.
+"""
+
+import argparse
+import dataclasses
+import json
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import ray
+from ray.rllib.algorithms.algorithm import Algorithm
+from ray.rllib.algorithms.algorithm_config import AlgorithmConfig
+from ray.rllib.env.env_runner import EnvRunner
+
+from chefshat.learn import network, ppo, ppo_checkpoint
+from chefshat.learn.evaluation import evaluate
+from chefshat.learn.ppo import Params, Samples
+from chefshat.learn.ppo_checkpoint import Plan
+from chefshat.learn.ppo_command import full_rules
+from chefshat.learn.ppo_training import joined, play
+from chefshat.learn.self_play import Collector
+from chefshat.vector import VectorEnv
+
+
+class SelfPlayRunner(EnvRunner):  # type: ignore[misc]  # Ray has no types.
+    """Plays on where it stopped, with whatever weights it is given. One decision in each of its games is one step."""
+
+    def __init__(self, *, config: AlgorithmConfig, **kwargs: Any) -> None:  # noqa: ANN401 - RLlib's.
+        super().__init__(config=config, **kwargs)
+        self._plan: Plan = config.env_config["plan"]
+        self._seed = int(config.seed + self.worker_index)
+        self._calls = 0
+        self.env = VectorEnv(config.env_config["address"], self._plan.games, skip_forced=True, episode="shift", seed=self._seed)
+        self._collector = Collector(self.env, self._plan.games, self._plan.steps)
+
+    def sample(self, params: Params, **_: Any) -> Samples:  # noqa: ANN401 - RLlib's.
+        """Plays `plan.steps` steps."""
+        self._calls += 1
+        return play(self._collector, params, jax.random.fold_in(jax.random.key(self._seed), self._calls), self._plan)
+
+    def assert_healthy(self) -> None:
+        """Asks whether the games are there."""
+        assert self.env is not None
+
+    def get_spaces(self) -> None:
+        """None: there is no module of RLlib's that would have to know them."""
+
+    def stop(self) -> None:
+        """Ends the games."""
+        self.env.close()
+
+
+class JaxPPOConfig(AlgorithmConfig):  # type: ignore[misc]
+    """Runners are as above, the rest of what RLlib configures is not needed. `env_config` holds the plan and the address."""
+
+    def __init__(self, algo_class: type[Algorithm] | None = None) -> None:
+        super().__init__(algo_class=algo_class or JaxPPO)
+        self.api_stack(enable_rl_module_and_learner=False, enable_env_runner_and_connector_v2=True)
+        self.env_runners(env_runner_cls=SelfPlayRunner)
+        self._dont_auto_sync_env_runner_states = True
+
+    def validate(self) -> None:
+        """RLlib refuses its new runners without its new learners; these runners bring what they need."""
+
+
+class JaxPPO(Algorithm):  # type: ignore[misc]
+    """Every iteration all runners play with the newest weights, and what they played is learned from, all at once."""
+
+    def setup(self, config: AlgorithmConfig) -> None:
+        """Makes the networks, and the runners."""
+        super().setup(config)
+        options = self.config.env_config
+        self.training = ppo_checkpoint.begin(
+            options["plan"], self.config.seed, options["rules"], "python samples/cluster/rllib_ppo.py"
+        )
+        self._learner = self.training.learner
+
+    def training_step(self) -> None:
+        """Plays and learns once."""
+        plan = self.training.plan
+        # Put once, fetched by every machine once.
+        params = ray.put(jax.tree.map(np.asarray, self._learner.params))
+        parts = self.env_runner_group.foreach_env_runner(partial(_sample, params), local_env_runner=False)
+        samples = joined(parts)
+        for _ in range(plan.epochs):
+            self._learner, losses = ppo.learn(
+                self._learner, samples, jnp.float32(plan.learning_rate), jnp.float32(plan.entropy_bonus), plan.hyper
+            )
+        self.metrics.log_value("decisions", samples.actions.size, reduce="lifetime_sum")
+        for name, value in losses._asdict().items():
+            self.metrics.log_value(("losses", name), float(value), window=1)
+
+    def network(self, name: str) -> network.Network:
+        """The policy as it stands."""
+        return dataclasses.replace(self.training, learner=self._learner).network(name)
+
+
+def _sample(params: ray.ObjectRef, runner: SelfPlayRunner) -> Samples:
+    return runner.sample(ray.get(params))
+
+
+def main() -> None:
+    """Trains a few iterations and says what came of it."""
+    parser = argparse.ArgumentParser(description="Trains by self-play on a Ray cluster.")
+    parser.add_argument(
+        "--ray", metavar="ADDRESS", help="a Ray cluster ('auto': the one this machine is part of); default: a local one"
+    )
+    parser.add_argument(
+        "--address", metavar="HOST:PORT", help="a Chef's Hat server for all runners; default: one for each, started by it"
+    )
+    parser.add_argument("--runners", type=int, default=2, help="runners (default: 2)")
+    parser.add_argument("--games", type=int, default=128, help="games of each (default: 128)")
+    parser.add_argument("--iterations", type=int, default=3, help="iterations (default: 3)")
+    parser.add_argument("--seed", type=int, default=1, help="where chance comes from (default: 1)")
+    parser.add_argument("--out", type=Path, metavar="FILE", help="write the network to this file")
+    options = parser.parse_args()
+
+    ray.init(address=options.ray, include_dashboard=False, log_to_driver=False)
+    plan = Plan(games=options.games, steps=64)
+    setting = {"plan": plan, "address": options.address, "rules": full_rules(None, options.address)}
+    config = (
+        JaxPPOConfig().environment(env_config=setting).env_runners(num_env_runners=options.runners).debugging(seed=options.seed)
+    )
+    algorithm = config.build_algo()
+    try:
+        for iteration in range(1, options.iterations + 1):
+            told = algorithm.train()
+            print(
+                json.dumps({"iteration": iteration, "decisions": told["decisions"], "seconds": round(told["time_this_iter_s"], 1)})
+            )
+        trained = algorithm.network("rllib")
+        for opponents in ("random", "greedy"):
+            print(evaluate(trained, opponents, games=200, seed=2, address=options.address))
+        if options.out:
+            network.save(options.out, trained.layers, trained.info, dtype=np.float16)
+    finally:
+        algorithm.stop()
+        ray.shutdown()
+
+
+if __name__ == "__main__":
+    main()

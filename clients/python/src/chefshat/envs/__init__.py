@@ -1,0 +1,42 @@
+"""Environments with the interfaces of Gymnasium and PettingZoo, over `VectorEnv`. They need the package's extra `envs`.
+
+- `ChefsHatEnv`, a `gymnasium.Env`: one seat against built-in agents, registered as "chefshat/ChefsHat-v1".
+- `ChefsHatVectorEnv`, a `gymnasium.vector.VectorEnv`: the same many times, stepped together.
+- `chefshat_v1`, a module for PettingZoo: `chefshat_v1.env()` has all seats, one deciding at a time.
+
+What an agent sees is chosen in `seeing`. For more than Gymnasium can say there is `chefshat.VectorEnv` itself.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+try:
+    import gymnasium
+except ImportError as error:
+    raise ImportError("chefshat.envs needs Gymnasium and PettingZoo: pip install 'chefshat[envs]'") from error
+
+from chefshat.envs.gymnasium_env import ChefsHatEnv
+from chefshat.envs.gymnasium_vector import ChefsHatVectorEnv
+
+if TYPE_CHECKING:
+    from chefshat.envs import chefshat_v1
+
+__all__ = ["ENV_ID", "ChefsHatEnv", "ChefsHatVectorEnv", "chefshat_v1"]
+
+#: The name in Gymnasium's registry. `gymnasium.make("chefshat.envs:chefshat/ChefsHat-v1")` needs no import before.
+ENV_ID = "chefshat/ChefsHat-v1"
+
+if ENV_ID not in gymnasium.registry:
+    gymnasium.register(
+        ENV_ID,
+        entry_point="chefshat.envs.gymnasium_env:ChefsHatEnv",
+        vector_entry_point="chefshat.envs.gymnasium_vector:ChefsHatVectorEnv",
+    )
+
+
+def __getattr__(name: str) -> Any:  # noqa: ANN401 - A module.
+    # PettingZoo is loaded only where it is used.
+    if name == "chefshat_v1":
+        import importlib
+
+        return importlib.import_module("chefshat.envs.chefshat_v1")
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

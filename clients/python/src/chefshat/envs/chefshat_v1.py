@@ -1,0 +1,185 @@
+"""All seats of one game for PettingZoo (AEC: one agent decides at a time): `chefshat_v1.env()`.
+
+One seat against built-in agents is in `gymnasium_env`. Seats decide one after the other by the rules of the game, so there is no
+parallel form.
+"""
+
+from typing import Any, ClassVar
+
+import numpy as np
+from gymnasium import spaces
+
+try:
+    from pettingzoo import AECEnv
+    from pettingzoo.utils import wrappers
+except ImportError as error:
+    raise ImportError("chefshat_v1 needs PettingZoo: pip install 'chefshat[envs]'") from error
+
+from chefshat import pb
+from chefshat.columns import Situations
+from chefshat.envs.gymnasium_env import wait_for_a_row
+from chefshat.envs.seeing import Form, ObservationFunction, mask_space
+from chefshat.envs.showing import action_texts, as_text
+from chefshat.vector import Batch, VectorEnv
+
+__all__ = ["env", "raw_env"]
+
+
+def env(address: str | None = None, **options: Any) -> "AECEnv[str, Any, Any]":  # noqa: ANN401 - Those of `raw_env`.
+    """The environment with PettingZoo's checks around it: of the order of calls, and of actions. Arguments: see `raw_env`."""
+    checked: AECEnv[str, Any, Any] = wrappers.AssertOutOfBoundsWrapper(raw_env(address, **options))
+    return wrappers.OrderEnforcingWrapper(checked)
+
+
+class raw_env(AECEnv[str, Any, Any]):  # type: ignore[misc]  # PettingZoo has no types.
+    """The environment itself. The agents are "player_0" to "player_{N-1}", by seat.
+
+    An observation is a dictionary: "observation", of the form chosen, and "action_mask", A numbers of 0 or 1 (standard 214), all 0
+    unless the agent is to decide. An agent that is not to decide sees what it saw at its last decision. `infos` have "kind" (a
+    value of `pb.DecisionKind`), "invalid_attempts", and at the end "place", from 1.
+
+    An illegal action is an invalid attempt: it is rewarded as the scheme has it, and the same agent decides again. An agent is
+    given its reward when it decides next, or at the end of the episode: all that came since it last decided. The agents that are
+    left at the end of an episode are done; `reset()` then begins the next Shift of the same game, or the next game where that is
+    the episode. In the middle of an episode, or with a seed, it begins a new game.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {
+        "render_modes": ["ansi", "human"],
+        "name": "chefshat_v1",
+        "is_parallelizable": False,
+        "render_fps": 4,
+    }
+
+    def __init__(
+        self,
+        address: str | None = None,
+        *,
+        observation: str | ObservationFunction = "classic",
+        rewards: str | None = "winning",
+        invalid: str = "ask_again",
+        render_mode: str | None = None,
+        **options: Any,  # noqa: ANN401 - Those of `VectorEnv`.
+    ) -> None:
+        """Begins a game.
+
+        Args:
+            address: the server; None: one of this process's own, which is started if need be.
+            observation: "classic", "table", "columns", or a function of one's own. See `Form`.
+            rewards: the scheme; see `VectorEnv`.
+            invalid: what an illegal action does; see `VectorEnv`.
+            render_mode: "ansi": `render()` returns a text; "human": it is printed with each step.
+            options: what else `VectorEnv` takes: `episode`, `decisions`, `rules`, `reward_function` and so on.
+        """
+        super().__init__()
+        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
+            raise ValueError(f'render_mode={render_mode!r}: choose "ansi" or "human", or leave it out')
+        if "client_seats" in options or "games" in options:
+            raise ValueError("this environment has one game and all seats; for other ways use chefshat.VectorEnv")
+        self.render_mode = render_mode
+        self.vector = VectorEnv(address, 1, rewards=rewards, invalid=invalid, **options)
+        sizes = self.vector.sizes
+        self.possible_agents = [f"player_{seat}" for seat in range(sizes.players)]
+        self.agents: list[str] = []
+        self._form = Form(observation, sizes, self.vector.batch)
+        seen = spaces.Dict({"observation": self._form.space, "action_mask": mask_space(sizes)})
+        # Spaces of their own, because each is seeded for itself.
+        self._observation_spaces: dict[str, spaces.Space[Any]] = {
+            agent: spaces.Dict(dict(seen.spaces)) for agent in self.possible_agents
+        }
+        self._action_spaces: dict[str, spaces.Space[Any]] = {
+            agent: spaces.Discrete(sizes.num_actions) for agent in self.possible_agents
+        }
+        self._nothing = self._form.of(Situations(1, sizes))
+        self._seen: dict[str, Any] = {}
+        self._stepped = False
+
+    def observation_space(self, agent: str) -> spaces.Space[Any]:
+        """The space of an agent's observations."""
+        return self._observation_spaces[agent]
+
+    def action_space(self, agent: str) -> spaces.Space[Any]:
+        """The space of an agent's actions."""
+        return self._action_spaces[agent]
+
+    def observe(self, agent: str) -> dict[str, Any]:
+        """What an agent sees: at its decision if it is to decide, else what it saw at its last; zeros if it has not decided yet."""
+        deciding = agent == self.agent_selection and not self.terminations.get(agent) and not self.truncations.get(agent)
+        mask = self.vector.batch.masks[0].astype(np.int8) if deciding else np.zeros(self.vector.num_actions, np.int8)
+        seen = self._seen.get(agent)
+        return {"observation": self._form.row(self._nothing, 0) if seen is None else seen, "action_mask": mask}
+
+    def reset(self, seed: int | None = None, options: dict[str, Any] | None = None) -> None:
+        """Begins the next episode; games follow from the last seed that was given."""
+        if seed is not None:
+            self.vector.reset(seed)
+        elif self._stepped:
+            self.vector.reset(games=[0])
+        self._stepped = False
+        self.agents = self.possible_agents.copy()
+        self.rewards = dict.fromkeys(self.agents, 0.0)
+        self._cumulative_rewards = dict.fromkeys(self.agents, 0.0)
+        self.terminations = dict.fromkeys(self.agents, False)
+        self.truncations = dict.fromkeys(self.agents, False)
+        self.infos: dict[str, dict[str, Any]] = {agent: {} for agent in self.agents}
+        self._skip_agent_selection = None
+        self._seen = {}
+        wait_for_a_row(self.vector)
+        self._take_turn(self.vector.batch)
+
+    def step(self, action: Any) -> None:  # noqa: ANN401 - As PettingZoo has it.
+        """Takes the decision of `agent_selection`; None where that agent is done."""
+        agent = self.agent_selection
+        if self.terminations[agent] or self.truncations[agent]:
+            self._was_dead_step(action)
+            return
+        self.vector.step(np.asarray([action]))
+        self._stepped = True
+        wait_for_a_row(self.vector, or_an_end=True)
+        batch = self.vector.batch
+        self._cumulative_rewards[agent] = 0.0
+        self._clear_rewards()
+        if len(batch.endings):
+            self._end(batch)
+        else:
+            self._take_turn(batch)
+            self.rewards[self.agent_selection] = float(batch.rewards[0])
+        self._accumulate_rewards()
+        if self.render_mode == "human":
+            self.render()
+
+    def render(self) -> str | None:
+        """What the agent that is to decide sees, as text: returned with "ansi", printed with "human"."""
+        situations: Situations = self.vector.batch
+        if self.agents and (any(self.terminations.values()) or any(self.truncations.values())):
+            situations = self.vector.batch.endings
+        text = as_text(situations, 0, action_texts(self.vector.address, self.vector.faces))
+        if self.render_mode == "human":
+            print(text)
+            return None
+        return text
+
+    def close(self) -> None:
+        """Ends the game."""
+        self.vector.close()
+
+    def _take_turn(self, batch: Batch) -> None:
+        """Gives the turn to the seat that is to decide."""
+        agent = self.possible_agents[int(batch.seats[0])]
+        self.agent_selection = agent
+        self._seen[agent] = self._form.row(self._form.of(batch), 0)
+        self.infos[agent] = {"kind": int(batch.kinds[0]), "invalid_attempts": int(batch.attempts[0])}
+
+    def _end(self, batch: Batch) -> None:
+        """Ends the episode for all agents."""
+        self._stepped = False
+        endings = batch.endings
+        observed = self._form.of(endings)
+        # In further episodes that ended with the same step nobody had anything to decide.
+        for row, seat in enumerate(endings.seats[: self.vector.players].tolist()):
+            agent = self.possible_agents[seat]
+            self.rewards[agent] = float(endings.rewards[row])
+            self.terminations[agent] = bool(endings.ends[row] == pb.EPISODE_END_FINISHED)
+            self.truncations[agent] = bool(endings.ends[row] == pb.EPISODE_END_CUT_SHORT)
+            self.infos[agent] = {"kind": 0, "invalid_attempts": 0, "place": int(endings.places_taken[row])}
+            self._seen[agent] = self._form.row(observed, row)

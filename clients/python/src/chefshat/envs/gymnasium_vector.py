@@ -1,0 +1,183 @@
+"""One seat of many games at once as a `gymnasium.vector.VectorEnv`, stepped together. One game is in `gymnasium_env`."""
+
+from collections.abc import Sequence
+from typing import Any, ClassVar
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from gymnasium.vector import AutoresetMode
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from chefshat import pb
+from chefshat.columns import Endings
+from chefshat.envs.seeing import Form, ObservationFunction, Observed, mask_space
+from chefshat.vector import Batch, VectorEnv
+
+
+class ChefsHatVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
+    """Games stepped together; the same seat is played here in all of them, the others are built-in agents of the server.
+
+    Observations, actions, rewards and episodes are those of `ChefsHatEnv`, a row for each game. An episode that ends is followed by
+    another in the same step (`AutoresetMode.SAME_STEP`): the observation returned is the first of the next episode, and the last
+    one of the old is in `infos["final_obs"]`, an array of objects, None where none has ended; `infos["final_info"]` has what goes
+    with it. `infos["action_mask"]` is an array of n rows of A numbers, 0 or 1. As in Gymnasium's own, `infos["_key"]` says which
+    rows of `infos["key"]` count.
+
+    In the rare case that a game's other seats take so many decisions that some are left for the next step, its row stays as it was,
+    and its next action is ignored.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
+        "render_modes": [],
+        "autoreset_mode": AutoresetMode.SAME_STEP,
+    }
+
+    def __init__(
+        self,
+        address: str | None = None,
+        num_envs: int = 1,
+        *,
+        seat: int = 0,
+        observation: str | ObservationFunction = "classic",
+        rewards: str | None = "winning",
+        invalid: str = "ask_again",
+        render_mode: str | None = None,
+        **options: Any,  # noqa: ANN401 - Those of `VectorEnv`.
+    ) -> None:
+        """Begins the games.
+
+        Args:
+            address: the server; None: one of this process's own, which is started if need be.
+            num_envs: n, the number of games.
+            seat: the seat that is played here.
+            observation: "classic", "table", "columns", or a function of one's own. See `Form`.
+            rewards: the scheme; see `VectorEnv`.
+            invalid: what an illegal action does; see `VectorEnv`.
+            render_mode: None; nothing can be rendered.
+            options: what else `VectorEnv` takes, but for `total_games`: games follow each other without end.
+        """
+        if render_mode is not None:
+            raise ValueError("many games cannot be rendered: leave render_mode out, or use ChefsHatEnv")
+        if {"client_seats", "games", "total_games"} & options.keys():
+            raise ValueError("client_seats, games and total_games: give seat= and num_envs= instead, or use chefshat.VectorEnv")
+        self.num_envs = num_envs
+        self.vector = VectorEnv(address, num_envs, client_seats=[seat], rewards=rewards, invalid=invalid, **options)
+        sizes = self.vector.sizes
+        self.single_action_space = spaces.Discrete(sizes.num_actions)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._form = Form(observation, sizes, self.vector.batch)
+        self.single_observation_space = self._form.space
+        if isinstance(self._form.space, spaces.Dict):
+            self.single_observation_space = spaces.Dict({**self._form.space, "action_mask": mask_space(sizes)})
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        # What each game was last seen like, for those that have no row in a batch.
+        self._seen: Observed | None = None
+        self._masks = np.zeros((num_envs, sizes.num_actions), np.int8)
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[Any, dict[str, Any]]:
+        """Begins new games.
+
+        Args:
+            seed: the base seed that all games follow from; None: the next games of the last.
+            options: `{"reset_mask": mask}`: only the games where the (n,) booleans are true begin anew, the others stay as they
+            are.
+        """
+        if seed is not None and not isinstance(seed, (int, np.integer)):
+            raise TypeError("all games follow from one seed: give a number")
+        super().reset(seed=seed)
+        chosen = None if options is None else options.get("reset_mask")
+        if chosen is not None:
+            mask = np.asarray(chosen)
+            if mask.shape != (self.num_envs,) or mask.dtype != np.bool_ or seed is not None:
+                raise ValueError(f"a reset_mask is an array of {self.num_envs} booleans, and goes without a seed")
+            batch = self.vector.reset(games=np.flatnonzero(mask))
+        elif seed is not None or self._seen is None:
+            batch = self.vector.reset(seed)
+        else:
+            batch = self.vector.reset(games=np.arange(self.num_envs))
+        return self._observe(batch), self._infos(batch)
+
+    def step(self, actions: Any) -> tuple[Any, NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]:  # noqa: ANN401
+        """Takes the open decision of each game; `actions` are n integers."""
+        chosen = np.asarray(actions)
+        waiting = self.vector.batch
+        if len(waiting) < self.num_envs and chosen.shape == (self.num_envs,):
+            chosen = chosen[waiting.games]
+        batch = self.vector.step(chosen)
+        rewards = np.zeros(self.num_envs, np.float64)
+        rewards[batch.games] = batch.rewards
+        terminations = np.zeros(self.num_envs, np.bool_)
+        truncations = np.zeros(self.num_envs, np.bool_)
+        observed, infos = self._observe(batch), self._infos(batch)
+        if len(batch.endings):
+            endings = _first_of_each(batch.endings)
+            rewards[endings.games] = endings.rewards
+            terminations[endings.games] = endings.ends == pb.EPISODE_END_FINISHED
+            truncations[endings.games] = endings.ends == pb.EPISODE_END_CUT_SHORT
+            self._add_endings(infos, endings)
+        return observed, rewards, terminations, truncations, infos
+
+    def close_extras(self, **kwargs: Any) -> None:  # noqa: ANN401 - As Gymnasium has it.
+        """Ends the games."""
+        self.vector.close()
+
+    def _observe(self, batch: Batch) -> Any:  # noqa: ANN401 - Of the space's kind.
+        """The observations of all games. Those a batch has no row for are seen as before."""
+        observed = self._form.of(batch)
+        masks = batch.masks.view(np.int8)
+        if len(batch) < self.num_envs:
+            masks = _put(self._masks, batch.games, masks)
+            if isinstance(observed, dict):
+                before = self._seen if isinstance(self._seen, dict) else {}
+                observed = {name: _put(before.get(name), batch.games, array, self.num_envs) for name, array in observed.items()}
+            else:
+                before_ = self._seen if isinstance(self._seen, np.ndarray) else None
+                observed = _put(before_, batch.games, observed, self.num_envs)
+        self._seen, self._masks = observed, masks
+        if isinstance(observed, dict):
+            return {**observed, "action_mask": masks}
+        return observed
+
+    def _infos(self, batch: Batch) -> dict[str, Any]:
+        everywhere = np.ones(self.num_envs, np.bool_)
+        infos: dict[str, Any] = {"action_mask": self._masks, "_action_mask": everywhere}
+        for name, column in (("kind", batch.kinds), ("invalid_attempts", batch.attempts)):
+            infos[name] = np.zeros(self.num_envs, np.int64)
+            infos[name][batch.games] = column
+            infos[f"_{name}"] = everywhere
+        return infos
+
+    def _add_endings(self, infos: dict[str, Any], endings: Endings) -> None:
+        """Adds what was seen at the end of episodes."""
+        ended = np.zeros(self.num_envs, np.bool_)
+        ended[endings.games] = True
+        observed = self._form.of(endings)
+        last = np.full(self.num_envs, None, object)
+        nothing = np.zeros(self.vector.num_actions, np.int8)
+        for row, game in enumerate(endings.games.tolist()):
+            one = self._form.row(observed, row)
+            last[game] = {**one, "action_mask": nothing} if self._form.has_parts else one
+        places = np.zeros(self.num_envs, np.int64)
+        places[endings.games] = endings.places_taken
+        infos["final_obs"], infos["_final_obs"] = last, ended
+        infos["final_info"], infos["_final_info"] = {"place": places, "_place": ended}, ended
+
+
+def _first_of_each(endings: Endings) -> Endings:
+    """The first ending of each game: in a further one the seat had nothing to decide."""
+    first = np.unique(endings.games, return_index=True)[1]
+    return endings if len(first) == len(endings) else endings.take(first)
+
+
+def _put(before: NDArray[Any] | None, games: NDArray[np.uint32], rows: NDArray[Any], count: int = 0) -> NDArray[Any]:
+    """Rows put into a copy of what was there before, or into zeros."""
+    array = np.zeros((count, *rows.shape[1:]), rows.dtype) if before is None else before.copy()
+    array[games] = rows
+    return array

@@ -1,0 +1,125 @@
+"""What the agents of environments see: named forms of observations, or a function of one's own, and the spaces they lie in.
+
+Each form turns all rows of `Situations` into observations at once. The mask of legal actions is no part of a form: each environment
+hands it out where its interface wants it.
+"""
+
+from collections.abc import Callable
+from typing import Any, TypeAlias
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from chefshat.columns import Column, Observations, Situations, Sizes
+from chefshat.learn import features
+
+ObservationFunction: TypeAlias = Callable[[Situations], NDArray[Any]]
+"""Observations of one's own: (R, ...) numbers from the columns of R situations, a row for each. Rows depend on no other."""
+
+Observed: TypeAlias = "NDArray[Any] | dict[str, NDArray[Any]]"
+"""Observations of R situations: an array of R rows, or a dictionary of such."""
+
+FORMS = ("classic", "table", "columns")
+# Columns of `Situations` that the form "columns" has besides those of `Observations`.
+_DECISION = ("seats", "kinds")
+
+
+class Form:
+    """A form of observations.
+
+    Attributes:
+        space: the space of one observation.
+        has_parts: whether an observation is a dictionary.
+    """
+
+    space: "spaces.Space[Any]"
+
+    def __init__(self, observation: str | ObservationFunction, sizes: Sizes, sample: Situations) -> None:
+        """Chooses a form.
+
+        Args:
+            observation: "classic" (the paper's vector: F + H + T numbers of 0..=1, standard 228), "table" (all that a seat may know
+                as numbers, standard 334; see `chefshat.learn.features.table`), "columns" (a dictionary of the columns as they are),
+                or a function of one's own.
+            sizes: the numbers that shapes follow from.
+            sample: some situations, to see what a function of one's own makes of them.
+        """
+        self._sizes = sizes
+        self._function: ObservationFunction | None = None
+        self.has_parts = observation == "columns"
+        if callable(observation):
+            self._function = observation
+            self.space = _space_of(np.asarray(observation(sample)), len(sample))
+        elif observation == "classic":
+            self._function = self._classic
+            width = features.classic_width(sizes.faces, sizes.hand_size)
+            self.space = spaces.Box(0.0, 1.0, (width,), np.float32)
+        elif observation == "table":
+            self._function = self._table
+            # A play of all F cards of face F with both jokers is more than one F-th for each.
+            self.space = spaces.Box(0.0, 2.0, (features.table_width(sizes.players, sizes.faces),), np.float32)
+        elif observation == "columns":
+            self.space = spaces.Dict({name: _column_space(column, sizes) for name, column in _columns().items()})
+        else:
+            known = ", ".join(map(repr, FORMS))
+            raise ValueError(f"observation={observation!r}: choose one of {known}, or give a function of the situations")
+
+    def of(self, situations: Situations) -> Observed:
+        """The observations of all rows."""
+        if self._function is not None:
+            return np.asarray(self._function(situations))
+        seen = situations.observations
+        found = {name: getattr(situations if name in _DECISION else seen, name) for name in _columns()}
+        return {name: array.reshape(len(situations), -1) for name, array in found.items()}
+
+    def row(self, observed: Observed, row: int) -> Any:  # noqa: ANN401 - An array or a dictionary of them.
+        """One observation, as a copy."""
+        if isinstance(observed, dict):
+            return {name: array[row].copy() for name, array in observed.items()}
+        return observed[row].copy()
+
+    def _classic(self, situations: Situations) -> NDArray[Any]:
+        sizes = self._sizes
+        return features.classic(situations.observations, situations.mask_bits, faces=sizes.faces, hand_size=sizes.hand_size)
+
+    def _table(self, situations: Situations) -> NDArray[Any]:
+        sizes = self._sizes
+        return features.table(
+            situations.observations,
+            situations.seats,
+            situations.kinds,
+            situations.mask_bits,
+            players=sizes.players,
+            faces=sizes.faces,
+            hand_size=sizes.hand_size,
+        )
+
+
+def mask_space(sizes: Sizes) -> spaces.Box:
+    """The space of a mask as Gymnasium's `Discrete.sample` wants it: A numbers, 1 where an action is legal."""
+    return spaces.Box(0, 1, (sizes.num_actions,), np.int8)
+
+
+def _columns() -> dict[str, Column[Any]]:
+    mine = Situations.columns()
+    return {**{name: mine[name] for name in _DECISION}, **Observations.columns()}
+
+
+def _column_space(column: Column[Any], sizes: Sizes) -> spaces.Box:
+    """The space of a column's row; a single number is an array of one."""
+    shape = column.shape(1, sizes)[1:] or (1,)
+    limits = np.iinfo(column.dtype)
+    return spaces.Box(limits.min, limits.max, shape, column.dtype.type)
+
+
+def _space_of(made: NDArray[Any], rows: int) -> spaces.Box:
+    """The space of what a function of one's own makes, as wide as its type."""
+    if made.ndim == 0 or len(made) != rows:
+        raise ValueError(f"the observation function made the shape {made.shape} of {rows} situations: one row for each is wanted")
+    if made.dtype.kind == "f":
+        return spaces.Box(-np.inf, np.inf, made.shape[1:], made.dtype.type)
+    if made.dtype.kind == "b":
+        raise ValueError("the observation function made booleans: make numbers of them, for instance with .astype(numpy.int8)")
+    limits = np.iinfo(made.dtype)
+    return spaces.Box(limits.min, limits.max, made.shape[1:], made.dtype.type)

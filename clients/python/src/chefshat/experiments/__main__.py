@@ -1,0 +1,129 @@
+"""The command line `python -m chefshat.experiments`: its options, and what to do where a package is missing.
+
+Nothing but the standard library is imported before the options are read, so that `--help` always answers.
+"""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+EXAMPLES = """examples:
+  python -m chefshat.experiments all --quick
+  python -m chefshat.experiments mechanics --seed 1 --out results
+  python -m chefshat.experiments rules --seeds 5 --out results --address 127.0.0.1:50051
+  python -m chefshat.experiments report results
+
+The same seeds give the same results. Without --address a server is started for as long as it is needed.
+
+exit code: 0 done, 1 it failed and the last line says why, 2 the arguments are wrong
+"""
+DEFAULT_SEEDS = 5
+QUICK_SEEDS = 2
+MAX_SEEDS = 1000
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs the command and returns its exit code."""
+    options = parse(arguments)
+    try:
+        from chefshat.experiments import command
+    except ModuleNotFoundError as error:
+        return say_what_is_missing(error)
+    try:
+        return command.report(options) if options.what == "report" else command.run(options)
+    except ModuleNotFoundError as error:
+        return say_what_is_missing(error)
+    except KeyboardInterrupt:
+        print("interrupted; results of finished experiments are kept", file=sys.stderr)
+        return 1
+
+
+def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
+    """Reads the options; ends the process with 2 where they are wrong, with 0 after --help."""
+    parser = argparse.ArgumentParser(
+        prog="python -m chefshat.experiments",
+        description="Makes the experiments of the 2020 paper again and prints their tables, the paper's figures beside ours.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    running = argparse.ArgumentParser(add_help=False)
+    running.add_argument("--quick", action="store_true", help="just enough to see that it works; the figures say nothing")
+    running.add_argument(
+        "--seeds",
+        type=_positive,
+        metavar="N",
+        help=f"repetitions of the learning experiments (default: {DEFAULT_SEEDS}, 2 if quick)",
+    )
+    running.add_argument("--seed", type=_natural, default=1, metavar="S", help="the first seed; others follow it (default: 1)")
+    running.add_argument(
+        "--out",
+        type=Path,
+        default=Path("experiments-results"),
+        metavar="DIR",
+        help="folder for results, plots and networks, made if need be (default: %(default)s)",
+    )
+    running.add_argument("--address", metavar="HOST:PORT", help="a server that runs already")
+    running.add_argument("--json", action="store_true", help="print one object of JSON: the results without the plots")
+    commands = parser.add_subparsers(dest="what", metavar="WHAT", required=True)
+    summaries = {
+        "mechanics": "Experiment 1: what each mechanic does, among random agents",
+        "rules": "Experiment 2: one agent learns the rules",
+        "winning": "Experiment 3: agents learn to win",
+        "all": "all three, in this order",
+    }
+    for name, summary in summaries.items():
+        commands.add_parser(
+            name,
+            help=summary,
+            description=summary,
+            parents=[running],
+            epilog=EXAMPLES,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+    told = "prints results again and draws their plots"
+    reporting = commands.add_parser(
+        "report",
+        help=told,
+        description=told,
+        epilog="example:\n  python -m chefshat.experiments report results --page docs/experiments.md",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    reporting.add_argument("folder", type=Path, metavar="DIR", help="where results lie")
+    reporting.add_argument(
+        "--page",
+        type=Path,
+        metavar="FILE",
+        help="a Markdown file whose places for results are filled; plots go to the folder images beside it",
+    )
+    reporting.add_argument("--json", action="store_true", help="print one object of JSON: the results without the plots")
+    options = parser.parse_args(arguments)
+    if options.what != "report" and options.seeds is None:
+        options.seeds = QUICK_SEEDS if options.quick else DEFAULT_SEEDS
+    return options
+
+
+def say_what_is_missing(error: ModuleNotFoundError) -> int:
+    """Says how to install what an import did not find; what is missing of this package itself is an error of ours."""
+    if error.name is None or error.name.partition(".")[0] == "chefshat":
+        raise error
+    print(f"error: the experiments need {error.name}, which is not installed: pip install 'chefshat[learn]'", file=sys.stderr)
+    return 1
+
+
+def _positive(text: str) -> int:
+    number = int(text)
+    if not 1 <= number <= MAX_SEEDS:
+        raise argparse.ArgumentTypeError(f"must be 1 to {MAX_SEEDS}")
+    return number
+
+
+def _natural(text: str) -> int:
+    number = int(text)
+    if not 0 <= number < 2**32:
+        raise argparse.ArgumentTypeError("must be 0 to 4294967295")
+    return number
+
+
+if __name__ == "__main__":
+    sys.exit(main())

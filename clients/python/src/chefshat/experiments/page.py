@@ -1,0 +1,53 @@
+"""Results in a page of Markdown: between the marks of an experiment stand its tables, its plots and how they were made.
+
+What is between the marks is always made from results files, never by hand; what is outside is never touched.
+"""
+
+from collections.abc import Iterable
+
+from chefshat.experiments import tables
+from chefshat.experiments.results import Figure, Result
+
+# The folder of plots, beside the page.
+PICTURES = "images"
+
+
+def fill(text: str, results: Iterable[Result]) -> str:
+    """The page with these results at their places; ValueError if one has no place. Places without a result stay as they are."""
+    for result in results:
+        begin, end = marks(result.experiment)
+        if text.count(begin) != 1 or text.count(end) != 1 or text.index(begin) > text.index(end):
+            raise ValueError(
+                f"there is no place for {result.experiment}: it needs the lines {begin} and {end}, once and in this order"
+            )
+        before, _, rest = text.partition(begin)
+        _, _, after = rest.partition(end)
+        text = f"{before}{begin}\n\n{section(result)}\n\n{end}{after}"
+    return text
+
+
+def marks(experiment: str) -> tuple[str, str]:
+    """The lines between which an experiment's results stand."""
+    return f"<!-- results of {experiment} -->", f"<!-- end of {experiment} -->"
+
+
+def section(result: Result) -> str:
+    """What stands between the marks."""
+    parts = [tables.markdown(table) for table in result.tables]
+    parts += [f"![{figure.title}]({PICTURES}/{picture_name(result, figure)})" for figure in result.figures]
+    return "\n\n".join([*parts, provenance(result)])
+
+
+def picture_name(result: Result, figure: Figure) -> str:
+    """The file name of a plot."""
+    return f"experiments-{result.experiment}-{figure.name}.png"
+
+
+def provenance(result: Result) -> str:
+    """Where a result comes from, in a sentence."""
+    run = result.run
+    seeds = f"seed {result.seeds[0]}" if len(result.seeds) == 1 else f"seeds {result.seeds[0]} to {result.seeds[-1]}"
+    return (
+        f"Made with {seeds} by `{run.get('command', 'a program')}` in {run.get('seconds', 0):,} s "
+        f"(package {run.get('package_version')}, server {run.get('server_version')}, Python {run.get('python')})."
+    )

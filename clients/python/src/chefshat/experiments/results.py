@@ -1,0 +1,263 @@
+"""What an experiment is given and what it hands back: settings, tables and figures as data, and the file they are kept in.
+
+Everything that is printed, drawn or put into a page is made from a `Result`, so that a file can be shown again without running
+anything. How tables and figures look is not decided here but in `tables` and `plots`.
+"""
+
+import dataclasses
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from chefshat.files import write_whole
+
+FORMAT = "chefshat-experiment-1"
+# Significant digits of the numbers in figures: more cannot be seen.
+FIGURE_DIGITS = 4
+
+# What JSON can hold.
+Json: TypeAlias = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Config:
+    """What an experiment is to do.
+
+    Attributes:
+        address: the server, "host:port".
+        seeds: one for each repetition, ascending. Experiments that need no repetition use the first.
+        quick: whether to do just enough to see that everything works, in seconds.
+        out: a folder that exists, for files beside the result: trained networks, checkpoints. Experiment 3 finds those of
+            Experiment 2 there.
+    """
+
+    address: str
+    seeds: tuple[int, ...]
+    quick: bool
+    out: Path
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A figure with its uncertainty: an interval, or the least and the most of several runs.
+
+    Attributes:
+        value: the figure; a share is 0..=1.
+        low: lower end; None if there is none.
+        high: upper end; None if there is none.
+        percent: whether it is a share, to be shown in percent.
+        digits: digits to show behind the point.
+    """
+
+    value: float
+    low: float | None = None
+    high: float | None = None
+    percent: bool = False
+    digits: int = 1
+
+
+# What a table's cell may hold; None is shown as a dash.
+Cell: TypeAlias = str | int | float | Estimate | None
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table: ours and the paper's figures side by side.
+
+    Attributes:
+        name: short name in lower case, unique within the result.
+        title: one line, saying what is counted.
+        columns: headings, with units.
+        rows: as many cells each as there are columns.
+        note: how to read it (which intervals, which spread); may be empty.
+    """
+
+    name: str
+    title: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[Cell]]
+    note: str = ""
+
+    def __post_init__(self) -> None:
+        wrong = [row for row in self.rows if len(row) != len(self.columns)]
+        if wrong:
+            raise ValueError(f"table {self.name} has {len(self.columns)} columns, but a row is {wrong[0]}")
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line of a figure, with a band around it where `low` and `high` are given. All of one length."""
+
+    label: str
+    x: Sequence[float]
+    y: Sequence[float]
+    low: Sequence[float] = ()
+    high: Sequence[float] = ()
+
+
+@dataclass(frozen=True)
+class Points:
+    """A point for each category of a panel, with a bar from low to high where given; NaN leaves a category out."""
+
+    label: str
+    y: Sequence[float]
+    low: Sequence[float] = ()
+    high: Sequence[float] = ()
+
+
+@dataclass(frozen=True)
+class Level:
+    """A horizontal dashed line, for a figure of the paper."""
+
+    label: str
+    y: float
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One system of axes: lines over numbers, or points over categories.
+
+    Attributes:
+        title: what is shown.
+        x_label: name and unit of x; may be empty over categories.
+        y_label: name and unit of y.
+        lines: lines, first to last in the order of the palette.
+        points: points over `categories`.
+        levels: horizontal lines.
+        categories: names along x, for `points`.
+        y_range: the least and the most y to show; None: what is needed.
+    """
+
+    title: str
+    x_label: str
+    y_label: str
+    lines: Sequence[Line] = ()
+    points: Sequence[Points] = ()
+    levels: Sequence[Level] = ()
+    categories: Sequence[str] = ()
+    y_range: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A picture of one or more panels, side by side (`columns` in a row).
+
+    Attributes:
+        name: short name in lower case, unique within the result: the picture becomes `EXPERIMENT-NAME.png`.
+        title: one line.
+        panels: at least one.
+        columns: panels in a row.
+    """
+
+    name: str
+    title: str
+    panels: Sequence[Panel]
+    columns: int = 2
+
+
+@dataclass(frozen=True)
+class Result:
+    """What came out of an experiment. Two runs of the same config hand back equal results; what differs from run to run is `run`.
+
+    Attributes:
+        experiment: "mechanics", "rules" or "winning".
+        title: one line.
+        seeds: those that were used.
+        quick: whether it was a quick run, whose figures say nothing.
+        settings: how it was done, as plain values: numbers of games, parameters of agents.
+        rules: the rule sets that were played, by the name of the condition, each as the JSON of chefshat.v1.RuleSet, every field
+            set.
+        tables: what is printed.
+        figures: what is drawn.
+        values: further numbers a program may want, as plain values: for instance those of every seed.
+        run: filled in by the command: package and server version, command, seconds.
+    """
+
+    experiment: str
+    title: str
+    seeds: Sequence[int]
+    quick: bool
+    settings: Json
+    rules: Mapping[str, Json]
+    tables: Sequence[Table]
+    figures: Sequence[Figure]
+    values: Json = field(default_factory=dict)
+    run: Json = field(default_factory=dict)
+
+
+def as_json(result: Result) -> dict[str, Any]:
+    """The result as plain values that JSON can hold."""
+    plain = dataclasses.asdict(result)
+    plain["tables"] = [
+        {**table_plain, "rows": [[_cell(cell) for cell in row] for row in table.rows]}
+        for table_plain, table in zip(plain["tables"], result.tables, strict=True)
+    ]
+    plain["figures"] = _rounded(plain["figures"])
+    # Through JSON and back, so that a result is the same whether it was just made or read from its file.
+    plain = json.loads(json.dumps({"format": FORMAT, **plain}))
+    return dict(plain)
+
+
+def from_json(plain: Json) -> Result:
+    """The result out of plain values; ValueError if they are none of ours."""
+    if plain.get("format") != FORMAT:
+        raise ValueError(f"not a results file of this version ({FORMAT})")
+    try:
+        tables = [
+            Table(**{**table, "rows": [[_uncell(cell) for cell in row] for row in table["rows"]]}) for table in plain["tables"]
+        ]
+        figures = [Figure(**{**figure, "panels": [_panel(panel) for panel in figure["panels"]]}) for figure in plain["figures"]]
+        rest = {key: value for key, value in plain.items() if key not in ("format", "tables", "figures")}
+        return Result(tables=tables, figures=figures, **rest)
+    except (KeyError, TypeError, AttributeError) as error:
+        raise ValueError(f"a results file with something missing or too much: {error}") from error
+
+
+def write(result: Result, path: Path) -> None:
+    """Writes the results file, whole or not at all."""
+    # A line for each field: curves have many numbers, and nobody wants a line for each of those.
+    lines = ",\n".join(f"{json.dumps(key)}: {json.dumps(value, ensure_ascii=False)}" for key, value in as_json(result).items())
+    write_whole(path, f"{{\n{lines}\n}}\n")
+
+
+def read(path: Path) -> Result:
+    """Reads a results file; OSError if it cannot be read, ValueError if it is none."""
+    return from_json(json.loads(path.read_text(encoding="utf-8")))
+
+
+def _cell(cell: Cell) -> Any:  # noqa: ANN401 - any plain value
+    return dataclasses.asdict(cell) if isinstance(cell, Estimate) else cell
+
+
+def _uncell(plain: Any) -> Cell:  # noqa: ANN401 - any plain value
+    return Estimate(**plain) if isinstance(plain, dict) else plain
+
+
+def _panel(plain: Json) -> Panel:
+    read = {
+        "lines": [Line(**line) for line in plain["lines"]],
+        "points": [Points(**_missing_as_nan(points)) for points in plain["points"]],
+        "levels": [Level(**level) for level in plain["levels"]],
+        "y_range": tuple(plain["y_range"]) if plain["y_range"] else None,
+    }
+    return Panel(**{**plain, **read})
+
+
+def _rounded(plain: Any) -> Any:  # noqa: ANN401 - any plain value
+    """Numbers with the digits that can be seen; NaN, which JSON lacks, as null."""
+    if isinstance(plain, dict):
+        return {key: _rounded(value) for key, value in plain.items()}
+    if isinstance(plain, list | tuple):
+        return [_rounded(value) for value in plain]
+    if isinstance(plain, float):
+        return None if plain != plain else float(f"{plain:.{FIGURE_DIGITS}g}")
+    return plain
+
+
+def _missing_as_nan(points: Json) -> dict[str, Any]:
+    numbers = {
+        key: [float("nan") if number is None else number for number in points[key]] for key in ("y", "low", "high") if points[key]
+    }
+    return {**points, **numbers}

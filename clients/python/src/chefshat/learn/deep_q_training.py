@@ -1,0 +1,251 @@
+"""Deep Q agents at the seats of a `VectorEnv`: what they did and what came of it, brought together and learned from, step by step.
+
+Every seat that the client plays, in every game, has an agent of its own: the agent at the k-th client seat of game g is number
+g * seats + k of the stack. Agents of different games never meet, so that repetitions of an experiment run side by side. How an
+agent decides and learns is in `deep_q`; what is counted of a Shift is the server's business.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from chefshat import pb
+from chefshat.learn import deep_q, features
+from chefshat.learn.deep_q import Agents, DeepQConfig, Transitions
+from chefshat.vector import Batch, VectorEnv
+
+Ids: TypeAlias = npt.NDArray[np.int32]
+Floats: TypeAlias = npt.NDArray[np.float32]
+Mask: TypeAlias = npt.NDArray[np.bool_]
+
+# What a Shift's statistics say of the Shift, and of each of its seats.
+OF_SHIFTS = ("starters", "pizzas", "laps", "turns", "adjudicated")
+OF_SEATS = ("places", "points", "valid", "wrong", "passes", "reward_sums")
+
+
+class LockStep:
+    """A stack of agents and, of each, the decision that nothing has come of yet.
+
+    Attributes:
+        agents: the stack. May be replaced between calls.
+    """
+
+    def __init__(self, config: DeepQConfig, agents: Agents, rows: int, *, explore: bool = True, learn: bool = True) -> None:
+        """Takes the agents over.
+
+        Args:
+            config: their hyper-parameters.
+            agents: the stack.
+            rows: the most agents that decide at a time. Calls with fewer are filled up to it.
+            explore: whether they explore.
+            learn: whether they learn.
+        """
+        self.agents = agents
+        self._config = config
+        self._rows = rows
+        self._explore = explore
+        self._learn = learn
+        number = len(agents.epsilon)
+        self._states = np.zeros((number, config.inputs), np.float32)
+        self._actions = np.zeros(number, np.int32)
+        self._open = np.zeros(number, np.bool_)
+
+    def end(self, ids: Ids, rewards: Floats) -> None:
+        """Tells agents that their episodes have ended, and what they were rewarded with since they decided.
+
+        Episodes of an agent that has decided nothing in them are ignored, so also a second one of the same agent.
+        """
+        ids, first = np.unique(ids, return_index=True)
+        rewards = rewards[first]
+        for begin in range(0, len(ids), self._rows):
+            part = slice(begin, begin + self._rows)
+            self._close(ids[part], rewards[part], None, None)
+
+    def decide(self, ids: Ids, rewards: Floats, states: Floats, masks: Mask, attempts: Ids) -> npt.NDArray[np.int32]:
+        """Lets agents learn from their last decisions and take their next.
+
+        Args:
+            ids: (rows,) the agents, each once, at most as many as `rows` of the constructor.
+            rewards: (rows,) since their last decision of the episode.
+            states: (rows, inputs) what they see.
+            masks: (rows, outputs) the legal actions.
+            attempts: (rows,) wrong actions at this decision so far.
+
+        Returns:
+            (rows,) the actions.
+        """
+        self._close(ids, rewards, states, masks)
+        count = len(ids)
+        padded = _filled(self._rows, states), _filled(self._rows, masks), _filled(self._rows, attempts)
+        keys, chosen = deep_q.act(self._config, self.agents, self._padded(ids), *padded, explore=self._explore)
+        self.agents = self.agents._replace(keys=keys)
+        actions: npt.NDArray[np.int32] = np.asarray(chosen)[:count]
+        self._states[ids] = states
+        self._actions[ids] = actions
+        self._open[ids] = True
+        return actions
+
+    def _close(self, ids: Ids, rewards: Floats, states: Floats | None, masks: Mask | None) -> None:
+        """Learns from the decisions of those who have one open; without a next state these were their episodes' last."""
+        rows = np.flatnonzero(self._open[ids])
+        if len(rows) == 0 or not self._learn:
+            self._open[ids] = False
+            return
+        closed = ids[rows]
+        config = self._config
+        # Without a next state there is nothing to see and nothing to do.
+        next_states = np.zeros((0, config.inputs), np.float32) if states is None else states[rows]
+        next_masks = np.zeros((0, config.outputs), np.bool_) if masks is None else masks[rows]
+        transitions = Transitions(
+            states=_filled(self._rows, self._states[closed]),
+            actions=_filled(self._rows, self._actions[closed]),
+            rewards=_filled(self._rows, rewards[rows]),
+            next_states=_filled(self._rows, next_states),
+            next_masks=_filled(self._rows, next_masks),
+            done=_filled(self._rows, np.full(len(rows), states is None)),
+        )
+        self.agents = deep_q.learn(config, self.agents, self._padded(closed), transitions)
+        self._open[ids] = False
+
+    def _padded(self, ids: Ids) -> Ids:
+        """The ids filled up with an agent that does not exist."""
+        padded = np.full(self._rows, len(self._open), np.int32)
+        padded[: len(ids)] = ids
+        return padded
+
+
+@dataclass(frozen=True)
+class Played:
+    """What was counted of each Shift. G games of S Shifts among N seats.
+
+    Attributes:
+        of_shifts: (G, S) arrays by the names in `OF_SHIFTS`.
+        of_seats: (G, S, N) arrays by the names in `OF_SEATS`.
+        rules: the rule set, every field set.
+        most_attempts: the most wrong actions that one decision of a learning agent took.
+    """
+
+    of_shifts: Mapping[str, npt.NDArray[Any]]
+    of_seats: Mapping[str, npt.NDArray[Any]]
+    rules: pb.RuleSet
+    most_attempts: int
+
+
+def play(
+    env: VectorEnv,
+    config: DeepQConfig,
+    agents: Agents,
+    *,
+    explore: bool = True,
+    learn: bool = True,
+    idle_pass_is_wrong: bool = False,
+    advance: Callable[[int], object] = lambda shifts: None,
+) -> tuple[Agents, Played]:
+    """Plays all games of an env to their ends and lets the agents learn.
+
+    Args:
+        env: fresh, with decisions "turns", episode "shift", Shift statistics, a reward scheme and as many games in all as side by
+            side, of a fixed number of Shifts. Agents without a mask need invalid "ask_again".
+        config: the agents' hyper-parameters.
+        agents: one for each client seat of each game.
+        explore: whether they explore.
+        learn: whether they learn.
+        idle_pass_is_wrong: whether passing counts as a wrong action where something else is legal. Needs invalid "ask_again".
+        advance: told how many more Shifts have ended.
+
+    Returns:
+        The agents, and what was counted.
+
+    Raises:
+        ValueError: env, config and agents do not fit each other.
+    """
+    _check(env, config, agents)
+    seats = len(env.client_seats)
+    seat_index = np.zeros(env.players, np.int32)
+    seat_index[list(env.client_seats)] = np.arange(seats)
+    stack = LockStep(config, agents, env.games, explore=explore, learn=learn)
+    log = _Log(env)
+    batch = env.reset()
+    while True:
+        advance(log.add(batch))
+        endings = batch.endings
+        if len(endings):
+            stack.end(_ids(endings.games, seat_index[endings.seats], seats), endings.rewards)
+        if batch.done:
+            return stack.agents, log.played()
+        states = features.classic(batch.observations, batch.mask_bits, faces=env.faces, hand_size=env.hand_size)
+        masks = states[:, -config.outputs :] != 0
+        actions = stack.decide(
+            _ids(batch.games, seat_index[batch.seats], seats), batch.rewards, states, masks, batch.attempts.astype(np.int32)
+        )
+        batch = env.step(_without_idle_passes(actions, masks) if idle_pass_is_wrong else actions)
+
+
+class _Log:
+    """The Shifts that have ended so far."""
+
+    def __init__(self, env: VectorEnv) -> None:
+        self._env = env
+        self._shifts = env.rules.target_shifts
+        shape = (env.games, self._shifts)
+        self._of_shifts = {name: np.zeros(shape, np.int64) for name in OF_SHIFTS}
+        self._of_seats = {name: np.zeros((*shape, env.players), np.int64) for name in OF_SEATS}
+        self._of_seats["reward_sums"] = np.zeros((*shape, env.players), np.float32)
+        self._ended = np.zeros(shape, np.bool_)
+        self._most_attempts = 0
+
+    def add(self, batch: Batch) -> int:
+        """Keeps what a batch says; returns how many Shifts have ended."""
+        if len(batch):
+            self._most_attempts = max(self._most_attempts, int(batch.attempts.max()))
+        ended = batch.shifts
+        if ended is None or len(ended) == 0:
+            return 0
+        at = (ended.games.astype(np.intp), ended.shifts.astype(np.intp) - 1)
+        for name, kept in (*self._of_shifts.items(), *self._of_seats.items()):
+            kept[at] = getattr(ended, name)
+        self._ended[at] = True
+        return len(ended)
+
+    def played(self) -> Played:
+        """All of them."""
+        if not self._ended.all():
+            raise RuntimeError(f"only {int(self._ended.sum())} of {self._ended.size} Shifts were counted")
+        return Played(self._of_shifts, self._of_seats, self._env.rules, self._most_attempts)
+
+
+def _check(env: VectorEnv, config: DeepQConfig, agents: Agents) -> None:
+    wanted = env.games * len(env.client_seats)
+    if len(agents.epsilon) != wanted:
+        raise ValueError(
+            f"{len(agents.epsilon)} agents for {env.games} games of {len(env.client_seats)} seats: {wanted} are needed"
+        )
+    width = features.classic_width(env.faces, env.hand_size)
+    if (config.inputs, config.outputs) != (width, env.turn_actions):
+        raise ValueError(
+            f"agents of {config.inputs} inputs and {config.outputs} outputs cannot play by this rule set, which needs {width} and "
+            f"{env.turn_actions}"
+        )
+    if env.rules.target_shifts < 1:
+        raise ValueError("the rule set must end the game after a number of Shifts (target_shifts)")
+
+
+def _without_idle_passes(actions: npt.NDArray[np.int32], masks: Mask) -> npt.NDArray[np.int32]:
+    """The actions, with an illegal one in place of a pass where something else is legal: the server knows what to do with it."""
+    idle = (actions == masks.shape[1] - 1) & (masks.sum(axis=1) > 1)
+    return np.where(idle, np.argmin(masks, axis=1), actions).astype(np.int32)
+
+
+def _ids(games: npt.NDArray[np.uint32], seat_index: Ids, seats: int) -> Ids:
+    ids: Ids = games.astype(np.int32) * np.int32(seats) + seat_index
+    return ids
+
+
+def _filled(rows: int, array: npt.NDArray[Any]) -> Any:  # noqa: ANN401 - a numpy array where jax's types want one of jax
+    """A copy with so many rows, those beyond the array zero."""
+    filled = np.zeros((rows, *array.shape[1:]), array.dtype)
+    filled[: len(array)] = array
+    return filled

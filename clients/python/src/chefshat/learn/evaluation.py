@@ -1,0 +1,140 @@
+"""How good a network is: one seat of it against three others, over whole games.
+
+Deals are not played again with seats rotated here: `chefshat compare` (the program) does that, and so needs far fewer Shifts for
+the same certainty. How a network decides is in `network`. The command is `python -m chefshat.learn evaluate`.
+"""
+
+import argparse
+import dataclasses
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from chefshat.errors import ChefsHatError
+from chefshat.learn import network as network_file
+from chefshat.learn.network import Network, NetworkFileError
+from chefshat.vector import Rules, Seed, VectorEnv
+
+# Games played side by side.
+SIDE_BY_SIDE = 256
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """What came out.
+
+    Attributes:
+        opponents: who held the other seats.
+        games: games played.
+        shifts: Shifts played.
+        points: points per Shift of the network's seat.
+        standard_error: of `points`; the Shifts of a game depend on each other through the roles, and are not taken for independent.
+        places: how often each place was taken, first to last.
+    """
+
+    opponents: tuple[str, ...]
+    games: int
+    shifts: int
+    points: float
+    standard_error: float
+    places: tuple[int, ...]
+
+    def __str__(self) -> str:
+        shares = " ".join(f"{100 * count / self.shifts:.1f} %" for count in self.places)
+        against = ", ".join(self.opponents)
+        points = f"{self.points:.3f} ± {self.standard_error:.3f} points per Shift against {against}"
+        return f"{points} ({self.shifts:,} Shifts in {self.games:,} games; places {shares})"
+
+
+def evaluate(
+    network: Network,
+    opponents: str | Sequence[str],
+    *,
+    games: int,
+    seed: Seed = None,
+    rules: Rules = None,
+    address: str | None = None,
+) -> Evaluation:
+    """Plays games with the network on seat 0: deals make all seats alike.
+
+    Args:
+        network: who plays; it takes the legal action with the highest output.
+        opponents: built-in agents of the other seats, one name for all or one for each.
+        games: how many games.
+        seed: where deals come from.
+        rules: the rule set.
+        address: of a server; None: one of this process's own.
+
+    Raises:
+        ChefsHatError: the server refused, or there is none.
+        ValueError: the network was trained for other sizes than the rule set's.
+    """
+    with VectorEnv(
+        address,
+        min(games, SIDE_BY_SIDE),
+        client_seats=[0],
+        opponents=opponents,
+        episode="shift",
+        skip_forced=True,
+        total_games=games,
+        seed=seed,
+        rules=rules,
+        shift_statistics=True,
+    ) as env:
+        trained_for = (network.info.players, network.info.faces, network.info.jokers)
+        if trained_for != (env.players, env.faces, env.jokers):
+            raise ValueError(
+                f"the network knows (players, faces, jokers) {trained_for}, not {(env.players, env.faces, env.jokers)}"
+            )
+        others = env.players - 1
+        names = (opponents,) * others if isinstance(opponents, str) else tuple(opponents) * (others if len(opponents) == 1 else 1)
+        batch = env.reset()
+        indices: list[npt.NDArray[np.uint64]] = []
+        points: list[npt.NDArray[np.uint32]] = []
+        places: list[npt.NDArray[np.uint8]] = []
+        while True:
+            assert batch.shifts is not None, "the environment was asked for them"
+            indices.append(batch.shifts.indices)
+            points.append(batch.shifts.points[:, 0])
+            places.append(batch.shifts.places[:, 0])
+            if batch.done:
+                break
+            batch = env.step(network.actions(batch.observations, batch.seats, batch.kinds, batch.mask_bits))
+        taken = np.bincount(np.concatenate(places), minlength=env.players + 1)[1:]
+    return summed_up(names, games, np.concatenate(indices).astype(np.intp), np.concatenate(points), taken)
+
+
+def run(options: argparse.Namespace) -> int:
+    """The command. Returns the exit code."""
+    try:
+        trained = network_file.load(options.file)
+        found = evaluate(
+            trained, options.opponents, games=options.games, seed=options.seed, rules=options.rules, address=options.address
+        )
+    except (ChefsHatError, NetworkFileError, OSError, ValueError) as error:
+        if options.json:
+            print(json.dumps({"event": "error", "reason": getattr(error, "reason", "REFUSED"), "message": str(error)}))
+        else:
+            print(f"error: {error}", file=sys.stderr)
+        return 1
+    print(json.dumps(dataclasses.asdict(found)) if options.json else found)
+    return 0
+
+
+def summed_up(
+    opponents: tuple[str, ...],
+    games: int,
+    indices: npt.NDArray[np.intp],
+    points: npt.NDArray[np.uint32],
+    taken: npt.NDArray[np.intp],
+) -> Evaluation:
+    """What came out, from the games' indices, the points of each Shift and the number of times that each place was taken."""
+    mean = float(points.mean())
+    # Points over what was to be expected of so many Shifts, summed over each game: the games are independent.
+    over = np.bincount(indices, weights=points - mean, minlength=games)
+    error = float(np.sqrt(games / max(games - 1, 1) * np.square(over).sum()) / len(points))
+    return Evaluation(opponents, games, len(points), mean, error, tuple(int(count) for count in taken))

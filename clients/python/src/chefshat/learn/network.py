@@ -1,0 +1,257 @@
+"""A trained network as a file: safetensors, small enough to be carried about, read by this package and by `chefshat` (the program).
+
+The file's tensors are `layer0.weight` (out, in), `layer0.bias` (out,), `layer1.weight` and so on, in float32 or float16; between
+layers stands max(0, x). Its metadata, all text, say what the numbers mean: `NetworkInfo`. Also here: computing the outputs with
+numpy, and the action that an agent takes by them. Training is not here, nor the state from which a training goes on.
+"""
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Literal, NamedTuple, Self, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+import safetensors
+import safetensors.numpy
+
+from chefshat import pb
+from chefshat.files import write_whole
+from chefshat.learn import features
+
+FORMAT = "chefshat-network-1"
+
+Floats = npt.NDArray[np.float32]
+Actions = npt.NDArray[np.uint16]
+
+
+class NetworkFileError(ValueError):
+    """A file is not a network of this format. The message names the file and what is wrong with it."""
+
+
+class Layer(NamedTuple):
+    """One layer: weight (out, in) and bias (out,)."""
+
+    weight: npt.NDArray[np.floating]
+    bias: npt.NDArray[np.floating]
+
+
+AnyLayer: TypeAlias = Layer | tuple[npt.NDArray[np.floating], npt.NDArray[np.floating]]
+
+
+@dataclass(frozen=True)
+class NetworkInfo:
+    """What a network's numbers mean.
+
+    Attributes:
+        input: which function of `features` makes its input.
+        output: "actions": a number for each of the A actions; "turns": for the T actions of a turn alone, other decisions are the
+            default ones.
+        output_activation: what is applied to the last layer's numbers.
+        masked: whether it was trained to choose among legal actions alone. Agents that play it do so either way.
+        players: seats of the rule set, N.
+        faces: faces of the deck, F.
+        jokers: jokers of the deck.
+        rules: the rule set it was trained by, as canonical protobuf JSON of `pb.RuleSet`.
+        name: what the agent is called.
+        trained_by: the command that trained it.
+    """
+
+    input: Literal["classic", "table"]
+    output: Literal["turns", "actions"]
+    output_activation: Literal["none", "tanh"]
+    masked: bool
+    players: int
+    faces: int
+    jokers: int
+    rules: str
+    name: str
+    trained_by: str
+
+    @property
+    def hand_size(self) -> int:
+        """Cards dealt to a hand, H."""
+        return features.dealt(self.players, self.faces, self.jokers)
+
+    @property
+    def input_width(self) -> int:
+        """Numbers of one row of features."""
+        if self.input == "classic":
+            return features.classic_width(self.faces, self.hand_size)
+        return features.table_width(self.players, self.faces)
+
+    @property
+    def output_width(self) -> int:
+        """Numbers of one row of outputs."""
+        return features.turn_actions(self.faces) if self.output == "turns" else features.num_actions(self.faces)
+
+    @classmethod
+    def of(cls, metadata: Mapping[str, str]) -> Self:
+        """Reads the metadata of a file. Raises `ValueError` saying what is missing or wrong."""
+
+        def one_of(key: str, *allowed: str) -> str:
+            value = metadata.get(key)
+            if value not in allowed:
+                raise ValueError(f"its {key} is {value!r}, not one of {', '.join(allowed)}")
+            return value
+
+        def number(key: str, low: int, high: int) -> int:
+            value = metadata.get(key, "")
+            if not (value.isascii() and value.isdigit() and low <= int(value) <= high):
+                raise ValueError(f"its {key} is {value!r}, not a number in {low}..={high}")
+            return int(value)
+
+        one_of("format", FORMAT)
+        return cls(
+            input="classic" if one_of("input", "classic", "table") == "classic" else "table",
+            output="turns" if one_of("output", "turns", "actions") == "turns" else "actions",
+            output_activation="tanh" if one_of("output_activation", "none", "tanh") == "tanh" else "none",
+            masked=one_of("masked", "true", "false") == "true",
+            players=number("players", 2, 6),
+            faces=number("faces", 4, 15),
+            jokers=number("jokers", 0, features.MAX_JOKERS),
+            rules=metadata.get("rules", ""),
+            name=metadata.get("name", ""),
+            trained_by=metadata.get("trained_by", ""),
+        )
+
+    def metadata(self) -> dict[str, str]:
+        """The metadata of a file."""
+        texts = {key: str(value) for key, value in asdict(self).items()}
+        return {"format": FORMAT, **texts, "masked": json.dumps(self.masked)}
+
+
+class Network:
+    """Layers and what they mean, computed with numpy in float32.
+
+    Attributes:
+        layers: the layers in float32, first to last.
+        info: what the numbers mean.
+    """
+
+    def __init__(self, layers: Sequence[AnyLayer], info: NetworkInfo) -> None:
+        """Raises `ValueError` if the layers do not fit each other or the meaning."""
+        self.layers = tuple(Layer(weight.astype(np.float32), bias.astype(np.float32)) for weight, bias in layers)
+        self.info = info
+        if not self.layers:
+            raise ValueError("it has no layers")
+        width = info.input_width
+        for number, (weight, bias) in enumerate(self.layers):
+            if weight.ndim != 2 or bias.ndim != 1 or weight.shape != (len(bias), width):
+                raise ValueError(f"layer {number} has weights {weight.shape} and biases {bias.shape} for {width} inputs")
+            if not (np.isfinite(weight).all() and np.isfinite(bias).all()):
+                raise ValueError(f"layer {number} has numbers that are not finite")
+            width = len(bias)
+        if width != info.output_width:
+            raise ValueError(f"its last layer has {width} outputs, not the {info.output_width} of its {info.output}")
+
+    def inputs(
+        self, observations: features.Columns, seats: features.Bytes, kinds: features.Bytes, mask_bits: features.Bytes
+    ) -> Floats:
+        """The network's input, (R, `info.input_width`) float32."""
+        info = self.info
+        if info.input == "classic":
+            return features.classic(observations, mask_bits, faces=info.faces, hand_size=info.hand_size)
+        return features.table(
+            observations, seats, kinds, mask_bits, players=info.players, faces=info.faces, hand_size=info.hand_size
+        )
+
+    def outputs(self, inputs: Floats) -> Floats:
+        """The network's output for each row of features, (R, `info.output_width`) float32."""
+        values = inputs
+        for number, (weight, bias) in enumerate(self.layers):
+            values = (np.maximum(values, 0) if number else values) @ weight.T + bias
+        return np.tanh(values) if self.info.output_activation == "tanh" else values
+
+    def actions(
+        self, observations: features.Columns, seats: features.Bytes, kinds: features.Bytes, mask_bits: features.Bytes
+    ) -> Actions:
+        """The action of each row, (R,) u16: the legal one with the highest output, the lowest index of equal ones.
+
+        Decisions that a network of output "turns" does not know are the default ones.
+        """
+        outputs = self.outputs(self.inputs(observations, seats, kinds, mask_bits))
+        chosen = best_legal(outputs, mask_bits)
+        if self.info.output == "actions":
+            return chosen
+        defaults = default_decisions(observations, kinds, mask_bits, faces=self.info.faces)
+        return np.where(kinds == pb.DECISION_KIND_TURN, chosen, defaults)
+
+
+def best_legal(outputs: Floats, mask_bits: features.Bytes) -> Actions:
+    """The legal action with the highest output, the lowest index of equal ones: (R,) u16; 0 where none of the outputs is legal."""
+    legal = np.unpackbits(mask_bits, axis=1, count=outputs.shape[1], bitorder="little").view(np.bool_)
+    best: Actions = np.argmax(np.where(legal, outputs, -np.inf), axis=1).astype(np.uint16)
+    return best
+
+
+def default_decisions(observations: features.Columns, kinds: features.Bytes, mask_bits: features.Bytes, *, faces: int) -> Actions:
+    """The default decision of each row, (R,) u16.
+
+    At a turn a pass; in the exchange the highest plain face, else the Golden card, else a joker; of special actions none. Where
+    that is not legal, the legal action with the lowest index.
+    """
+    turns = features.turn_actions(faces)
+    plain = observations.hands.copy()
+    plain[:, faces - 1] -= observations.golden
+    # Ascending in preference: joker, Golden card, faces 1..F.
+    holds = np.column_stack([observations.hands[:, faces], observations.golden, plain[:, :faces]]) > 0
+    gift = np.append([turns + faces, turns + faces - 1], turns + np.arange(faces))
+    preferred = gift[holds.shape[1] - 1 - np.argmax(holds[:, ::-1], axis=1)]
+    wanted = np.select(
+        [kinds == pb.DECISION_KIND_TURN, kinds == pb.DECISION_KIND_EXCHANGE],
+        [np.full(len(kinds), turns - 1), preferred],
+        turns + faces + 1,
+    )
+    legal = np.unpackbits(mask_bits, axis=1, count=features.num_actions(faces), bitorder="little").view(np.bool_)
+    allowed = np.take_along_axis(legal, wanted[:, np.newaxis], axis=1)[:, 0]
+    decisions: Actions = np.where(allowed, wanted, np.argmax(legal, axis=1)).astype(np.uint16)
+    return decisions
+
+
+def save(
+    path: str | os.PathLike[str],
+    layers: Sequence[AnyLayer],
+    info: NetworkInfo,
+    *,
+    dtype: type[np.float16] | type[np.float32] = np.float32,
+) -> None:
+    """Writes a network to a file, whole or not at all.
+
+    Args:
+        path: where to; what stands there is replaced.
+        layers: (weight, bias) of each layer, first to last.
+        info: what the numbers mean.
+        dtype: how the numbers are kept.
+
+    Raises:
+        ValueError: the layers do not fit each other or the meaning, or hold numbers that `dtype` cannot.
+        OSError: it could not be written.
+    """
+    tensors: dict[str, npt.NDArray[np.floating]] = {}
+    for number, (weight, bias) in enumerate(Network(layers, info).layers):
+        # A number that is too large becomes infinite, which is refused below in words.
+        with np.errstate(over="ignore"):
+            tensors[f"layer{number}.weight"], tensors[f"layer{number}.bias"] = weight.astype(dtype), bias.astype(dtype)
+    if not all(np.isfinite(tensor).all() for tensor in tensors.values()):
+        raise ValueError(f"its weights are too large for {dtype.__name__}")
+    write_whole(path, safetensors.numpy.save(tensors, metadata=info.metadata()))
+
+
+def load(path: str | os.PathLike[str]) -> Network:
+    """Reads a network from a file. Raises `NetworkFileError` if it is not one, `OSError` if it cannot be read."""
+    with open(path, "rb"):
+        pass  # What cannot be read is an OSError in its own words, not safetensors'.
+    try:
+        with safetensors.safe_open(path, framework="np") as file:
+            info = NetworkInfo.of(file.metadata() or {})
+            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 (it is not a mapping)
+        layers = [Layer(tensors[f"layer{number}.weight"], tensors[f"layer{number}.bias"]) for number in range(len(tensors) // 2)]
+        if len(tensors) % 2 or any(tensor.dtype not in (np.float16, np.float32) for tensor in tensors.values()):
+            raise ValueError("its tensors are not pairs of weight and bias in float16 or float32")
+        return Network(layers, info)
+    except KeyError as missing:
+        raise NetworkFileError(f"{os.fspath(path)} is no network: it has no tensor {missing}") from missing
+    except (ValueError, safetensors.SafetensorError) as error:
+        raise NetworkFileError(f"{os.fspath(path)} is no network: {error}") from error

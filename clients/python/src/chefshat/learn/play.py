@@ -1,0 +1,94 @@
+"""An agent that plays by a network from a file, in any room of a server whose rule set has the sizes it was trained for.
+
+It takes the legal action with the highest output, and the default decision where the network has no say; so it never takes a wrong
+action, however it was trained. The command `python -m chefshat.learn play` joins a room with it.
+"""
+
+import argparse
+import json
+import sys
+
+import numpy as np
+import numpy.typing as npt
+
+import chefshat
+from chefshat import Agent, Decision, SeatInfo, agent
+from chefshat.errors import ChefsHatError
+from chefshat.learn import network
+from chefshat.learn.network import Network, NetworkFileError
+
+# Points above this are shown as this in columns.
+MAX_SHOWN = 2**32 - 1
+
+
+class RulesDoNotFit(ValueError):
+    """A network was trained for other numbers of players, faces or jokers than those of the game. The message names both."""
+
+
+class NetworkAgent(Agent):
+    """Plays one seat by a network."""
+
+    def __init__(self, network: Network) -> None:
+        self._network = network
+
+    def on_attached(self, seat: SeatInfo) -> None:
+        """Looks whether the network knows such games, if the game has begun; else the first decision does."""
+        if seat.game_started is not None:
+            self._check(seat)
+
+    def decide(self, request: Decision) -> int:
+        """The legal action with the highest output."""
+        self._check(request.seat_info)
+        kinds = np.array([request.kind], np.uint8)
+        seats = np.array([request.seat], np.uint8)
+        mask_bits = np.frombuffer(request.mask_bytes, np.uint8)[np.newaxis]
+        return int(self._network.actions(Row(request), seats, kinds, mask_bits)[0])
+
+    def _check(self, seat: SeatInfo) -> None:
+        if seat.game_started is None:
+            return
+        rules, info = seat.game_started.rules, self._network.info
+        if (rules.players, rules.faces, rules.jokers) != (info.players, info.faces, info.jokers):
+            raise RulesDoNotFit(
+                f"the network {info.name!r} plays with {info.players} players, {info.faces} faces and {info.jokers} jokers; this "
+                f"game has {rules.players}, {rules.faces} and {rules.jokers}"
+            )
+
+
+class Row:
+    """The observation of one decision as columns of one row, as `features` takes them."""
+
+    def __init__(self, request: Decision) -> None:
+        none = np.zeros(request.faces + 1, np.uint8)
+        self.pizzas = np.array([request.pizza], np.uint32)
+        self.hands = _row(request.hand)
+        self.golden = np.array([request.golden], np.uint8)
+        self.boards = np.array([[request.board_face, request.board_size, request.board_jokers]], np.uint8)
+        self.cards_left = _row(request.cards_left)
+        self.passed = _row(request.passed)
+        self.places = _row(request.places)
+        self.roles = _row(request.roles)
+        self.points = np.minimum(request.points, MAX_SHOWN).astype(np.uint32)[np.newaxis]
+        self.played = _row(request.played)
+        # Nothing given or received is left out of the message.
+        self.gave = _row(request.gave if len(request.gave) else none)
+        self.received = _row(request.received if len(request.received) else none)
+
+
+def run(options: argparse.Namespace) -> int:
+    """The command: joins a room, plays one game, prints the standings. Returns the exit code."""
+    try:
+        player = NetworkAgent(network.load(options.file))
+        result = chefshat.play(player, options.address, join_code=options.join_code, name=options.name, seat=options.seat)
+    except (ChefsHatError, NetworkFileError, RulesDoNotFit, OSError) as error:
+        if options.json:
+            print(json.dumps({"event": "error", "reason": getattr(error, "reason", "REFUSED"), "message": str(error)}))
+        else:
+            print(f"error: {error}", file=sys.stderr)
+        return 1
+    print(json.dumps(agent.as_json(result)) if options.json else agent.as_table(result), flush=True)
+    return 0 if result.finished else 1
+
+
+def _row(values: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
+    return values[np.newaxis]

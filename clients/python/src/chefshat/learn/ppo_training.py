@@ -1,0 +1,109 @@
+"""Training by self-play: games are played, what happened is learned from, again and again.
+
+The policy that is trained holds every seat of most games, and one seat against built-in agents in some if the plan says so. How
+games are played for it is in `self_play`, how it learns in `ppo`; files are in `ppo_checkpoint`, the command in `ppo_command`.
+"""
+
+import dataclasses
+import itertools
+import time
+from collections.abc import Sequence
+from typing import Any, Self
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import numpy.typing as npt
+
+from chefshat.learn import ppo
+from chefshat.learn.ppo import Params, Samples
+from chefshat.learn.ppo_checkpoint import Plan, Progress, Training
+from chefshat.learn.self_play import Collector, Floats, advantages
+from chefshat.vector import VectorEnv
+
+# Base seeds of one training are apart by this much, one for each time it goes on.
+SEED_STEP = 2**32
+
+
+class Trainer:
+    """A training at work; a context manager, whose games end with it."""
+
+    def __init__(self, training: Training, *, address: str | None = None) -> None:
+        """Begins the games. Raises `ChefsHatError` if there is no server for them or it refuses."""
+        plan = training.plan
+        runs = training.progress.runs + 1
+        self.training = dataclasses.replace(training, progress=dataclasses.replace(training.progress, runs=runs))
+        first_seed = training.seed + SEED_STEP * runs
+        kinds: list[tuple[int, dict[str, Any]]] = [(plan.games, {})]
+        if plan.opponent_games:
+            kinds.append((plan.opponent_games, {"client_seats": [0], "opponents": plan.opponents}))
+        self._envs: list[VectorEnv] = []
+        self._collectors: list[Collector] = []
+        try:
+            for number, (games, others) in enumerate(kinds):
+                settings = {"episode": "shift", "skip_forced": True, "rules": training.rules, **others}
+                # Seeds of trainings are below 2^31, so no two environments share one.
+                self._envs.append(VectorEnv(address, games, seed=first_seed + SEED_STEP // 2 * number, **settings))
+                self._collectors.append(Collector(self._envs[-1], games, plan.steps))
+        except BaseException:
+            self.close()
+            raise
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Ends the games."""
+        for env in self._envs:
+            env.close()
+
+    def update(self, done: float) -> dict[str, float]:
+        """Plays and learns once. Returns means of the last epoch by name.
+
+        Args:
+            done: share of the training that is done, 0..=1, on which the learning rate and the entropy bonus depend.
+        """
+        began = time.monotonic()
+        plan, learner = self.training.plan, self.training.learner
+        before = sum(collector.decisions for collector in self._collectors)
+        key, *chances = jax.random.split(learner.key, 1 + len(self._collectors))
+        parts = [play(collector, learner.params, chance, plan) for collector, chance in zip(self._collectors, chances, strict=True)]
+        samples, learner = joined(parts), learner._replace(key=key)
+        learning_rate = jnp.float32(plan.learning_rate * (1 - 0.95 * done))
+        entropy_bonus = jnp.float32(plan.entropy_bonus * (1 - 0.9 * done))
+        for _ in range(plan.epochs):
+            learner, losses = ppo.learn(learner, samples, learning_rate, entropy_bonus, plan.hyper)
+        told = {name: float(value) for name, value in losses._asdict().items()}
+        progress = self.training.progress
+        decisions = sum(collector.decisions for collector in self._collectors) - before
+        progress = Progress(
+            progress.updates + 1, progress.decisions + decisions, progress.seconds + time.monotonic() - began, progress.runs
+        )
+        self.training = dataclasses.replace(self.training, learner=learner, progress=progress)
+        return told
+
+
+def play(collector: Collector, params: Params, chance: jax.Array, plan: Plan) -> Samples:
+    """Plays `plan.steps` batches. Returns what is to be learned from: numpy arrays, good until the collector plays again."""
+    numbers = itertools.count()
+
+    def act(inputs: Floats) -> tuple[npt.NDArray[np.int32], Floats, Floats]:
+        actions, log_probabilities, values = ppo.act(params, jax.random.fold_in(chance, next(numbers)), inputs)
+        return np.asarray(actions), np.asarray(log_probabilities), np.asarray(values)
+
+    rollout = collector.collect(act)
+    gains, known = advantages(rollout, collector.players, discount=plan.discount, trace=plan.trace)
+    returns, weights = gains + rollout.values, known.astype(np.float32)
+    columns: list[Any] = [rollout.inputs, rollout.actions, rollout.log_probabilities, gains, returns, weights]
+    return Samples(*(column.reshape(-1, *column.shape[2:]) for column in columns))
+
+
+def joined(parts: Sequence[Samples]) -> Samples:
+    """All of them, as numpy arrays, with advantages of mean 0 and deviation 1."""
+    columns: list[Any] = [np.concatenate(column) if len(parts) > 1 else column[0] for column in zip(*parts, strict=True)]
+    samples = Samples(*columns)
+    counted = samples.advantages[samples.weights > 0]
+    return samples._replace(advantages=(samples.advantages - counted.mean()) / (counted.std() + 1e-8))

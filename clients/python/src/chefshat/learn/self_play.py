@@ -1,0 +1,167 @@
+"""Playing to learn: one policy on all of a client's seats in many games, and what each of its decisions turned out to be worth.
+
+An episode is a Shift. A seat's decisions in it form a chain of their own; the reward comes once, at the end of the Shift,
+from the place taken. How a policy acts and learns is not here (see `ppo`).
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from chefshat.learn import features
+from chefshat.vector import Batch, VectorEnv
+
+Floats: TypeAlias = npt.NDArray[np.float32]
+# Features (n, width) to actions, their log-probabilities and values, each (n,).
+Act: TypeAlias = Callable[[Floats], tuple[npt.NDArray[np.integer], Floats, Floats]]
+
+
+@dataclass(frozen=True)
+class Ends:
+    """Chains that ended between two batches, in the order in which they did.
+
+    Attributes:
+        games: (E,) the game.
+        seats: (E,) the seat.
+        rewards: (E,) what the place was worth.
+    """
+
+    games: npt.NDArray[np.uint32]
+    seats: npt.NDArray[np.uint8]
+    rewards: Floats
+
+
+@dataclass(frozen=True)
+class Rollout:
+    """`steps` batches of n games. The arrays are used again for the next rollout.
+
+    Attributes:
+        inputs: (steps, n, width) features; 1 where a row has never been present.
+        actions: (steps, n) what was decided.
+        log_probabilities: (steps, n) of that.
+        values: (steps, n) what the value network said.
+        seats: (steps, n) who decided.
+        present: (steps, n) whether the game waited for the client at all.
+        ends: for each step, what ended after its decisions and before the next ones.
+    """
+
+    inputs: Floats
+    actions: npt.NDArray[np.int32]
+    log_probabilities: Floats
+    values: Floats
+    seats: npt.NDArray[np.uint8]
+    present: npt.NDArray[np.bool_]
+    ends: list[Ends]
+
+
+def place_rewards(points: Sequence[int]) -> Floats:
+    """What a place is worth, by place from 0: its points less the mean of all, divided by those of the first. They add up to 0."""
+    worth = np.array(points, np.float64)
+    worth -= worth.mean()
+    return np.array(worth / points[0], np.float32)
+
+
+class Collector:
+    """Plays on where it stopped and keeps what happened, `steps` batches at a time.
+
+    Its environment has episodes of a Shift, asks for all decisions and leaves out forced ones.
+    """
+
+    def __init__(self, env: VectorEnv, games: int, steps: int) -> None:
+        """Begins with the environment's first batch."""
+        self._env = env
+        self._batch: Batch = env.reset()
+        self._rewards = place_rewards(env.rules.points)
+        width = features.table_width(env.players, env.faces)
+        shape = (steps, games)
+        self._rollout = Rollout(
+            # A row that has no legal action has no probabilities: padding may do anything.
+            inputs=np.ones((*shape, width), np.float32),
+            actions=np.zeros(shape, np.int32),
+            log_probabilities=np.zeros(shape, np.float32),
+            values=np.zeros(shape, np.float32),
+            seats=np.zeros(shape, np.uint8),
+            present=np.zeros(shape, np.bool_),
+            ends=[],
+        )
+        self._rows = np.empty((games, width), np.float32)
+        #: Seats of a game.
+        self.players = env.players
+        #: Decisions taken since the beginning.
+        self.decisions = 0
+
+    def collect(self, act: Act) -> Rollout:
+        """Plays. What it returns is good until the next call."""
+        rollout = self._rollout
+        rollout.ends.clear()
+        for step in range(len(rollout.actions)):
+            batch = self._batch
+            rows = batch.games
+            inputs = rollout.inputs[step]
+            inputs[rows] = self._features(batch, self._rows[: len(batch)])
+            actions, rollout.log_probabilities[step], rollout.values[step] = act(inputs)
+            rollout.actions[step] = actions
+            rollout.present[step] = False
+            rollout.present[step, rows] = True
+            rollout.seats[step, rows] = batch.seats
+            self._batch = self._env.step(rollout.actions[step, rows])
+            self.decisions += len(rows)
+            rollout.ends.append(self._ends(self._batch))
+        return rollout
+
+    def _features(self, batch: Batch, out: Floats) -> Floats:
+        env = self._env
+        return features.table(
+            batch.observations,
+            batch.seats,
+            batch.kinds,
+            batch.mask_bits,
+            players=env.players,
+            faces=env.faces,
+            hand_size=env.hand_size,
+            out=out,
+        )
+
+    def _ends(self, batch: Batch) -> Ends:
+        endings = batch.endings
+        return Ends(endings.games, endings.seats, self._rewards[endings.places_taken.astype(np.intp) - 1])
+
+
+def advantages(rollout: Rollout, players: int, *, discount: float, trace: float) -> tuple[Floats, npt.NDArray[np.bool_]]:
+    """How much better than expected each decision turned out, by generalised advantage estimation along the seat's own chain.
+
+    Args:
+        rollout: what was played.
+        players: seats of a game.
+        discount: what a decision later is worth, gamma.
+        trace: how far what came later is believed rather than the value network, lambda.
+
+    Returns:
+        (steps, n) advantages; (steps, n) whether they are known: not that of the last decision in a chain that goes on after the
+        rollout. Its value is what those before it lead to.
+    """
+    shape = rollout.values.shape
+    result, known = np.zeros(shape, np.float32), np.zeros(shape, np.bool_)
+    # What follows the decision looked at, for each game and seat.
+    reward, value, advantage = (np.zeros((shape[1], players), np.float32) for _ in range(3))
+    follows = np.zeros((shape[1], players), np.bool_)
+    for step in reversed(range(shape[0])):
+        ends = rollout.ends[step]
+        # Of several ends of a seat the first is that of its last decision's chain; `unique` finds the first ones.
+        _, first = np.unique(ends.games.astype(np.intp) * players + ends.seats, return_index=True)
+        ended = (ends.games[first], ends.seats[first])
+        reward[ended] = ends.rewards[first]
+        value[ended] = advantage[ended] = 0
+        follows[ended] = True
+
+        games = np.flatnonzero(rollout.present[step])
+        here = (games, rollout.seats[step, games])
+        values = rollout.values[step, games]
+        known[step, games] = follows[here]
+        error = reward[here] + discount * value[here] - values
+        result[step, games] = np.where(follows[here], error + discount * trace * advantage[here], 0)
+        reward[here], value[here], advantage[here], follows[here] = 0, values, result[step, games], True
+    return result, known

@@ -1,0 +1,175 @@
+"""The command `python -m chefshat.learn tune`: looks for good hyper-parameters of the Deep Q agent by TPE, as the 2020 paper did.
+
+Every trial trains a few agents, each in a game of its own, with one set of parameters; what counts is the mean, over the agents, of
+what they do in the second half of their Shifts. The tree-structured Parzen estimator proposes the next set. The file of results is
+written after every trial, so an interrupted run keeps what it has found.
+"""
+
+import argparse
+import dataclasses
+import json
+import sys
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import optuna
+from tqdm import tqdm
+
+from chefshat.errors import ChefsHatError
+from chefshat.files import write_whole
+from chefshat.learn import deep_q, deep_q_training
+from chefshat.learn.deep_q import DeepQConfig
+from chefshat.learn.deep_q_training import Played
+from chefshat.vector import VectorEnv
+
+FORMAT = "chefshat-tune-1"
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One set of parameters and what came of it.
+
+    Attributes:
+        number: from 0.
+        parameters: those that were looked for, by the names of `DeepQConfig`.
+        value: what was to be made as large as possible: the mean over the agents.
+        least: the least of the agents.
+        most: the most of them.
+    """
+
+    number: int
+    parameters: dict[str, Any]
+    value: float
+    least: float
+    most: float
+
+
+def run(options: argparse.Namespace) -> int:
+    """The command. Returns the exit code."""
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    study = optuna.create_study(direction="maximize", sampler=optuna.samplers.TPESampler(seed=options.seed))
+    # The paper's own parameters are tried first: what is found is then never worse than they are in this measure.
+    study.enqueue_trial(_as_proposed(DeepQConfig()))
+    trials: list[Trial] = []
+    try:
+        with tqdm(total=options.trials, unit=" trials", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar:
+            for _ in range(options.trials):
+                asked = study.ask()
+                config = dataclasses.replace(_proposed(asked), mask=options.mask)
+                values = evaluate(options, config)
+                study.tell(asked, float(np.mean(values)))
+                trials.append(
+                    Trial(asked.number, _looked_for(config), float(np.mean(values)), float(np.min(values)), float(np.max(values)))
+                )
+                write_whole(options.out, json.dumps(_as_json(options, trials), indent=1) + "\n")
+                bar.update()
+                bar.set_postfix(best=f"{best(trials).value:.3f}")
+    except (ChefsHatError, OSError, ValueError) as error:
+        if options.json:
+            print(json.dumps({"event": "error", "reason": getattr(error, "reason", "REFUSED"), "message": str(error)}))
+        else:
+            print(f"error: {error}", file=sys.stderr)
+        return 1
+    if options.json:
+        print(json.dumps({"event": "tuned", "file": str(options.out), **_as_json(options, trials)}))
+    else:
+        print(as_table(trials, goal(options)))
+        print(f"written: {options.out}; train with them: python -m chefshat.learn deep-q --parameters {options.out} --out FILE")
+    return 0
+
+
+def evaluate(options: argparse.Namespace, config: DeepQConfig) -> list[float]:
+    """Trains agents with these parameters; what each of them achieved in the second half of its Shifts, 0..=1."""
+    seeds = [options.seed + number for number in range(options.agents)]
+    env = VectorEnv(
+        options.address,
+        len(seeds),
+        client_seats=[0],
+        opponents=options.opponents,
+        rewards=options.rewards,
+        episode="shift",
+        decisions="turns",
+        invalid="ask_again",
+        total_games=len(seeds),
+        seed=options.seed,
+        rules={"preset": "paper", "target_shifts": options.shifts},
+        shift_statistics=True,
+    )
+    with env:
+        _, played = deep_q_training.play(env, config, deep_q.start(config, seeds))
+    return achieved(options, played)
+
+
+def achieved(options: argparse.Namespace, played: Played) -> list[float]:
+    """What counts, by agent: the share of valid actions if they learn what is valid, else the share of Shifts won."""
+    second = slice(options.shifts // 2, None)
+    seats = {name: counted[:, second, 0] for name, counted in played.of_seats.items()}
+    if options.rewards == "validity":
+        valid, wrong = seats["valid"].sum(axis=1), seats["wrong"].sum(axis=1)
+        return [float(share) for share in valid / (valid + wrong)]
+    return [float(share) for share in (seats["places"] == 1).mean(axis=1)]
+
+
+def goal(options: argparse.Namespace) -> str:
+    """What counts, in words."""
+    return "valid actions" if options.rewards == "validity" else "Shifts won"
+
+
+def best(trials: list[Trial]) -> Trial:
+    """The trial with the highest value, the first of equal ones."""
+    return max(trials, key=lambda trial: trial.value)
+
+
+def as_table(trials: list[Trial], what: str) -> str:
+    """The trials for people, the best first."""
+    names = list(trials[0].parameters)
+    rows = [["trial", what, "least to most", *names]]
+    for trial in sorted(trials, key=lambda trial: -trial.value):
+        shown = [f"{value:.3g}" if isinstance(value, float) else str(value) for value in trial.parameters.values()]
+        rows.append([str(trial.number), f"{trial.value:.1%}", f"{trial.least:.1%} to {trial.most:.1%}", *shown])
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    lines = ["  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in rows]
+    return "\n".join([lines[0], "─" * len(lines[0]), *lines[1:], "", "Trial 0 has the paper's parameters."])
+
+
+def _proposed(trial: optuna.Trial) -> DeepQConfig:
+    """The parameters that the estimator proposes."""
+    return DeepQConfig(
+        hidden=(
+            trial.suggest_categorical("first_layer", [64, 128, 256]),
+            trial.suggest_categorical("second_layer", [64, 128, 256]),
+        ),
+        batch_size=trial.suggest_categorical("batch_size", [16, 32, 64, 128]),
+        memory_size=trial.suggest_categorical("memory_size", [1_000, 2_000, 5_000, 20_000]),
+        discount=trial.suggest_float("discount", 0.5, 0.99),
+        learning_rate=trial.suggest_float("learning_rate", 1e-4, 1e-2, log=True),
+        epsilon_decay=trial.suggest_float("epsilon_decay", 0.98, 0.9995),
+        epsilon_end=trial.suggest_float("epsilon_end", 0.01, 0.2),
+        target_every=trial.suggest_int("target_every", 10, 1_000, log=True),
+    )
+
+
+def _as_proposed(config: DeepQConfig) -> dict[str, Any]:
+    """Parameters under the names that `_proposed` asks for."""
+    found = _looked_for(config)
+    found["first_layer"], found["second_layer"] = found.pop("hidden")
+    return found
+
+
+def _looked_for(config: DeepQConfig) -> dict[str, Any]:
+    """Those parameters of a config that are looked for."""
+    names = ("hidden", "batch_size", "memory_size", "discount", "learning_rate", "epsilon_decay", "epsilon_end", "target_every")
+    return {name: getattr(config, name) for name in names}
+
+
+def _as_json(options: argparse.Namespace, trials: list[Trial]) -> dict[str, Any]:
+    return {
+        "format": FORMAT,
+        "command": options.trained_by,
+        "goal": goal(options),
+        "best": best(trials).number,
+        # Under this name `deep-q --parameters` finds them.
+        "parameters": best(trials).parameters,
+        "trials": [dataclasses.asdict(trial) for trial in trials],
+    }

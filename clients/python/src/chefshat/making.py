@@ -1,0 +1,49 @@
+"""`make`: one door to all environments. What they are is in `vector` and `envs`."""
+
+# ruff: noqa: ANN401 - The options are those of what is made.
+import importlib
+from typing import TYPE_CHECKING, Any, Literal, overload
+
+from chefshat.vector import VectorEnv
+
+if TYPE_CHECKING:
+    from pettingzoo import AECEnv
+
+    from chefshat.envs import ChefsHatEnv, ChefsHatVectorEnv
+
+# The kinds that need the extra `envs`, by module and name.
+_KINDS = {
+    "gymnasium": ("chefshat.envs", "ChefsHatEnv"),
+    "gymnasium_vector": ("chefshat.envs", "ChefsHatVectorEnv"),
+    "pettingzoo": ("chefshat.envs.chefshat_v1", "env"),
+}
+
+
+@overload
+def make(kind: Literal["gymnasium"] = ..., **options: Any) -> "ChefsHatEnv": ...
+@overload
+def make(kind: Literal["gymnasium_vector"], **options: Any) -> "ChefsHatVectorEnv": ...
+@overload
+def make(kind: Literal["vector"], **options: Any) -> VectorEnv: ...
+@overload
+def make(kind: Literal["pettingzoo"], **options: Any) -> "AECEnv[str, Any, Any]": ...
+@overload
+def make(kind: str, **options: Any) -> Any: ...
+def make(kind: str = "gymnasium", **options: Any) -> Any:
+    """Makes an environment. Without an `address` it plays on a server of this process's own, which is started if need be.
+
+    Args:
+        kind: "gymnasium": `envs.ChefsHatEnv`, one seat against built-in agents; "gymnasium_vector": `envs.ChefsHatVectorEnv`, the
+            same many times; "vector": `VectorEnv`, columns of any seats of many games; "pettingzoo": `envs.chefshat_v1`, all seats.
+        options: what that environment takes, for instance `address`, `opponents`, `rewards`, `observation`, `rules`, `seed`.
+
+    Raises:
+        ImportError: the kind needs the extra `envs`.
+        ChefsHatError: there is no server: the message says what to do about it.
+    """
+    if kind == "vector":
+        return VectorEnv(**options)
+    if kind not in _KINDS:
+        raise ValueError(f"kind={kind!r}: choose one of {', '.join(map(repr, [*_KINDS, 'vector']))}")
+    module, name = _KINDS[kind]
+    return getattr(importlib.import_module(module), name)(**options)

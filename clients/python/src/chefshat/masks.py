@@ -1,0 +1,93 @@
+"""Masks of legal actions, many at a time: bit i%8 of byte i//8 is action i. What the actions are is not here."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+# Constants of the well-known parallel count of bits in 64-bit words, by pairs, by fours, by bytes; and one in every byte.
+_PAIRS = np.uint64(0x5555555555555555)
+_FOURS = np.uint64(0x3333333333333333)
+_BYTES = np.uint64(0x0F0F0F0F0F0F0F0F)
+_ONES = np.uint64(0x0101010101010101)
+_TOPS = np.uint64(0x8080808080808080)
+
+
+def _positions() -> NDArray[np.uint16]:
+    """For a byte b and a number k, at b * 8 + k: the position of the k-th of its set bits, from 0; 0 if it has not so many."""
+    table = np.zeros((256, 8), np.uint16)
+    for byte in range(256):
+        bits = [bit for bit in range(8) if byte >> bit & 1]
+        table[byte, : len(bits)] = bits
+    return table.reshape(-1)
+
+
+_POSITIONS = _positions()
+
+
+def unpack(mask_bits: NDArray[np.uint8], num_actions: int) -> NDArray[np.bool_]:
+    """The masks as booleans.
+
+    Args:
+        mask_bits: (R, ceil(A/8)).
+        num_actions: A.
+
+    Returns:
+        (R, A), read-only.
+    """
+    masks = np.unpackbits(mask_bits, axis=1, count=num_actions, bitorder="little").view(np.bool_)
+    masks.flags.writeable = False
+    return masks
+
+
+def is_legal(mask_bits: NDArray[np.uint8], actions: NDArray[np.integer]) -> NDArray[np.bool_]:
+    """Whether each row's action is legal by its mask: (R,)."""
+    rows = np.arange(len(mask_bits))
+    return np.asarray(mask_bits[rows, actions >> 3] >> (actions & 7).astype(np.uint8) & 1, np.bool_)
+
+
+def sample_legal(mask_bits: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.uint16]:
+    """Draws one legal action for each row, all of a row's alike likely.
+
+    Args:
+        mask_bits: (R, ceil(A/8)), at least one bit set in every row, no bit from A on.
+        rng: where chance comes from; one draw for each row.
+
+    Returns:
+        (R,): the actions.
+
+    Raises:
+        ValueError: a row has no legal action.
+    """
+    rows, width = mask_bits.shape
+    if rows == 0:
+        return np.zeros(0, np.uint16)
+    words_wide = -(-width // 8)
+    padded = np.zeros((rows, words_wide * 8), np.uint8)
+    padded[:, :width] = mask_bits
+    words = padded.view("<u8")
+    counts = np.bitwise_count(words).astype(np.uint64)
+    # Set bits up to each word, its own included.
+    upto = counts.copy()
+    for word in range(1, words_wide):
+        upto[:, word] += upto[:, word - 1]
+    total = upto[:, -1]
+    if not total.all():
+        raise ValueError(f"row {int(total.argmin())} has no legal action: nothing is decided there")
+    # The number of the bit to take, from 0; then the word it is in, and its number within that word.
+    rank = (rng.random(rows) * total).astype(np.uint64)
+    wanted = np.zeros(rows, np.intp)
+    for before in range(words_wide - 1):
+        wanted += upto[:, before] <= rank
+    at = np.arange(0, rows * words_wide, words_wide) + wanted
+    rank -= upto.reshape(-1)[at] - counts.reshape(-1)[at]
+    chosen = words.reshape(-1)[at]
+    # Byte b of `sums` counts the set bits of the bytes up to b.
+    sums = chosen - (chosen >> np.uint64(1) & _PAIRS)
+    sums = (sums & _FOURS) + (sums >> np.uint64(2) & _FOURS)
+    sums = (sums + (sums >> np.uint64(4)) & _BYTES) * _ONES
+    # Byte b of `full` has its top bit set where no more than `rank` bits are in the bytes up to b: those before the one wanted.
+    full = ((rank * _ONES | _TOPS) - sums) & _TOPS
+    shift = np.bitwise_count(full).astype(np.uint64) << np.uint64(3)
+    rank -= (sums << np.uint64(8)) >> shift & np.uint64(0xFF)
+    byte = chosen >> shift & np.uint64(0xFF)
+    within = _POSITIONS[(byte << np.uint64(3) | rank).astype(np.intp)]
+    return np.asarray((wanted << 6) + shift.astype(np.intp) + within, np.uint16)

@@ -1,0 +1,184 @@
+"""The table of decisions of a dataset, read from Parquet, JSON Lines or CSV, and its columns as numpy arrays.
+
+What the columns mean is in docs/datasets.md. Nothing is made of them here (see `recorded`).
+"""
+
+import csv
+import json
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+TABLE = "decisions"
+# By preference.
+SUFFIXES = (".parquet", ".jsonl", ".csv")
+
+
+class Decisions(ABC):
+    """The table; R is the number of its rows."""
+
+    rows: int
+
+    @abstractmethod
+    def numbers(self, name: str, dtype: DTypeLike) -> NDArray[Any]:
+        """A column of numbers or booleans, (R,); null is 0."""
+
+    @abstractmethod
+    def lists(self, name: str, width: int, dtype: DTypeLike) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+        """A column of lists of one length, (R, width), and where it is known, (R,); null is zeros."""
+
+    @abstractmethod
+    def ragged(self, name: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """A column of lists of any length: their items one after the other, and their lengths, (R,)."""
+
+    @abstractmethod
+    def packed(self, name: str, width: int) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
+        """A column of bytes of one length, (R, width), and where it is known, (R,)."""
+
+    @abstractmethod
+    def texts(self, name: str) -> NDArray[np.str_]:
+        """A column of texts, (R,); null is empty."""
+
+
+def read(path: Path) -> Decisions:
+    """Reads a table: the file, or the best there is in a dataset's folder.
+
+    Raises:
+        FileNotFoundError: there is no table of decisions.
+        ImportError: it is a Parquet file, and pyarrow is not installed.
+        ValueError: it is no table of decisions.
+    """
+    file = _file_of(path)
+    columns = _Arrow(file) if file.suffix == ".parquet" else _Rows(file)
+    return columns
+
+
+def _file_of(path: Path) -> Path:
+    if path.is_file():
+        if path.suffix not in SUFFIXES:
+            raise ValueError(f"{path} is none of {', '.join(SUFFIXES)}: give a dataset made by `chefshat export`")
+        return path
+    found = [path / f"{TABLE}{suffix}" for suffix in SUFFIXES if (path / f"{TABLE}{suffix}").is_file()]
+    if not found:
+        raise FileNotFoundError(f"{path} has no table of decisions: make a dataset with `chefshat export`, and give its folder")
+    if found[0].suffix == ".parquet" and len(found) > 1 and not has_pyarrow():
+        return found[1]
+    return found[0]
+
+
+def has_pyarrow() -> bool:
+    """Whether Parquet can be read."""
+    try:
+        import pyarrow.parquet  # noqa: F401
+    except ImportError:
+        return False
+    return True
+
+
+class _Arrow(Decisions):
+    """A Parquet file."""
+
+    def __init__(self, file: Path) -> None:
+        try:
+            import pyarrow.parquet
+        except ImportError as error:
+            hint = "pip install pyarrow, or export with --format jsonl"
+            raise ImportError(f"{file} is a Parquet file, which pyarrow reads: {hint}") from error
+        self._file = file
+        self._table = pyarrow.parquet.read_table(file)
+        self.rows = self._table.num_rows
+
+    def _column(self, name: str) -> Any:  # noqa: ANN401 - pyarrow has no types.
+        if name not in self._table.column_names:
+            raise _lacks(self._file, name)
+        column = self._table.column(name)
+        return column.combine_chunks() if column.num_chunks != 1 else column.chunk(0)
+
+    def numbers(self, name: str, dtype: DTypeLike) -> NDArray[Any]:
+        column = self._column(name)
+        filled = column.fill_null(False) if str(column.type) == "bool" else column.fill_null(0)
+        return np.asarray(filled.to_numpy(zero_copy_only=False)).astype(dtype)
+
+    def lists(self, name: str, width: int, dtype: DTypeLike) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+        column = self._column(name)
+        known = np.asarray(column.is_valid().to_numpy(zero_copy_only=False), np.bool_)
+        return _filled(known, column.flatten().to_numpy(zero_copy_only=False), width, dtype), known
+
+    def ragged(self, name: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        column = self._column(name)
+        lengths = column.value_lengths().fill_null(0).to_numpy(zero_copy_only=False)
+        return np.asarray(column.flatten().to_numpy(zero_copy_only=False), np.int64), np.asarray(lengths, np.int64)
+
+    def packed(self, name: str, width: int) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
+        column = self._column(name)
+        known = np.asarray(column.is_valid().to_numpy(zero_copy_only=False), np.bool_)
+        joined = np.frombuffer(b"".join(filter(None, column.to_pylist())), np.uint8)
+        return _filled(known, joined, width, np.uint8), known
+
+    def texts(self, name: str) -> NDArray[np.str_]:
+        return np.array(self._column(name).fill_null("").to_pylist(), np.str_)
+
+
+class _Rows(Decisions):
+    """A file of JSON Lines or CSV. Slower than Parquet, and needs nothing."""
+
+    def __init__(self, file: Path) -> None:
+        self._file = file
+        with file.open(encoding="utf-8", newline="") as lines:
+            if file.suffix == ".csv":
+                rows = list(csv.reader(lines))
+                # A cell holds JSON, or a text as it is; an empty one is null.
+                self._parse: Callable[[str], Any] | None = json.loads
+                names = rows[0] if rows else []
+                self._cells = {name: [row[number] or None for row in rows[1:]] for number, name in enumerate(names)}
+            else:
+                objects = [json.loads(line) for line in lines]
+                self._parse = None
+                self._cells = {name: [row[name] for row in objects] for name in (objects[0] if objects else {})}
+        self.rows = len(next(iter(self._cells.values()), []))
+        if not self._cells:
+            raise ValueError(f"{file} has no rows; is there a game in the dataset?")
+
+    def _column(self, name: str, *, text: bool = False) -> list[Any]:
+        if name not in self._cells:
+            raise _lacks(self._file, name)
+        cells = self._cells[name]
+        if self._parse is None or text:
+            return cells
+        return [None if cell is None else self._parse(cell) for cell in cells]
+
+    def numbers(self, name: str, dtype: DTypeLike) -> NDArray[Any]:
+        return np.array([cell or 0 for cell in self._column(name)]).astype(dtype)
+
+    def lists(self, name: str, width: int, dtype: DTypeLike) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+        cells = self._column(name)
+        known = np.array([cell is not None for cell in cells], np.bool_)
+        return _filled(known, np.array([cell for cell in cells if cell is not None]), width, dtype), known
+
+    def ragged(self, name: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        cells = [cell or [] for cell in self._column(name)]
+        return np.array([item for cell in cells for item in cell], np.int64), np.array([len(cell) for cell in cells], np.int64)
+
+    def packed(self, name: str, width: int) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
+        cells = self._column(name, text=True)
+        known = np.array([cell is not None for cell in cells], np.bool_)
+        joined = np.frombuffer(bytes.fromhex("".join(filter(None, cells))), np.uint8)
+        return _filled(known, joined, width, np.uint8), known
+
+    def texts(self, name: str) -> NDArray[np.str_]:
+        return np.array([cell or "" for cell in self._column(name, text=True)], np.str_)
+
+
+def _filled(known: NDArray[np.bool_], items: NDArray[Any], width: int, dtype: DTypeLike) -> NDArray[Any]:
+    """Rows of one width put where they are known, zeros elsewhere."""
+    array = np.zeros((len(known), width), dtype)
+    array[known] = items.reshape(-1, width)
+    return array
+
+
+def _lacks(file: Path, name: str) -> ValueError:
+    return ValueError(f"{file} has no column {name}: is it a table of decisions made by `chefshat export`?")

@@ -1,0 +1,92 @@
+"""Columns of observations made up by chance, for tests and fixtures that need no server. No game need ever have stood like this."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from chefshat import pb
+from chefshat.learn import features
+from chefshat.learn.features import Bytes, Counts
+
+
+@dataclass(frozen=True)
+class HandMade:
+    """Columns of observations, and with them what a row says of its decision."""
+
+    players: int
+    faces: int
+    pizzas: Counts
+    hands: Bytes
+    golden: Bytes
+    boards: Bytes
+    cards_left: Bytes
+    passed: Bytes
+    places: Bytes
+    roles: Bytes
+    points: Counts
+    played: Bytes
+    gave: Bytes
+    received: Bytes
+    seats: Bytes
+    kinds: Bytes
+    mask_bits: Bytes
+
+    def __len__(self) -> int:
+        return len(self.seats)
+
+
+def hand_made(rows: int, *, seed: int, players: int = 4, faces: int = 11, jokers: int = 2) -> HandMade:
+    """Rows that keep to the deck, to the own seat's count of cards and to the decision kind, and are otherwise drawn freely."""
+    chance = np.random.default_rng(seed)
+    deck = np.repeat(np.arange(faces + 1), [*range(1, faces + 1), jokers])
+    size = features.dealt(players, faces, jokers)
+    turns, actions = features.turn_actions(faces), features.num_actions(faces)
+
+    def counted(cards: np.ndarray) -> Bytes:
+        return np.bincount(cards, minlength=faces + 1).astype(np.uint8)
+
+    hands, played, gave, received, boards, masks = [], [], [], [], [], []
+    kinds = chance.integers(1, 4, rows, dtype=np.uint8)
+    for kind in kinds:
+        shuffled = chance.permutation(deck)
+        held = int(chance.integers(1, size + 1))
+        hands.append(counted(shuffled[:held]))
+        played.append(counted(shuffled[held : held + int(chance.integers(0, len(deck) - held))]))
+        gave.append(counted(shuffled[: chance.integers(0, 3)]))
+        received.append(counted(shuffled[-1 - int(chance.integers(0, 2)) :]))
+        face = int(chance.integers(0, faces + 2))
+        joker = int(chance.integers(0, jokers + 1))
+        boards.append([0, 0, 0] if face == 0 else [face, 1, 1] if face == faces + 1 else [face, 1 + joker, joker])
+        if kind == pb.DECISION_KIND_TURN:
+            low, high = 0, turns
+        elif kind == pb.DECISION_KIND_EXCHANGE:
+            low, high = turns, turns + faces + 1
+        else:
+            low, high = turns + faces + 1, actions
+        mask = np.zeros(actions, np.uint8)
+        mask[low:high] = chance.random(high - low) < 0.2
+        mask[chance.integers(low, high)] = 1
+        masks.append(np.packbits(mask, bitorder="little"))
+    hand = np.array(hands)
+    seats = chance.integers(0, players, rows, dtype=np.uint8)
+    cards_left = chance.integers(0, size + 1, (rows, players), dtype=np.uint8)
+    cards_left[np.arange(rows), seats] = hand.sum(axis=1)
+    return HandMade(
+        players=players,
+        faces=faces,
+        pizzas=chance.integers(0, 45, rows, dtype=np.uint32),
+        hands=hand,
+        golden=((hand[:, faces - 1] > 0) & (chance.random(rows) < 0.5)).astype(np.uint8),
+        boards=np.array(boards, np.uint8),
+        cards_left=cards_left,
+        passed=chance.integers(0, 2, (rows, players), dtype=np.uint8),
+        places=chance.integers(0, players + 1, (rows, players), dtype=np.uint8),
+        roles=chance.integers(0, 6, (rows, players), dtype=np.uint8),
+        points=chance.integers(0, 25, (rows, players), dtype=np.uint32),
+        played=np.array(played),
+        gave=np.array(gave),
+        received=np.array(received),
+        seats=seats,
+        kinds=kinds,
+        mask_bits=np.array(masks),
+    )

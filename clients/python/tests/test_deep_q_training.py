@@ -1,0 +1,196 @@
+"""Deep Q agents at seats learn from what happened; against the real server: training, tuning and playing by command."""
+
+import json
+import threading
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from test_deep_q import TINY, ids
+
+import chefshat
+from chefshat import RandomAgent, pb
+from chefshat.learn import checkpoint, deep_q, deep_q_training, network
+from chefshat.learn.__main__ import main
+from chefshat.learn.deep_q import DeepQConfig
+from chefshat.learn.deep_q_training import LockStep
+from chefshat.vector import VectorEnv
+
+
+def told(*numbers: float) -> Any:
+    return np.array(numbers, np.float32)
+
+
+def seen(*numbers: int) -> Any:
+    """States that tell which they are."""
+    states = np.zeros((len(numbers), 4), np.float32)
+    states[:, 0] = numbers
+    return states
+
+
+def legal(rows: int) -> Any:
+    return np.ones((rows, 3), np.bool_)
+
+
+def test_agents_remember_what_came_of_each_decision() -> None:
+    """Agent 0 decides three times in two episodes, agent 2 once and then again in the next, agent 1 never."""
+    stack = LockStep(TINY, deep_q.start(TINY, [1, 2, 3]), 2)
+    first = stack.decide(ids(0, 2), told(9, 9), seen(10, 12), legal(2), ids(0, 0))
+    second = stack.decide(ids(0), told(1), seen(20), legal(1), ids(0))
+    stack.end(ids(0, 1, 2, 0), told(2, 3, 4, 5))
+    third = stack.decide(ids(2, 0), told(9, 9), seen(32, 30), legal(2), ids(0, 0))
+    stack.decide(ids(0), told(6), seen(40), legal(1), ids(0))
+    memory = stack.agents.memory
+    assert np.asarray(stack.agents.remembered).tolist() == [3, 0, 1]
+    assert np.asarray(memory.states[0, :3, 0]).tolist() == [10, 20, 30]
+    assert np.asarray(memory.actions[0, :3]).tolist() == [first[0], second[0], third[1]]
+    assert np.asarray(memory.rewards[0, :3]).tolist() == [1, 2, 6]
+    assert np.asarray(memory.next_states[0, :3, 0]).tolist() == [20, 0, 40]
+    assert np.asarray(memory.done[0, :3]).tolist() == [False, True, False]
+    assert np.asarray(memory.next_masks[0, :3]).all(axis=1).tolist() == [True, False, True]
+    assert (float(memory.states[2, 0, 0]), float(memory.rewards[2, 0]), bool(memory.done[2, 0])) == (12, 4, True)
+
+
+def test_agents_that_do_not_learn_remember_nothing() -> None:
+    stack = LockStep(TINY, deep_q.start(TINY, [1]), 1, explore=False, learn=False)
+    actions = {int(stack.decide(ids(0), told(1), seen(10), legal(1), ids(0))[0]) for _ in range(20)}
+    stack.end(ids(0), told(1))
+    assert len(actions) == 1
+    assert int(stack.agents.remembered[0]) == 0
+
+
+def games(address: str, *, seats: list[int], seeds: list[bytes], shifts: int = 2, invalid: str = "ask_again") -> VectorEnv:
+    return VectorEnv(
+        address,
+        len(seeds),
+        client_seats=seats,
+        rewards="validity",
+        decisions="turns",
+        invalid=invalid,
+        total_games=len(seeds),
+        seed=seeds,
+        rules={"target_shifts": shifts},
+        shift_statistics=True,
+    )
+
+
+@pytest.mark.server
+def test_a_game_is_the_same_whatever_is_played_beside_it(real_address: str) -> None:
+    config = DeepQConfig(hidden=(16,), batch_size=8, memory_size=64, wrong_limit=5)
+    seeds = [bytes([number]) * 32 for number in range(3)]
+    with games(real_address, seats=[0, 2], seeds=seeds) as env:
+        agents, played = deep_q_training.play(env, config, deep_q.start(config, [1, 2, 3, 4, 5, 6]))
+    with games(real_address, seats=[0, 2], seeds=seeds[1:2]) as env:
+        alone, played_alone = deep_q_training.play(env, config, deep_q.start(config, [3, 4]))
+    assert played.of_seats["places"].shape == (3, 2, 4)
+    assert np.sort(played.of_seats["places"], axis=2).tolist() == [[[1, 2, 3, 4]] * 2] * 3
+    for name, counted in played.of_seats.items():
+        assert np.array_equal(counted[1:2], played_alone.of_seats[name]), name
+    assert int(played.of_seats["wrong"][:, :, [0, 2]].sum()) > 0
+    assert played.most_attempts == 5
+    # Every decision of the server's count is a transition: those that went on, and those that ended an episode.
+    attempts = played.of_seats["valid"] + played.of_seats["wrong"]
+    assert np.asarray(agents.remembered).tolist() == attempts[:, :, [0, 2]].sum(axis=1).ravel().tolist()
+    assert np.asarray(alone.remembered).tolist() == np.asarray(agents.remembered[2:4]).tolist()
+    # Memory holds what the server rewarded: 1 for a valid action, -1 for a wrong one.
+    assert set(np.asarray(agents.memory.rewards).ravel().tolist()) == {1.0, -1.0}
+
+
+@pytest.mark.server
+def test_agents_with_a_mask_do_nothing_wrong(real_address: str) -> None:
+    config = DeepQConfig(hidden=(16,), batch_size=8, memory_size=64, mask=True)
+    with games(real_address, seats=[1], seeds=[bytes(32)], invalid="error") as env:
+        agents, played = deep_q_training.play(env, config, deep_q.start(config, [1]))
+    assert int(played.of_seats["wrong"].sum()) == 0
+    assert int(agents.updates[0]) > 0
+    with (
+        games(real_address, seats=[0, 1], seeds=[bytes(32)]) as env,
+        pytest.raises(ValueError, match="1 agents for 1 games of 2 seats"),
+    ):
+        deep_q_training.play(env, config, agents)
+
+
+@pytest.mark.server
+def test_an_agent_is_trained_goes_on_and_plays_in_a_room(
+    real_address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "agent.safetensors"
+    command = ["deep-q", "--out", str(out), "--shifts", "2", "--mask", "--address", real_address, "--json"]
+    assert main(command) == 0
+    before = json.loads(capsys.readouterr().out)
+    assert (before["event"], before["wrong_per_shift"]) == ("trained", 0)
+    trained = checkpoint.load(tmp_path / "agent.training")
+    assert network.load(out).info.rules == trained.networks("deep-q")[0].info.rules
+    assert main([*command, "--resume"]) == 0
+    resumed = checkpoint.load(tmp_path / "agent.training")
+    assert int(resumed.agents.updates[0]) > int(trained.agents.updates[0]) > 0
+    capsys.readouterr()
+
+    with chefshat.Client(real_address) as client:
+        room = client.create_room("trained", rules=pb.RuleSet(target_shifts=2))
+        tickets = {client.join_room(room.join_code, f"random {seat}").ticket: RandomAgent(seat) for seat in range(3)}
+        others = threading.Thread(target=client.play_many, args=[tickets])
+        others.start()
+        code = main(["play", str(out), "--address", real_address, "--code", room.join_code, "--name", "Deep", "--json"])
+        others.join()
+    told = json.loads(capsys.readouterr().out)
+    assert (code, told["event"], told["invalid"], told["late"]) == (0, "finished", 0, 0)
+    # Two Shifts, with an exchange and perhaps a special action before the second.
+    assert told["decisions"] > 2
+
+
+@pytest.mark.server
+def test_a_network_for_other_decks_does_not_play(real_address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    config = DeepQConfig(hidden=(4,))
+    rules = pb.RuleSet(players=4, faces=11, jokers=2)
+    (net,) = checkpoint.Training(config, deep_q.start(config, [1]), rules, "").networks("standard")
+    network.save(tmp_path / "n.safetensors", net.layers, net.info)
+    with chefshat.Client(real_address) as client:
+        room = client.create_room("small", rules=pb.RuleSet(faces=7))
+        tickets = {client.join_room(room.join_code, f"random {seat}").ticket: RandomAgent(seat) for seat in range(3)}
+        others = threading.Thread(target=client.play_many, args=[tickets], daemon=True)
+        others.start()
+        code = main(
+            ["play", str(tmp_path / "n.safetensors"), "--address", real_address, "--code", room.join_code, "--name", "Deep"]
+        )
+        client.close_room(room.room.room_id, room.owner_token)
+        others.join()
+    assert code == 1
+    assert "plays with 4 players, 11 faces and 2 jokers; this game has 4, 7 and 2" in capsys.readouterr().err
+
+
+def test_a_file_that_is_no_network_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "n").write_text("no")
+    assert main(["play", str(tmp_path / "n"), "--address", "127.0.0.1:1", "--code", "C", "--name", "N"]) == 1
+    assert "is no network" in capsys.readouterr().err
+
+
+@pytest.mark.server
+def test_parameters_are_tuned_and_trained_with(real_address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    found = tmp_path / "tuned.json"
+    command = ["tune", "--out", str(found), "--trials", "2", "--agents", "2", "--shifts", "2", "--mask", "--address", real_address]
+    assert main(command) == 0
+    table = capsys.readouterr().out
+    assert "Shifts won" in table
+    assert "Trial 0 has the paper's parameters." in table
+    kept = json.loads(found.read_text())
+    assert [trial["number"] for trial in kept["trials"]] == [0, 1]
+    first, second = (trial["parameters"] for trial in kept["trials"])
+    assert (first["hidden"], first["batch_size"], first["discount"]) == ([128, 256], 32, 0.95)
+    assert first != second
+    assert kept["parameters"] == kept["trials"][kept["best"]]["parameters"]
+    # Chance is seeded: the same command finds the same.
+    assert main([*command[:2], str(tmp_path / "again.json"), *command[3:], "--json"]) == 0
+    again = json.loads(capsys.readouterr().out)
+    assert again["trials"] == kept["trials"]
+    out = tmp_path / "agent.safetensors"
+    assert main(["deep-q", "--out", str(out), "--shifts", "1", "--parameters", str(found), "--address", real_address]) == 0
+    assert checkpoint.load(tmp_path / "agent.training").config.batch_size == kept["parameters"]["batch_size"]
+
+
+def test_parameters_of_no_such_file_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "p.json").write_text('{"parameters": {"inputs": 3}}')
+    options = ["deep-q", "--out", str(tmp_path / "a"), "--parameters", str(tmp_path / "p.json"), "--address", "127.0.0.1:1"]
+    assert main(options) == 1
+    assert 'has no object "parameters"' in capsys.readouterr().err

@@ -1,0 +1,298 @@
+"""The environments of Gymnasium and PettingZoo: their own checkers against the real server, and details against the toy."""
+
+import io
+import subprocess
+import sys
+import warnings
+from contextlib import redirect_stdout
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pettingzoo.test
+import pytest
+from fake_vector import ACTIONS, FakeVector
+from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AutoresetMode
+from numpy.typing import NDArray
+
+import chefshat
+from chefshat.columns import Situations
+from chefshat.envs import ENV_ID, ChefsHatEnv, ChefsHatVectorEnv, chefshat_v1
+from chefshat.learn import features
+
+
+def hands(situations: Situations) -> NDArray[np.float32]:
+    """An observation of one's own."""
+    return np.asarray(situations.observations.hands, np.float32)
+
+
+FORMS: list[Any] = ["classic", "table", "columns", hands]
+NAMES = ["classic", "table", "columns", "own"]
+
+
+@pytest.mark.server
+@pytest.mark.parametrize("episode", ["shift", "game"])
+@pytest.mark.parametrize("observation", FORMS, ids=NAMES)
+def test_gymnasium_finds_nothing_wrong(real_address: str, observation: Any, episode: str) -> None:
+    env = gymnasium.make(ENV_ID, address=real_address, observation=observation, episode=episode)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        # A function of one's own may make any number.
+        warnings.filterwarnings("ignore", message=".*A Box observation space m.*imum value is")
+        with redirect_stdout(io.StringIO()):
+            check_env(env.unwrapped)
+    env.close()
+
+
+@pytest.mark.server
+@pytest.mark.parametrize("episode", ["shift", "game"])
+@pytest.mark.parametrize("observation", FORMS, ids=NAMES)
+def test_pettingzoo_finds_nothing_wrong(real_address: str, observation: Any, episode: str) -> None:
+    def make(**options: Any) -> Any:
+        return chefshat_v1.env(real_address, observation=observation, episode=episode, **options)
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        # It knows by name which environments have masks in their observations, and those are not asked for arrays.
+        warnings.filterwarnings("ignore", message="Observation is not a NumPy array")
+        warnings.filterwarnings("ignore", message="Observation space for each agent probably should be")
+        # A hand may be empty.
+        warnings.filterwarnings("ignore", message="Observation numpy array is all zeros")
+        pettingzoo.test.api_test(make(), num_cycles=100)
+        pettingzoo.test.seed_test(make, num_cycles=100)
+        with redirect_stdout(io.StringIO()) as printed:
+            pettingzoo.test.render_test(lambda render_mode: make(render_mode=render_mode))
+    assert "takes a turn" in printed.getvalue()
+
+
+@pytest.mark.server
+def test_a_random_agent_plays_whole_games(real_address: str) -> None:
+    env = chefshat.make("gymnasium", address=real_address, episode="game", rewards="points", render_mode="ansi")
+    env.action_space.seed(1)
+    _, info = env.reset(seed=1)
+    total, ended = 0.0, False
+    while not ended:
+        shown = env.render()
+        assert shown is not None
+        assert "board:" in shown
+        _, reward, terminated, truncated, info = env.step(env.action_space.sample(info["action_mask"]))
+        total += reward
+        ended = terminated or truncated
+    assert info["place"] in (1, 2, 3, 4)
+    assert total == env.vector.batch.endings.observations.points[0, 0]
+    assert not info["action_mask"].any()
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        env.step(0)
+    env.close()
+
+
+@pytest.mark.server
+def test_the_vector_environment_is_many_of_the_single_one(real_address: str) -> None:
+    games = 3
+    options: dict[str, Any] = {"address": real_address, "opponents": "greedy", "observation": "columns", "rewards": "paper"}
+    vector = gymnasium.make_vec(ENV_ID, num_envs=games, **options)
+    assert vector.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
+    observed, infos = vector.reset(seed=11)
+    assert isinstance(vector, ChefsHatVectorEnv)
+    beginnings = vector.vector.batch.beginnings
+    singles = [chefshat.make(**options, seed=[bytes(seed)]) for seed in beginnings.seeds]
+    for env in singles:
+        env.reset()
+    endings = 0
+    while True:
+        assert observed in vector.observation_space
+        actions = infos["action_mask"].argmax(axis=1)
+        observed, rewards, terminations, truncations, infos = vector.step(actions)
+        if len(vector.vector.batch.beginnings) > 0:
+            # A game is over, and another seed's turn has come.
+            break
+        for game, env in enumerate(singles):
+            alone, reward, terminated, truncated, info = env.step(actions[game])
+            assert (reward, terminated, truncated) == (rewards[game], terminations[game], truncations[game])
+            if terminated or truncated:
+                endings += 1
+                assert infos["_final_obs"][game]
+                last = infos["final_obs"][game]
+                assert {name: array.tolist() for name, array in last.items()} == {
+                    name: array.tolist() for name, array in alone.items()
+                }
+                assert infos["final_info"]["place"][game] == info["place"]
+                alone, info = env.reset()
+            for name, array in alone.items():
+                assert array.tolist() == observed[name][game].tolist()
+            assert info["action_mask"].tolist() == infos["action_mask"][game].tolist()
+    assert endings >= games
+    for env in singles:
+        env.close()
+    vector.close()
+
+
+@pytest.mark.server
+def test_forms_are_what_their_names_say(real_address: str) -> None:
+    with chefshat.VectorEnv(real_address, seed=3) as env:
+        seen = env.batch
+        sizes = env.sizes
+        classic = features.classic(seen.observations, seen.mask_bits, faces=sizes.faces, hand_size=sizes.hand_size)
+        for observation, wanted in [("classic", classic[0]), (hands, seen.observations.hands[0])]:
+            one = chefshat.make(address=real_address, observation=observation, seat=int(seen.seats[0]), seed=3)
+            assert one.reset()[0].tolist() == wanted.tolist()
+            one.close()
+
+
+def test_an_episode_of_one_seat(toy: FakeVector) -> None:
+    env = ChefsHatEnv(toy.address, seat=2, observation="columns", opponents="greedy", rewards="validity")
+    assert toy.setups[0].client_seats == [2]
+    assert list(toy.setups[0].opponents) == ["greedy"]
+    assert toy.setups[0].invalid_actions == chefshat.pb.INVALID_ACTION_RULE_ASK_AGAIN
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        env.step(199)
+    seen, info = env.reset()
+    assert toy.requests == []
+    # In game 0 seat 2 decides once, at decision 2.
+    assert seen["hands"][:3].tolist() == [0, 2, 2]
+    assert seen["seats"].tolist() == [2]
+    assert np.flatnonzero(seen["action_mask"]).tolist() == np.flatnonzero(info["action_mask"]).tolist() == [2, 199]
+    seen, reward, terminated, truncated, info = env.step(150)
+    assert (reward, terminated, truncated, info["invalid_attempts"]) == (-1, False, False, 1)
+    seen, reward, terminated, truncated, info = env.step(np.int64(199))
+    assert (reward, terminated, truncated, info["place"]) == (3 + 102, True, False, 3)
+    assert seen["hands"][2] == 5
+    assert not seen["action_mask"].any()
+    # The next Shift has been begun by the server, the one after is asked for.
+    seen, _ = env.reset()
+    assert seen["shifts"].tolist() == [2]
+    assert not any(request.HasField("reset") for request in toy.requests)
+    env.step(199)
+    env.reset()
+    env.step(150)
+    env.reset()
+    assert toy.requests[-1].reset.games == bytes(4)
+    env.reset(seed=5)
+    assert toy.requests[-1].reset.base_seed == 5
+    env.close()
+
+
+def test_many_games_go_on_in_the_same_step(toy: FakeVector) -> None:
+    env = ChefsHatVectorEnv(toy.address, 3, seat=2, observation=hands)
+    seen, infos = env.reset(seed=4)
+    # Seat 2 decides first at decision 2, 1 and 0.
+    assert seen[:, 2].tolist() == [2, 1, 0]
+    seen, rewards, terminations, truncations, infos = env.step([199, 199, 199])
+    assert terminations.tolist() == [True, False, False]
+    assert rewards.tolist() == [3 + 102, 2, 1]
+    assert seen[:, 2].tolist() == [2, 5, 4]
+    assert infos["final_obs"][0][2] == 5
+    assert infos["final_obs"][1] is None
+    assert infos["_final_obs"].tolist() == infos["_final_info"].tolist() == [True, False, False]
+    assert infos["final_info"]["place"].tolist() == [3, 0, 0]
+    seen, rewards, terminations, truncations, infos = env.step([199, 199, 199])
+    assert terminations.tolist() == [True, False, True]
+    assert truncations.tolist() == [False, True, False]
+    mask = np.array([False, True, False])
+    env.reset(options={"reset_mask": mask})
+    assert toy.requests[-1].reset.games == np.array([1], "<u4").tobytes()
+    env.reset()
+    assert toy.requests[-1].reset.games == np.arange(3, dtype="<u4").tobytes()
+    env.close()
+
+
+def test_games_without_a_row_stay_as_they_were(toy: FakeVector) -> None:
+    env = ChefsHatVectorEnv(toy.address, 3, seat=0, observation=hands)
+    env.reset()
+    whole = env.step([199, 199, 199])[0]
+    batch = env.vector.batch
+    # Game 1 has none: the server left decisions of its other seats for later.
+    left = batch.take(np.array([0, 2]))
+    seen = env._observe(left)
+    assert seen.tolist() == whole.tolist()
+    assert env._infos(left)["action_mask"].sum(axis=1).tolist() == [2, 2, 2]
+    env.vector.batch = left
+    sent: list[Any] = []
+    env.vector.step = lambda actions: sent.append(actions) or batch  # type: ignore[func-returns-value, method-assign]
+    env.step([10, 11, 12])
+    assert sent[0].tolist() == [10, 12]
+    env.close()
+
+
+def test_all_seats_are_rewarded_when_they_decide_next(toy: FakeVector) -> None:
+    env = chefshat_v1.env(toy.address, observation=hands, rewards="validity")
+    env.reset(seed=1)
+    given: dict[str, list[float]] = {}
+    for agent in env.agent_iter():
+        seen, reward, terminated, truncated, _ = env.last()
+        given.setdefault(agent, []).append(reward)
+        if terminated or truncated:
+            env.step(None)
+            continue
+        other = env.possible_agents[(int(agent[-1]) + 1) % 4]
+        assert not env.observe(other)["action_mask"].any()
+        assert np.flatnonzero(seen["action_mask"]).tolist()[-1] == 199
+        env.step(199)
+    # Seat 0 decided at 0 and at 4, the others once; the end brings 100 and the seat.
+    assert given == {"player_0": [0, 1, 105], "player_1": [0, 103], "player_2": [0, 105], "player_3": [0, 107]}
+    env.close()
+
+
+@pytest.mark.parametrize("kind", ["gymnasium", "gymnasium_vector", "pettingzoo", "vector"])
+def test_make_makes_every_kind(toy: FakeVector, kind: Any) -> None:
+    env = chefshat.make(kind, address=toy.address, rewards="points", seed=8)
+    assert toy.setups[0].reward_scheme == chefshat.pb.REWARD_SCHEME_POINTS
+    assert toy.setups[0].base_seed == 8
+    env.close()
+    assert toy.ended.wait(10)
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (lambda address: chefshat.make("gym", address=address), "'gymnasium_vector'"),
+        (lambda address: ChefsHatEnv(address, observation="picture"), "'classic', 'table', 'columns'"),
+        (lambda address: ChefsHatEnv(address, observation=lambda seen: np.zeros(3)), "one row for each"),
+        (lambda address: ChefsHatEnv(address, observation=lambda seen: seen.masks), "booleans"),
+        (lambda address: ChefsHatEnv(address, games=2), "VectorEnv"),
+        (lambda address: ChefsHatEnv(address, render_mode="rgb_array"), '"ansi"'),
+        (lambda address: ChefsHatVectorEnv(address, render_mode="ansi"), "render_mode"),
+        (lambda address: ChefsHatVectorEnv(address, 2, total_games=2), "total_games"),
+        (lambda address: ChefsHatVectorEnv(address, 2).reset(options={"reset_mask": [1, 0]}), "booleans"),
+        (lambda address: chefshat_v1.env(address, client_seats=[1]), "all seats"),
+        (lambda address: chefshat_v1.env(address, render_mode="rgb_array"), '"human"'),
+    ],
+)
+def test_what_cannot_be_made_is_told(toy: FakeVector, make: Any, says: str) -> None:
+    with pytest.raises(ValueError, match=says):
+        make(toy.address)
+
+
+def test_a_mask_can_be_drawn_from(toy: FakeVector) -> None:
+    env = chefshat.make(address=toy.address)
+    _, info = env.reset()
+    assert info["action_mask"].dtype == np.int8
+    assert info["action_mask"].shape == (ACTIONS,)
+    assert {int(env.action_space.sample(info["action_mask"])) for _ in range(64)} == {0, 199}
+    env.close()
+
+
+def without(missing: str, use: str) -> "subprocess.CompletedProcess[str]":
+    """Runs Python where a package is missing."""
+    code = f"import sys; sys.modules[{missing!r}] = None; import chefshat; {use}"
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=Path(chefshat.__file__).parents[1])
+
+
+def test_nothing_is_loaded_that_is_not_needed(toy: FakeVector) -> None:
+    by_name = f"import gymnasium; gymnasium.make('chefshat.envs:{ENV_ID}', address='{toy.address}', observation='table')"
+    for missing in ("jax", "pettingzoo", "pyarrow"):
+        done = without(missing, by_name)
+        assert done.returncode == 0, done.stderr
+    assert toy.setups
+
+
+@pytest.mark.parametrize(
+    ("missing", "use"),
+    [("gymnasium", "import chefshat.envs"), ("gymnasium", "chefshat.make()"), ("pettingzoo", "chefshat.make('pettingzoo')")],
+)
+def test_it_is_said_which_extra_is_missing(missing: str, use: str) -> None:
+    done = without(missing, use)
+    assert done.returncode != 0
+    assert "pip install 'chefshat[envs]'" in done.stderr

@@ -1,0 +1,22 @@
+"""What is made of the points of many Shifts."""
+
+import numpy as np
+import pytest
+
+from chefshat.learn.evaluation import summed_up
+
+
+def test_shifts_of_one_game_are_not_taken_for_independent() -> None:
+    places = np.array([0, 2, 1, 3])
+    # Two games of three Shifts each, all alike within a game: as certain as two numbers are, not as six.
+    found = summed_up(("greedy",) * 3, 2, np.array([0, 1, 0, 1, 0, 1]), np.array([5, 1, 5, 1, 5, 1], np.uint32), places)
+    assert (found.shifts, found.points, found.places) == (6, 3.0, (0, 2, 1, 3))
+    two_numbers = np.std([5, 1], ddof=1) / 2**0.5
+    assert found.standard_error == pytest.approx(float(two_numbers))
+    assert "3.000 ± 2.000 points per Shift against greedy, greedy, greedy (6 Shifts in 2 games" in str(found)
+
+
+def test_independent_shifts_have_the_usual_error() -> None:
+    points = np.random.default_rng(1).choice([5, 3, 1, 0], 400).astype(np.uint32)
+    found = summed_up(("random",) * 3, 400, np.arange(400), points, np.array([1, 1, 1, 397]))
+    assert found.standard_error == pytest.approx(float(points.std(ddof=1)) / 400**0.5)

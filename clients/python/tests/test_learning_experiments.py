@@ -1,0 +1,94 @@
+"""Experiments 2 and 3: what is worked out of what the server counts, and where the networks of 3 come from."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from chefshat import pb
+from chefshat.experiments import learning, rules, stats, winning
+from chefshat.experiments.learning import Learned
+from chefshat.experiments.progress import Progress
+from chefshat.experiments.results import Config, Estimate
+from chefshat.learn import deep_q, deep_q_training
+from chefshat.learn.deep_q import DeepQConfig
+from chefshat.learn.deep_q_training import Played
+
+AGENT = DeepQConfig(hidden=(4,), batch_size=2, memory_size=4)
+
+
+def learned(places: list[list[list[int]]]) -> Learned:
+    """Figures of our own: the places of each seat in each Shift of each game, and numbers that go with them."""
+    array = np.array(places)
+    ones = np.ones_like(array)
+    of_seats: dict[str, Any] = {
+        "places": array,
+        "valid": 10 * ones,
+        "wrong": 10 * (array - 1),
+        "passes": 5 * ones,
+        "reward_sums": array.astype(np.float32),
+    }
+    of_shifts: dict[str, Any] = {"starters": np.zeros(array.shape[:2], np.int64), "turns": 40 * np.ones(array.shape[:2])}
+    return Learned(deep_q.start(AGENT, [1]), Played(of_shifts, of_seats, pb.RuleSet(), 7))
+
+
+# Two games of three Shifts. The starter is always seat 0.
+SOME = learned([[[1, 2, 3, 4], [2, 1, 3, 4], [1, 2, 4, 3]], [[4, 1, 2, 3], [4, 2, 1, 3], [1, 2, 3, 4]]])
+
+
+def test_what_is_worked_out_of_places_and_counts() -> None:
+    assert SOME.wins(0) == [2, 1]
+    assert SOME.wins(1) == [1, 1]
+    assert SOME.starter_wins() == pytest.approx([2 / 3, 1 / 3])
+    # An action's mean reward is place / (10 valid + 10 (place - 1) wrong ones): the same in every Shift.
+    assert SOME.mean_reward(0) == pytest.approx([0.1, 0.1])
+    assert SOME.mean_wrong(0) == pytest.approx([10 / 3, 20])
+    assert SOME.mean_wrong(0, slice(-1, None)) == [0, 0]
+    assert SOME.share_of_turns("passes", 3) == [0.5, 0.5]
+
+
+def test_the_tables_say_what_was_counted(tmp_path: Path) -> None:
+    config = Config("", (1, 2), True, tmp_path)
+    both = dict.fromkeys(rules.CONDITIONS, SOME)
+    actions = {str(row[0]): row[2] for row in rules._actions(config, both).rows}
+    assert actions["wrong actions of the learner, per Shift"] == stats.spread([10 / 3, 20])
+    victories = rules._victories(config, both).rows
+    assert [row[2] for row in victories][:2] == [Estimate(1.5, 1, 2, digits=0), Estimate(1.0, 1, 1, digits=0)]
+    table = winning._four(config, dict.fromkeys(winning.FOUR, SOME))
+    assert table.rows[0][1:7] == [117, 45, 55, 33, 117, 33]
+    # The seat that wins most is another one in each game, or the same: it wins two, and one.
+    assert table.rows[1][5] == Estimate(1.5, 1, 2, digits=0)
+    assert table.rows[1][6] == Estimate(0.0, 0, 0, digits=0)
+
+
+def test_a_pass_is_wrong_where_something_else_is_legal() -> None:
+    masks = np.array([[False, True, True], [False, False, True], [True, False, True]])
+    sent = deep_q_training._without_idle_passes(np.array([2, 2, 0], np.int32), masks)
+    # The first is sent as an illegal action; the second has nothing else; the third is no pass.
+    assert sent.tolist() == [0, 2, 0]
+
+
+@pytest.mark.server
+def test_experiment_3_begins_with_the_networks_of_2(real_address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(learning, "QUICK_SHIFTS", 2)
+    quiet = Progress(show=False)
+    both = rules.networks(Config(real_address, (1, 2), True, tmp_path), quiet)
+    files = sorted(path.name for path in tmp_path.iterdir())
+    assert files == ["rules-seed-1.safetensors", "rules-seed-2.safetensors"]
+
+    def never(*_: object, **__: object) -> Learned:
+        raise AssertionError("learned again")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(learning, "learn", never)
+        again = rules.networks(Config(real_address, (1, 2), True, tmp_path), quiet)
+        # Networks of a quick run are none of a full one.
+        with pytest.raises(AssertionError, match="learned again"):
+            rules.networks(Config(real_address, (1, 2), False, tmp_path), quiet)
+    # A seed alone learns what it learns beside another.
+    (tmp_path / "alone").mkdir()
+    alone = rules.networks(Config(real_address, (2,), True, tmp_path / "alone"), quiet)
+    for (first, _), (second, _), (third, _) in zip(both, again, alone, strict=True):
+        assert np.array_equal(np.asarray(first), np.asarray(second))
+        assert np.array_equal(np.asarray(first[1]), np.asarray(third[0]))

@@ -1,0 +1,126 @@
+"""A server of one's own: how the program is found, what is said if there is none, and that it goes when its process does."""
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from conftest import BINARY
+
+import chefshat
+from chefshat import ChefsHatError, LocalServer, local_server
+
+SOURCE = str(Path(chefshat.__file__).parents[1])
+# Seconds to wait for what must happen: generous, because nothing is measured by it.
+WAIT_S = 60
+
+# Prints where the shared server listens and the number of its process, then ends in the way it is told.
+ORPHAN = """
+import os, signal, sys
+import chefshat
+from chefshat import local_server
+
+address = local_server.shared_address()
+assert local_server.shared_address() == address
+with chefshat.VectorEnv() as env:
+    assert env.address == address
+env = chefshat.make()
+assert env.unwrapped.vector.address == address
+env.reset()
+print(address, local_server._shared._process.pid, flush=True)
+if sys.argv[1] == "kill":
+    os.kill(os.getpid(), signal.SIGKILL)
+if sys.argv[1] == "raise":
+    raise KeyboardInterrupt
+"""
+
+
+def program(path: Path, text: str) -> Path:
+    """A program that is a shell script."""
+    path.write_text(f"#!/bin/sh\n{text}\n", encoding="utf-8")
+    path.chmod(0o755)
+    return path
+
+
+@pytest.fixture
+def nowhere(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """A machine without the program; returns an empty folder that is the whole path."""
+    folder = tmp_path / "bin"
+    folder.mkdir()
+    monkeypatch.delenv(BINARY, raising=False)
+    monkeypatch.setenv("PATH", str(folder))
+    monkeypatch.setattr(local_server, "_cargo_targets", list)
+    return folder
+
+
+def test_the_program_is_looked_for_in_this_order(nowhere: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    old, new = (program(tmp_path / name, "exit 0") for name in ("release", "debug"))
+    os.utime(old, (1, 1))
+    monkeypatch.setattr(local_server, "_cargo_targets", lambda: [old, new, tmp_path / "not there"])
+    assert local_server.find_binary() == new
+    on_the_path = program(nowhere / "chefshat", "exit 0")
+    assert local_server.find_binary() == on_the_path
+    named = program(tmp_path / "mine", "exit 0")
+    monkeypatch.setenv(BINARY, str(named))
+    assert local_server.find_binary() == named
+
+
+def test_it_is_said_what_to_do_without_a_program(nowhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    makers: list[Callable[[], object]] = [LocalServer, chefshat.VectorEnv, lambda: chefshat.make("vector")]
+    for make in makers:
+        with pytest.raises(ChefsHatError, match=rf"BINARY_MISSING.*cargo build.*{BINARY}.*address"):
+            make()
+    monkeypatch.setenv(BINARY, "/no/such/program")
+    with pytest.raises(ChefsHatError, match=rf"{BINARY} names /no/such/program"):
+        LocalServer()
+
+
+def test_a_program_that_does_not_serve_is_told_with_what_it_said(tmp_path: Path) -> None:
+    for text, says in [("echo 'no such option' >&2; exit 2", "no such option"), ("exec true", "did not start listening")]:
+        with pytest.raises(ChefsHatError, match=says) as refused:
+            LocalServer(program(tmp_path / "wrong", text)).start()
+        assert refused.value.reason == "SERVER_DID_NOT_START"
+    with pytest.raises(ChefsHatError, match="cannot be started"):
+        LocalServer(tmp_path).start()
+
+
+def test_the_checkout_is_where_cargo_is_looked_for() -> None:
+    found = [path.relative_to(Path(__file__).resolve().parents[3]) for path in local_server._cargo_targets()]
+    assert found == [Path("target/release/chefshat"), Path("target/debug/chefshat")]
+
+
+@pytest.mark.server
+def test_a_server_can_be_stopped_and_started_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    binary = os.environ.get(BINARY) or pytest.skip(f"{BINARY} is not set")
+    # What configures the user's own server must not reach this one.
+    monkeypatch.setenv("CHEFSHAT_DATA_DIR", "/no/such/folder")
+    with LocalServer(binary) as server:
+        address = server.address
+        assert server.running
+        with chefshat.Client(address) as client:
+            assert client.server_info().built_in_agents
+        server.kill()
+        assert not server.running
+        assert server.start().address == address
+        with chefshat.Client(address) as client:
+            assert client.server_info().built_in_agents
+    assert not server.running
+    server.stop()
+
+
+@pytest.mark.server
+@pytest.mark.parametrize("way", ["return", "raise", "kill"])
+def test_the_shared_server_goes_with_its_process(way: str) -> None:
+    if not os.environ.get(BINARY):
+        pytest.skip(f"{BINARY} is not set")
+    environment = {**os.environ, "PYTHONPATH": SOURCE}
+    done = subprocess.run([sys.executable, "-c", ORPHAN, way], capture_output=True, text=True, timeout=WAIT_S, env=environment)
+    codes = {"return": 0, "kill": -signal.SIGKILL}
+    assert done.returncode == codes.get(way, done.returncode)
+    _, process = done.stdout.split()
+    # The server is the child of a process that is gone, so that only its absence can be waited for.
+    watch = f"while kill -0 {process} 2>/dev/null; do sleep 0.05; done"
+    subprocess.run(["sh", "-c", watch], check=True, timeout=WAIT_S)

@@ -1,0 +1,145 @@
+"""Network files: what is written is read, what is wrong is refused in words, and the fixtures shared with Rust still hold."""
+
+import itertools
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import safetensors.numpy
+from hand_made import hand_made
+
+from chefshat import pb
+from chefshat.learn import features, network
+from chefshat.learn.network import Layer, Network, NetworkFileError, NetworkInfo
+
+FIXTURES = Path(__file__).resolve().parents[3] / "tests" / "fixtures" / "network"
+INFO = NetworkInfo("table", "actions", "none", True, 4, 11, 2, '{"preset":"paper"}', "a name", "a command --with ünïcode")
+
+
+def chance_layers(info: NetworkInfo, hidden: int = 5) -> list[Layer]:
+    chance = np.random.default_rng(5)
+    widths = [info.input_width, hidden, hidden, info.output_width]
+    return [
+        Layer(chance.normal(size=(outputs, inputs)).astype(np.float32), chance.normal(size=outputs).astype(np.float32))
+        for inputs, outputs in itertools.pairwise(widths)
+    ]
+
+
+@pytest.mark.parametrize("dtype", [np.float16, np.float32])
+def test_a_network_is_read_as_it_was_written(tmp_path: Path, dtype: type[np.float16] | type[np.float32]) -> None:
+    layers = chance_layers(INFO)
+    network.save(tmp_path / "n.safetensors", layers, INFO, dtype=dtype)
+    read = network.load(tmp_path / "n.safetensors")
+    assert read.info == INFO
+    assert len(read.layers) == len(layers)
+    for (weight, bias), (weight_read, bias_read) in zip(layers, read.layers, strict=True):
+        np.testing.assert_array_equal(weight.astype(dtype).astype(np.float32), weight_read)
+        np.testing.assert_array_equal(bias.astype(dtype).astype(np.float32), bias_read)
+    assert [path.name for path in tmp_path.iterdir()] == ["n.safetensors"]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"format": "other"}, "format"),
+        ({"input": "picture"}, "input"),
+        ({"faces": "3"}, "faces"),
+        ({"faces": "12"}, "layer 0"),
+        ({"players": "four"}, "players"),
+        ({"output": "turns"}, "214 outputs, not the 200"),
+        ({"masked": "yes"}, "masked"),
+    ],
+)
+def test_wrong_metadata_is_refused_in_words(tmp_path: Path, change: dict[str, str], words: str) -> None:
+    path = tmp_path / "n.safetensors"
+    tensors = {f"layer{i}.{key}": value for i, layer in enumerate(chance_layers(INFO)) for key, value in layer._asdict().items()}
+    path.write_bytes(safetensors.numpy.save(tensors, metadata={**INFO.metadata(), **change}))
+    with pytest.raises(NetworkFileError, match=words) as refused:
+        network.load(path)
+    assert "n.safetensors" in str(refused.value)
+
+
+def test_what_is_no_network_is_refused_in_words(tmp_path: Path) -> None:
+    path = tmp_path / "n.safetensors"
+    path.write_bytes(b"cards")
+    with pytest.raises(NetworkFileError, match="is no network"):
+        network.load(path)
+    layers = chance_layers(INFO)
+    tensors = {f"layer{i}.{key}": value for i, layer in enumerate(layers) for key, value in layer._asdict().items()}
+    path.write_bytes(safetensors.numpy.save({**tensors, "other": layers[0].bias}, metadata=INFO.metadata()))
+    with pytest.raises(NetworkFileError, match="pairs"):
+        network.load(path)
+    path.write_bytes(safetensors.numpy.save({"a": layers[0].bias, "b": layers[0].bias}, metadata=INFO.metadata()))
+    with pytest.raises(NetworkFileError, match=r"layer0\.weight"):
+        network.load(path)
+    path.write_bytes(safetensors.numpy.save({**tensors, "layer1.bias": layers[1].bias * np.nan}, metadata=INFO.metadata()))
+    with pytest.raises(NetworkFileError, match="not finite"):
+        network.load(path)
+    with pytest.raises(FileNotFoundError):
+        network.load(tmp_path / "nothing")
+
+
+def test_weights_that_float16_cannot_hold_are_not_written(tmp_path: Path) -> None:
+    layers = chance_layers(INFO)
+    layers[1].weight[0, 0] = 1e6
+    with pytest.raises(ValueError, match="too large for float16"):
+        network.save(tmp_path / "n.safetensors", layers, INFO, dtype=np.float16)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("output", ["actions", "turns"])
+def test_actions_are_legal_and_the_best_ones(output: str) -> None:
+    info = replace(INFO, output="turns" if output == "turns" else "actions")
+    net = Network(chance_layers(info), info)
+    case = hand_made(200, seed=6)
+    actions = net.actions(case, case.seats, case.kinds, case.mask_bits)
+    outputs = net.outputs(net.inputs(case, case.seats, case.kinds, case.mask_bits))
+    legal = np.unpackbits(case.mask_bits, axis=1, bitorder="little")[:, : features.num_actions(11)].astype(bool)
+    seen = set()
+    for row, action in enumerate(actions):
+        assert legal[row, action]
+        if case.kinds[row] == pb.DECISION_KIND_TURN or output == "actions":
+            seen.add("best")
+            assert outputs[row, action] == max(outputs[row, other] for other in np.flatnonzero(legal[row][: outputs.shape[1]]))
+    assert seen == {"best"}
+
+
+def test_the_default_decisions() -> None:
+    case = hand_made(300, seed=7)
+    turns, all_legal = features.turn_actions(11), np.full_like(case.mask_bits, 255)
+    chosen = network.default_decisions(case, case.kinds, all_legal, faces=11)
+    seen = set()
+    for row, action in enumerate(chosen):
+        if case.kinds[row] == pb.DECISION_KIND_TURN:
+            assert action == 199
+        elif case.kinds[row] == pb.DECISION_KIND_SPECIAL_ACTION:
+            assert action == turns + 12
+        else:
+            plain = case.hands[row].copy()
+            plain[10] -= case.golden[row]
+            faces = np.flatnonzero(plain[:11])
+            expected = turns + faces[-1] if len(faces) else turns + 10 if case.golden[row] else turns + 11
+            seen.add("plain" if len(faces) else "golden" if case.golden[row] else "joker")
+            assert action == expected
+    assert "plain" in seen
+    # Of what the mask forbids nothing is taken.
+    np.testing.assert_array_equal(
+        network.default_decisions(case, case.kinds, np.eye(1, 27, 2, dtype=np.uint8).repeat(300, 0), faces=11), np.full(300, 16)
+    )
+
+
+@pytest.mark.parametrize("name", ["table-actions", "classic-turns", "small-table"])
+def test_the_fixtures_say_what_they_said(name: str) -> None:
+    net = network.load(FIXTURES / f"{name}.safetensors")
+    assert net.info.name == name
+    rows = json.loads((FIXTURES / f"{name}.json").read_text())
+    assert len(rows) >= 10
+    seed = ["table-actions", "classic-turns", "small-table"].index(name)
+    case = hand_made(len(rows), seed=seed, players=net.info.players, faces=net.info.faces, jokers=net.info.jokers)
+    np.testing.assert_array_equal(case.hands, [row["hands"] for row in rows])
+    inputs = net.inputs(case, case.seats, case.kinds, case.mask_bits)
+    np.testing.assert_array_equal(inputs, np.array([row["features"] for row in rows], np.float32))
+    np.testing.assert_allclose(net.outputs(inputs), [row["outputs"] for row in rows], rtol=1e-5, atol=1e-5)
+    assert net.actions(case, case.seats, case.kinds, case.mask_bits).tolist() == [row["action"] for row in rows]

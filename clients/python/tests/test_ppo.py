@@ -1,0 +1,120 @@
+"""PPO: what it draws is always legal, it learns what pays, and it goes on from a file as if nothing had been."""
+
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from hand_made import hand_made
+
+from chefshat import pb
+from chefshat.learn import features, ppo, ppo_checkpoint
+from chefshat.learn.ppo import Hyper, Samples
+from chefshat.learn.ppo_checkpoint import Plan, Progress, TrainingFileError
+
+HYPER = Hyper(policy_widths=(16,), value_widths=(16,), minibatches=4)
+RULES = pb.RuleSet(players=4, faces=11, jokers=2)
+
+
+def rows(count: int, seed: int) -> np.ndarray:
+    case = hand_made(count, seed=seed)
+    return features.table(case, case.seats, case.kinds, case.mask_bits, players=4, faces=11, hand_size=17)
+
+
+def test_what_is_drawn_is_legal_and_as_likely_as_it_says() -> None:
+    learner = ppo.start(1, 334, 214, HYPER)
+    # Weights far from the small ones of the start, so that legal actions differ.
+    params = jax.tree.map(lambda weights: weights * 30, learner.params)
+    inputs = rows(64, seed=1)
+    legal = inputs[:, -214:] > 0
+    draws = 400
+    drawn = jax.vmap(ppo.act, in_axes=(None, 0, None))(params, jax.random.split(jax.random.key(2), draws), inputs)
+    actions, log_probabilities, values = (np.asarray(column) for column in drawn)
+    assert np.take_along_axis(legal[np.newaxis], actions[:, :, np.newaxis], axis=2).all()
+    assert (log_probabilities <= 1e-6).all()
+    assert np.isfinite(values).all()
+    # The row with the most to choose from; of its actions the one drawn first.
+    row = int(np.argmax(legal.sum(axis=1)))
+    likely = float(np.exp(log_probabilities[0, row]))
+    seen = float((actions[:, row] == actions[0, row]).mean())
+    assert abs(seen - likely) < 5 * (likely * (1 - likely) / draws) ** 0.5 + 1 / draws
+
+
+def test_it_learns_which_action_pays() -> None:
+    learner = ppo.start(1, 334, 214, HYPER)
+    inputs = rows(256, seed=3)
+    legal = inputs[:, -214:] > 0
+    # The legal action with the lowest index pays, every other one costs.
+    best = legal.argmax(axis=1)
+
+    def share(params: ppo.Params) -> float:
+        actions, _, _ = ppo.act(params, jax.random.key(9), inputs)
+        return float((np.asarray(actions) == best).mean())
+
+    before = share(learner.params)
+    for number in range(60):
+        actions, log_probabilities, _ = ppo.act(learner.params, jax.random.key(100 + number), inputs)
+        paid = np.where(np.asarray(actions) == best, 1.0, -1.0).astype(np.float32)
+        weights = np.ones(256, np.float32)
+        samples = Samples(
+            jnp.asarray(inputs), actions, log_probabilities, jnp.asarray(paid), jnp.asarray(paid), jnp.asarray(weights)
+        )
+        learner, losses = ppo.learn(learner, samples, jnp.float32(3e-3), jnp.float32(0.0), HYPER)
+        assert all(np.isfinite(float(value)) for value in losses)
+    assert share(learner.params) > max(0.8, before + 0.2)
+
+
+def test_rows_without_weight_teach_nothing() -> None:
+    learner = ppo.start(1, 334, 214, HYPER)
+    inputs = jnp.asarray(rows(32, seed=4))
+    actions, log_probabilities, _ = ppo.act(learner.params, jax.random.key(1), inputs)
+    gains = jnp.linspace(-1, 1, 32)
+    nothing = Samples(inputs, actions, log_probabilities, gains, gains, jnp.zeros(32))
+    # Adam divides nothing by nothing but its epsilon: the networks stay as they were.
+    after, losses = ppo.learn(learner, nothing, jnp.float32(1.0), jnp.float32(1.0), HYPER)
+    for old, new in zip(jax.tree.leaves(learner.params), jax.tree.leaves(after.params), strict=True):
+        np.testing.assert_array_equal(old, new)
+    assert float(losses.value) == 0
+
+
+def test_a_training_goes_on_from_a_file_as_if_nothing_had_been(tmp_path: Path) -> None:
+    plan = Plan(games=8, steps=16, hyper=HYPER)
+    training = ppo_checkpoint.begin(plan, 7, RULES, "a command")
+    inputs = jnp.asarray(rows(32, seed=4))
+    actions, log_probabilities, _ = ppo.act(training.learner.params, jax.random.key(1), inputs)
+    gains = jnp.linspace(-1, 1, 32)
+    samples = Samples(inputs, actions, log_probabilities, gains, gains, jnp.ones(32))
+
+    def learned(learner: ppo.Learner) -> ppo.Learner:
+        after, _ = ppo.learn(learner, samples, jnp.float32(1e-3), jnp.float32(0.01), HYPER)
+        return ppo.Learner(*after)
+
+    training = ppo_checkpoint.Training(plan, 7, RULES, learned(training.learner), Progress(1, 128, 0.5, 1), "a command")
+    ppo_checkpoint.save(tmp_path / "t", training)
+    read = ppo_checkpoint.load(tmp_path / "t")
+    assert (read.plan, read.seed, read.rules, read.progress, read.trained_by) == (plan, 7, RULES, training.progress, "a command")
+    on, on_read = learned(training.learner), learned(read.learner)
+    np.testing.assert_array_equal(jax.random.key_data(on.key), jax.random.key_data(on_read.key))
+    for one, other in zip(jax.tree.leaves(on[:2]), jax.tree.leaves(on_read[:2]), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_what_is_no_training_is_refused_in_words(tmp_path: Path) -> None:
+    path = tmp_path / "t"
+    path.write_bytes(b"cards")
+    with pytest.raises(TrainingFileError, match="is no training"):
+        ppo_checkpoint.load(path)
+    with pytest.raises(FileNotFoundError):
+        ppo_checkpoint.load(tmp_path / "nothing")
+
+
+def test_the_network_is_the_policy() -> None:
+    training = ppo_checkpoint.begin(Plan(hyper=HYPER), 7, RULES, "a command")
+    network = training.network("a name")
+    case = hand_made(20, seed=5)
+    inputs = network.inputs(case, case.seats, case.kinds, case.mask_bits)
+    chosen = network.actions(case, case.seats, case.kinds, case.mask_bits)
+    logits = np.asarray(ppo._logits(training.learner.params, jnp.asarray(inputs)))
+    np.testing.assert_array_equal(chosen, logits.argmax(axis=1))
+    assert network.info.trained_by == "a command"

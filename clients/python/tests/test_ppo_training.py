@@ -1,0 +1,92 @@
+"""Training by self-play against the real server: a small game is learned, the command writes its files and goes on from them."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from chefshat.learn import __main__ as command
+from chefshat.learn import network, ppo_checkpoint
+from chefshat.learn.evaluation import evaluate
+from chefshat.learn.ppo import Hyper
+from chefshat.learn.ppo_checkpoint import Plan
+from chefshat.learn.ppo_command import full_rules
+from chefshat.learn.ppo_training import Trainer
+
+pytestmark = pytest.mark.server
+
+SMALL = {"players": 2, "faces": 4}
+PLAN = Plan(games=64, steps=32, learning_rate=2e-3, hyper=Hyper(policy_widths=(32,), value_widths=(32,), minibatches=4))
+
+
+def test_a_small_game_is_learned(real_address: str) -> None:
+    rules = full_rules(SMALL, real_address)
+    assert (rules.players, rules.faces, list(rules.points)) == (2, 4, [5, 0])
+    before = ppo_checkpoint.begin(PLAN, 1, rules, "a test")
+    with Trainer(before, address=real_address) as trainer:
+        for _ in range(20):
+            losses = trainer.update(0.0)
+            assert all(np.isfinite(value) for value in losses.values())
+        after = trainer.training
+    assert after.progress.updates == 20
+    assert after.progress.decisions == 20 * 32 * 64
+    points = [
+        evaluate(training.network("small"), "random", games=150, seed=2, rules=rules, address=real_address).points
+        for training in (before, after)
+    ]
+    # Half of the 5 points is what chance has; the untrained network is no better than that by much.
+    assert points[1] > max(3.0, points[0] + 0.3), points
+
+
+def test_some_games_may_be_against_built_in_agents(real_address: str) -> None:
+    plan = replace(PLAN, games=8, opponent_games=8, opponents="random", steps=16)
+    with Trainer(ppo_checkpoint.begin(plan, 1, full_rules(SMALL, real_address), "a test"), address=real_address) as trainer:
+        trainer.update(0.0)
+        assert trainer.training.progress.decisions == 16 * 16
+
+
+def test_the_command_writes_its_files_and_goes_on(real_address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "small.safetensors"
+    options = ["ppo", "--out", str(out), "--address", real_address, "--seed", "3", "--name", "small", "--json"]
+    plan = ["--games", "16", "--steps", "16", "--minibatches", "2", "--width", "8", "--looks", "2", "--evaluation-games", "4"]
+    assert command.main([*options, *plan, "--decisions", "512"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert (told["event"], told["decisions"], told["updates"], told["runs"]) == ("trained", 512, 2, 1)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["small.jsonl", "small.safetensors", "small.training"]
+    trained = network.load(out)
+    assert trained.info.name == "small"
+    assert trained.info.trained_by.startswith("python -m chefshat.learn ppo --out")
+    assert json.loads(trained.info.rules)["players"] == 4
+    lines = [json.loads(line) for line in (tmp_path / "small.jsonl").read_text().splitlines()]
+    assert [line["event"] for line in lines] == ["setup", "evaluation", "evaluation", "evaluation"]
+    assert [line["decisions"] for line in lines[1:]] == [0, 256, 512]
+
+    assert command.main([*options, "--resume", "--looks", "2", "--decisions", "1024"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert (told["decisions"], told["updates"], told["runs"]) == (1024, 4, 2)
+    assert [evaluation["games"] for evaluation in told["evaluations"]] == [4, 4]
+    assert network.load(out).info.trained_by.count("python -m chefshat.learn ppo") == 2
+    assert any((old.weight != new.weight).any() for old, new in zip(trained.layers, network.load(out).layers, strict=True))
+
+    assert command.main(["evaluate", str(out), "--opponents", "greedy", "--games", "3", "--address", real_address, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert (found["opponents"], found["games"], sum(found["places"])) == (["greedy"] * 3, 3, found["shifts"])
+
+
+def test_the_command_says_what_is_wrong(real_address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    nothing = str(tmp_path / "nothing.safetensors")
+    assert command.main(["ppo", "--out", nothing, "--decisions", "1", "--resume", "--address", real_address]) == 1
+    assert "leave out --resume" in capsys.readouterr().err
+    assert (
+        command.main(["ppo", "--out", nothing, "--decisions", "1", "--games", "3", "--steps", "3", "--address", real_address]) == 1
+    )
+    assert "do not split" in capsys.readouterr().err
+    assert command.main(["evaluate", nothing, "--address", real_address]) == 1
+    assert "nothing.safetensors" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+    with pytest.raises(SystemExit) as ended:
+        command.main(["ppo", "--out", nothing])
+    assert ended.value.code == 2
+    assert "--minutes" in capsys.readouterr().err

@@ -1,0 +1,286 @@
+"""Replay: the buffer, and transitions of datasets and records: those a `VectorEnv` gave while the games were played."""
+
+import json
+import os
+import subprocess
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import BINARY
+from fake_vector import FakeVector
+from numpy.typing import NDArray
+
+import chefshat
+from chefshat import ChefsHatError, Transitions, VectorEnv, pb, replay, sample_legal
+from chefshat.transitions import concatenate
+
+# A row of a dataset, but for what a test changes.
+RULES = json.dumps({"players": 4, "faces": 11, "jokers": 2, "targetPoints": 15})
+ROW: dict[str, Any] = {
+    "game_id": "a",
+    "rules": RULES,
+    "finished": True,
+    "number": 1,
+    "shift": 1,
+    "pizza": 1,
+    "seat": 0,
+    "agent": "Ada",
+    "phase": "turn",
+    "hand": [1] * 12,
+    "golden": False,
+    "board_face": 0,
+    "board_size": 0,
+    "board_jokers": 0,
+    "cards_left": [12, 17, 17, 17],
+    "passed": [False, True, False, False],
+    "places": [0] * 4,
+    "roles": [0] * 4,
+    "points": [2**40, 0, 0, 7],
+    "played": [0] * 12,
+    "gave": None,
+    "received": None,
+    "mask": "ff" * 26 + "3f",
+    "action": 199,
+    "source": "agent",
+    "invalid_count": 0,
+    "invalid_attempts": [],
+    "reward_winning": -0.25,
+    "invalid_reward_winning": 0.0,
+    "shift_place": 2,
+    "game_place": 3,
+}
+
+
+def dataset(folder: Path, *rows: Mapping[str, Any]) -> Path:
+    """A dataset of these rows, numbered in order."""
+    full = [{**ROW, "number": number, **row} for number, row in enumerate(rows, 1)]
+    text = "".join(json.dumps(row) + "\n" for row in full)
+    (folder / "decisions.jsonl").write_text(text, encoding="utf-8")
+    return folder
+
+
+def test_decisions_are_paired_by_seat_and_shift(tmp_path: Path) -> None:
+    rows: list[dict[str, Any]] = [
+        {"seat": 0, "action": 10},
+        {"seat": 1, "action": 11},
+        {"seat": 0, "action": 12, "hand": [2] * 12},
+        {"seat": 0, "action": 13, "shift": 2, "phase": "exchange", "gave": [1] * 12},
+        {"seat": 0, "action": 14, "shift": 2},
+        {"seat": 0, "action": 15, "game_id": "b", "shift_place": None, "finished": False, "game_place": None},
+    ]
+    made = replay.from_dataset(dataset(tmp_path, *rows), rewards="winning")
+    assert made.actions.tolist() == [10, 12, 13, 14, 11]
+    assert made.ended.tolist() == [False, True, False, True, True]
+    assert made.game_over.tolist() == [False, False, False, True, False]
+    assert made.places_taken.tolist() == [0, 2, 0, 2, 2]
+    assert made.kinds.tolist() == [1, 1, pb.DECISION_KIND_EXCHANGE, 1, 1]
+    assert made.seats.tolist() == [0, 0, 0, 0, 1]
+    assert made.rewards.tolist() == [-0.25] * 5
+    assert made.after.observations.hands[:, 0].tolist() == [2, 0, 1, 0, 0]
+    assert made.before.observations.gave[:, 0].tolist() == [0, 0, 1, 0, 0]
+    assert made.before.observations.points[0].tolist() == [2**32 - 1, 0, 0, 7]
+    assert made.before.observations.passed[0].tolist() == [0, 1, 0, 0]
+    assert made.after.masks.sum(axis=1).tolist() == [214, 0, 214, 0, 0]
+    by_game = replay.from_dataset(tmp_path, episode="game")
+    assert by_game.actions.tolist() == [10, 12, 13, 14, 11]
+    assert by_game.ended.tolist() == [False, False, False, True, True]
+    assert by_game.places_taken.tolist() == [0, 0, 0, 3, 3]
+    assert by_game.rewards.tolist() == [0] * 5
+    turns = replay.from_dataset(tmp_path, decisions="turns", episode="game")
+    assert turns.actions.tolist() == [10, 12, 14, 11]
+    nobody = replay.from_dataset(tmp_path, agents=["Bob"])
+    assert len(nobody) == 0
+    assert nobody.before.masks.shape == (0, 214)
+
+
+def test_invalid_attempts_are_transitions_of_their_own(tmp_path: Path) -> None:
+    tried = {"action": 7, "invalid_attempts": [5, 70_000], "invalid_count": 2, "invalid_reward_winning": -2.0}
+    exhausted = {**tried, "action": 199, "source": "invalid"}
+    folder = dataset(tmp_path, {"action": 1}, tried, exhausted)
+    made = replay.from_dataset(folder, rewards="winning")
+    assert made.actions.tolist() == [1, 5, 65535, 7, 5, 65535]
+    assert made.attempts.tolist() == [0, 0, 1, 2, 0, 1]
+    assert made.invalid.tolist() == [False, True, True, False, True, True]
+    # The last attempt brings what the default decision brought, too.
+    assert made.rewards.tolist() == [-0.25, -1, -1, -0.25, -1, -1.25]
+    assert made.ended.tolist() == [False, False, False, False, False, True]
+    assert made.after.observations.hands[:, 0].tolist() == [1, 1, 1, 1, 1, 0]
+    assert replay.from_dataset(folder, invalid_attempts=False).actions.tolist() == [1, 7, 199]
+
+
+def test_hands_that_nobody_knows_are_left_out(tmp_path: Path) -> None:
+    unknown: dict[str, Any] = {"mask": None, "hand": None, "golden": None}
+    made = replay.from_dataset(dataset(tmp_path, {"action": 1}, {"action": 2, **unknown}, {"action": 3}, {"action": 4}))
+    assert made.actions.tolist() == [3, 4]
+
+
+def test_rewards_of_ones_own(tmp_path: Path) -> None:
+    made = replay.from_dataset(dataset(tmp_path, {}, {}), rewards=lambda transitions: transitions.ended * 7.0)
+    assert made.rewards.tolist() == [0, 7]
+
+
+@pytest.mark.parametrize(
+    ("rows", "options", "says"),
+    [
+        ([{}], {"rewards": "money"}, "'paper_intended'"),
+        ([{}], {"episode": "match"}, "'game'"),
+        ([{}], {"decisions": "some"}, "'turns'"),
+        ([{}, {"rules": RULES.replace("11", "9")}], {}, "4 players, 9 faces, 2 jokers; 4 players, 11 faces, 2 jokers"),
+        ([{}], {"rewards": "paper"}, "no column reward_paper"),
+        ([], {}, "no rows"),
+    ],
+)
+def test_what_is_no_dataset_is_told(tmp_path: Path, rows: list[Any], options: Any, says: str) -> None:
+    with pytest.raises(ValueError, match=says):
+        replay.from_dataset(dataset(tmp_path, *rows), **options)
+    with pytest.raises(FileNotFoundError, match="chefshat export"):
+        replay.from_dataset(tmp_path / "nothing")
+    (tmp_path / "a.txt").touch()
+    with pytest.raises(ValueError, match=r"\.parquet, \.jsonl, \.csv"):
+        replay.from_dataset(tmp_path / "a.txt")
+
+
+def test_a_buffer_keeps_the_latest_and_draws_them_all(tmp_path: Path) -> None:
+    buffer = replay.ReplayBuffer(5, seed=1)
+    with pytest.raises(ValueError, match="empty"):
+        buffer.sample(1)
+    made = replay.from_dataset(dataset(tmp_path, *[{"action": action} for action in range(8)]))
+    buffer.add(made.take(np.arange(3)))
+    assert len(buffer) == 3
+    assert set(buffer.sample(200).actions.tolist()) == {0, 1, 2}
+    buffer.add(made.take(np.arange(3, 6)))
+    assert set(buffer.sample(200).actions.tolist()) == {1, 2, 3, 4, 5}
+    buffer.add(made)
+    assert len(buffer) == 5
+    drawn = buffer.sample(200)
+    assert set(drawn.actions.tolist()) == {3, 4, 5, 6, 7}
+    assert drawn.ended.tolist() == (drawn.actions == 7).tolist()
+    assert drawn.before.observations.hands.shape == (200, 12)
+    again = [replay.ReplayBuffer(5, seed=seed) for seed in (9, 9, 10)]
+    for other in again:
+        other.add(made)
+    first, second, third = (other.sample(50).actions.tolist() for other in again)
+    assert first == second != third
+    small = replay.from_dataset(dataset(tmp_path, {"rules": RULES.replace('"jokers": 2', '"jokers": 1')}))
+    with pytest.raises(ValueError, match="use a buffer for each"):
+        buffer.add(small)
+    with pytest.raises(ValueError, match="at least 1"):
+        replay.ReplayBuffer(0)
+
+
+def test_a_buffer_takes_what_an_env_gives() -> None:
+    buffer = replay.ReplayBuffer(1000, seed=2)
+    with FakeVector() as server, VectorEnv(server.address, 8, transitions=True) as env:
+        count = 0
+        while count < 100:
+            transitions = env.step(np.full(8, 199)).transitions
+            buffer.add(transitions)
+            count += len(transitions)
+    assert len(buffer) == count
+    drawn = buffer.sample(64)
+    assert (drawn.before.observations.hands[:, 0] == drawn.games).all()
+    assert (drawn.before.observations.hands[:, 1] == drawn.seats).all()
+
+
+@pytest.fixture(scope="module")
+def binary() -> str:
+    """The program."""
+    return os.environ.get(BINARY) or pytest.skip(f"{BINARY} is not set: name the chefshat binary to replay with it")
+
+
+def in_order(transitions: Transitions) -> list[Transitions]:
+    """The transitions of each game, by seat and in the order in which they were made; the games by their first hands."""
+    games = []
+    for game in np.unique(transitions.games):
+        own = transitions.take(transitions.games == game)
+        games.append(own.take(np.argsort(own.seats, kind="stable")))
+    return sorted(games, key=lambda game: game.before.observations.hands.tobytes())
+
+
+@pytest.mark.server
+@pytest.mark.parametrize("invalid", ["error", "ask_again"])
+@pytest.mark.parametrize("episode", ["shift", "game"])
+def test_records_give_the_transitions_of_the_games_as_they_were_played(
+    real_address: str, binary: str, tmp_path: Path, episode: str, invalid: str
+) -> None:
+    rng = np.random.default_rng(5)
+    options: dict[str, Any] = {"rewards": "paper", "episode": episode}
+    limit = 3 if invalid == "ask_again" else 0
+    parts: list[Transitions] = []
+    with VectorEnv(
+        real_address,
+        4,
+        seed=3,
+        total_games=4,
+        records=True,
+        transitions=True,
+        invalid=invalid,
+        max_invalid_attempts=limit,
+        **options,
+    ) as env:
+        while not env.batch.done:
+            actions = sample_legal(env.batch.mask_bits, rng)
+            if limit:
+                wrong = rng.random(len(actions)) < 0.2
+                actions[wrong] = rng.integers(0, env.num_actions, wrong.sum())
+            batch = env.step(actions)
+            parts.append(batch.transitions)
+            for record in batch.records:
+                replay.save_record(record.lines, tmp_path / f"{record.index}.jsonl")
+    assert len(list(tmp_path.glob("*.jsonl"))) == 4
+    played = in_order(concatenate(parts))
+    recorded = in_order(replay.from_records(tmp_path, **options))
+    assert len(played) == len(recorded) == 4
+    assert (sum(int(game.invalid.sum()) for game in played) > 0) == bool(limit)
+    for lived, read in zip(played, recorded, strict=True):
+        assert len(lived) == len(read) > 100
+        goes_on = ~lived.ended
+        columns = read.flatten()
+        for name, array in lived.flatten().items():
+            # What was seen at an end is not in a dataset, and games are counted otherwise.
+            rows: NDArray[np.bool_] = goes_on if name.startswith("after.") else np.ones(len(lived), np.bool_)
+            if name == "rewards":
+                np.testing.assert_allclose(array, columns[name], rtol=1e-6)
+            elif name != "games":
+                np.testing.assert_array_equal(array[rows], columns[name][rows], err_msg=name)
+
+
+@pytest.mark.server
+def test_all_forms_of_a_dataset_are_read_alike(binary: str, tmp_path: Path) -> None:
+    records, folder = tmp_path / "records", tmp_path / "dataset"
+    simulate = [binary, "simulate", "--games", "2", "--seed", "1", "--agents", "greedy,random,random_unmasked,random"]
+    subprocess.run([*simulate, "--records", str(records)], check=True, capture_output=True)
+    export = [binary, "export", str(records), "--out", str(folder), "--format", "parquet,jsonl,csv"]
+    subprocess.run(export, check=True, capture_output=True)
+    made = [replay.from_dataset(folder / f"decisions.{form}", rewards="paper").flatten() for form in ("parquet", "jsonl", "csv")]
+    assert len(made[0]["actions"]) > 400
+    assert made[0]["invalid"].any()
+    for name, array in made[0].items():
+        for other in made[1:]:
+            np.testing.assert_array_equal(array, other[name], err_msg=name)
+            assert array.dtype == other[name].dtype
+    whole = replay.from_dataset(folder, rewards="paper")
+    assert len(whole) == len(made[0]["actions"])
+
+
+@pytest.mark.server
+def test_games_of_a_server(real_address: str, binary: str) -> None:
+    with chefshat.Client(real_address) as client:
+        room = client.create_room("replayed", seats=[None, "greedy", "random", "random"], rules=pb.RuleSet(target_shifts=2))
+        client.play(chefshat.RandomAgent(seed=1), client.join_room(room.join_code, "Ada").ticket)
+    made = replay.from_server(real_address, pb.RecordFilter(room_name="replayed"), rewards="points")
+    assert sorted(np.unique(made.seats).tolist()) == [0, 1, 2, 3]
+    assert made.ended.sum() == 8
+    assert made.rewards.sum() == 18
+    with pytest.raises(ChefsHatError, match="NO_RECORDS"):
+        replay.from_server(real_address, pb.RecordFilter(room_name="no such room"))
+
+
+@pytest.mark.server
+def test_damaged_records_are_told(binary: str, tmp_path: Path) -> None:
+    (tmp_path / "broken.jsonl").write_text("{}\n", encoding="utf-8")
+    with pytest.raises(ChefsHatError, match=r"RECORDS_REFUSED.*damaged"):
+        replay.from_records(tmp_path)

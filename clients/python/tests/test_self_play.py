@@ -1,0 +1,79 @@
+"""Advantages against a plain loop over each seat's own chain, and what places are worth."""
+
+import itertools
+from collections import defaultdict
+
+import numpy as np
+import pytest
+
+from chefshat.learn.self_play import Ends, Rollout, advantages, place_rewards
+
+STEPS, GAMES, PLAYERS = 40, 6, 4
+
+
+def made_up(seed: int) -> Rollout:
+    """A rollout in which seats decide by chance, games are left out by chance, and Shifts end by chance, some twice in a step."""
+    chance = np.random.default_rng(seed)
+    shape = (STEPS, GAMES)
+    ends = []
+    for _ in range(STEPS):
+        ended = [game for game in range(GAMES) for _ in range(int(chance.choice([0, 1, 2], p=[0.85, 0.12, 0.03])))]
+        games = np.repeat(np.array(ended, np.uint32), PLAYERS)
+        seats = np.tile(np.arange(PLAYERS, dtype=np.uint8), len(ended))
+        ends.append(Ends(games, seats, chance.normal(size=len(games)).astype(np.float32)))
+    return Rollout(
+        inputs=np.zeros((*shape, 1), np.float32),
+        actions=np.zeros(shape, np.int32),
+        log_probabilities=np.zeros(shape, np.float32),
+        values=chance.normal(size=shape).astype(np.float32),
+        seats=chance.integers(0, PLAYERS, shape, dtype=np.uint8),
+        present=chance.random(shape) < 0.9,
+        ends=ends,
+    )
+
+
+def plain(rollout: Rollout, discount: float, trace: float) -> dict[tuple[int, int], float]:
+    """The advantage of every decision of which it is known, by step and game."""
+    # For each game and seat what happened to it, in order: its decisions (step) and the rewards of its ends (None, reward).
+    stories: dict[tuple[int, int], list[int | float]] = defaultdict(list)
+    for step in range(STEPS):
+        for game in range(GAMES):
+            if rollout.present[step, game]:
+                stories[game, int(rollout.seats[step, game])].append(step)
+        ends = rollout.ends[step]
+        for game, seat, reward in zip(ends.games, ends.seats, ends.rewards, strict=True):
+            stories[int(game), int(seat)].append(float(reward))
+    found: dict[tuple[int, int], float] = {}
+    for (game, _), story in stories.items():
+        chain: list[int] = []
+        for what in [*story, None]:
+            if isinstance(what, int):
+                chain.append(what)
+                continue
+            values = [float(rollout.values[step, game]) for step in chain]
+            # What goes on after the rollout leads to its last decision.
+            deltas = [discount * later - value for value, later in itertools.pairwise(values)]
+            if what is not None and values:
+                deltas.append(what - values[-1])
+            for number in range(len(deltas)):
+                found[chain[number], game] = sum((discount * trace) ** k * delta for k, delta in enumerate(deltas[number:]))
+            chain = []
+    return found
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_advantages_are_those_of_a_plain_loop(seed: int) -> None:
+    rollout = made_up(seed)
+    found, known = advantages(rollout, PLAYERS, discount=0.9, trace=0.8)
+    expected = plain(rollout, 0.9, 0.8)
+    assert len(expected) > 100
+    assert {(int(step), int(game)) for step, game in np.argwhere(known)} == set(expected)
+    for (step, game), advantage in expected.items():
+        assert found[step, game] == pytest.approx(advantage, rel=1e-4, abs=1e-5)
+    assert not found[~known].any()
+
+
+def test_places_are_worth_something_that_adds_up_to_nothing() -> None:
+    worth = place_rewards([5, 3, 1, 0])
+    np.testing.assert_allclose(worth, [0.55, 0.15, -0.25, -0.45], rtol=1e-6)
+    assert worth.sum() == pytest.approx(0, abs=1e-6)

@@ -1,0 +1,199 @@
+"""`VectorEnv` against the real server: what holds in every game, and what is refused."""
+
+from collections import Counter
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import chefshat
+from chefshat import ChefsHatError, Transitions, VectorEnv, pb, sample_legal
+
+pytestmark = pytest.mark.server
+
+
+def test_what_holds_in_every_game(real_address: str) -> None:
+    rng = np.random.default_rng(1)
+    decided, ended, games_over = 0, 0, 0
+    points = np.zeros(4)
+    with VectorEnv(real_address, 16, seed=1, rewards="points", shift_statistics=True) as env:
+        batch = env.batch
+        assert (env.players, env.faces, env.hand_size, env.num_actions, env.turn_actions) == (4, 11, 17, 214, 200)
+        assert env.base_seed == 1
+        assert batch.beginnings.games.tolist() == list(range(16))
+        while ended < 60:
+            seen, rows = batch.observations, np.arange(len(batch))
+            assert batch.games.tolist() == list(range(16))
+            assert (seen.hands.sum(axis=1) == seen.cards_left[rows, batch.seats]).all()
+            assert batch.masks.any(axis=1).all()
+            turns = batch.kinds == pb.DECISION_KIND_TURN
+            assert not batch.masks[turns, 200:].any()
+            assert not batch.masks[~turns, :200].any()
+            assert (batch.rewards == 0).all()
+            decided += len(batch)
+            batch = env.step(sample_legal(batch.mask_bits, rng))
+            endings, shifts = batch.endings, batch.shifts
+            assert shifts is not None
+            assert len(endings) == 4 * len(shifts)
+            assert endings.games.tolist() == np.repeat(shifts.games, 4).tolist()
+            assert (np.sort(endings.places_taken.reshape(-1, 4), axis=1) == [1, 2, 3, 4]).all()
+            assert (endings.places_taken.reshape(-1, 4) == shifts.places).all()
+            assert (endings.rewards.reshape(-1, 4) == shifts.points).all()
+            assert (shifts.reward_sums == shifts.points).all()
+            assert (shifts.valid.sum(axis=1) == shifts.turns).all()
+            points += endings.rewards.reshape(-1, 4).sum(axis=0)
+            ended += len(shifts)
+            games_over += int(endings.game_over.sum()) // 4
+        assert batch.totals.client_decisions == batch.totals.decisions == decided
+        assert batch.totals.shifts == ended
+        assert batch.totals.games == games_over
+        assert points.sum() == 9 * ended
+
+
+def trajectory(env: VectorEnv, steps: int) -> list[Any]:
+    """What is seen and given while the last legal action is taken each time."""
+    found = []
+    for _ in range(steps):
+        batch = env.step(env.num_actions - 1 - env.batch.masks[:, ::-1].argmax(axis=1))
+        found.append(
+            [batch.seats.tolist(), batch.observations.hands.tolist(), batch.rewards.tolist(), batch.endings.places_taken.tolist()]
+        )
+    return found
+
+
+def test_a_game_of_a_batch_can_be_played_again_alone(real_address: str) -> None:
+    options: dict[str, Any] = {"rewards": "paper", "client_seats": [1], "opponents": ["greedy", "random", "random_unmasked"]}
+    with VectorEnv(real_address, 3, seed=5, **options) as env:
+        seeds = [bytes(seed) for seed in env.batch.beginnings.seeds]
+        together = trajectory(env, 40)
+        env.reset(seed=5)
+        assert trajectory(env, 40) == together
+        env.reset(seed=6)
+        assert trajectory(env, 40) != together
+    for game, seed in enumerate(seeds):
+        with VectorEnv(real_address, 1, seed=[seed], **options) as env:
+            alone = trajectory(env, 40)
+        assert [[column[0] for column in step[:3]] for step in alone] == [
+            [column[game] for column in step[:3]] for step in together
+        ]
+
+
+def test_a_custom_reward_can_say_what_a_scheme_says(real_address: str) -> None:
+    def validity(transitions: Transitions) -> NDArray[np.float32]:
+        turns = transitions.kinds == pb.DECISION_KIND_TURN
+        return np.where(turns, np.where(transitions.invalid, -1, 1), 0).astype(np.float32)
+
+    rng = np.random.default_rng(2)
+    options: dict[str, Any] = {"seed": 9, "invalid": "ask_again", "client_seats": [0, 2]}
+    wrong = 0
+    with (
+        VectorEnv(real_address, 8, rewards="validity", **options) as scheme,
+        VectorEnv(real_address, 8, reward_function=validity, **options) as own,
+    ):
+        while len(scheme.batch.endings) == 0 or wrong < 100:
+            actions = sample_legal(scheme.batch.mask_bits, rng)
+            tried = rng.random(len(actions)) < 0.3
+            actions[tried] = rng.integers(0, 214, tried.sum())
+            wrong += int((~scheme.batch.masks[np.arange(len(actions)), actions]).sum())
+            told, made = scheme.step(actions), own.step(actions)
+            assert told.seats.tolist() == made.seats.tolist()
+            assert told.attempts.tolist() == made.attempts.tolist()
+            assert told.rewards.tolist() == made.rewards.tolist()
+            assert told.endings.rewards.tolist() == made.endings.rewards.tolist()
+        assert scheme.batch.totals.invalid_attempts == wrong
+
+
+def test_turns_alone_are_the_papers_200_actions(real_address: str) -> None:
+    with VectorEnv(real_address, 8, seed=1, decisions="turns", other_decisions="greedy", skip_forced=True) as env:
+        kinds: Counter[int] = Counter()
+        while env.batch.totals.games < 2:
+            batch = env.step(sample_legal(env.batch.mask_bits, np.random.default_rng(0)))
+            kinds.update(batch.kinds.tolist())
+            assert (batch.masks.sum(axis=1) > 1).all()
+            assert not batch.masks[:, 200:].any()
+        assert set(kinds) == {pb.DECISION_KIND_TURN}
+
+
+def test_a_number_of_games_and_then_no_more(real_address: str) -> None:
+    rng = np.random.default_rng(3)
+    with VectorEnv(real_address, 2, seed=1, total_games=5, episode="game", rules={"target_shifts": 2}) as env:
+        begun, over = env.batch.beginnings.indices.tolist(), 0
+        while not env.batch.done:
+            batch = env.step(sample_legal(env.batch.mask_bits, rng))
+            begun += batch.beginnings.indices.tolist()
+            over += len(batch.endings)
+            assert batch.endings.game_over.all()
+        assert sorted(begun) == [0, 1, 2, 3, 4]
+        assert over == 4 * 5
+        assert env.batch.totals.games == 5
+        assert len(env.batch) == 0
+        assert len(env.reset()) == 2
+
+
+def test_other_tables_have_other_widths(real_address: str) -> None:
+    with VectorEnv(real_address, 2, rules={"players": 6, "faces": 15, "jokers": 1}, transitions=True) as env:
+        for _ in range(50):
+            batch = env.step(sample_legal(env.batch.mask_bits, np.random.default_rng(4)))
+        assert env.num_actions == 380
+        assert batch.masks.shape == (2, 380)
+        assert batch.observations.hands.shape == (2, 16)
+        assert batch.observations.roles.shape == (2, 6)
+        assert batch.transitions.before.observations.points.shape[1] == 6
+
+
+def test_games_go_on_from_a_record(real_address: str) -> None:
+    with chefshat.Client(real_address) as client:
+        room = client.create_room("to branch from", seats=[None, "greedy", "random", "random"])
+        client.play(chefshat.RandomAgent(seed=1), client.join_room(room.join_code, "Ada").ticket)
+        decisions = [line.decision for line in client.record(room.room.game_id) if line.HasField("decision")]
+    branch = pb.BranchPoint(game_id=room.room.game_id, decisions=30)
+    with VectorEnv(real_address, 3, branch=branch) as env:
+        following = decisions[30]
+        assert env.batch.seats.tolist() == [following.seat] * 3
+        assert env.batch.mask_bits[2].tobytes() == following.action_mask
+        env.step([following.action] * 3)
+        assert env.batch.seats.tolist() == [decisions[31].seat] * 3
+    missing = pb.BranchPoint(game_id="0" * 32, decisions=1)
+    with pytest.raises(ChefsHatError) as refused:
+        VectorEnv(real_address, 1, branch=missing)
+    assert refused.value.reason == "GAME_UNKNOWN"
+
+
+def test_games_begin_with_given_hands(real_address: str) -> None:
+    rules = pb.RuleSet(players=2, faces=4, jokers=2)
+    cards = [[1, 2, 3, 4, 4, 5], [2, 3, 3, 4, 4, 5]]
+    hands = [pb.SeatCards(seat=seat, cards=held, golden=seat == 1) for seat, held in enumerate(cards)]
+    with VectorEnv(real_address, 2, rules=rules, hands=pb.ScriptedShift(hands=hands)) as env:
+        assert env.batch.seats.tolist() == [1, 1]
+        assert env.batch.observations.hands.tolist() == [[0, 1, 2, 2, 1]] * 2
+        assert env.batch.observations.golden.tolist() == [1, 1]
+
+
+@pytest.mark.parametrize(
+    ("options", "reason", "says"),
+    [
+        ({"games": 10**6}, "SETUP_REFUSED", "[0-9]"),
+        ({"client_seats": [4]}, "SETUP_REFUSED", "seat"),
+        ({"opponents": "nobody", "client_seats": [0]}, "SETUP_REFUSED", "nobody"),
+        ({"rules": {"faces": 40}}, "RULE_SET_REFUSED", "40"),
+        ({"rules": "no such preset"}, "RULE_SET_REFUSED", "no such preset"),
+    ],
+)
+def test_setups_are_refused_with_their_reason(real_address: str, options: Any, reason: str, says: str) -> None:
+    with pytest.raises(ChefsHatError, match=says) as refused:
+        VectorEnv(real_address, **options)
+    assert refused.value.reason == reason
+    assert not refused.value.retryable
+
+
+def test_an_illegal_action_is_named_by_its_row(real_address: str) -> None:
+    with VectorEnv(real_address, 4, seed=1) as env:
+        actions = env.batch.masks.argmax(axis=1)
+        actions[2] = env.batch.masks[2].argmin()
+        with pytest.raises(ChefsHatError) as refused:
+            env.step(actions)
+        assert refused.value.reason == "ILLEGAL_ACTION"
+        assert "2" in refused.value.metadata.values()
+        with pytest.raises(ChefsHatError, match="ENV_ENDED"):
+            env.step(actions)

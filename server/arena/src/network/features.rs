@@ -1,0 +1,129 @@
+//! What a network is shown with the input `table`: everything that a seat may know, as numbers. The Python package computes the same
+//! (`chefshat.learn.features`); a fixture holds the two together. The input `classic` is the engine's.
+
+use chefshat_engine::{ActionSpace, Cards, DecisionKind, Mask, Observation, Seat};
+
+/// Points from which on more make no difference.
+const MAX_POINTS: u8 = 15;
+/// Pizzas from which on more make no difference.
+const MAX_PIZZAS: u8 = 30;
+/// Values of a role: none, and five of them.
+const ROLES: usize = 6;
+/// Kinds of decisions.
+const KINDS: usize = 3;
+/// Jokers that count as 1.
+const JOKERS: f32 = 2.0;
+
+/// How many numbers [`table_features`] gives.
+pub(super) fn table_len(players: usize, space: ActionSpace) -> usize {
+    let faces = usize::from(space.faces());
+    let cards = 5 * (faces + 1);
+    let board = faces + 2 + 2;
+    let seats = players * (4 + ROLES);
+    cards + 1 + board + seats + KINDS + 1 + usize::from(space.size())
+}
+
+/// Everything that a seat may know at a decision, as numbers from 0 to about 1: 334 in the standard game. In this order, where F is the
+/// number of faces, N of players, H of cards dealt to a hand and A of actions, and where what there is one of for each seat begins with the
+/// own seat and goes on to its left:
+///
+/// | numbers | what |
+/// |---|---|
+/// | F + 1 | the own hand: cards of face f divided by f, jokers by 2 |
+/// | 1 | whether the own hand holds the Golden card |
+/// | F + 2 | one-hot: face on the board, 0 (empty) to F + 1 (a joker alone) |
+/// | 1 | cards on the board / F |
+/// | 1 | jokers among them / 2 |
+/// | N | cards in each hand / H |
+/// | N | whether each seat has passed |
+/// | N | place of each seat that has finished / N, else 0 |
+/// | 6 N | one-hot for each seat: role, 0 (none), Chef, Sous-Chef, Cook, Waiter, Dishwasher |
+/// | N | points of each seat, at most 15, / 15 |
+/// | F + 1 | cards played so far in the Shift, divided as the hand |
+/// | F + 1 | cards neither played nor in the own hand (of a deck with two jokers), divided as the hand |
+/// | F + 1 | cards given in the Shift's exchange / 2 |
+/// | F + 1 | cards received in it / 2 |
+/// | 3 | one-hot: kind of the decision (turn, exchange, special action) |
+/// | 1 | number of the pizza, at most 30, / 30 |
+/// | A | whether each action is legal |
+///
+/// An observation without a seat, a spectator's, is seen from seat 0.
+pub fn table_features(observation: &Observation, legal: &Mask) -> Vec<f32> {
+    let faces = observation.faces;
+    let players = observation.cards_left.len();
+    let space = ActionSpace::new(faces).expect("an observation has 4 to 15 faces");
+    let own = observation.seat.unwrap_or_default().index();
+    let seats = || (0..players).map(|left| Seat::new((own + left) % players));
+    let length = table_len(players, space);
+    let mut out = Vec::with_capacity(length);
+
+    shares(&mut out, observation.hand, faces);
+    out.push(flag(observation.hand.has_golden()));
+    one_hot(
+        &mut out,
+        observation.board.face.into(),
+        usize::from(faces) + 2,
+    );
+    out.push(f32::from(observation.board.size) / f32::from(faces));
+    out.push(f32::from(observation.board.jokers) / JOKERS);
+
+    let hand_size = f32::from(observation.hand_size);
+    out.extend(seats().map(|seat| f32::from(observation.cards_left[seat]) / hand_size));
+    out.extend(seats().map(|seat| flag(observation.passed[seat])));
+    let places = players as f32;
+    out.extend(seats().map(|seat| f32::from(observation.places[seat]) / places));
+    for seat in seats() {
+        let role = observation.roles[seat].map_or(0, |role| role as usize);
+        one_hot(&mut out, role, ROLES);
+    }
+    out.extend(seats().map(|seat| {
+        let points = u8::try_from(observation.points[seat]).unwrap_or(MAX_POINTS);
+        f32::from(points.min(MAX_POINTS)) / f32::from(MAX_POINTS)
+    }));
+
+    shares(&mut out, observation.played, faces);
+    let known = observation
+        .hand
+        .counts(faces)
+        .zip(observation.played.counts(faces));
+    out.extend(sizes(faces).zip(known).map(|(size, (hand, played))| {
+        f32::from(size.saturating_sub(hand).saturating_sub(played)) / f32::from(size)
+    }));
+    for cards in [observation.gave, observation.received] {
+        out.extend(cards.counts(faces).map(|count| f32::from(count) / 2.0));
+    }
+
+    let kind = match observation.kind {
+        Some(DecisionKind::Turn) => 0,
+        Some(DecisionKind::Exchange) => 1,
+        Some(DecisionKind::SpecialAction) => 2,
+        None => KINDS,
+    };
+    one_hot(&mut out, kind, KINDS);
+    let pizza = u8::try_from(observation.pizza).unwrap_or(MAX_PIZZAS);
+    out.push(f32::from(pizza.min(MAX_PIZZAS)) / f32::from(MAX_PIZZAS));
+    out.extend(space.iter().map(|action| flag(legal.contains(action))));
+
+    debug_assert_eq!(out.len(), length);
+    out
+}
+
+/// How many cards of each face a deck has, jokers last.
+fn sizes(faces: u8) -> impl Iterator<Item = u8> {
+    (1..=faces).chain([chefshat_engine::MAX_JOKERS])
+}
+
+/// Each count as a share of the deck's.
+fn shares(out: &mut Vec<f32>, cards: Cards, faces: u8) {
+    let counts = cards.counts(faces).zip(sizes(faces));
+    out.extend(counts.map(|(count, size)| f32::from(count) / f32::from(size)));
+}
+
+/// `length` zeros, with a 1 at `index` if it is below.
+fn one_hot(out: &mut Vec<f32>, index: usize, length: usize) {
+    out.extend((0..length).map(|slot| flag(slot == index)));
+}
+
+fn flag(set: bool) -> f32 {
+    f32::from(u8::from(set))
+}

@@ -1,0 +1,371 @@
+//! What a step gives: tables whose columns are bytes, one value or a fixed number of values per row, without gaps; numbers are little-endian.
+//! The layout is that of the protocol's vector messages, so that a column is sent as it is. When rows are written is decided in `slot`.
+
+use chefshat_engine::{
+    BySeat, Cards, DecisionKind, Mask, Observation, Seat, SeatOrder, ShiftMetrics, SpecialAction,
+    Standings,
+};
+
+use super::{Episode, PlayedGame, VectorSetup};
+
+/// Seat in a column where there is none.
+const NO_SEAT: u8 = u8::MAX;
+
+/// One step's tables.
+#[derive(Debug, Default)]
+pub struct Batch {
+    /// Number of the batch, from 1.
+    pub step: u64,
+    /// Decisions that wait.
+    pub rows: u32,
+    /// Whether all games are over for good.
+    pub done: bool,
+    /// u32: game.
+    pub games: Vec<u8>,
+    /// u8: seat.
+    pub seats: Vec<u8>,
+    /// u8: kind of decision: 1 turn, 2 exchange, 3 special action.
+    pub kinds: Vec<u8>,
+    /// u32: invalid attempts so far.
+    pub attempts: Vec<u8>,
+    /// f32: rewards since the seat last decided.
+    pub rewards: Vec<u8>,
+    /// What the seats see.
+    pub observations: ObservationColumns,
+    /// ceil(A/8) bytes wide: legal actions.
+    pub masks: Vec<u8>,
+    /// Episodes that ended.
+    pub endings: Endings,
+    /// Games that began.
+    pub beginnings: Beginnings,
+    /// Shifts that ended, if asked for.
+    pub shifts: Shifts,
+    /// Counts from the beginning.
+    pub totals: Totals,
+    /// Games that ended, if their decisions are kept.
+    pub played: Vec<PlayedGame>,
+    /// Bytes of a mask.
+    mask_bytes: usize,
+}
+
+/// Observations, one per row. Cards are F+1 counts, seats N values.
+#[derive(Debug, Default)]
+pub struct ObservationColumns {
+    /// u32.
+    pub shifts: Vec<u8>,
+    /// u32.
+    pub pizzas: Vec<u8>,
+    /// u8 by card.
+    pub hands: Vec<u8>,
+    /// u8: 0 or 1.
+    pub golden: Vec<u8>,
+    /// u8, 3 wide: face, size, jokers.
+    pub boards: Vec<u8>,
+    /// u8 by seat.
+    pub cards_left: Vec<u8>,
+    /// u8 by seat.
+    pub passed: Vec<u8>,
+    /// u8 by seat.
+    pub places: Vec<u8>,
+    /// u8 by seat: 0 none, 1 Chef, 2 Sous-Chef, 3 Cook, 4 Waiter, 5 Dishwasher.
+    pub roles: Vec<u8>,
+    /// u32 by seat.
+    pub points: Vec<u8>,
+    /// u8 by card.
+    pub played: Vec<u8>,
+    /// u8 by card.
+    pub gave: Vec<u8>,
+    /// u8 by card.
+    pub received: Vec<u8>,
+}
+
+/// Episodes of the owner's seats that ended.
+#[derive(Debug, Default)]
+pub struct Endings {
+    /// Number of rows.
+    pub rows: u32,
+    /// u32.
+    pub games: Vec<u8>,
+    /// u8.
+    pub seats: Vec<u8>,
+    /// f32: rewards since the seat last decided.
+    pub rewards: Vec<u8>,
+    /// u8: 1 finished, 2 cut short.
+    pub ends: Vec<u8>,
+    /// u8: 0 or 1.
+    pub game_over: Vec<u8>,
+    /// u8: place in the episode, from 1.
+    pub places_taken: Vec<u8>,
+    /// What the seats saw at the end.
+    pub observations: ObservationColumns,
+}
+
+/// Games that began.
+#[derive(Debug, Default)]
+pub struct Beginnings {
+    /// Number of rows.
+    pub rows: u32,
+    /// u32.
+    pub games: Vec<u8>,
+    /// u64.
+    pub indices: Vec<u8>,
+    /// 32 bytes wide.
+    pub seeds: Vec<u8>,
+}
+
+/// Shifts that ended.
+#[derive(Debug, Default)]
+pub struct Shifts {
+    /// Number of rows.
+    pub rows: u32,
+    /// u32.
+    pub games: Vec<u8>,
+    /// u64.
+    pub indices: Vec<u8>,
+    /// u32: number in the game.
+    pub shifts: Vec<u8>,
+    /// u8.
+    pub starters: Vec<u8>,
+    /// u32.
+    pub pizzas: Vec<u8>,
+    /// u32.
+    pub laps: Vec<u8>,
+    /// u32.
+    pub turns: Vec<u8>,
+    /// u8: 0 none, 1 Food Fight, 2 Dinner is Served.
+    pub special_actions: Vec<u8>,
+    /// u8: 0 or 1.
+    pub adjudicated: Vec<u8>,
+    /// u8: seat, or 255.
+    pub game_winners: Vec<u8>,
+    /// u8 by seat.
+    pub places: Vec<u8>,
+    /// u32 by seat.
+    pub points: Vec<u8>,
+    /// u32 by seat.
+    pub valid: Vec<u8>,
+    /// u32 by seat.
+    pub wrong: Vec<u8>,
+    /// u32 by seat.
+    pub passes: Vec<u8>,
+    /// f32 by seat.
+    pub reward_sums: Vec<u8>,
+    /// f32 by seat.
+    pub performance: Vec<u8>,
+}
+
+/// Counts from the beginning.
+#[derive(Copy, Clone, Eq, PartialEq, Debug, Default)]
+pub struct Totals {
+    /// Decisions of the owner that were taken.
+    pub client_decisions: u64,
+    /// All decisions that were taken.
+    pub decisions: u64,
+    /// Invalid attempts of the owner.
+    pub invalid_attempts: u64,
+    /// Shifts that ended.
+    pub shifts: u64,
+    /// Games that ended.
+    pub games: u64,
+}
+
+/// A decision that waits, as a row.
+pub(super) struct Row<'a> {
+    pub(super) game: u32,
+    pub(super) seat: Seat,
+    pub(super) attempts: u32,
+    pub(super) reward: f32,
+    pub(super) observation: &'a Observation,
+    pub(super) legal: &'a Mask,
+}
+
+/// An episode of a seat that ended, as a row.
+pub(super) struct Ending<'a> {
+    pub(super) game: u32,
+    pub(super) seat: Seat,
+    pub(super) reward: f32,
+    pub(super) cut_short: bool,
+    pub(super) game_over: bool,
+    pub(super) place: u8,
+    pub(super) observation: &'a Observation,
+}
+
+impl Batch {
+    /// No rows, with room for one of every game.
+    pub(super) fn new(setup: &VectorSetup) -> Batch {
+        let games = setup.games() as usize;
+        let rules = setup.rules();
+        let mask_bytes = usize::from(rules.actions().size()).div_ceil(8);
+        let of = |width: usize| Vec::with_capacity(games * width);
+        Batch {
+            games: of(4),
+            seats: of(1),
+            kinds: of(1),
+            attempts: of(4),
+            rewards: of(4),
+            observations: ObservationColumns::with_room(
+                games,
+                usize::from(rules.faces()) + 1,
+                rules.players(),
+            ),
+            masks: of(mask_bytes),
+            mask_bytes,
+            ..Batch::default()
+        }
+    }
+
+    pub(super) fn push(&mut self, row: &Row<'_>) {
+        self.rows += 1;
+        put_u32(&mut self.games, row.game);
+        self.seats.push(row.seat.index() as u8);
+        self.kinds.push(row.observation.kind.map_or(0, kind_number));
+        put_u32(&mut self.attempts, row.attempts);
+        put_f32(&mut self.rewards, row.reward);
+        self.observations.push(row.observation);
+        let mut words = row.legal.words().iter();
+        for word in words.by_ref().take(self.mask_bytes / 8) {
+            self.masks.extend_from_slice(&word.to_le_bytes());
+        }
+        let last = words.next().map_or([0; 8], |word| word.to_le_bytes());
+        self.masks
+            .extend(last.into_iter().take(self.mask_bytes % 8));
+    }
+}
+
+impl ObservationColumns {
+    fn with_room(rows: usize, cards: usize, seats: usize) -> ObservationColumns {
+        let of = |width: usize| Vec::with_capacity(rows * width);
+        ObservationColumns {
+            shifts: of(4),
+            pizzas: of(4),
+            hands: of(cards),
+            golden: of(1),
+            boards: of(3),
+            cards_left: of(seats),
+            passed: of(seats),
+            places: of(seats),
+            roles: of(seats),
+            points: of(4 * seats),
+            played: of(cards),
+            gave: of(cards),
+            received: of(cards),
+        }
+    }
+
+    fn push(&mut self, seen: &Observation) {
+        let put_cards =
+            |column: &mut Vec<u8>, cards: Cards| column.extend(cards.counts(seen.faces));
+        put_u32(&mut self.shifts, seen.shift);
+        put_u32(&mut self.pizzas, seen.pizza);
+        put_cards(&mut self.hands, seen.hand);
+        self.golden.push(seen.hand.has_golden().into());
+        let board = seen.board;
+        self.boards
+            .extend_from_slice(&[board.face, board.size, board.jokers]);
+        self.cards_left
+            .extend_from_slice(seen.cards_left.as_slice());
+        self.passed
+            .extend(seen.passed.values().map(|passed| u8::from(*passed)));
+        self.places.extend_from_slice(seen.places.as_slice());
+        let roles = seen.roles.values();
+        self.roles
+            .extend(roles.map(|role| role.map_or(0, |role| role as u8)));
+        for points in seen.points.values() {
+            put_u32(&mut self.points, u32::try_from(*points).unwrap_or(u32::MAX));
+        }
+        put_cards(&mut self.played, seen.played);
+        put_cards(&mut self.gave, seen.gave);
+        put_cards(&mut self.received, seen.received);
+    }
+}
+
+impl Endings {
+    pub(super) fn push(&mut self, row: &Ending<'_>) {
+        self.rows += 1;
+        put_u32(&mut self.games, row.game);
+        self.seats.push(row.seat.index() as u8);
+        put_f32(&mut self.rewards, row.reward);
+        self.ends.push(if row.cut_short { 2 } else { 1 });
+        self.game_over.push(row.game_over.into());
+        self.places_taken.push(row.place);
+        self.observations.push(row.observation);
+    }
+}
+
+impl Beginnings {
+    pub(super) fn push(&mut self, game: u32, index: u64, seed: &[u8; 32]) {
+        self.rows += 1;
+        put_u32(&mut self.games, game);
+        self.indices.extend_from_slice(&index.to_le_bytes());
+        self.seeds.extend_from_slice(seed);
+    }
+}
+
+impl Shifts {
+    pub(super) fn push(
+        &mut self,
+        game: u32,
+        index: u64,
+        shift: &ShiftMetrics,
+        winner: Option<Seat>,
+    ) {
+        self.rows += 1;
+        put_u32(&mut self.games, game);
+        self.indices.extend_from_slice(&index.to_le_bytes());
+        put_u32(&mut self.shifts, shift.shift);
+        self.starters.push(shift.starter.index() as u8);
+        put_u32(&mut self.pizzas, shift.pizzas);
+        put_u32(&mut self.laps, shift.laps);
+        put_u32(&mut self.turns, shift.turns);
+        self.special_actions.push(match shift.special {
+            None => 0,
+            Some(SpecialAction::FoodFight) => 1,
+            Some(SpecialAction::DinnerIsServed) => 2,
+        });
+        self.adjudicated.push(shift.adjudicated.into());
+        self.game_winners
+            .push(winner.map_or(NO_SEAT, |seat| seat.index() as u8));
+        for seat in shift.seats.values() {
+            self.places.push(seat.place);
+            put_u32(&mut self.points, seat.points);
+            put_u32(&mut self.valid, seat.valid);
+            put_u32(&mut self.wrong, seat.wrong);
+            put_u32(&mut self.passes, seat.passes);
+            put_f32(&mut self.reward_sums, seat.reward_sum as f32);
+            put_f32(&mut self.performance, seat.performance as f32);
+        }
+    }
+}
+
+/// The places that seats take in an episode that a Shift ended: those of the Shift, or of the game where that is the episode.
+pub(super) fn places_taken(
+    episode: Episode,
+    shift: &SeatOrder,
+    standings: Option<&Standings>,
+) -> BySeat<u8> {
+    let order = match (episode, standings) {
+        (Episode::Game, Some(standings)) => standings.as_slice(),
+        _ => shift.as_slice(),
+    };
+    let mut places = BySeat::filled(order.len(), 0);
+    for (&seat, place) in order.iter().zip(1..) {
+        places[seat] = place;
+    }
+    places
+}
+
+const fn kind_number(kind: DecisionKind) -> u8 {
+    match kind {
+        DecisionKind::Turn => 1,
+        DecisionKind::Exchange => 2,
+        DecisionKind::SpecialAction => 3,
+    }
+}
+
+fn put_u32(column: &mut Vec<u8>, value: u32) {
+    column.extend_from_slice(&value.to_le_bytes());
+}
+
+fn put_f32(column: &mut Vec<u8>, value: f32) {
+    column.extend_from_slice(&value.to_le_bytes());
+}

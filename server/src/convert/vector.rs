@@ -1,0 +1,329 @@
+//! The setup of a client's own games, and their batches, as messages. The columns of a batch are already in the protocol's layout; they are
+//! handed over, not copied.
+
+use std::num::{NonZeroU32, NonZeroU64};
+
+use chefshat_arena::AgentKind;
+use chefshat_arena::vector::{
+    Batch, Decisions, Episode, InvalidActions, ObservationColumns, Seeds, SetupError, Start,
+    VectorSetup,
+};
+use chefshat_engine::{RuleSet, Seed, Stop};
+use chefshat_proto::v1::{self, vector_reset, vector_setup};
+use chefshat_records::convert::{
+    FieldProblem, action_space, reward_scheme_from_proto, rules_to_proto, seat_from_number,
+    seat_number,
+};
+
+use super::played::MAX_RECORDED_ATTEMPTS;
+use super::policy::{agent, unknown};
+use crate::config::MAX_HOSTED_SHIFTS;
+
+/// Most seeds that may be given one by one.
+const MAX_SEEDS: usize = 16_384;
+
+/// The games a message asks for, its rules, start and seeds having been looked at.
+///
+/// # Errors
+/// The first field that makes no sense.
+pub fn setup_from_proto(
+    message: &v1::VectorSetup,
+    rules: RuleSet,
+    start: Start,
+    seeds: Seeds,
+) -> Result<VectorSetup, FieldProblem> {
+    let agents = agents(message, &rules)?;
+    let invalid = invalid_actions(message)?;
+    let dealt = matches!(start, Start::Deal);
+    let setup = VectorSetup::new(rules, message.games, &agents, seeds)
+        .map_err(problem)?
+        .with_rewards(
+            v1::RewardScheme::try_from(message.reward_scheme)
+                .map(reward_scheme_from_proto)
+                .map_err(|_| unknown("reward_scheme", message.reward_scheme))?,
+        )
+        .with_episode(match v1::EpisodeScope::try_from(message.episode) {
+            Ok(v1::EpisodeScope::Unspecified | v1::EpisodeScope::Shift) => Episode::Shift,
+            Ok(v1::EpisodeScope::Game) => Episode::Game,
+            Err(_) => return Err(unknown("episode", message.episode)),
+        })
+        .with_decisions(decisions(message)?)
+        .with_skip_forced(message.skip_forced)
+        .with_invalid_actions(invalid)
+        .with_total_games(NonZeroU64::new(message.total_games))
+        .map_err(problem)?
+        .with_start(start)
+        .map_err(problem)?
+        .with_statistics(message.shift_statistics)
+        .with_records(message.records);
+    if message.records {
+        check_records(&rules, invalid, dealt)?;
+    }
+    Ok(setup)
+}
+
+/// Seeds given one by one.
+///
+/// # Errors
+/// If there are none or too many, or one is not 32 bytes long.
+fn seeds_from_proto(message: &v1::GameSeeds) -> Result<Seeds, FieldProblem> {
+    if !(1..=MAX_SEEDS).contains(&message.seeds.len()) {
+        let given = message.seeds.len();
+        let words = format!("{given} seeds; give 1 to {MAX_SEEDS}");
+        return Err(FieldProblem::new("game_seeds", words));
+    }
+    let seeds = message.seeds.iter().map(|bytes| {
+        bytes.as_slice().try_into().map(Seed).map_err(|_| {
+            let words = format!("a seed of {} bytes; give 32", bytes.len());
+            FieldProblem::new("game_seeds", words)
+        })
+    });
+    Ok(Seeds::List(seeds.collect::<Result<_, _>>()?))
+}
+
+/// The games to begin anew (none: all) and the seeds that go on with.
+///
+/// # Errors
+/// If the games are no whole numbers, or seeds come with some of the games alone.
+pub fn reset_from_proto(
+    message: &v1::VectorReset,
+) -> Result<(Vec<u32>, Option<Seeds>), FieldProblem> {
+    let (games, rest) = message.games.as_chunks::<4>();
+    if !rest.is_empty() {
+        let words = "the column is not whole: 4 bytes for each game";
+        return Err(FieldProblem::new("games", words));
+    }
+    let seeds = match &message.seeds {
+        None => None,
+        Some(_) if !games.is_empty() => {
+            let words = "seeds can be given where all games begin anew; leave `games` empty";
+            return Err(FieldProblem::new("seeds", words));
+        }
+        Some(vector_reset::Seeds::BaseSeed(base)) => Some(Seeds::Base(*base)),
+        Some(vector_reset::Seeds::GameSeeds(seeds)) => Some(seeds_from_proto(seeds)?),
+    };
+    let games = games.iter().map(|bytes| u32::from_le_bytes(*bytes));
+    Ok((games.collect(), seeds))
+}
+
+/// What was made of a setup.
+pub fn started_to_proto(setup: &VectorSetup) -> v1::VectorStarted {
+    let rules = setup.rules();
+    v1::VectorStarted {
+        rules: Some(rules_to_proto(rules)),
+        action_space: Some(action_space(&rules.actions())),
+        hand_size: rules.hand_size().into(),
+        client_seats: setup.client_seats().map(seat_number).collect(),
+        built_in_agents: (setup.agents().values())
+            .map(|agent| agent.map_or("", AgentKind::name).to_owned())
+            .collect(),
+        base_seed: match setup.seeds() {
+            Seeds::Base(base) => Some(*base),
+            Seeds::List(_) => None,
+        },
+    }
+}
+
+/// A batch, but for the games whose decisions were kept.
+pub fn batch_to_proto(batch: Batch, statistics: bool) -> v1::VectorBatch {
+    let (endings, beginnings, shifts) = (batch.endings, batch.beginnings, batch.shifts);
+    v1::VectorBatch {
+        step: batch.step,
+        rows: batch.rows,
+        done: batch.done,
+        games: batch.games.into(),
+        seats: batch.seats.into(),
+        kinds: batch.kinds.into(),
+        attempts: batch.attempts.into(),
+        rewards: batch.rewards.into(),
+        observations: Some(observations(batch.observations)),
+        action_masks: batch.masks.into(),
+        endings: (endings.rows > 0).then(|| v1::EpisodeEndings {
+            rows: endings.rows,
+            games: endings.games.into(),
+            seats: endings.seats.into(),
+            rewards: endings.rewards.into(),
+            ends: endings.ends.into(),
+            game_over: endings.game_over.into(),
+            places_taken: endings.places_taken.into(),
+            observations: Some(observations(endings.observations)),
+        }),
+        beginnings: (beginnings.rows > 0).then(|| v1::GameBeginnings {
+            rows: beginnings.rows,
+            games: beginnings.games.into(),
+            indices: beginnings.indices.into(),
+            seeds: beginnings.seeds.into(),
+        }),
+        shifts: statistics.then(|| v1::ShiftStatistics {
+            rows: shifts.rows,
+            games: shifts.games.into(),
+            indices: shifts.indices.into(),
+            shifts: shifts.shifts.into(),
+            starters: shifts.starters.into(),
+            pizzas: shifts.pizzas.into(),
+            laps: shifts.laps.into(),
+            turns: shifts.turns.into(),
+            special_actions: shifts.special_actions.into(),
+            adjudicated: shifts.adjudicated.into(),
+            game_winners: shifts.game_winners.into(),
+            places: shifts.places.into(),
+            points: shifts.points.into(),
+            valid: shifts.valid.into(),
+            wrong: shifts.wrong.into(),
+            passes: shifts.passes.into(),
+            reward_sums: shifts.reward_sums.into(),
+            performance: shifts.performance.into(),
+        }),
+        totals: Some(v1::VectorTotals {
+            client_decisions: batch.totals.client_decisions,
+            decisions: batch.totals.decisions,
+            invalid_attempts: batch.totals.invalid_attempts,
+            shifts: batch.totals.shifts,
+            games: batch.totals.games,
+        }),
+    }
+}
+
+fn observations(columns: ObservationColumns) -> v1::ObservationColumns {
+    v1::ObservationColumns {
+        shifts: columns.shifts.into(),
+        pizzas: columns.pizzas.into(),
+        hands: columns.hands.into(),
+        golden: columns.golden.into(),
+        boards: columns.boards.into(),
+        cards_left: columns.cards_left.into(),
+        passed: columns.passed.into(),
+        places: columns.places.into(),
+        roles: columns.roles.into(),
+        points: columns.points.into(),
+        played: columns.played.into(),
+        gave: columns.gave.into(),
+        received: columns.received.into(),
+    }
+}
+
+/// Who plays each seat; `None`: the client.
+fn agents(
+    message: &v1::VectorSetup,
+    rules: &RuleSet,
+) -> Result<Vec<Option<AgentKind>>, FieldProblem> {
+    let players = rules.players();
+    let mut owned = vec![message.client_seats.is_empty(); players];
+    let mut before = None;
+    for &number in &message.client_seats {
+        let seat = seat_from_number(number, players).filter(|_| before < Some(number));
+        let Some(seat) = seat else {
+            let words = format!(
+                "{:?}: name seats of 0..={}, ascending, each once",
+                message.client_seats,
+                players - 1
+            );
+            return Err(FieldProblem::new("client_seats", words));
+        };
+        owned[seat.index()] = true;
+        before = Some(number);
+    }
+    let others = owned.iter().filter(|owned| !**owned).count();
+    let names: Vec<Option<AgentKind>> = (message.opponents.iter())
+        .map(|name| agent("opponents", name))
+        .collect::<Result<_, _>>()?;
+    if !(names.len() <= 1 || names.len() == others) {
+        let words = format!(
+            "{} agents for {others} other seats: name one for each of them, or one for all",
+            names.len()
+        );
+        return Err(FieldProblem::new("opponents", words));
+    }
+    let for_all = names.first().copied().flatten().unwrap_or_default();
+    let mut one_by_one = (names.len() > 1).then(|| names.into_iter());
+    Ok(owned
+        .into_iter()
+        .map(|owned| {
+            (!owned).then(|| match &mut one_by_one {
+                None => for_all,
+                Some(names) => names.next().flatten().unwrap_or_default(),
+            })
+        })
+        .collect())
+}
+
+fn decisions(message: &v1::VectorSetup) -> Result<Decisions, FieldProblem> {
+    let others = agent("other_decisions", &message.other_decisions)?;
+    match v1::DecisionScope::try_from(message.decisions) {
+        Ok(v1::DecisionScope::Turns) => Ok(Decisions::Turns { others }),
+        Ok(v1::DecisionScope::Unspecified | v1::DecisionScope::All) if others.is_some() => {
+            let words =
+                "the client takes all decisions; leave it empty, or let it take turns alone";
+            Err(FieldProblem::new("other_decisions", words))
+        }
+        Ok(v1::DecisionScope::Unspecified | v1::DecisionScope::All) => Ok(Decisions::All),
+        Err(_) => Err(unknown("decisions", message.decisions)),
+    }
+}
+
+fn invalid_actions(message: &v1::VectorSetup) -> Result<InvalidActions, FieldProblem> {
+    let limit = NonZeroU32::new(message.max_invalid_attempts);
+    match v1::InvalidActionRule::try_from(message.invalid_actions) {
+        Ok(v1::InvalidActionRule::AskAgain) => Ok(InvalidActions::AskAgain { limit }),
+        Ok(_) if limit.is_some() => {
+            let words = "an invalid action is an error here; leave it 0, or ask again";
+            Err(FieldProblem::new("max_invalid_attempts", words))
+        }
+        Ok(_) => Ok(InvalidActions::Error),
+        Err(_) => Err(unknown("invalid_actions", message.invalid_actions)),
+    }
+}
+
+/// Checks that records can say what happens and stay of bounded size.
+fn check_records(
+    rules: &RuleSet,
+    invalid: InvalidActions,
+    dealt: bool,
+) -> Result<(), FieldProblem> {
+    let refused = |words: String| Err(FieldProblem::new("records", words));
+    if !dealt {
+        return refused("records are for games that are dealt; leave `start` unset".to_owned());
+    }
+    let (Stop::Points(length) | Stop::Shifts(length)) = rules.stop();
+    if length > MAX_HOSTED_SHIFTS {
+        return refused(format!(
+            "a recorded game ends after at most {MAX_HOSTED_SHIFTS} points or Shifts, not {length}"
+        ));
+    }
+    match invalid {
+        InvalidActions::AskAgain { limit }
+            if limit.is_none_or(|limit| limit.get() > MAX_RECORDED_ATTEMPTS) =>
+        {
+            refused(format!(
+                "with records, set max_invalid_attempts to 1..={MAX_RECORDED_ATTEMPTS}"
+            ))
+        }
+        InvalidActions::AskAgain { .. } | InvalidActions::Error => Ok(()),
+    }
+}
+
+fn problem(error: SetupError) -> FieldProblem {
+    let field = match &error {
+        SetupError::Seats { .. } | SetupError::NoClient => "client_seats",
+        SetupError::Games { .. } => "games",
+        SetupError::Total { .. } => "total_games",
+        SetupError::NoSeeds => "game_seeds",
+        SetupError::Script(_) => "scripted",
+    };
+    FieldProblem::new(field, error.to_string())
+}
+
+/// What a setup says of where the seeds come from.
+///
+/// # Errors
+/// If there are none or too many, or one is not 32 bytes long.
+pub fn setup_seeds(
+    message: &v1::VectorSetup,
+    drawn: impl FnOnce() -> u64,
+) -> Result<Seeds, FieldProblem> {
+    match &message.seeds {
+        None => Ok(Seeds::Base(drawn())),
+        Some(vector_setup::Seeds::BaseSeed(base)) => Ok(Seeds::Base(*base)),
+        Some(vector_setup::Seeds::GameSeeds(seeds)) => seeds_from_proto(seeds),
+    }
+}

@@ -1,0 +1,177 @@
+//! `chefshat compare`: the same output for the same seed, a table that fits, networks by their files, errors that name what is at fault.
+
+use serde_json::Value;
+
+use super::run::{Ended, chefshat};
+
+/// Widest line of the table.
+const COLUMNS: usize = 100;
+/// Networks of chance weights.
+const TABLE: &str = concat!(
+    env!("CARGO_MANIFEST_DIR"),
+    "/../tests/fixtures/network/table-actions.safetensors"
+);
+const SMALL: &str = concat!(
+    env!("CARGO_MANIFEST_DIR"),
+    "/../tests/fixtures/network/small-table.safetensors"
+);
+
+fn compare(a: &str, b: &str, flags: &str) -> Ended {
+    let mut arguments = vec!["compare", a, b];
+    arguments.extend(flags.split_whitespace());
+    chefshat(&arguments)
+}
+
+fn json(a: &str, b: &str, flags: &str) -> Value {
+    let ended = compare(a, b, &format!("{flags} --json"));
+    assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+    serde_json::from_str(&ended.stdout).unwrap()
+}
+
+#[test]
+fn the_table_is_readable_and_the_same_for_the_same_seed() {
+    let flags = "--deals 50 --seed 7";
+    let ended = compare("greedy", "random", flags);
+    assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+    assert_eq!(ended.stderr, "", "no progress where there is no terminal");
+    assert_eq!(ended.stdout, include_str!("compare.txt"));
+    for threads in ["--threads 1", "--threads 3"] {
+        let again = compare("greedy", "random", &format!("{flags} {threads}"));
+        assert_eq!(again, ended);
+    }
+    assert_ne!(
+        compare("greedy", "random", "--deals 50").stdout,
+        ended.stdout
+    );
+}
+
+#[test]
+fn lines_keep_within_100_columns() {
+    for (a, b, flags) in [
+        (TABLE, TABLE, "--deals 2 --shifts 1000 --seats one"),
+        (
+            "random_unmasked",
+            "random_unmasked",
+            "--deals 3 --players 5 --preset original2020 --no-exchange --no-special-actions --points 1000,100,50,10,1",
+        ),
+    ] {
+        let ended = compare(a, b, flags);
+        assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+        assert!(ended.stdout.lines().count() > 8);
+        for line in ended.stdout.lines() {
+            assert!(line.chars().count() <= COLUMNS, "{line}");
+            assert!(
+                !line.contains('\x1b'),
+                "colours where there is no terminal: {line}"
+            );
+        }
+    }
+}
+
+#[test]
+fn json_holds_what_was_played_and_what_came_out() {
+    let result = json(
+        "random",
+        "greedy",
+        "--deals 10 --shifts 2 --seats one --preset rulebook",
+    );
+    assert_eq!(
+        (&result["a"]["agent"], &result["b"]["agent"]),
+        (&"random".into(), &"greedy".into())
+    );
+    assert_eq!(result["seats"], "one");
+    assert_eq!(result["rules"]["target_shifts"], 2);
+    let counts =
+        ["deals", "seatings", "games", "shifts"].map(|field| result[field].as_u64().unwrap());
+    assert_eq!(counts, [10, 4, 40, 80]);
+    let points = &result["points_per_shift"];
+    let number = |field: &str| points[field].as_f64().unwrap();
+    // Three times as many seats of B; 3 + 2 + 1 + 0 points a Shift.
+    assert!(
+        (number("a") + 3.0 * number("b") - 6.0).abs() < 1e-9,
+        "{points}"
+    );
+    assert!(number("a") < number("b"), "random loses to greedy");
+    let interval = &points["difference_95"];
+    assert!(interval[0].as_f64().unwrap() < number("difference"));
+    assert!(number("difference") < interval[1].as_f64().unwrap());
+    let errors = ["standard_error", "independent_standard_error"].map(number);
+    let gain = (errors[1] / errors[0]).powi(2);
+    assert!((gain - number("gain")).abs() < 1e-9);
+
+    let network = json(TABLE, "greedy", "--deals 2");
+    let file =
+        ["file", "name", "input", "output"].map(|field| network["a"][field].as_str().unwrap());
+    assert_eq!(file, [TABLE, "table-actions", "table", "actions"]);
+    assert_eq!(network["a"]["masked"], true);
+
+    let same = json("greedy", "greedy", "--deals 4");
+    assert_eq!(same["points_per_shift"]["difference"], 0.0);
+    assert_eq!(same["points_per_shift"]["gain"], Value::Null);
+    assert_eq!(
+        (&same["seatings"], &same["shifts_per_game"]),
+        (&6.into(), &4.into())
+    );
+}
+
+#[test]
+fn mistakes_are_explained() {
+    let folder = env!("CARGO_MANIFEST_DIR");
+    let manifest = concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml");
+    for (a, b, flags, expected) in [
+        ("clever", "greedy", "", "neither a built-in agent (random, "),
+        ("greedy", manifest, "", "Cargo.toml: not a safetensors file"),
+        ("greedy", folder, "", "directory"),
+        (
+            SMALL,
+            "greedy",
+            "",
+            "A was trained for 3 players, 5 faces and hands of 5 cards",
+        ),
+        (SMALL, "greedy", "", "change --players, --faces or --jokers"),
+        (
+            "greedy",
+            "random",
+            "--target-points 9",
+            "--shifts says how long",
+        ),
+        ("greedy", "random", "--deals 1", "--deals"),
+        ("greedy", "random", "--shifts 0", "--shifts"),
+        ("greedy", "random", "--players 7", "--players: 7 players"),
+        (
+            "greedy",
+            "random",
+            "--seats two",
+            "possible values: half, one",
+        ),
+    ] {
+        let ended = compare(a, b, flags);
+        assert!(
+            matches!(ended.code, Some(1 | 2)),
+            "{a} {b} {flags}: {ended:?}"
+        );
+        assert!(
+            ended.stderr.contains(expected),
+            "{a} {b} {flags}: {}",
+            ended.stderr
+        );
+        assert_eq!(ended.stdout, "", "{flags}");
+    }
+    let fits = compare(
+        SMALL,
+        "greedy",
+        "--deals 2 --players 3 --faces 5 --jokers 1",
+    );
+    assert_eq!(fits.code, Some(0), "{}", fits.stderr);
+}
+
+#[test]
+fn help_shows_an_example() {
+    let help = chefshat(&["compare", "--help"]);
+    assert_eq!(help.code, Some(0));
+    assert!(
+        help.stdout.contains("chefshat compare greedy random"),
+        "{}",
+        help.stdout
+    );
+}
