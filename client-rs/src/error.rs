@@ -18,6 +18,9 @@ const CONNECT_FAILED: &str = "CONNECT_FAILED";
 /// Reason of a response without a part that the protocol promises; made by the client.
 const RESPONSE_INCOMPLETE: &str = "RESPONSE_INCOMPLETE";
 
+/// Reason of a step of games that have ended with the step before; made by the client.
+const STEP_GIVEN_UP: &str = "STEP_GIVEN_UP";
+
 /// A call that failed.
 #[derive(Clone, Debug)]
 pub struct Error {
@@ -34,7 +37,7 @@ impl Error {
     }
 
     /// The reason in UPPER_SNAKE, for instance `JOIN_CODE_WRONG`; `None` if whoever failed named none, as when a connection breaks.
-    /// The client's own are `ADDRESS_REFUSED`, `CONNECT_FAILED` and `RESPONSE_INCOMPLETE`.
+    /// The client's own are `ADDRESS_REFUSED`, `CONNECT_FAILED`, `RESPONSE_INCOMPLETE` and `STEP_GIVEN_UP`.
     pub fn reason(&self) -> Option<&str> {
         self.reason.as_deref()
     }
@@ -72,6 +75,12 @@ impl Error {
     pub(crate) fn incomplete(part: &str) -> Self {
         let message = format!("the server's response lacks its {part}");
         Self::own(Code::Internal, RESPONSE_INCOMPLETE, message)
+    }
+
+    pub(crate) fn step_given_up() -> Self {
+        let message =
+            "the step before was refused or given up, which ended these games; begin new ones";
+        Self::own(Code::FailedPrecondition, STEP_GIVEN_UP, message.to_owned())
     }
 
     pub(crate) fn refused(refused: v1::Refused) -> Self {

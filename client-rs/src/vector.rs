@@ -18,6 +18,8 @@ pub struct VectorGames {
     responses: Streaming<v1::RunResponse>,
     started: v1::VectorStarted,
     records: Vec<v1::VectorRecord>,
+    /// Whether a batch is on its way that nobody waits for any more.
+    given_up: bool,
 }
 
 impl Client {
@@ -45,6 +47,7 @@ impl Client {
             responses,
             started,
             records: Vec::new(),
+            given_up: false,
         };
         let batch = games.batch().await?;
         Ok((games, batch))
@@ -57,10 +60,11 @@ impl VectorGames {
         &self.started
     }
 
-    /// Answers each row of the last batch, in its order, and gives the next batch.
+    /// Answers each row of the last batch, in its order, and gives the next batch. A call that is dropped before it has its batch ends
+    /// the games: nobody would know which rows the next actions are for.
     ///
     /// # Errors
-    /// `ACTIONS_REFUSED`, and `ILLEGAL_ACTION` where that is an error; either ends the games.
+    /// `ACTIONS_REFUSED`, and `ILLEGAL_ACTION` where that is an error; either ends the games. `STEP_GIVEN_UP` when a call was dropped.
     pub async fn step(
         &mut self,
         actions: impl IntoIterator<Item = Action>,
@@ -72,22 +76,30 @@ impl VectorGames {
         let actions = v1::VectorActions {
             actions: column.into(),
         };
-        send(&self.requests, Request::Actions(actions)).await;
-        self.batch().await
+        self.ask(Request::Actions(actions)).await
     }
 
-    /// Gives up games and begins them anew; gives the next batch.
+    /// Gives up games and begins them anew; gives the next batch. Dropped calls as with [`step`](Self::step).
     ///
     /// # Errors
-    /// `RESET_REFUSED`, which ends the games.
+    /// `RESET_REFUSED`, which ends the games. `STEP_GIVEN_UP`.
     pub async fn reset(&mut self, reset: v1::VectorReset) -> Result<Box<v1::VectorBatch>, Error> {
-        send(&self.requests, Request::Reset(reset)).await;
-        self.batch().await
+        self.ask(Request::Reset(reset)).await
     }
 
-    /// The parts of records that have come since this was last called, in order, if the setup asked for records.
+    /// The parts of records that have come since this was last called, in order, if the setup asked for records. Until then they are kept.
     pub fn take_records(&mut self) -> Vec<v1::VectorRecord> {
         std::mem::take(&mut self.records)
+    }
+
+    async fn ask(&mut self, request: Request) -> Result<Box<v1::VectorBatch>, Error> {
+        if std::mem::replace(&mut self.given_up, true) {
+            return Err(Error::step_given_up());
+        }
+        send(&self.requests, request).await;
+        let batch = self.batch().await?;
+        self.given_up = false;
+        Ok(batch)
     }
 
     async fn batch(&mut self) -> Result<Box<v1::VectorBatch>, Error> {

@@ -17,8 +17,22 @@ pub const MAX_COMMANDS_PER_MESSAGE: usize = 1_024;
 pub const ROOM_MAILBOX: usize = 256;
 /// Largest message of a client that steps games of its own, bytes: room for seeds given one by one.
 pub const MAX_VECTOR_MESSAGE_BYTES: usize = 1024 * 1024;
+/// Largest batch of such games, bytes: that of the most games of the largest rule set, two Shifts of each having ended at once.
+pub const MAX_VECTOR_BATCH_BYTES: usize = 16 * 1024 * 1024;
 /// Streams of clients' own games at a time.
 pub const MAX_VECTOR_STREAMS: usize = 64;
+/// Seats played on all of them together, games times seats: some 5 KB each.
+pub const MAX_VECTOR_SEATS_IN_ALL: usize = 131_072;
+/// Seeds that may be given one by one.
+pub const MAX_VECTOR_SEEDS: usize = 16_384;
+/// Games of one such stream whose records are kept.
+pub const MAX_VECTOR_RECORDED_GAMES: u32 = 256;
+/// How long a client may take to say which games it wants.
+pub const VECTOR_SETUP_TIMEOUT: Duration = Duration::from_secs(30);
+/// How long a client may think about a batch.
+pub const VECTOR_IDLE_TIMEOUT: Duration = Duration::from_secs(3_600);
+/// How long a client may take to take in one message.
+pub const VECTOR_SEND_TIMEOUT: Duration = Duration::from_secs(60);
 /// Largest record that may be imported, bytes as encoded.
 pub const MAX_IMPORT_BYTES: usize = 64 * 1024 * 1024;
 /// Most lines of a record that may be imported.

@@ -156,7 +156,8 @@ class ToyStream:
         """The batch after a request, and before it the records of games that have ended."""
         self.endings, self.began = [], []
         if request.HasField("reset"):
-            chosen = np.frombuffer(request.reset.games, "<u4").tolist() or range(len(self.games))
+            named = np.frombuffer(request.reset.games, "<u4").tolist()
+            chosen = range(len(self.games)) if request.reset.all else named
             for game in chosen:
                 self.games[game].begin()
                 self.began.append(game)

@@ -71,7 +71,6 @@ def test_a_pass_is_wrong_where_something_else_is_legal() -> None:
 
 @pytest.mark.server
 def test_experiment_3_begins_with_the_networks_of_2(real_address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(learning, "QUICK_SHIFTS", 2)
     quiet = Progress(show=False)
     both = rules.networks(Config(real_address, (1, 2), True, tmp_path), quiet)
     files = sorted(path.name for path in tmp_path.iterdir())

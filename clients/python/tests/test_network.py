@@ -106,6 +106,27 @@ def test_actions_are_legal_and_the_best_ones(output: str) -> None:
     assert seen == {"best"}
 
 
+def test_outputs_are_compared_before_tanh() -> None:
+    info = replace(INFO, output_activation="tanh")
+    ascending = np.arange(20, 20 + info.output_width, dtype=np.float32)
+    net = Network([(np.zeros((info.output_width, info.input_width), np.float32), ascending)], info)
+    case = hand_made(50, seed=8)
+    outputs = net.outputs(net.inputs(case, case.seats, case.kinds, case.mask_bits))
+    np.testing.assert_allclose(outputs, 1, atol=1e-6)
+    legal = np.unpackbits(case.mask_bits, axis=1, bitorder="little")
+    assert (legal.sum(axis=1) > 1).any()
+    last = [np.flatnonzero(row)[-1] for row in legal]
+    assert net.actions(case, case.seats, case.kinds, case.mask_bits).tolist() == last
+
+
+def test_outputs_that_are_no_numbers_never_win() -> None:
+    nan, inf = np.nan, np.inf
+    outputs = np.array([[9, nan, 1, 2], [9, 1, nan, 2], [9, nan, 1, nan], [9, nan, nan, nan], [9, -inf, nan, -inf]], np.float32)
+    masks = np.full((len(outputs), 1), 0b1110, np.uint8)
+    assert network.best_legal(outputs, masks).tolist() == [3, 3, 2, 1, 1]
+    assert network.best_legal(outputs, masks * 0).tolist() == [0] * 5
+
+
 def test_the_default_decisions() -> None:
     case = hand_made(300, seed=7)
     turns, all_legal = features.turn_actions(11), np.full_like(case.mask_bits, 255)

@@ -173,7 +173,7 @@ def test_resets(toy: FakeVector) -> None:
         env.step(legal(env.batch))
         batch = env.reset()
         assert batch.observations.hands[:, 2].tolist() == [0, 0]
-        assert toy.requests[-1] == pb.RunRequest(reset=pb.VectorReset())
+        assert toy.requests[-1] == pb.RunRequest(reset=pb.VectorReset(all=True))
         assert env.reset() is batch
         assert env.reset(seed=9) is not batch
         assert toy.requests[-1].reset.base_seed == 9

@@ -128,7 +128,8 @@ def test_a_number_of_games_and_then_no_more(real_address: str) -> None:
         assert over == 4 * 5
         assert env.batch.totals.games == 5
         assert len(env.batch) == 0
-        assert len(env.reset()) == 2
+        assert len(env.reset()) == 0
+        assert len(env.reset(9)) == 2
 
 
 def test_other_tables_have_other_widths(real_address: str) -> None:

@@ -20,11 +20,18 @@ pub enum AgentKind {
     RandomUnmasked,
     /// Sheds as many of its least rare cards as it can, keeps jokers, gives away its worst.
     Greedy,
+    /// Plays by a network that was trained by self-play and is part of the program ([`Network::trained`]).
+    Trained,
 }
 
 impl AgentKind {
     /// All of them.
-    pub const ALL: [Self; 3] = [Self::Random, Self::RandomUnmasked, Self::Greedy];
+    pub const ALL: [Self; 4] = [
+        Self::Random,
+        Self::RandomUnmasked,
+        Self::Greedy,
+        Self::Trained,
+    ];
 
     /// The name by which people and messages call it.
     pub fn name(self) -> &'static str {
@@ -32,6 +39,7 @@ impl AgentKind {
             Self::Random => "random",
             Self::RandomUnmasked => "random_unmasked",
             Self::Greedy => "greedy",
+            Self::Trained => "trained",
         }
     }
 
@@ -120,6 +128,7 @@ impl BuiltInAgent {
                 chance.uniform(legal)
             }
             Mind::Kind(AgentKind::Greedy, _) => greedy(observation, legal, space),
+            Mind::Kind(AgentKind::Trained, _) => Network::trained().decide(observation, legal),
             Mind::Replay(player) => player.decide(observation, legal),
             Mind::Network(network) => network.decide(observation, legal),
         }

@@ -35,7 +35,7 @@ pub use duplicate::{Comparison, Contender, Duplicate, DuplicateError, Figure, Se
 pub use network::{
     MAX_FILE_BYTES, Network, NetworkError, NetworkInfo, NetworkInput, NetworkOutput, table_features,
 };
-pub use play::{Listener, play};
+pub use play::{Listener, PlayedDecision, play};
 pub use recorded::{MAX_MODELS, RecordedDecision, RecordedPlayer};
 pub use rules_form::{OpeningName, PassScopeName, RulesForm, RulesFormError};
 pub use seeds::{agent_seed, game_seed};

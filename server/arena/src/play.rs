@@ -26,6 +26,17 @@ pub trait Listener {
     }
 }
 
+/// A decision that was taken, after the attempts that were refused.
+#[derive(Clone, Eq, PartialEq, Debug)]
+pub struct PlayedDecision {
+    /// The action.
+    pub action: Action,
+    /// Invalid attempts before it.
+    pub attempts: Vec<Action>,
+    /// Whether it is the default, taken because there were too many of them.
+    pub by_default: bool,
+}
+
 /// Plays a game to its end. `decide` answers for every seat; an illegal answer is reported and the decision asked again, without limit
 /// unless `max_invalid_attempts` says after how many of them the default decision is taken.
 ///

@@ -26,7 +26,7 @@ use crate::convert::recorded_player;
                   Exit code: 0 when the game finished, 1 when it was aborted or the seat was lost."
 )]
 pub(super) struct AgentCommand {
-    /// Which agent: random, random_unmasked or greedy; or replay, which plays as a recorded player.
+    /// Which agent: random, random_unmasked, greedy or trained; or replay, which plays as a recorded player.
     #[arg(value_parser = agent_arg, value_name = "KIND")]
     agent: AgentArg,
     #[command(flatten)]

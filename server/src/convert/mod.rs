@@ -23,5 +23,5 @@ pub use record::{lines_of, record_lines, summary};
 pub use room::{describe, fill_to_proto, fills_from_proto, kind_from_proto, participants};
 pub use start::{start_from_proto, start_to_proto};
 pub use vector::{
-    batch_to_proto, reset_from_proto, setup_from_proto, setup_seeds, started_to_proto,
+    Reset, batch_to_proto, reset_from_proto, setup_from_proto, setup_seeds, started_to_proto,
 };

@@ -2,7 +2,7 @@
 //! decisions are taken again and written down with the events that follow from them. There is no clock in it: all times are zero, and so is
 //! that of its making.
 
-use chefshat_arena::vector::PlayedDecision;
+use chefshat_arena::PlayedDecision;
 use chefshat_engine::{BySeat, Event, Game, RULES_VERSION, RewardScheme, RuleSet, Seed};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 use chefshat_records::convert::{

@@ -8,7 +8,7 @@ use chefshat_arena::vector::{
     Batch, Decisions, Episode, InvalidActions, ObservationColumns, Seeds, SetupError, Start,
     VectorSetup,
 };
-use chefshat_engine::{RuleSet, Seed, Stop};
+use chefshat_engine::{RuleSet, RuleSetSpec, Seed, Stop};
 use chefshat_proto::v1::{self, vector_reset, vector_setup};
 use chefshat_records::convert::{
     FieldProblem, action_space, reward_scheme_from_proto, rules_to_proto, seat_from_number,
@@ -17,10 +17,7 @@ use chefshat_records::convert::{
 
 use super::played::MAX_RECORDED_ATTEMPTS;
 use super::policy::{agent, unknown};
-use crate::config::MAX_HOSTED_SHIFTS;
-
-/// Most seeds that may be given one by one.
-const MAX_SEEDS: usize = 16_384;
+use crate::config::{MAX_HOSTED_SHIFTS, MAX_VECTOR_RECORDED_GAMES, MAX_VECTOR_SEEDS};
 
 /// The games a message asks for, its rules, start and seeds having been looked at.
 ///
@@ -57,7 +54,7 @@ pub fn setup_from_proto(
         .with_statistics(message.shift_statistics)
         .with_records(message.records);
     if message.records {
-        check_records(&rules, invalid, dealt)?;
+        check_records(&setup, dealt)?;
     }
     Ok(setup)
 }
@@ -67,9 +64,9 @@ pub fn setup_from_proto(
 /// # Errors
 /// If there are none or too many, or one is not 32 bytes long.
 fn seeds_from_proto(message: &v1::GameSeeds) -> Result<Seeds, FieldProblem> {
-    if !(1..=MAX_SEEDS).contains(&message.seeds.len()) {
+    if !(1..=MAX_VECTOR_SEEDS).contains(&message.seeds.len()) {
         let given = message.seeds.len();
-        let words = format!("{given} seeds; give 1 to {MAX_SEEDS}");
+        let words = format!("{given} seeds; give 1 to {MAX_VECTOR_SEEDS}");
         return Err(FieldProblem::new("game_seeds", words));
     }
     let seeds = message.seeds.iter().map(|bytes| {
@@ -81,13 +78,20 @@ fn seeds_from_proto(message: &v1::GameSeeds) -> Result<Seeds, FieldProblem> {
     Ok(Seeds::List(seeds.collect::<Result<_, _>>()?))
 }
 
-/// The games to begin anew (none: all) and the seeds that go on with.
+/// Which games are to begin anew.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Reset {
+    /// Some, with their next indices.
+    Some(Vec<u32>),
+    /// All: with seeds from the first, else with their next indices.
+    All(Option<Seeds>),
+}
+
+/// The games that a message wants to begin anew.
 ///
 /// # Errors
-/// If the games are no whole numbers, or seeds come with some of the games alone.
-pub fn reset_from_proto(
-    message: &v1::VectorReset,
-) -> Result<(Vec<u32>, Option<Seeds>), FieldProblem> {
+/// If the games are no whole numbers, or what goes with all games comes with some.
+pub fn reset_from_proto(message: &v1::VectorReset) -> Result<Reset, FieldProblem> {
     let (games, rest) = message.games.as_chunks::<4>();
     if !rest.is_empty() {
         let words = "the column is not whole: 4 bytes for each game";
@@ -95,15 +99,22 @@ pub fn reset_from_proto(
     }
     let seeds = match &message.seeds {
         None => None,
-        Some(_) if !games.is_empty() => {
-            let words = "seeds can be given where all games begin anew; leave `games` empty";
+        Some(_) if !message.all => {
+            let words = "seeds can be given where all games begin anew; set `all`";
             return Err(FieldProblem::new("seeds", words));
         }
         Some(vector_reset::Seeds::BaseSeed(base)) => Some(Seeds::Base(*base)),
         Some(vector_reset::Seeds::GameSeeds(seeds)) => Some(seeds_from_proto(seeds)?),
     };
+    if message.all && !games.is_empty() {
+        let words = "name games, or set `all`, not both";
+        return Err(FieldProblem::new("games", words));
+    }
+    if message.all {
+        return Ok(Reset::All(seeds));
+    }
     let games = games.iter().map(|bytes| u32::from_le_bytes(*bytes));
-    Ok((games.collect(), seeds))
+    Ok(Reset::Some(games.collect()))
 }
 
 /// What was made of a setup.
@@ -141,6 +152,7 @@ pub fn batch_to_proto(batch: Batch, statistics: bool) -> v1::VectorBatch {
         endings: (endings.rows > 0).then(|| v1::EpisodeEndings {
             rows: endings.rows,
             games: endings.games.into(),
+            indices: endings.indices.into(),
             seats: endings.seats.into(),
             rewards: endings.rewards.into(),
             ends: endings.ends.into(),
@@ -275,22 +287,29 @@ fn invalid_actions(message: &v1::VectorSetup) -> Result<InvalidActions, FieldPro
 }
 
 /// Checks that records can say what happens and stay of bounded size.
-fn check_records(
-    rules: &RuleSet,
-    invalid: InvalidActions,
-    dealt: bool,
-) -> Result<(), FieldProblem> {
+fn check_records(setup: &VectorSetup, dealt: bool) -> Result<(), FieldProblem> {
     let refused = |words: String| Err(FieldProblem::new("records", words));
     if !dealt {
         return refused("records are for games that are dealt; leave `start` unset".to_owned());
     }
-    let (Stop::Points(length) | Stop::Shifts(length)) = rules.stop();
+    if setup.games() > MAX_VECTOR_RECORDED_GAMES {
+        return refused(format!(
+            "records are kept of at most {MAX_VECTOR_RECORDED_GAMES} games side by side"
+        ));
+    }
+    let max_turns = RuleSetSpec::default().max_turns;
+    if setup.rules().max_turns() > max_turns {
+        return refused(format!(
+            "a recorded Shift has a max_turns of at most {max_turns}"
+        ));
+    }
+    let (Stop::Points(length) | Stop::Shifts(length)) = setup.rules().stop();
     if length > MAX_HOSTED_SHIFTS {
         return refused(format!(
             "a recorded game ends after at most {MAX_HOSTED_SHIFTS} points or Shifts, not {length}"
         ));
     }
-    match invalid {
+    match setup.invalid_actions() {
         InvalidActions::AskAgain { limit }
             if limit.is_none_or(|limit| limit.get() > MAX_RECORDED_ATTEMPTS) =>
         {
@@ -325,5 +344,130 @@ pub fn setup_seeds(
         None => Ok(Seeds::Base(drawn())),
         Some(vector_setup::Seeds::BaseSeed(base)) => Ok(Seeds::Base(*base)),
         Some(vector_setup::Seeds::GameSeeds(seeds)) => seeds_from_proto(seeds),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use chefshat_arena::game_seed;
+    use chefshat_arena::vector::{MAX_SEATS_PLAYED, VectorGames};
+    use chefshat_engine::{Action, DecisionKind, Role};
+    use prost::Message as _;
+
+    use super::*;
+    use crate::config::MAX_VECTOR_BATCH_BYTES;
+    use crate::convert::decision_kind;
+
+    fn actions(batch: &Batch) -> Vec<Action> {
+        let width = batch.masks.len() / batch.rows as usize;
+        let first = |mask: &[u8]| {
+            let mask = chefshat_engine::Mask::from_bytes(mask).unwrap();
+            mask.nth(0).unwrap()
+        };
+        batch.masks.chunks(width).map(first).collect()
+    }
+
+    #[test]
+    fn numbers_in_columns_are_those_of_the_protocol() {
+        let rules = RuleSetSpec::default().validate().unwrap();
+        let setup = VectorSetup::new(rules, 64, &[None; 4], Seeds::Base(3))
+            .unwrap()
+            .with_statistics(true);
+        let (mut games, mut batch) = VectorGames::new(setup);
+        let (mut kinds, mut roles, mut ends, mut specials) = ([0; 4], [0; 6], [0; 3], [0; 3]);
+        while batch.totals.shifts < 2000 {
+            batch
+                .kinds
+                .iter()
+                .for_each(|kind| kinds[usize::from(*kind)] += 1);
+            let seen = &batch.observations;
+            seen.roles
+                .iter()
+                .for_each(|role| roles[usize::from(*role)] += 1);
+            let ended = &batch.endings;
+            ended
+                .ends
+                .iter()
+                .for_each(|end| ends[usize::from(*end)] += 1);
+            let special = batch.shifts.special_actions.iter();
+            special.for_each(|special| specials[usize::from(*special)] += 1);
+            // Whoever may declare does; giving is told by its actions.
+            let masks = batch
+                .masks
+                .chunks(27)
+                .map(|mask| chefshat_engine::Mask::from_bytes(mask).unwrap());
+            for (kind, mask) in batch.kinds.iter().zip(masks) {
+                let expected = match mask.nth(0).unwrap().index() {
+                    0..=199 => DecisionKind::Turn,
+                    200..=211 => DecisionKind::Exchange,
+                    _ => DecisionKind::SpecialAction,
+                };
+                assert_eq!(i32::from(*kind), i32::from(decision_kind(expected)));
+            }
+            let mut actions = actions(&batch);
+            for (action, kind) in actions.iter_mut().zip(&batch.kinds) {
+                if i32::from(*kind) == i32::from(v1::DecisionKind::SpecialAction) {
+                    *action = Action::new(213);
+                }
+            }
+            batch = games.step(&actions).unwrap();
+        }
+        let chef = v1::Role::Chef as usize;
+        assert_eq!(chef, Role::Chef as usize);
+        assert_eq!(v1::Role::Dishwasher as usize, Role::Dishwasher as usize);
+        assert_eq!(v1::Role::SousChef as usize, Role::SousChef as usize);
+        assert_eq!(v1::Role::Cook as usize, Role::Cook as usize);
+        assert_eq!(v1::Role::Waiter as usize, Role::Waiter as usize);
+        assert!(kinds[1..].iter().all(|count| *count > 0), "{kinds:?}");
+        assert!(
+            roles[chef] > 0 && roles[v1::Role::Cook as usize] == 0,
+            "{roles:?}"
+        );
+        assert_eq!(ends[v1::EpisodeEnd::CutShort as usize], 0);
+        assert!(ends[v1::EpisodeEnd::Finished as usize] > 0);
+        // One role in four has a Food Fight to declare.
+        let fights = specials[v1::SpecialAction::FoodFight as usize];
+        let dinners = specials[v1::SpecialAction::DinnerIsServed as usize];
+        assert!(fights > 0 && dinners > fights, "{specials:?}");
+    }
+
+    #[test]
+    fn the_largest_batch_is_within_its_bound() {
+        // All columns as wide as can be, and two Shifts of one turn each ended in every game.
+        let spec = RuleSetSpec {
+            players: 6,
+            faces: 15,
+            max_turns: 1,
+            stop: Stop::Shifts(u32::MAX),
+            ..RuleSetSpec::default()
+        };
+        let random = Some(AgentKind::Random);
+        let agents = [None, random, random, random, random, random];
+        let setup = VectorSetup::new(
+            spec.validate().unwrap(),
+            MAX_SEATS_PLAYED,
+            &agents,
+            Seeds::List(vec![game_seed(1, 1)].into()),
+        )
+        .unwrap()
+        .with_statistics(true);
+        let (mut games, mut batch) = VectorGames::new(setup);
+        let mut most = 0;
+        for _ in 0..3 {
+            batch = if batch.rows == 0 {
+                games.step(&[]).unwrap()
+            } else {
+                games.step(&actions(&batch)).unwrap()
+            };
+            let shifts = batch.shifts.rows;
+            let rows = batch.rows;
+            let message = batch_to_proto(std::mem::take(&mut batch), true);
+            most = most.max(message.encoded_len());
+            assert!(message.encoded_len() <= MAX_VECTOR_BATCH_BYTES);
+            assert!(shifts <= 3 * MAX_SEATS_PLAYED);
+            batch.rows = rows;
+            batch.masks = message.action_masks.to_vec();
+        }
+        assert!(most > MAX_VECTOR_BATCH_BYTES / 4, "{most}");
     }
 }

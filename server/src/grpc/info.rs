@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use chefshat_arena::AgentKind;
-use chefshat_arena::vector::MAX_ROWS;
+use chefshat_arena::vector::MAX_SEATS_PLAYED;
 use chefshat_engine::{Action, ActionSpace, RULES_VERSION, RuleSetSpec};
 use chefshat_proto::v1::{self, server_service_server::ServerService};
 use chefshat_records::convert::{FieldProblem, action_space, rules_to_proto};
@@ -13,7 +13,9 @@ use tonic::{Request, Response, Status};
 use super::status::field;
 use crate::config::{
     MAX_HOSTED_SHIFTS, MAX_MESSAGE_BYTES, MAX_SEATS_PER_STREAM, MAX_SEATS_PER_WATCH,
-    MAX_STREAMS_PER_CONNECTION, MAX_VECTOR_MESSAGE_BYTES, MAX_VECTOR_STREAMS, ServerConfig,
+    MAX_STREAMS_PER_CONNECTION, MAX_VECTOR_BATCH_BYTES, MAX_VECTOR_MESSAGE_BYTES,
+    MAX_VECTOR_RECORDED_GAMES, MAX_VECTOR_SEATS_IN_ALL, MAX_VECTOR_SEEDS, MAX_VECTOR_STREAMS,
+    ServerConfig,
 };
 use crate::room::MAX_SPECTATORS;
 use crate::rooms::Rooms;
@@ -37,7 +39,14 @@ impl Info {
             ("max_message_bytes", MAX_MESSAGE_BYTES),
             ("max_vector_message_bytes", MAX_VECTOR_MESSAGE_BYTES),
             ("max_vector_streams", MAX_VECTOR_STREAMS),
-            ("max_vector_rows", MAX_ROWS as usize),
+            ("max_vector_batch_bytes", MAX_VECTOR_BATCH_BYTES),
+            ("max_vector_seats", MAX_SEATS_PLAYED as usize),
+            ("max_vector_seats_in_all", MAX_VECTOR_SEATS_IN_ALL),
+            ("max_vector_seeds", MAX_VECTOR_SEEDS),
+            (
+                "max_vector_recorded_games",
+                MAX_VECTOR_RECORDED_GAMES as usize,
+            ),
             ("max_seats_per_stream", MAX_SEATS_PER_STREAM),
             ("max_seats_per_watch", MAX_SEATS_PER_WATCH),
             ("max_spectators_per_room", MAX_SPECTATORS),

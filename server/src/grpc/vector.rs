@@ -1,7 +1,9 @@
 //! `VectorService`: games of a client's own, stepped in batches on a thread pool of their own, so that rooms keep their clocks. How the games
 //! go is decided in `chefshat_arena::vector`; here streams are read and written, and the records of games are cut into messages.
 
+use std::panic::AssertUnwindSafe;
 use std::sync::Arc;
+use std::time::Duration;
 
 use chefshat_arena::AgentKind;
 use chefshat_arena::vector::{
@@ -12,11 +14,13 @@ use chefshat_proto::v1::{
     self, run_request::Request as Asked, run_response::Response as Said,
     vector_service_server::VectorService, vector_setup,
 };
-use chefshat_records::branch::branch_of;
+use chefshat_records::branch::{BranchError, branch_of};
 use chefshat_records::convert::{FieldProblem, rules_from_proto, script_from_proto};
 use prost::Message as _;
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
+use tokio::sync::mpsc::error::SendTimeoutError;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc, oneshot};
+use tokio::time::timeout;
 use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::sync::CancellationToken;
 use tonic::{Code, Request, Response, Status, Streaming};
@@ -24,8 +28,11 @@ use tonic::{Code, Request, Response, Status, Streaming};
 use super::new_room::branch_refused;
 use super::recorded::Recorded;
 use super::status::{field, internal, shutting_down, status};
-use crate::config::MAX_VECTOR_STREAMS;
-use crate::convert::{self, Played};
+use crate::config::{
+    MAX_VECTOR_SEATS_IN_ALL, MAX_VECTOR_STREAMS, VECTOR_IDLE_TIMEOUT, VECTOR_SEND_TIMEOUT,
+    VECTOR_SETUP_TIMEOUT,
+};
+use crate::convert::{self, Played, Reset};
 use crate::ids::random_bytes;
 
 /// Messages that wait for a client that reads slowly. It has at most one batch to answer, so more are parts of records.
@@ -39,6 +46,8 @@ pub struct Vectors {
     recorded: Recorded,
     pool: Arc<ThreadPool>,
     streams: Arc<Semaphore>,
+    /// Games times seats that clients play.
+    seats: Arc<Semaphore>,
     closing: CancellationToken,
 }
 
@@ -60,6 +69,7 @@ impl Vectors {
             recorded,
             pool: Arc::new(pool),
             streams: Arc::new(Semaphore::new(MAX_VECTOR_STREAMS)),
+            seats: Arc::new(Semaphore::new(MAX_VECTOR_SEATS_IN_ALL)),
             closing,
         })
     }
@@ -111,7 +121,7 @@ impl From<Status> for End {
 /// What a client asked of its games.
 enum Move {
     Actions(Vec<Action>),
-    Reset(v1::VectorReset),
+    Reset(Reset),
 }
 
 impl Runner {
@@ -122,47 +132,73 @@ impl Runner {
             () = closing.cancelled() => Err(End::Told(shutting_down())),
         };
         if let Err(End::Told(status)) = end {
-            // If the client is gone, nobody is to be told.
-            let _ = self.responses.send(Err(status)).await;
+            // If the client is gone, or still does not read, nobody is to be told.
+            let _ = self
+                .responses
+                .send_timeout(Err(status), VECTOR_SEND_TIMEOUT)
+                .await;
         }
     }
 
     async fn play(&self, requests: &mut Streaming<v1::RunRequest>) -> Result<(), End> {
-        let Some(Asked::Setup(message)) = next(requests).await? else {
-            let words = "the first message is the setup of the games";
-            return Err(field("SETUP_MISSING", &FieldProblem::new("setup", words)).into());
+        let first = timeout(VECTOR_SETUP_TIMEOUT, next(requests)).await;
+        let message = match first.map_err(|_| setup_too_late())?? {
+            None => return Err(End::Left),
+            Some(Some(Asked::Setup(message))) => message,
+            Some(_) => {
+                let words = "the first message is the setup of the games";
+                return Err(field("SETUP_MISSING", &FieldProblem::new("setup", words)).into());
+            }
         };
         let setup = self.setup(&message).await?;
+        let _seats = self.reserve(&setup)?;
         self.say(Said::Started(convert::started_to_proto(&setup)))
             .await?;
-        let mut games = self
-            .stepped(move || {
-                let (games, batch) = VectorGames::new(setup);
-                let parts = parts(&games, batch);
-                (games, parts)
-            })
-            .await
-            .map(|(games, parts)| (games, Ok(parts)))?;
+        let begun = self.stepped(move || VectorGames::new(setup)).await?;
+        let (mut games, mut batch) = begun;
         loop {
-            for part in games.1? {
-                self.say(part).await?;
-            }
-            let asked = match next(requests).await? {
-                None => return Err(End::Left),
-                Some(Asked::Actions(message)) => Move::Actions(actions(&message)?),
-                Some(Asked::Reset(message)) => Move::Reset(message),
-                Some(Asked::Setup(_)) => {
-                    let words = "the games are set up already; open another stream for others";
-                    return Err(field("SETUP_REFUSED", &FieldProblem::new("setup", words)).into());
+            for played in std::mem::take(&mut batch.played) {
+                // One at a time: a record is far larger than what it is made of.
+                let made = self.stepped(move || (record_parts(games.setup(), &played), games));
+                let parts;
+                (parts, games) = made.await?;
+                for part in parts {
+                    self.say(Said::Record(part)).await?;
                 }
+            }
+            let statistics = games.setup().statistics();
+            let said = Said::Batch(Box::new(convert::batch_to_proto(batch, statistics)));
+            self.say(said).await?;
+            let Some(asked) = self.asked(requests).await? else {
+                return Err(End::Left);
             };
-            let mut owned = games.0;
-            games = self
-                .stepped(move || {
-                    let batch = moved(&mut owned, &asked).map(|batch| parts(&owned, batch));
-                    (owned, batch)
-                })
+            let stepped;
+            (stepped, games) = self
+                .stepped(move || (moved(&mut games, asked), games))
                 .await?;
+            batch = stepped.map_err(|error| step_refused(&error))?;
+        }
+    }
+
+    /// What the client asks of its games; `None` when it has ended the stream.
+    async fn asked(&self, requests: &mut Streaming<v1::RunRequest>) -> Result<Option<Move>, End> {
+        let asked = timeout(VECTOR_IDLE_TIMEOUT, next(requests)).await;
+        match asked.map_err(|_| client_idle())?? {
+            None => Ok(None),
+            Some(Some(Asked::Actions(message))) => Ok(Some(Move::Actions(actions(&message)?))),
+            Some(Some(Asked::Reset(message))) => {
+                let reset = convert::reset_from_proto(&message)
+                    .map_err(|problem| field("RESET_REFUSED", &problem))?;
+                Ok(Some(Move::Reset(reset)))
+            }
+            Some(Some(Asked::Setup(_))) => {
+                let words = "the games are set up already; open another stream for others";
+                Err(field("SETUP_REFUSED", &FieldProblem::new("setup", words)).into())
+            }
+            Some(None) => {
+                let words = "say what is to be done: actions or reset";
+                Err(field("ACTIONS_REFUSED", &FieldProblem::new("request", words)).into())
+            }
         }
     }
 
@@ -171,11 +207,7 @@ impl Runner {
         &self,
         work: impl FnOnce() -> T + Send + 'static,
     ) -> Result<T, Status> {
-        let (done, result) = oneshot::channel();
-        self.service.pool.spawn(move || {
-            let _ = done.send(work());
-        });
-        result.await.map_err(|_| internal())
+        on_pool(&self.service.pool, work).await
     }
 
     async fn say(&self, said: Said) -> Result<(), End> {
@@ -183,9 +215,20 @@ impl Runner {
             response: Some(said),
         };
         self.responses
-            .send(Ok(response))
+            .send_timeout(Ok(response), VECTOR_SEND_TIMEOUT)
             .await
-            .map_err(|_| End::Left)
+            .map_err(|error| match error {
+                SendTimeoutError::Timeout(_) => End::Told(client_too_slow()),
+                SendTimeoutError::Closed(_) => End::Left,
+            })
+    }
+
+    /// Counts the seats of these games among those of all streams, as long as what is returned is kept.
+    fn reserve(&self, setup: &VectorSetup) -> Result<OwnedSemaphorePermit, Status> {
+        let seats = setup.games() * u32::try_from(setup.client_seats().count()).unwrap_or(u32::MAX);
+        Arc::clone(&self.service.seats)
+            .try_acquire_many_owned(seats)
+            .map_err(|_| too_many_games(seats))
     }
 
     /// What a setup asks for, with the recorded game that it names looked up.
@@ -228,73 +271,64 @@ impl Runner {
             return Err(refused("rules", words));
         }
         let decisions = point.decisions;
-        let branch = self
+        let (branch, game) = self
             .service
             .recorded
-            .of_game(&point.game_id, move |lines| branch_of(&lines, decisions))
+            .of_game(&point.game_id, move |lines| {
+                let branch = branch_of(&lines, decisions)?;
+                let game = branch.played(branch.later_deals.unwrap_or(Seed([0; 32])));
+                Ok((branch, game))
+            })
             .await?
-            .map_err(|error| branch_refused(&error))?;
+            .map_err(|error: BranchError| branch_refused(&error))?;
         if point.same_deals && branch.later_deals.is_none() {
             let words = "the later Shifts of this game were not dealt from one seed";
             return Err(refused("same_deals", words));
         }
-        let game = branch
-            .played(branch.later_deals.unwrap_or(Seed([0; 32])))
-            .ok_or_else(internal)?;
         let start = Start::Point {
-            game: Box::new(game),
+            game: Box::new(game.ok_or_else(internal)?),
             same_deals: point.same_deals,
         };
         Ok((branch.rules, start))
     }
 }
 
-/// What the client sends next; `None` when it has ended the stream.
-async fn next(requests: &mut Streaming<v1::RunRequest>) -> Result<Option<Asked>, End> {
-    match requests.message().await {
-        Ok(None) => Ok(None),
-        Ok(Some(v1::RunRequest {
-            request: Some(asked),
-        })) => Ok(Some(asked)),
-        Ok(Some(v1::RunRequest { request: None })) => {
-            let words = "say what is to be done: actions or reset";
-            Err(field("ACTIONS_REFUSED", &FieldProblem::new("request", words)).into())
+/// Does work on a pool's threads. Work that panics ends nothing but itself: rooms are served by the same process.
+async fn on_pool<T: Send + 'static>(
+    pool: &ThreadPool,
+    work: impl FnOnce() -> T + Send + 'static,
+) -> Result<T, Status> {
+    let (done, result) = oneshot::channel();
+    pool.spawn(move || {
+        // What the work had in hand is dropped, so that nobody sees it half done.
+        match std::panic::catch_unwind(AssertUnwindSafe(work)) {
+            Ok(value) => drop(done.send(value)),
+            Err(_) => {
+                tracing::error!("the games of a client were given up: stepping them panicked")
+            }
         }
-        // A message that is too large or no message is the client's to know; a broken connection finds nobody to tell.
-        Err(status) => Err(End::Told(status)),
-    }
+    });
+    result.await.map_err(|_| internal())
+}
+
+/// What the client sends next, if anything is in it; `None` when it has ended the stream.
+async fn next(requests: &mut Streaming<v1::RunRequest>) -> Result<Option<Option<Asked>>, End> {
+    // A message that is too large or no message is the client's to know; a broken connection finds nobody to tell.
+    let message = requests.message().await.map_err(End::Told)?;
+    Ok(message.map(|message| message.request))
 }
 
 /// Moves the games as asked.
-fn moved(games: &mut VectorGames, asked: &Move) -> Result<Batch, Status> {
+fn moved(games: &mut VectorGames, asked: Move) -> Result<Batch, StepError> {
     match asked {
-        Move::Actions(actions) => games.step(actions).map_err(|error| step_refused(&error)),
-        Move::Reset(message) => {
-            let refused = |problem| field("RESET_REFUSED", &problem);
-            let (some, seeds) = convert::reset_from_proto(message).map_err(refused)?;
-            if some.is_empty() {
-                return Ok(games.reset(seeds));
-            }
-            games
-                .reset_some(&some)
-                .map_err(|error| step_refused(&error))
-        }
+        Move::Actions(actions) => games.step(&actions),
+        Move::Reset(Reset::All(seeds)) => Ok(games.reset(seeds)),
+        Move::Reset(Reset::Some(some)) => games.reset_some(&some),
     }
 }
 
-/// A batch as messages, after the records of the games that ended.
-fn parts(games: &VectorGames, mut batch: Batch) -> Vec<Said> {
-    let setup = games.setup();
-    let mut parts = Vec::new();
-    for played in std::mem::take(&mut batch.played) {
-        put_record(setup, &played, &mut parts);
-    }
-    let batch = convert::batch_to_proto(batch, setup.statistics());
-    parts.push(Said::Batch(Box::new(batch)));
-    parts
-}
-
-fn put_record(setup: &VectorSetup, played: &PlayedGame, parts: &mut Vec<Said>) {
+/// The record of a game, in parts.
+fn record_parts(setup: &VectorSetup, played: &PlayedGame) -> Vec<v1::VectorRecord> {
     let record = Played {
         by: "vector",
         rules: setup.rules(),
@@ -307,26 +341,24 @@ fn put_record(setup: &VectorSetup, played: &PlayedGame, parts: &mut Vec<Said>) {
         },
         decisions: &played.decisions,
     };
-    let mut part = v1::VectorRecord {
-        game: played.game,
-        index: played.index,
-        ..v1::VectorRecord::default()
-    };
+    let mut parts = vec![v1::VectorRecord::default()];
     let mut size = 0;
     for line in record.record() {
         if size > RECORD_PART_BYTES {
-            let lines = std::mem::take(&mut part.lines);
-            parts.push(Said::Record(v1::VectorRecord {
-                lines,
-                ..part.clone()
-            }));
+            parts.push(v1::VectorRecord::default());
             size = 0;
         }
         size += line.encoded_len();
+        let part = parts.last_mut().expect("there is a first part");
         part.lines.push(line);
     }
-    part.last = true;
-    parts.push(Said::Record(part));
+    for part in &mut parts {
+        part.game = played.game;
+        part.index = played.index;
+    }
+    let last = parts.last_mut().expect("there is a first part");
+    last.last = true;
+    parts
 }
 
 fn actions(message: &v1::VectorActions) -> Result<Vec<Action>, Status> {
@@ -366,7 +398,15 @@ fn step_refused(error: &StepError) -> Status {
                 ("seat", &seat.index().to_string()),
             ],
         ),
-        StepError::Game { .. } => field("RESET_REFUSED", &FieldProblem::new("games", words)),
+        StepError::NoGame { .. } | StepError::Order { .. } => {
+            field("RESET_REFUSED", &FieldProblem::new("games", words))
+        }
+        StepError::Kept => status(
+            Code::ResourceExhausted,
+            "RECORDS_TOO_LONG",
+            words,
+            [("field", "records")],
+        ),
     }
 }
 
@@ -382,4 +422,72 @@ fn too_many() -> Status {
             ("max_vector_streams", &MAX_VECTOR_STREAMS.to_string()),
         ],
     )
+}
+
+fn too_many_games(seats: u32) -> Status {
+    status(
+        Code::ResourceExhausted,
+        "TOO_MANY_VECTOR_GAMES",
+        format!(
+            "games times seats are {seats} here, and all streams of this server together play at most {MAX_VECTOR_SEATS_IN_ALL}; play fewer games, or when others have ended"
+        ),
+        [
+            ("limit", "max_vector_seats_in_all"),
+            (
+                "max_vector_seats_in_all",
+                &MAX_VECTOR_SEATS_IN_ALL.to_string(),
+            ),
+        ],
+    )
+}
+
+fn setup_too_late() -> Status {
+    too_late(
+        "SETUP_TOO_LATE",
+        "no setup came",
+        VECTOR_SETUP_TIMEOUT,
+        "open the stream when you know which games you want",
+    )
+}
+
+fn client_idle() -> Status {
+    too_late(
+        "CLIENT_IDLE",
+        "nothing was answered",
+        VECTOR_IDLE_TIMEOUT,
+        "open another stream; games can begin with the seeds these had",
+    )
+}
+
+fn client_too_slow() -> Status {
+    too_late(
+        "CLIENT_TOO_SLOW",
+        "a message was not taken in",
+        VECTOR_SEND_TIMEOUT,
+        "read what comes, also while you think",
+    )
+}
+
+fn too_late(reason: &str, what: &str, limit: Duration, advice: &str) -> Status {
+    let seconds = limit.as_secs().to_string();
+    let words = format!("{what} within {seconds} s; {advice}");
+    status(
+        Code::DeadlineExceeded,
+        reason,
+        words,
+        [("limit_seconds", &seconds)],
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[tokio::test]
+    async fn work_that_panics_ends_nothing_but_itself() {
+        let pool = ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+        let failed = on_pool(&pool, || -> u32 { panic!("on purpose") }).await;
+        assert_eq!(failed.unwrap_err().code(), Code::Internal);
+        assert_eq!(on_pool(&pool, || 7).await.unwrap(), 7);
+    }
 }

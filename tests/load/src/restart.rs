@@ -256,7 +256,8 @@ async fn play_on(
         streams.spawn(Arc::clone(&run).stream(endpoint.clone(), number));
     }
     let mut counts = run.counts.subscribe();
-    let all_rest = counts.wait_for(|counts| counts.resting == rooms);
+    // A seat that is not asked may be attached again after all games have gone on.
+    let all_rest = counts.wait_for(|counts| counts.resting == rooms && counts.playable_s > 0.0);
     let counts = tokio::select! {
         counts = tokio::time::timeout(LIMIT, all_rest) => {
             *counts.map_err(|_| LoadError::Stuck("playing"))?.expect("the run holds the sender")

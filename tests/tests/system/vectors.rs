@@ -5,9 +5,10 @@ use std::collections::BTreeMap;
 
 use chefshat_arena::game_seed;
 use chefshat_client::{Action, Client, RandomAgent, VectorGames};
-use chefshat_engine::{Game, RuleSetSpec, Seed};
+use chefshat_engine::{Event, Game, RuleSetSpec, Seed, Viewer};
 use chefshat_proto::v1::{self, record_line::Line, vector_setup::Seeds, vector_setup::Start};
 use chefshat_records::replay::replay;
+use chefshat_server::convert::{decision_kind, observation_to_proto};
 use chefshat_tests::{TestServer, patiently};
 
 use crate::played::{ended, original};
@@ -332,14 +333,227 @@ async fn what_makes_no_sense_is_refused_in_words() {
     assert_eq!(error.reason(), Some("ILLEGAL_ACTION"));
     assert_eq!(error.metadata()["row"], "0");
     let gone = games.step([Action(0), Action(0)]).await;
-    assert!(gone.is_err(), "the stream has ended");
-    let (mut games, _) = client.vector(standard()).await.expect("games");
-    let reset = v1::VectorReset {
-        games: 7u32.to_le_bytes().to_vec(),
-        seeds: None,
+    let gone = gone.expect_err("the stream has ended");
+    assert_eq!(gone.reason(), Some("STEP_GIVEN_UP"));
+    let column = |game: u32| game.to_le_bytes().to_vec();
+    let base = Some(v1::vector_reset::Seeds::BaseSeed(1));
+    for (games, all, seeds) in [
+        (column(7), false, None),
+        (column(0), true, None),
+        (column(0), false, base.clone()),
+        (vec![0; 3], false, None),
+    ] {
+        let (mut stepped, _) = client.vector(standard()).await.expect("games");
+        let reset = v1::VectorReset { games, all, seeds };
+        let error = stepped.reset(reset).await.expect_err("refused");
+        assert_eq!(error.reason(), Some("RESET_REFUSED"));
+        let error = stepped.step([Action(0), Action(0)]).await;
+        let error = error.expect_err("the games have ended");
+        assert_eq!(error.reason(), Some("STEP_GIVEN_UP"));
+    }
+}
+
+#[tokio::test]
+async fn every_column_says_what_the_engine_says() {
+    let server = TestServer::start().await;
+    let client = server.client().await;
+    let wanted = v1::VectorSetup {
+        shift_statistics: true,
+        reward_scheme: v1::RewardScheme::Points.into(),
+        ..setup(3, 9)
     };
-    let error = games.reset(reset).await.expect_err("there is no game 7");
-    assert_eq!(error.reason(), Some("RESET_REFUSED"));
+    let (mut games, batch) = client.vector(wanted).await.expect("games");
+    let rules = RuleSetSpec::default().validate().expect("standard rules");
+    let mut alone: Vec<Game> = (0..3)
+        .map(|index| Game::new(rules, game_seed(11, index), |_| {}))
+        .collect();
+    let mut rows = 0;
+    let mut beside = Vec::new();
+    let last = play_on(&mut games, batch, |batch, actions| {
+        let begun = batch.beginnings.clone().unwrap_or_default();
+        let (begun, indices) = (
+            begun.games.as_chunks::<4>().0.to_vec(),
+            begun.indices.to_vec(),
+        );
+        for (game, index) in begun.iter().zip(indices.as_chunks::<8>().0) {
+            let seed = game_seed(11, u64::from_le_bytes(*index));
+            alone[u32::from_le_bytes(*game) as usize] = Game::new(rules, seed, |_| {});
+        }
+        let seen = batch.observations.as_ref().expect("observations");
+        for (row, bytes) in batch.games.as_chunks::<4>().0.iter().enumerate() {
+            let game = &mut alone[u32::from_le_bytes(*bytes) as usize];
+            let open = game.decision().expect("a decision is open");
+            let view = game.observe(Viewer::Seat(open.seat));
+            let expected = observation_to_proto(&view);
+            let part = |column: &[u8], width: usize| column[row * width..][..width].to_vec();
+            let numbers = |column: &[u8], width: usize| -> Vec<u64> {
+                let bytes = part(column, 4 * width);
+                let numbers = bytes.as_chunks::<4>().0.iter();
+                numbers
+                    .map(|number| u32::from_le_bytes(*number).into())
+                    .collect()
+            };
+            let or_none = |cards: &[u8]| {
+                if cards.is_empty() {
+                    vec![0; 12]
+                } else {
+                    cards.to_vec()
+                }
+            };
+            let board = [
+                expected.board_face,
+                expected.board_size,
+                expected.board_jokers,
+            ];
+            assert_eq!(u32::from(batch.seats[row]), open.seat.index() as u32);
+            assert_eq!(
+                i32::from(batch.kinds[row]),
+                i32::from(decision_kind(open.kind))
+            );
+            assert_eq!(numbers(&seen.shifts, 1), [u64::from(expected.shift)]);
+            assert_eq!(numbers(&seen.pizzas, 1), [u64::from(expected.pizza)]);
+            assert_eq!(part(&seen.hands, 12), expected.hand);
+            assert_eq!(seen.golden[row], u8::from(expected.golden));
+            assert!(
+                part(&seen.boards, 3)
+                    .iter()
+                    .map(|part| u32::from(*part))
+                    .eq(board)
+            );
+            assert_eq!(part(&seen.cards_left, 4), expected.cards_left);
+            assert_eq!(part(&seen.passed, 4), expected.passed);
+            assert_eq!(part(&seen.places, 4), expected.places);
+            assert_eq!(part(&seen.roles, 4), expected.roles);
+            assert_eq!(numbers(&seen.points, 4), expected.points);
+            assert_eq!(part(&seen.played, 12), expected.played);
+            assert_eq!(part(&seen.gave, 12), or_none(&expected.gave));
+            assert_eq!(part(&seen.received, 12), or_none(&expected.received));
+            assert_eq!(
+                part(&batch.action_masks, 27),
+                game.legal_actions().to_bytes(214)
+            );
+            let action = u16::try_from(actions[row].0).expect("an action");
+            game.apply(chefshat_engine::Action::new(action), |event| {
+                if let Event::ShiftEnded {
+                    pizzas,
+                    laps,
+                    turns,
+                    points,
+                    ..
+                } = event
+                {
+                    beside.push((pizzas, laps, turns, points.as_slice().to_vec()));
+                }
+            })
+            .expect("legal");
+            rows += 1;
+        }
+    })
+    .await;
+    assert!(rows > 1000 && beside.len() > 20, "{rows} rows");
+    assert_eq!(last.totals.expect("totals").shifts, beside.len() as u64);
+}
+
+#[tokio::test]
+async fn attempts_are_asked_again_and_recorded() {
+    let server = TestServer::start().await;
+    let client = server.client().await;
+    let wanted = v1::VectorSetup {
+        client_seats: vec![1],
+        opponents: vec!["greedy".into()],
+        decisions: v1::DecisionScope::Turns.into(),
+        other_decisions: "greedy".into(),
+        skip_forced: true,
+        invalid_actions: v1::InvalidActionRule::AskAgain.into(),
+        max_invalid_attempts: 3,
+        reward_scheme: v1::RewardScheme::Validity.into(),
+        records: true,
+        seeds: Some(Seeds::GameSeeds(v1::GameSeeds {
+            seeds: vec![vec![1; 32], vec![2; 32]],
+        })),
+        ..setup(2, 2)
+    };
+    let (mut games, mut batch) = client.vector(wanted).await.expect("games");
+    assert_eq!(games.started().base_seed, None);
+    let mut agent = RandomAgent::new(3);
+    while !batch.done {
+        let answers = choose(&mut agent, &batch);
+        // Game 0 never answers with a legal action: gifts are for the exchange.
+        let own = batch.games.as_chunks::<4>().0.iter().zip(answers);
+        let answers: Vec<Action> = own
+            .map(|(game, action)| if *game == [0; 4] { Action(200) } else { action })
+            .collect();
+        batch = games.step(answers).await.expect("asked again");
+    }
+    let mut records: BTreeMap<u64, Vec<v1::RecordLine>> = BTreeMap::new();
+    for part in games.take_records() {
+        records.entry(part.index).or_default().extend(part.lines);
+    }
+    assert_eq!(records.len(), 2);
+    for (index, lines) in records {
+        replay(&lines).expect("the record can be verified");
+        let (mut defaults, mut own) = (0, 0);
+        for line in &lines {
+            let Some(Line::Decision(decision)) = &line.line else {
+                continue;
+            };
+            if decision.seat == 1 && decision.invalid_attempts == [200; 3] {
+                assert_eq!(decision.source(), v1::DecisionSource::Invalid);
+                assert_eq!(decision.invalid_reward, Some(-3.0));
+                defaults += 1;
+            } else if decision.seat == 1 {
+                assert_eq!(decision.source(), v1::DecisionSource::Agent);
+                own += 1;
+            }
+        }
+        assert!(
+            own > 0 && (defaults > 0) == (index == 0),
+            "{index} {own} {defaults}"
+        );
+    }
+}
+
+#[tokio::test]
+async fn games_begin_anew_over_the_wire() {
+    let server = TestServer::start().await;
+    let client = server.client().await;
+    let (mut games, first) = client.vector(setup(3, 0)).await.expect("games");
+    let begun = |batch: &v1::VectorBatch| -> Vec<u64> {
+        let begun = batch.beginnings.clone().unwrap_or_default();
+        let indices = begun.indices.as_chunks::<8>().0.iter();
+        indices.map(|index| u64::from_le_bytes(*index)).collect()
+    };
+    assert_eq!(begun(&first), [0, 1, 2]);
+    let actions = choose(&mut RandomAgent::new(1), &first);
+    games.step(actions).await.expect("legal");
+    let some = v1::VectorReset {
+        games: 1u32.to_le_bytes().to_vec(),
+        ..v1::VectorReset::default()
+    };
+    assert_eq!(begun(&games.reset(some).await.expect("anew")), [4]);
+    let all = v1::VectorReset {
+        all: true,
+        ..v1::VectorReset::default()
+    };
+    assert_eq!(
+        begun(&games.reset(all.clone()).await.expect("anew")),
+        [3, 7, 5]
+    );
+    let seeded = v1::VectorReset {
+        seeds: Some(v1::vector_reset::Seeds::BaseSeed(11)),
+        ..all
+    };
+    let again = games.reset(seeded).await.expect("anew");
+    assert_eq!(begun(&again), [0, 1, 2]);
+    assert_eq!(
+        (again.observations, again.seats),
+        (first.observations, first.seats)
+    );
+    let none = games
+        .reset(v1::VectorReset::default())
+        .await
+        .expect("as it was");
+    assert_eq!((begun(&none), none.rows), (vec![], 3));
 }
 
 #[tokio::test]
@@ -348,7 +562,7 @@ async fn streams_are_bounded_and_end_with_the_server() {
     let client = server.client().await;
     let limits = client.server_info().await.expect("information").limits;
     let most = limits["max_vector_streams"];
-    assert!(limits["max_vector_rows"] >= 16_384);
+    assert!(limits["max_vector_seats"] >= 16_384);
     let mut open = Vec::new();
     for _ in 0..most {
         open.push(client.vector(setup(1, 0)).await.expect("games"));
@@ -364,10 +578,29 @@ async fn streams_are_bounded_and_end_with_the_server() {
         }
     })
     .await;
-    let (mut games, batch) = open.pop().expect("a stream");
+    // So are the seats of all of them together.
+    open.truncate(1);
+    let whole = u32::try_from(limits["max_vector_seats"] / 4).expect("a number of games");
+    let error = patiently("too many games", async {
+        loop {
+            match client.vector(setup(whole, 0)).await {
+                Ok(stream) => open.push(stream),
+                Err(error) if error.reason() == Some("TOO_MANY_VECTOR_GAMES") => break error,
+                Err(_) => tokio::task::yield_now().await,
+            }
+        }
+    })
+    .await;
+    assert_eq!(
+        open.len() as u64,
+        limits["max_vector_seats_in_all"] / (4 * u64::from(whole))
+    );
+    assert!(error.message().contains("play fewer games"));
+    let (mut games, batch) = open.swap_remove(0);
     let actions = choose(&mut RandomAgent::new(1), &batch);
     games.step(actions.clone()).await.expect("it still plays");
     let _ = server.stop().await;
     let error = patiently("the end of the stream", games.step(actions)).await;
-    assert!(error.is_err());
+    let error = error.expect_err("the server has ended");
+    assert_eq!(error.reason(), Some("SHUTTING_DOWN"));
 }

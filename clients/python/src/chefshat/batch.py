@@ -47,7 +47,7 @@ class Batch(Situations):
         self._told = message or pb.VectorBatch()
         #: Number of the batch, from 1.
         self.step = self._told.step
-        #: Whether all games are over and no other follows; only a reset goes on.
+        #: Whether all games are over and no other follows; only a reset with a seed goes on.
         self.done = self._told.done
         #: The records of the games that have ended, if the env was made with `records=True`.
         self.records: tuple[GameRecord, ...] = ()

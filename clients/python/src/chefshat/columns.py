@@ -225,6 +225,8 @@ class Endings(Situations):
 
     games = Column[np.uint32]("<u4")
     """(R,): the game, 0..n-1."""
+    indices = Column[np.uint64]("<u8")
+    """(R,): the game's index, as in `Beginnings`: more than one game of a number may end within a step."""
     rewards = Column[np.float32]("<f4")
     """(R,): sum of the seat's rewards since it last decided."""
     ends = Column[np.uint8]("u1")

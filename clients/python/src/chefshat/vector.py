@@ -95,7 +95,7 @@ class VectorEnv:
         Args:
             address: "host:port", "http://host:port" or, for TLS, "https://host:port"; None: a server of this process's own, which
                 is started if need be (see `LocalServer`).
-            games: n. Games times client seats is limited by the server (`max_vector_rows`).
+            games: n. Games times client seats is limited by the server (`max_vector_seats`).
             client_seats: the seats played here; None: all.
             opponents: the built-in agents of the other seats: one for each in the order of the seats, or one for all.
             rewards: "validity", "paper", "paper_intended", "winning" or "points"; None: all rewards are 0.
@@ -198,7 +198,7 @@ class VectorEnv:
         self._check_open()
         batch = self.batch
         if batch.done:
-            raise ChefsHatError("GAMES_OVER", "all games are over and no other follows; call reset() to begin anew")
+            raise ChefsHatError("GAMES_OVER", "all games are over and no other follows; reset(seed) begins anew")
         array = self._checked(actions, len(batch))
         if self._memory is not None:
             self._memory.remember(batch.games, batch.attempts, batch, array)
@@ -210,19 +210,19 @@ class VectorEnv:
     def reset(self, seed: Seed = None, *, games: ArrayLike | None = None) -> Batch:
         """Gives games up, begins them anew and returns the next batch. What they were rewarded with is lost.
 
-        Without arguments it begins at the first games of the seed again; before the first step that is the batch which is there
-        already.
+        Before the first step, reset() without arguments is the batch which is there already.
 
         Args:
-            seed: seeds from here on; None: every game goes on with its next index. Not together with `games`.
-            games: the games; None: all, and indices begin at 0 again.
+            seed: seeds from here on, indices beginning at 0 again; None: every game goes on with its next index. Not together with
+                `games`.
+            games: the games; None: all.
         """
         self._check_open()
         if self._fresh and seed is None and games is None:
             return self.batch
         if seed is not None and games is not None:
             raise ValueError("seeds can be given only where all games begin anew: leave games out")
-        request = pb.VectorReset()
+        request = pb.VectorReset(all=games is None)
         put_seed(request, seed)
         chosen = None
         if games is not None:

@@ -1,6 +1,6 @@
-//! The arithmetic of a network: dense layers in 32-bit floats, laid out so that the inner loops run over neighbouring numbers. Nothing is
-//! fused or reordered by the compiler, so the same file gives the same values on every machine. What goes in and what comes out is not
-//! known here.
+//! The arithmetic of a network: dense layers in 32-bit floats, laid out so that the inner loops run over neighbouring numbers. There are
+//! only sums, products and ReLU, and the compiler neither fuses nor reorders them, so the same file gives the same values on every machine;
+//! tanh, which does not, is left to who shows the outputs. What goes in and what comes out is not known here.
 
 /// Numbers that are summed beside each other in a dot product, so that they fit one vector register or two.
 const LANES: usize = 8;

@@ -5,6 +5,8 @@ mod features;
 mod file;
 mod layers;
 
+use std::sync::{Arc, LazyLock};
+
 use chefshat_engine::{Action, ActionSpace, DecisionKind, Mask, Observation, RuleSet};
 
 use crate::agents::greedy;
@@ -12,6 +14,12 @@ pub use features::table_features;
 use layers::{Hidden, Output};
 
 pub use file::{MAX_FILE_BYTES, NetworkError};
+
+/// The network of the built-in agent `trained`, read once.
+static TRAINED: LazyLock<Arc<Network>> = LazyLock::new(|| {
+    let file = include_bytes!("trained.safetensors");
+    Arc::new(Network::from_bytes(file).expect("the file within the program is sound"))
+});
 
 /// What a network is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,7 +46,7 @@ pub struct NetworkInfo {
     pub input: NetworkInput,
     /// What its outputs stand for.
     pub output: NetworkOutput,
-    /// Whether its outputs go through tanh.
+    /// Whether its outputs go through tanh. What it plays does not depend on it.
     pub tanh: bool,
     /// Whether it was trained to choose among the legal actions alone. It always plays so.
     pub masked: bool,
@@ -67,6 +75,11 @@ pub struct Network {
 }
 
 impl Network {
+    /// The network of the built-in agent `trained`, which is part of the program.
+    pub fn trained() -> &'static Arc<Network> {
+        &TRAINED
+    }
+
     /// What its file says of it.
     pub fn info(&self) -> &NetworkInfo {
         &self.info
@@ -94,18 +107,20 @@ impl Network {
         }
     }
 
-    /// Its outputs, T or A numbers, for what [`Network::features`] gives.
+    /// Its outputs, T or A numbers, for what [`Network::features`] gives. After tanh the last digits may differ between platforms.
     ///
     /// # Panics
     /// If there are not as many features as it has inputs.
     pub fn outputs(&self, features: &[f32]) -> Vec<f32> {
         let last = self.last_hidden(features);
         (0..self.output.len())
-            .map(|index| self.activated(self.output.value(index, &last)))
+            .map(|index| self.output.value(index, &last))
+            .map(|sum| if self.info.tanh { sum.tanh() } else { sum })
             .collect()
     }
 
-    /// Decides: of the legal actions the one with the highest output, of equal ones that with the lowest index. A decision without an
+    /// Decides: of the legal actions the one with the highest output, of equal ones that with the lowest index. Outputs are compared
+    /// before tanh; one that is no number, because weights are too large to be summed, counts as the lowest. A decision without an
     /// output is taken by default ([`Observation::default_action`]); in a game with other numbers of seats, faces or cards dealt than
     /// it was trained for it plays as the built-in agent `greedy`.
     ///
@@ -121,24 +136,25 @@ impl Network {
         {
             return (observation.default_action(legal)).expect("a decision has a legal action");
         }
-        let only = legal.nth(0).expect("a decision has a legal action");
+        let mut best = legal.nth(0).expect("a decision has a legal action");
         if legal.len() == 1 {
-            return only;
+            return best;
         }
         let last = self.last_hidden(&self.features(observation, legal));
-        let mut best: Option<(Action, f32)> = None;
+        let mut highest = f32::NEG_INFINITY;
         for action in legal.iter() {
             let index = usize::from(action.index());
             if index >= self.output.len() {
                 continue;
             }
-            let value = self.activated(self.output.value(index, &last));
-            // Weights so large that their sums are no numbers any more never win.
-            if best.is_none_or(|(_, highest)| value > highest || highest.is_nan()) {
-                best = Some((action, value));
+            // Not tanh of it: that changes no order, but differs between platforms and makes equal what is far from 0. What is no
+            // number is not above anything.
+            let sum = self.output.value(index, &last);
+            if sum > highest {
+                (best, highest) = (action, sum);
             }
         }
-        best.map_or(only, |(action, _)| action)
+        best
     }
 
     /// Whether an observation has the numbers of seats, faces and cards dealt that it was trained for.
@@ -162,10 +178,6 @@ impl Network {
             "there are as many features as the network has inputs"
         );
         values
-    }
-
-    fn activated(&self, value: f32) -> f32 {
-        if self.info.tanh { value.tanh() } else { value }
     }
 }
 

@@ -86,6 +86,8 @@ pub struct Endings {
     pub rows: u32,
     /// u32.
     pub games: Vec<u8>,
+    /// u64.
+    pub indices: Vec<u8>,
     /// u8.
     pub seats: Vec<u8>,
     /// f32: rewards since the seat last decided.
@@ -182,6 +184,7 @@ pub(super) struct Row<'a> {
 /// An episode of a seat that ended, as a row.
 pub(super) struct Ending<'a> {
     pub(super) game: u32,
+    pub(super) index: u64,
     pub(super) seat: Seat,
     pub(super) reward: f32,
     pub(super) cut_short: bool,
@@ -283,6 +286,7 @@ impl Endings {
     pub(super) fn push(&mut self, row: &Ending<'_>) {
         self.rows += 1;
         put_u32(&mut self.games, row.game);
+        self.indices.extend_from_slice(&row.index.to_le_bytes());
         self.seats.push(row.seat.index() as u8);
         put_f32(&mut self.rewards, row.reward);
         self.ends.push(if row.cut_short { 2 } else { 1 });

@@ -11,17 +11,18 @@ use thiserror::Error;
 
 pub use columns::{Batch, Beginnings, Endings, ObservationColumns, Shifts, Totals};
 pub use setup::{Decisions, Episode, InvalidActions, Seeds, SetupError, Start, VectorSetup};
+pub use slot::PlayedGame;
 use slot::Slot;
-pub use slot::{PlayedDecision, PlayedGame};
 
-/// Most games of one owner.
-pub const MAX_GAMES: u32 = 16_384;
-/// Most rows that games and the owner's seats can make up: games times seats.
-pub const MAX_ROWS: u32 = 16_384;
-/// Decisions that are taken in one game within one step; what is left is done in the next.
-pub(crate) const MAX_DECISIONS_PER_STEP: u32 = 100_000;
-/// Shifts that may end in one game within one step, but for the one that is over the number.
-pub(crate) const MAX_SHIFTS_PER_STEP: u32 = 8;
+/// Most seats that an owner plays: games times seats of each.
+pub const MAX_SEATS_PLAYED: u32 = 16_384;
+/// Decisions and invalid attempts of built-in agents within one step, in all games; those that are left have no row and go on with the
+/// next. About a second.
+const MAX_WORK_PER_STEP: u64 = 10_000_000;
+/// Shifts that end in one game within one step before it is left for the next, but for one that the owner's answer ends.
+const MAX_SHIFTS_PER_STEP: u64 = 2;
+/// Decisions and invalid attempts that are kept for the records of games that go on: some 64 MB.
+pub const MAX_KEPT: u64 = 2_000_000;
 
 /// Why games were not stepped. Nothing has been moved then.
 #[derive(Copy, Clone, Eq, PartialEq, Debug, Error)]
@@ -50,15 +51,24 @@ pub enum StepError {
         action: Action,
     },
     /// A game to begin anew that there is not.
-    #[error(
-        "there is no game {game}: the games are 0 to {last}, and each is named once, ascending"
-    )]
-    Game {
+    #[error("there is no game {game}: the games are 0 to {last}")]
+    NoGame {
         /// What was named.
         game: u32,
         /// The last game.
         last: u32,
     },
+    /// Games to begin anew in another order, or twice.
+    #[error("game {game} is named twice or out of order: name games ascending, each once")]
+    Order {
+        /// What was named.
+        game: u32,
+    },
+    /// The games that go on have become too long for their records. They have been moved, and are of no use any more.
+    #[error(
+        "more than {MAX_KEPT} decisions and invalid attempts are kept of games that go on: play fewer or shorter games at a time, or without records"
+    )]
+    Kept,
 }
 
 /// Games of one owner.
@@ -106,27 +116,33 @@ impl VectorGames {
             self.check(actions)?;
         }
         let mut batch = self.empty_batch();
+        let mut budget = MAX_WORK_PER_STEP;
         let mut answers = self.open.drain(..).zip(actions).peekable();
         let mut open = Vec::with_capacity(self.slots.len());
         for (game, slot) in (0..).zip(&mut self.slots) {
             if let Some((_, action)) = answers.next_if(|(answered, _)| *answered == game) {
                 slot.answer(*action, &self.setup, &mut batch, &mut self.totals);
             }
-            slot.go_on(&self.setup, &mut batch, &mut self.totals);
+            slot.go_on(&self.setup, &mut batch, &mut self.totals, &mut budget);
             if slot.put_row(&mut batch) {
                 open.push(game);
             }
         }
         drop(answers);
         self.open = open;
+        if self.setup.keeps_records() && self.slots.iter().map(Slot::kept).sum::<u64>() > MAX_KEPT {
+            return Err(StepError::Kept);
+        }
         Ok(self.finished(batch))
     }
 
-    /// Gives up all games and begins them anew, with other seeds if any are given.
+    /// Gives up all games and begins them anew: with other seeds from the first, without each with its next index.
     pub fn reset(&mut self, seeds: Option<Seeds>) -> Batch {
-        if let Some(seeds) = seeds {
-            self.setup = self.setup.clone().with_seeds(seeds);
-        }
+        let Some(seeds) = seeds else {
+            let all: Vec<u32> = (0..self.setup.games()).collect();
+            return self.begin_some(&all);
+        };
+        self.setup = self.setup.clone().with_seeds(seeds);
         self.begin_all()
     }
 
@@ -136,39 +152,41 @@ impl VectorGames {
     /// If there is no such game, or the order is another.
     pub fn reset_some(&mut self, games: &[u32]) -> Result<Batch, StepError> {
         let last = self.setup.games() - 1;
-        let wrong = (games.iter().copied())
-            .find(|game| *game > last)
-            .or_else(|| {
-                games
-                    .windows(2)
-                    .find(|pair| pair[0] >= pair[1])
-                    .map(|pair| pair[1])
-            });
-        if let Some(game) = wrong {
-            return Err(StepError::Game { game, last });
+        if let Some(&game) = games.iter().find(|game| **game > last) {
+            return Err(StepError::NoGame { game, last });
         }
+        if let Some(pair) = games.windows(2).find(|pair| pair[0] >= pair[1]) {
+            return Err(StepError::Order { game: pair[1] });
+        }
+        Ok(self.begin_some(games))
+    }
+
+    /// Begins some games, ascending, with their next indices.
+    fn begin_some(&mut self, games: &[u32]) -> Batch {
         let mut batch = self.empty_batch();
+        let mut budget = MAX_WORK_PER_STEP;
         self.open.clear();
         let mut anew = games.iter().copied().peekable();
         for (game, slot) in (0..).zip(&mut self.slots) {
             if anew.next_if_eq(&game).is_some() {
                 slot.begin_next(&self.setup, &mut batch);
-                slot.go_on(&self.setup, &mut batch, &mut self.totals);
+                slot.go_on(&self.setup, &mut batch, &mut self.totals, &mut budget);
             }
             if slot.put_row(&mut batch) {
                 self.open.push(game);
             }
         }
-        Ok(self.finished(batch))
+        self.finished(batch)
     }
 
     fn begin_all(&mut self) -> Batch {
         let mut batch = self.empty_batch();
+        let mut budget = MAX_WORK_PER_STEP;
         self.slots.clear();
         self.open.clear();
         for game in 0..self.setup.games() {
             let mut slot = Slot::new(game, &self.setup, &mut batch);
-            slot.go_on(&self.setup, &mut batch, &mut self.totals);
+            slot.go_on(&self.setup, &mut batch, &mut self.totals, &mut budget);
             if slot.put_row(&mut batch) {
                 self.open.push(game);
             }

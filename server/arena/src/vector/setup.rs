@@ -6,7 +6,7 @@ use std::sync::Arc;
 use chefshat_engine::{BySeat, Game, RewardScheme, RuleSet, Script, ScriptError, Seat, Seed};
 use thiserror::Error;
 
-use super::{MAX_GAMES, MAX_ROWS};
+use super::MAX_SEATS_PLAYED;
 use crate::{AgentKind, game_seed};
 
 /// What an episode is.
@@ -114,7 +114,7 @@ pub enum SetupError {
     NoClient,
     /// No games, or too many.
     #[error(
-        "{games} games with {seats} of the client's seats: play 1 to {MAX_GAMES} games, and at most {MAX_ROWS} games times seats"
+        "{games} games with {seats} of the client's seats: play at least 1 game, and at most {MAX_SEATS_PLAYED} games times seats"
     )]
     Games {
         /// Games asked for.
@@ -161,8 +161,8 @@ impl VectorSetup {
         if seats == 0 {
             return Err(SetupError::NoClient);
         }
-        let rows = u64::from(games) * seats as u64;
-        if !(1..=MAX_GAMES).contains(&games) || rows > u64::from(MAX_ROWS) {
+        let played = u64::from(games) * seats as u64;
+        if !(1..=u64::from(MAX_SEATS_PLAYED)).contains(&played) {
             return Err(SetupError::Games { games, seats });
         }
         if matches!(&seeds, Seeds::List(list) if list.is_empty()) {

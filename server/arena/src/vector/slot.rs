@@ -7,20 +7,9 @@ use chefshat_engine::{
 };
 
 use super::columns::{Batch, Ending, Row, Totals, places_taken};
-use super::{Decisions, Episode, MAX_DECISIONS_PER_STEP, MAX_SHIFTS_PER_STEP, VectorSetup};
+use super::{Decisions, Episode, MAX_SHIFTS_PER_STEP, VectorSetup};
 use crate::play::is_wrong_action;
-use crate::{AgentKind, BuiltInAgent, agent_seed};
-
-/// A decision that was taken, after the attempts that were refused.
-#[derive(Clone, Eq, PartialEq, Debug)]
-pub struct PlayedDecision {
-    /// The action.
-    pub action: Action,
-    /// Invalid attempts before it.
-    pub attempts: Vec<Action>,
-    /// Whether it is the default, taken because there were too many of them.
-    pub by_default: bool,
-}
+use crate::{AgentKind, BuiltInAgent, PlayedDecision, agent_seed};
 
 /// A game that ended, with all its decisions.
 #[derive(Clone, Eq, PartialEq, Debug)]
@@ -62,6 +51,8 @@ struct Table {
     /// Attempts at the decision being taken, if they are kept.
     attempts: Vec<Action>,
     decisions: Vec<PlayedDecision>,
+    /// Number of decisions and attempts in `decisions`.
+    kept: u64,
 }
 
 #[derive(Debug)]
@@ -85,10 +76,14 @@ impl Slot {
         slot
     }
 
-    /// Gives up the game and begins the next, whether or not it is among those to be played in all.
+    /// Leaves the game, ended or given up, for the next of its indices, if that is among those to be played in all.
     pub(super) fn begin_next(&mut self, setup: &VectorSetup, batch: &mut Batch) {
-        self.index += u64::from(setup.games());
-        self.begin(setup, batch);
+        self.table = None;
+        let next = self.index + u64::from(setup.games());
+        if setup.has_game(next) {
+            self.index = next;
+            self.begin(setup, batch);
+        }
     }
 
     fn begin(&mut self, setup: &VectorSetup, batch: &mut Batch) {
@@ -102,6 +97,11 @@ impl Slot {
     /// Whether the game is over and none follows.
     pub(super) fn is_over(&self) -> bool {
         self.table.is_none()
+    }
+
+    /// Decisions and attempts that are kept of the game.
+    pub(super) fn kept(&self) -> u64 {
+        self.table.as_ref().map_or(0, |table| table.kept)
     }
 
     /// The seat whose open decision does not allow this action.
@@ -141,21 +141,26 @@ impl Slot {
         self.take(taken, taken != action, setup, batch, totals);
     }
 
-    /// Goes on until the owner has to decide, the game is over and none follows, or the step is long enough.
-    pub(super) fn go_on(&mut self, setup: &VectorSetup, batch: &mut Batch, totals: &mut Totals) {
+    /// Goes on until the owner has to decide, the game is over and none follows, or the step is long enough. Decisions and attempts of
+    /// built-in agents are taken off `budget`.
+    pub(super) fn go_on(
+        &mut self,
+        setup: &VectorSetup,
+        batch: &mut Batch,
+        totals: &mut Totals,
+        budget: &mut u64,
+    ) {
         let shifts_before = totals.shifts;
-        for _ in 0..MAX_DECISIONS_PER_STEP {
+        while *budget > 0 && totals.shifts - shifts_before < MAX_SHIFTS_PER_STEP {
             let Some(table) = &mut self.table else { return };
-            if table.open.is_some()
-                || totals.shifts - shifts_before > u64::from(MAX_SHIFTS_PER_STEP)
-            {
+            if table.open.is_some() {
                 return;
             }
             let Some(decision) = table.game.decision() else {
                 self.follow(setup, batch);
                 continue;
             };
-            if let Some((action, by_default)) = table.built_in_action(setup, decision) {
+            if let Some((action, by_default)) = table.built_in_action(setup, decision, budget) {
                 self.take(action, by_default, setup, batch, totals);
             } else {
                 return;
@@ -196,6 +201,7 @@ impl Slot {
         let table = self.table.as_mut().expect("a game is being played");
         totals.decisions += 1;
         if setup.keeps_records() {
+            table.kept += 1 + table.attempts.len() as u64;
             table.decisions.push(PlayedDecision {
                 action,
                 attempts: std::mem::take(&mut table.attempts),
@@ -248,6 +254,7 @@ impl Slot {
             for seat in setup.client_seats() {
                 batch.endings.push(&Ending {
                     game: self.number,
+                    index: self.index,
                     seat,
                     reward: std::mem::take(&mut table.rewards[seat]),
                     cut_short: adjudicated,
@@ -271,11 +278,7 @@ impl Slot {
                 decisions: std::mem::take(&mut table.decisions),
             });
         }
-        if setup.has_game(self.index + u64::from(setup.games())) {
-            self.begin_next(setup, batch);
-        } else {
-            self.table = None;
-        }
+        self.begin_next(setup, batch);
     }
 }
 
@@ -306,6 +309,7 @@ impl Table {
             events: Vec::with_capacity(8),
             attempts: Vec::new(),
             decisions: Vec::new(),
+            kept: 0,
         }
     }
 
@@ -315,7 +319,9 @@ impl Table {
         &mut self,
         setup: &VectorSetup,
         decision: Decision,
+        budget: &mut u64,
     ) -> Option<(Action, bool)> {
+        *budget = budget.saturating_sub(1);
         let seat = decision.seat;
         let owned = setup.agents()[seat].is_none();
         if owned {
@@ -349,6 +355,7 @@ impl Table {
             {
                 recorder.wrong(seat);
             }
+            *budget = budget.saturating_sub(1);
             if setup.keeps_records() {
                 self.attempts.push(action);
             }

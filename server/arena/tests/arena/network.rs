@@ -1,11 +1,14 @@
 //! Network agents: the same features, outputs and actions as the Python package (the fixtures of tests/fixtures/network, which
 //! clients/python/tools/network_fixtures.py makes), and decisions that follow from the outputs. Files, sound and broken, are in `network_file`.
 
+use std::num::NonZeroU32;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use chefshat_arena::{
-    AgentKind, BuiltInAgent, Network, NetworkInput, NetworkOutput, table_features,
+    AgentKind, BuiltInAgent, Contender, Duplicate, Network, NetworkInput, NetworkOutput, SeatPlan,
+    table_features,
 };
 use chefshat_engine::{
     Action, Board, BySeat, Cards, DecisionKind, Game, Mask, Observation, Role, RuleSetSpec, Seat,
@@ -166,22 +169,12 @@ fn the_highest_output_is_played_and_of_equal_ones_the_first() {
     let ascending: Vec<f32> = (0..214u8).map(f32::from).collect();
     let highest = NetworkFile::preferring(&ascending).network();
     let lowest = NetworkFile::preferring(&[0.5; 214]).network();
-    // Saturated: tanh makes equal what is not.
+    // Saturated: tanh makes equal what is not, so what is played is found before it.
     let saturated =
         NetworkFile::preferring(&ascending.iter().map(|n| 20.0 + n).collect::<Vec<_>>());
     let saturated = saturated.with("output_activation", "tanh").network();
-    // Sums that are no numbers never win.
-    let mut broken = ascending.clone();
-    (broken[213], broken[198]) = (f32::MAX, f32::MAX);
-    let mut overflowing = NetworkFile::new("classic", "actions");
-    let mut weights = vec![0.0; 214 * 228];
-    weights[..228].fill(f32::MAX);
-    weights[..228]
-        .iter_mut()
-        .step_by(2)
-        .for_each(|weight| *weight = -f32::MAX);
-    overflowing.layer(0, 228, &weights, &ascending);
-    let overflowing = overflowing.network();
+    let outputs = saturated.outputs(&[0.0; 228]);
+    assert!(outputs.iter().all(|output| (output - 1.0).abs() < 1e-6));
 
     let seen = decisions(&shifts(6));
     assert!(seen.len() > 200, "{} decisions", seen.len());
@@ -189,8 +182,48 @@ fn the_highest_output_is_played_and_of_equal_ones_the_first() {
         let last = legal.iter().last().unwrap();
         assert_eq!(highest.decide(observation, legal), last);
         assert_eq!(Some(lowest.decide(observation, legal)), legal.nth(0));
-        assert_eq!(Some(saturated.decide(observation, legal)), legal.nth(0));
-        assert!(legal.contains(overflowing.decide(observation, legal)));
+        assert_eq!(saturated.decide(observation, legal), last);
+    }
+}
+
+/// A network with the outputs 0, 1, 2 and so on for whatever it is shown, but no number for the actions in `broken`.
+fn overflowing(broken: Range<usize>) -> Network {
+    let mut file = NetworkFile::new("classic", "actions");
+    file.layer(0, 228, &[0.0; 2 * 228], &[f32::MAX; 2]);
+    // Infinity less infinity, though every number of the file is finite.
+    let mut weights = [0.0; 2 * 214];
+    for row in broken.clone() {
+        (weights[2 * row], weights[2 * row + 1]) = (f32::MAX, -f32::MAX);
+    }
+    let ascending: Vec<f32> = (0..214u8).map(f32::from).collect();
+    file.layer(1, 2, &weights, &ascending);
+    let network = file.network();
+    for (row, output) in network.outputs(&[0.0; 228]).iter().enumerate() {
+        assert_eq!(output.is_nan(), broken.contains(&row), "output {row}");
+    }
+    network
+}
+
+#[test]
+fn outputs_that_are_no_numbers_never_win() {
+    let seen = decisions(&shifts(6));
+    // A pass alone, which is the last of a turn's actions; those before it, all or some; everything.
+    for broken in [199..200, 0..199, 0..40, 0..214] {
+        let network = overflowing(broken.clone());
+        let (mut mixed, mut without) = (0, 0);
+        for (observation, legal) in &seen {
+            let sound = |action: &Action| !broken.contains(&usize::from(action.index()));
+            let count = legal.iter().filter(sound).count();
+            mixed += u32::from(count > 0 && count < legal.len());
+            without += u32::from(count == 0 && legal.len() > 1);
+            // Of none that is a number, all are equal.
+            let expected = legal.iter().filter(sound).last().or(legal.nth(0));
+            let chosen = network.decide(observation, legal);
+            assert_eq!(Some(chosen), expected, "{broken:?} of {legal:?}");
+        }
+        let all = broken.len() == 214;
+        assert!(all || mixed > 50, "{broken:?}: {mixed} decisions");
+        assert!(!all || without > 50, "{broken:?}: {without} decisions");
     }
 }
 
@@ -247,6 +280,25 @@ fn an_agent_of_a_network_has_a_name_and_no_generator() {
     let agent = BuiltInAgent::network(Arc::new(NetworkFile::preferring(&[0.0; 214]).network()));
     assert_eq!(agent.name(), "network");
     assert!(!agent.has_generator());
+}
+
+#[test]
+fn the_trained_agent_is_for_the_standard_game_and_stronger_than_greedy() {
+    let network = Network::trained();
+    let standard = RuleSetSpec::default().validate().unwrap();
+    assert!(network.fits(&standard), "{:?}", network.info());
+    let mut agent = BuiltInAgent::new(AgentKind::Trained, [0; 32]);
+    assert_eq!(agent.name(), "trained");
+    assert!(!agent.has_generator());
+    for (observation, legal) in &decisions(&shifts(3)) {
+        let expected = network.decide(observation, legal);
+        assert_eq!(agent.decide(observation, legal), expected);
+    }
+    let contenders = [AgentKind::Trained, AgentKind::Greedy].map(Contender::Kind);
+    let shifts = NonZeroU32::new(4).unwrap();
+    let comparison = Duplicate::new(standard, shifts, contenders, SeatPlan::Half, 40, 0);
+    let points = comparison.unwrap().run(|_| {}).points;
+    assert!(points.interval95().low > 0.5, "{points:?}");
 }
 
 #[test]

@@ -46,7 +46,7 @@ pub(super) struct Demo {
     /// Makes the game repeatable: fixes its deals and the agents' choices.
     #[arg(long)]
     seed: Option<u64>,
-    /// Who plays, seat by seat: random, random_unmasked, greedy. Standard: greedy and random in turn.
+    /// Who plays, seat by seat: random, random_unmasked, greedy, trained. Standard: greedy and random in turn.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = agent_kind)]
     agents: Vec<AgentKind>,
     /// Milliseconds that each agent waits before it decides.

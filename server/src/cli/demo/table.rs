@@ -108,6 +108,7 @@ fn names(kinds: &[AgentKind]) -> Vec<String> {
                 AgentKind::Greedy => (0, ["Greta", "Gustav", "Gina", "Georg", "Gloria", "Gil"]),
                 AgentKind::Random => (1, ["Rosa", "Rolf", "Rita", "Remi", "Ruth", "Ravi"]),
                 AgentKind::RandomUnmasked => (2, ["Uma", "Udo", "Ulla", "Ugo", "Ursa", "Ulf"]),
+                AgentKind::Trained => (3, ["Tara", "Timo", "Thea", "Theo", "Tilda", "Tom"]),
             };
             let name = names[used[number] % names.len()];
             used[number] += 1;

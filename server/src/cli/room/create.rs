@@ -35,7 +35,7 @@ pub(super) struct Create {
     name: String,
     #[command(flatten)]
     server: ServerArg,
-    /// How the next seat is filled: random, random_unmasked or greedy (played by the server), replay:GAME-ID:SEAT (played by the server
+    /// How the next seat is filled: random, random_unmasked, greedy or trained (played by the server), replay:GAME-ID:SEAT (played by the server
     /// as the player of that seat of a recorded game played), or open, agent, human or robot (for whom it is free). Repeatable; seats
     /// not named are open.
     #[arg(long = "seat", value_name = "SEAT", value_parser = seat)]

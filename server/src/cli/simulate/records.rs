@@ -3,8 +3,7 @@
 
 use std::path::Path;
 
-use chefshat_arena::vector::PlayedDecision;
-use chefshat_arena::{AgentKind, Batch, Listener};
+use chefshat_arena::{AgentKind, Batch, Listener, PlayedDecision};
 use chefshat_engine::{Action, Decision};
 use chefshat_records::jsonl::{self, RecordFileError};
 

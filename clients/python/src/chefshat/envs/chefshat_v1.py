@@ -114,7 +114,7 @@ class raw_env(AECEnv[str, Any, Any]):  # type: ignore[misc]  # PettingZoo has no
         if seed is not None:
             self.vector.reset(seed)
         elif self._stepped:
-            self.vector.reset(games=[0])
+            self.vector.reset()
         self._stepped = False
         self.agents = self.possible_agents.copy()
         self.rewards = dict.fromkeys(self.agents, 0.0)

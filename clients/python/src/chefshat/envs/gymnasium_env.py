@@ -92,7 +92,7 @@ class ChefsHatEnv(gymnasium.Env[Any, Any]):
         if seed is not None:
             self.vector.reset(seed)
         elif self._running and self._stepped:
-            self.vector.reset(games=[0])
+            self.vector.reset()
         wait_for_a_row(self.vector)
         self._running = True
         self._stepped = False

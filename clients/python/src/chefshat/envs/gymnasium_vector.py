@@ -98,10 +98,8 @@ class ChefsHatVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
             if mask.shape != (self.num_envs,) or mask.dtype != np.bool_ or seed is not None:
                 raise ValueError(f"a reset_mask is an array of {self.num_envs} booleans, and goes without a seed")
             batch = self.vector.reset(games=np.flatnonzero(mask))
-        elif seed is not None or self._seen is None:
-            batch = self.vector.reset(seed)
         else:
-            batch = self.vector.reset(games=np.arange(self.num_envs))
+            batch = self.vector.reset(seed)
         return self._observe(batch), self._infos(batch)
 
     def step(self, actions: Any) -> tuple[Any, NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]:  # noqa: ANN401

@@ -22,7 +22,7 @@ from chefshat.learn.deep_q import Agents, DeepQConfig, Layers
 from chefshat.learn.deep_q_training import Played
 from chefshat.vector import VectorEnv
 
-QUICK_SHIFTS = 3
+QUICK_SHIFTS = 2
 # Random agents choose among all 200 actions, as the paper's do. Who wins does not depend on it: in the end they take every legal
 # action as often as `random` does.
 OPPONENTS = "random_unmasked"

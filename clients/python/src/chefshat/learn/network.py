@@ -48,7 +48,7 @@ class NetworkInfo:
         input: which function of `features` makes its input.
         output: "actions": a number for each of the A actions; "turns": for the T actions of a turn alone, other decisions are the
             default ones.
-        output_activation: what is applied to the last layer's numbers.
+        output_activation: what is applied to the last layer's numbers. What is played does not depend on it.
         masked: whether it was trained to choose among legal actions alone. Agents that play it do so either way.
         players: seats of the rule set, N.
         faces: faces of the deck, F.
@@ -159,10 +159,15 @@ class Network:
 
     def outputs(self, inputs: Floats) -> Floats:
         """The network's output for each row of features, (R, `info.output_width`) float32."""
+        sums = self._sums(inputs)
+        return np.tanh(sums) if self.info.output_activation == "tanh" else sums
+
+    def _sums(self, inputs: Floats) -> Floats:
+        """The outputs before their activation."""
         values = inputs
         for number, (weight, bias) in enumerate(self.layers):
             values = (np.maximum(values, 0) if number else values) @ weight.T + bias
-        return np.tanh(values) if self.info.output_activation == "tanh" else values
+        return values
 
     def actions(
         self, observations: features.Columns, seats: features.Bytes, kinds: features.Bytes, mask_bits: features.Bytes
@@ -171,8 +176,8 @@ class Network:
 
         Decisions that a network of output "turns" does not know are the default ones.
         """
-        outputs = self.outputs(self.inputs(observations, seats, kinds, mask_bits))
-        chosen = best_legal(outputs, mask_bits)
+        # Not after tanh: that changes no order, but makes equal what is far from 0.
+        chosen = best_legal(self._sums(self.inputs(observations, seats, kinds, mask_bits)), mask_bits)
         if self.info.output == "actions":
             return chosen
         defaults = default_decisions(observations, kinds, mask_bits, faces=self.info.faces)
@@ -180,10 +185,16 @@ class Network:
 
 
 def best_legal(outputs: Floats, mask_bits: features.Bytes) -> Actions:
-    """The legal action with the highest output, the lowest index of equal ones: (R,) u16; 0 where none of the outputs is legal."""
+    """The legal action with the highest output, the lowest index of equal ones: (R,) u16; 0 where none of the outputs is legal.
+
+    An output that is no number, because weights are too large to be summed, counts as the lowest.
+    """
     legal = np.unpackbits(mask_bits, axis=1, count=outputs.shape[1], bitorder="little").view(np.bool_)
-    best: Actions = np.argmax(np.where(legal, outputs, -np.inf), axis=1).astype(np.uint16)
-    return best
+    best = np.argmax(np.where(legal & ~np.isnan(outputs), outputs, -np.inf), axis=1)
+    # Where every legal output is the lowest, forbidden ones are equal to them.
+    allowed = np.take_along_axis(legal, best[:, np.newaxis], axis=1)[:, 0]
+    chosen: Actions = np.where(allowed, best, np.argmax(legal, axis=1)).astype(np.uint16)
+    return chosen
 
 
 def default_decisions(observations: features.Columns, kinds: features.Bytes, mask_bits: features.Bytes, *, faces: int) -> Actions:

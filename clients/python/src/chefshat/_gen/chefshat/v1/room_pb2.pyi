@@ -252,7 +252,7 @@ class SeatConfig(_message.Message):
     reserved_for: Global___ParticipantKind.ValueType
     """Participants of this kind, with the room's join code; UNSPECIFIED admits every kind."""
     built_in_agent: _builtins.str
-    """A built-in agent of the server: "random", "random_unmasked" or "greedy"."""
+    """A built-in agent of the server: "random", "random_unmasked", "greedy" or "trained"."""
     @_builtins.property
     def replay(self) -> Global___RecordedPlayer:
         """A built-in agent that plays what a recorded player played."""

@@ -211,8 +211,8 @@ class VectorSetup(_message.Message):
     SHIFT_STATISTICS_FIELD_NUMBER: _builtins.int
     RECORDS_FIELD_NUMBER: _builtins.int
     games: _builtins.int
-    """Number of games that are played side by side, n; games times client seats is at most the limit max_vector_rows of
-    ServerService.GetServerInfo.
+    """Number of games that are played side by side, n, at least 1; games times client seats is at most max_vector_seats, and all streams of
+    a server together have at most max_vector_seats_in_all.
     """
     reward_scheme: _room_pb2.RewardScheme.ValueType
     """How turns are rewarded; UNSPECIFIED: all rewards are 0."""
@@ -221,7 +221,9 @@ class VectorSetup(_message.Message):
     decisions: Global___DecisionScope.ValueType
     """Which decisions the client takes."""
     other_decisions: _builtins.str
-    """With DECISION_SCOPE_TURNS: the built-in agent that takes the other decisions of the client's seats; empty: the default decision is taken."""
+    """With DECISION_SCOPE_TURNS: the built-in agent that takes the other decisions of the client's seats; empty: the default decision is taken.
+    Either way a record says that the seat's agent took them.
+    """
     skip_forced: _builtins.bool
     """Whether a decision with one legal action is taken without asking."""
     invalid_actions: Global___InvalidActionRule.ValueType
@@ -229,16 +231,17 @@ class VectorSetup(_message.Message):
     max_invalid_attempts: _builtins.int
     """With ASK_AGAIN: invalid attempts of any seat at one decision after which the default decision is taken; 0: unlimited."""
     total_games: _builtins.int
-    """Number of games to play in all: one that has ended is followed by another until so many have begun. 0: without end. At least `games`;
-    equal to it: no game is followed by another.
+    """Number of games to play in all: the indices are below it, and a game that has ended, or was given up, is followed by the next of its
+    own indices (see GameBeginnings) if there is one. 0: without end. At least `games`; equal to it: no game is followed by another.
     """
     base_seed: _builtins.int
     """The game of index i has seed i of this base seed, as game i of `chefshat simulate --seed`."""
     shift_statistics: _builtins.bool
     """Whether batches carry the table of the Shifts that have ended."""
     records: _builtins.bool
-    """Whether the record of every game that ends is sent. Needs games that are dealt, an end after at most max_shifts points or Shifts, and
-    with ASK_AGAIN a limit of 1..=1000 attempts.
+    """Whether the record of every game that ends is sent. Needs games that are dealt, at most max_vector_recorded_games of them side by side,
+    an end after at most max_shifts points or Shifts, max_turns of at most 10000, and with ASK_AGAIN a limit of 1..=1000 attempts. What is
+    kept of games that go on is bounded, too (RECORDS_TOO_LONG).
     """
     @_builtins.property
     def rules(self) -> _rules_pb2.RuleSet:
@@ -250,13 +253,13 @@ class VectorSetup(_message.Message):
 
     @_builtins.property
     def opponents(self) -> _containers.RepeatedScalarFieldContainer[_builtins.str]:
-        """Names of the built-in agents of the other seats: one for each of them in the order of the seats, or one for all; empty: "random". They
-        decide within the same step.
+        """Names of the built-in agents of the other seats: one for each of them in the order of the seats, or one for all, however
+        many; empty: "random". They decide within the same step.
         """
 
     @_builtins.property
     def game_seeds(self) -> Global___GameSeeds:
-        """The game of index i has the seed i modulo their number, at most 16384."""
+        """The game of index i has the seed i modulo their number, 1..=max_vector_seeds."""
 
     @_builtins.property
     def scripted(self) -> _rules_pb2.ScriptedShift:
@@ -327,15 +330,20 @@ Global___VectorActions: _TypeAlias = VectorActions  # noqa: Y015
 
 @_typing.final
 class VectorReset(_message.Message):
-    """Games that are given up and begun anew. The next batch lists every game that waits for the client, the others as they were."""
+    """Games that are given up and begun anew. A game given up has no endings, no record and no statistics of the Shift it was in, and its index
+    is not played again. The next batch lists every game that waits for the client, the others as they were.
+    """
 
     DESCRIPTOR: _descriptor.Descriptor
 
     GAMES_FIELD_NUMBER: _builtins.int
+    ALL_FIELD_NUMBER: _builtins.int
     BASE_SEED_FIELD_NUMBER: _builtins.int
     GAME_SEEDS_FIELD_NUMBER: _builtins.int
     games: _builtins.bytes
-    """u32: the games, ascending; empty: all, and the indices begin at 0 again."""
+    """u32: the games that begin anew, ascending, each with its next index; may be empty. Empty with `all`."""
+    all: _builtins.bool
+    """All games begin anew: with seeds given here the indices begin at 0 again, without each game goes on with its next index."""
     base_seed: _builtins.int
     """As in the setup."""
     @_builtins.property
@@ -346,12 +354,13 @@ class VectorReset(_message.Message):
         self,
         *,
         games: _builtins.bytes = ...,
+        all: _builtins.bool = ...,
         base_seed: _builtins.int = ...,
         game_seeds: Global___GameSeeds | None = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["base_seed", b"base_seed", "game_seeds", b"game_seeds", "seeds", b"seeds"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["base_seed", b"base_seed", "game_seeds", b"game_seeds", "games", b"games", "seeds", b"seeds"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["all", b"all", "base_seed", b"base_seed", "game_seeds", b"game_seeds", "games", b"games", "seeds", b"seeds"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType_seeds: _TypeAlias = _typing.Literal["base_seed", "game_seeds"]  # noqa: Y015
     _WhichOneofArgType_seeds: _TypeAlias = _typing.Literal["seeds", b"seeds"]  # noqa: Y015
@@ -477,7 +486,7 @@ class VectorBatch(_message.Message):
     rows: _builtins.int
     """Number of rows. 0 with `done` unset: answer it with no actions."""
     done: _builtins.bool
-    """All games are over and no other follows. Only a reset goes on."""
+    """All games are over and no other follows. Only a reset with seeds goes on."""
     games: _builtins.bytes
     """u32: the game, 0..n-1, ascending."""
     seats: _builtins.bytes
@@ -616,6 +625,7 @@ class EpisodeEndings(_message.Message):
 
     ROWS_FIELD_NUMBER: _builtins.int
     GAMES_FIELD_NUMBER: _builtins.int
+    INDICES_FIELD_NUMBER: _builtins.int
     SEATS_FIELD_NUMBER: _builtins.int
     REWARDS_FIELD_NUMBER: _builtins.int
     ENDS_FIELD_NUMBER: _builtins.int
@@ -626,6 +636,8 @@ class EpisodeEndings(_message.Message):
     """Number of rows."""
     games: _builtins.bytes
     """u32: the game."""
+    indices: _builtins.bytes
+    """u64: the game's index: more than one game of a number may end within a step."""
     seats: _builtins.bytes
     """u8: the seat."""
     rewards: _builtins.bytes
@@ -645,6 +657,7 @@ class EpisodeEndings(_message.Message):
         *,
         rows: _builtins.int = ...,
         games: _builtins.bytes = ...,
+        indices: _builtins.bytes = ...,
         seats: _builtins.bytes = ...,
         rewards: _builtins.bytes = ...,
         ends: _builtins.bytes = ...,
@@ -654,7 +667,7 @@ class EpisodeEndings(_message.Message):
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["observations", b"observations"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["ends", b"ends", "game_over", b"game_over", "games", b"games", "observations", b"observations", "places_taken", b"places_taken", "rewards", b"rewards", "rows", b"rows", "seats", b"seats"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["ends", b"ends", "game_over", b"game_over", "games", b"games", "indices", b"indices", "observations", b"observations", "places_taken", b"places_taken", "rewards", b"rewards", "rows", b"rows", "seats", b"seats"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
@@ -677,7 +690,9 @@ class GameBeginnings(_message.Message):
     indices: _builtins.bytes
     """u64: its index: the k-th to begin (from 0) as game g of n has the index g + k*n."""
     seeds: _builtins.bytes
-    """u8, 32 wide: its seed. With it, the rule set and the decisions it can be played again."""
+    """u8, 32 wide: its seed. With it, how the setup lets games start and its decisions it can be played again. It deals every Shift, but for
+    the hands of a script, and what a branch takes over: Shifts up to the point, with same_deals also those after it.
+    """
     def __init__(
         self,
         *,
@@ -696,7 +711,9 @@ Global___GameBeginnings: _TypeAlias = GameBeginnings  # noqa: Y015
 
 @_typing.final
 class ShiftStatistics(_message.Message):
-    """Shifts that have ended."""
+    """Shifts that have ended. Of a Shift within which a game was branched from a record, pizzas, laps and turns are those of the whole Shift; what
+    is said of each seat's actions and rewards begins at the branch, and performance with the first Shift that ended after it.
+    """
 
     DESCRIPTOR: _descriptor.Descriptor
 
