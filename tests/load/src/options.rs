@@ -101,7 +101,7 @@ pub(crate) struct Load {
     /// Measure how long a server that was killed takes until so many unfinished games can be played again.
     #[arg(long, value_name = "ROOMS", conflicts_with_all = ["rooms", "server", "durability"], value_parser = clap::value_parser!(u64).range(1..=MAX_ROOMS))]
     pub(crate) restart: Option<u64>,
-    /// Measure games of a client's own, stepped in batches of 1, 64 and 1,024 on one stream and on two.
+    /// Measure games of a client's own, stepped in batches of 1, 64 and 1,024 on one, two and four streams.
     #[arg(long, conflicts_with_all = ["rooms", "server", "durability", "restart"])]
     pub(crate) vector: bool,
     /// Folder for what --durability and --restart keep on disk; it must lie on the disk that is meant. Standard: the temporary folder.

@@ -17,7 +17,7 @@ use crate::server::{Kind, ServerProcess};
 /// Games of one stream.
 const GAMES: [u32; 3] = [1, 64, 1_024];
 /// Streams at once.
-const STREAMS: [usize; 2] = [1, 2];
+const STREAMS: [usize; 3] = [1, 2, 4];
 /// What is aimed at with the most games, decisions per second.
 const GOAL: f64 = 4e6;
 

@@ -84,7 +84,7 @@ fn games_of_a_client_are_stepped_and_counted() {
     assert!(output.status.success(), "{errors}");
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
     let scenarios = report["scenarios"].as_array().unwrap();
-    assert_eq!(scenarios.len(), 6, "{report:#}");
+    assert_eq!(scenarios.len(), 9, "{report:#}");
     for scenario in scenarios {
         assert!(positive(&scenario["decisions"]), "{report:#}");
         assert!(positive(&scenario["bytes_per_decision"]), "{report:#}");

@@ -12,6 +12,7 @@ from pathlib import Path
 
 EXAMPLES = """examples:
   python -m chefshat.learn ppo --out strong.safetensors --minutes 30 --seed 1
+  python -m chefshat.learn curve strong.jsonl --out strong.png
   python -m chefshat.learn deep-q --out deep_q.safetensors --shifts 1000 --mask
   python -m chefshat.learn tune --out tuned.json --trials 50 --shifts 250
   python -m chefshat.learn evaluate strong.safetensors --opponents greedy --games 2000
@@ -110,6 +111,11 @@ def _evaluate(command: argparse.ArgumentParser) -> None:
     command.add_argument("--address", metavar="HOST:PORT", help="a server that runs already")
 
 
+def _curve(command: argparse.ArgumentParser) -> None:
+    command.add_argument("log", type=Path, metavar="LOG", help="the log that `ppo` wrote")
+    command.add_argument("--out", type=Path, required=True, metavar="PNG", help="the picture to write")
+
+
 def _deep_q(command: argparse.ArgumentParser) -> None:
     command.add_argument("--out", type=Path, required=True, metavar="FILE", help="the network to write")
     command.add_argument("--shifts", type=_count, default=250, help="Shifts to play")
@@ -173,6 +179,7 @@ COMMANDS: dict[str, tuple[str, str, Callable[[argparse.ArgumentParser], None]]] 
     "evaluate": ("evaluation", "plays a trained network on one seat against built-in agents", _evaluate),
     "deep-q": ("deep_q_command", "trains a Deep Q agent, the 2020 paper's, against built-in agents", _deep_q),
     "tune": ("tune", "looks for good hyper-parameters of the Deep Q agent", _tune),
+    "curve": ("curve", "draws how a training went, from its log", _curve),
     "play": ("play", "joins a room with a trained network and plays one game", _play),
 }
 
