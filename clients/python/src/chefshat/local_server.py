@@ -116,12 +116,23 @@ class LocalServer:
         command = [str(self._binary), "serve", "--listen", self.address, "--until-stdin-closes", "--json", *self._options]
         try:
             # The server stops when its standard input ends: this process holds the other end, and with it goes the pipe.
+            # A process group of its own: Ctrl-C is for the program that plays, which may still want to save what it has.
             self._process = subprocess.Popen(
-                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._log, text=True, env=clean_environment()
+                command,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=self._log,
+                text=True,
+                env=clean_environment(),
+                process_group=0,
             )
         except OSError as error:
             raise ChefsHatError("SERVER_DID_NOT_START", f"{self._binary} cannot be started: {error}") from error
-        address = self._listens(self._process)
+        try:
+            address = self._listens(self._process)
+        except BaseException:
+            self.stop()
+            raise
         if address is None:
             self.stop()
             raise ChefsHatError("SERVER_DID_NOT_START", f"{' '.join(command)} did not start listening; it said:\n{self.log}")
@@ -163,8 +174,11 @@ class LocalServer:
         try:
             assert process.stdout is not None, "it was asked for"
             for line in process.stdout:
-                said = json.loads(line)
-                if said.get("event") == "listening":
+                try:
+                    said = json.loads(line)
+                except ValueError:
+                    continue  # Another program than was thought.
+                if isinstance(said, dict) and said.get("event") == "listening":
                     return str(said["address"])
             return None
         finally:
@@ -196,6 +210,8 @@ def shared_address() -> str:
             _shared_by = os.getpid()
             atexit.register(_stop_shared, _shared, _shared_by)
         if not _shared.running:
+            # Another port, should it have run before: nobody is left who knows the old one, and somebody else may have it.
+            _shared.address = "127.0.0.1:0"
             _shared.start()
         return _shared.address
 

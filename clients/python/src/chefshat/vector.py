@@ -41,7 +41,7 @@ __all__ = [
     "sample_legal",
 ]
 
-# Bytes a batch may have: that of the most rows a server has is half as large.
+# Bytes a message may have: the largest batch has a quarter of them (`max_vector_batch_bytes`), and a part of a record far less.
 MAX_BATCH_BYTES = 64 * 1024 * 1024
 
 # The name exists in grpc's type stubs alone.
@@ -51,6 +51,8 @@ Requests: TypeAlias = "queue.SimpleQueue[pb.RunRequest | None]"
 
 class VectorEnv:
     """Games of one's own, stepped side by side. Close it, or use it as a context manager. For one thread at a time.
+
+    The server ends games that nobody has answered for an hour (CLIENT_IDLE), and serves 64 such environments at a time.
 
     Every method raises `ChefsHatError` with the server's reason when the server refuses, and so does every further call: make a new
     one then.

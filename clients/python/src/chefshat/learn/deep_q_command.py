@@ -31,6 +31,9 @@ def run(options: argparse.Namespace) -> int:
     out: Path = options.out
     state: Path = options.checkpoint or out.with_suffix(".training")
     try:
+        for path in (out, state):
+            if not path.parent.is_dir():
+                raise ValueError(f"there is no folder {path.parent} to write {path.name} to")
         training, played = _trained(options, state)
         checkpoint.save(state, training)
         (net,) = training.networks(options.name)

@@ -60,7 +60,6 @@ def run(options: argparse.Namespace) -> int:
         with Trainer(training, address=options.address) as trainer, log.open("a" if options.resume else "w") as lines:
             _tell(lines, _setup(trainer.training))
             evaluations = _train(trainer, options, lines, state)
-        _write_network(out, trainer.training, options.name)
     except (ChefsHatError, TrainingFileError, OSError, ValueError) as error:
         if options.json:
             print(json.dumps({"event": "error", "reason": getattr(error, "reason", "REFUSED"), "message": str(error)}))
@@ -129,6 +128,9 @@ def _train(trainer: Trainer, options: argparse.Namespace, lines: TextIO, state: 
             losses = trainer.update(done)
             bar.n = round(1000 * done)
             bar.set_postfix_str(f"{trainer.training.progress.decisions:,} decisions, entropy {losses['entropy']:.2f}")
+    # First of all what was learned: whoever is in a hurry may interrupt the last look as well.
+    ppo_checkpoint.save(state, trainer.training)
+    _write_network(options.out, trainer.training, options.name)
     evaluations = _look(trainer, options, lines, losses)
     ppo_checkpoint.save(state, trainer.training)
     return evaluations

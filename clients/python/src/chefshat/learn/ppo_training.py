@@ -106,4 +106,6 @@ def joined(parts: Sequence[Samples]) -> Samples:
     columns: list[Any] = [np.concatenate(column) if len(parts) > 1 else column[0] for column in zip(*parts, strict=True)]
     samples = Samples(*columns)
     counted = samples.advantages[samples.weights > 0]
+    if len(counted) == 0:
+        raise ValueError("what came of no decision is known yet: play more steps between two times of learning (--steps)")
     return samples._replace(advantages=(samples.advantages - counted.mean()) / (counted.std() + 1e-8))
