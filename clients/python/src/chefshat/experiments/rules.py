@@ -9,7 +9,7 @@ The most attempts that a decision took are among the values.) It is done three t
 - with the hand and the board alone, 28 numbers, which is how the paper's text describes the state;
 - with the classic vector, while a pass counts as a wrong action wherever something else is legal, as it does in an early public
   version of the paper's environment. Since that alone takes thousands of attempts until it is learned, a legal action is taken by
-  chance after ten wrong ones at one decision, as a later version of that environment does.
+  chance after ten wrong ones at one decision, as a later version of that environment does (and once more where that is a pass).
 """
 
 from collections.abc import Mapping
