@@ -14,5 +14,6 @@ mod rooms;
 mod spectators;
 mod stops;
 mod stranger;
+mod vector_columns;
 mod vectors;
 mod web;
