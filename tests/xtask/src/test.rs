@@ -80,6 +80,10 @@ pub(crate) fn python_command(places: &Places, module: &str) -> Command {
         .current_dir(places.python_package());
     command.env("RUFF_CACHE_DIR", places.own.join("ruff"));
     command.env("MYPY_CACHE_DIR", places.own.join("mypy"));
+    // Most of the time of the learning tests goes into compiling; what was compiled once is kept.
+    command.env("JAX_COMPILATION_CACHE_DIR", places.own.join("jax"));
+    command.env("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0");
+    command.env("JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES", "-1");
     command
 }
 
