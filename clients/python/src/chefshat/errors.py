@@ -1,8 +1,10 @@
-"""The one exception this package raises for what a server refuses or a connection suffers, and how it is read from gRPC.
+"""The one exception this package raises for what a server refuses or a connection suffers: made from gRPC, told by commands.
 
 Wrong use of the package itself (a bad argument) raises ValueError or TypeError; what an agent raises is passed on untouched.
 """
 
+import json
+import sys
 from collections.abc import Iterable, Mapping
 
 import grpc
@@ -94,3 +96,12 @@ def _error_info(trailers: Iterable[tuple[str, str | bytes]]) -> tuple[str, dict[
             if detail.Is(info.DESCRIPTOR) and detail.Unpack(info):
                 return info.reason, dict(info.metadata)
     return "", {}
+
+
+def failed(error: Exception, *, as_json: bool) -> int:
+    """What a command says of an error: a line of JSON on standard output, or words on standard error. Returns its exit code."""
+    if as_json:
+        print(json.dumps({"event": "error", "reason": getattr(error, "reason", "REFUSED"), "message": str(error)}))
+    else:
+        print(f"error: {error}", file=sys.stderr)
+    return 1

@@ -9,15 +9,13 @@ import importlib
 import importlib.metadata
 import json
 import platform
-import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import chefshat
-from chefshat.errors import ChefsHatError
+from chefshat.errors import ChefsHatError, failed
 from chefshat.experiments import page, plots, results, tables
 from chefshat.experiments.progress import Progress
 from chefshat.experiments.results import Config, Result
@@ -64,7 +62,7 @@ def run(options: argparse.Namespace) -> int:
                 if not options.json:
                     print(as_text(result), flush=True)
     except (Refused, ChefsHatError, OSError) as error:
-        return _failed(error, options)
+        return failed(error, as_json=options.json)
     _finish(made, files, options)
     return 0
 
@@ -89,7 +87,7 @@ def report(options: argparse.Namespace) -> int:
         else:
             files = _fill(options.page, made)
     except (Refused, OSError) as error:
-        return _failed(error, options)
+        return failed(error, as_json=options.json)
     if not options.json:
         for result in made:
             print(as_text(result))
@@ -186,12 +184,3 @@ def _finish(made: list[Result], files: list[Path], options: argparse.Namespace) 
         print(json.dumps({"results": shown, "files": [str(file) for file in files]}))
     else:
         print("written: " + ", ".join(str(file) for file in files))
-
-
-def _failed(error: Exception, options: argparse.Namespace) -> int:
-    if options.json:
-        said: dict[str, Any] = {"event": "error", "reason": getattr(error, "reason", "REFUSED"), "message": str(error)}
-        print(json.dumps(said))
-    else:
-        print(f"error: {error}", file=sys.stderr)
-    return 1

@@ -15,7 +15,7 @@ import numpy as np
 from tqdm import tqdm
 
 from chefshat import pb
-from chefshat.errors import ChefsHatError
+from chefshat.errors import ChefsHatError, failed
 from chefshat.learn import checkpoint, deep_q, deep_q_training, features, network
 from chefshat.learn.checkpoint import Training, TrainingFileError
 from chefshat.learn.deep_q import DeepQConfig
@@ -39,11 +39,7 @@ def run(options: argparse.Namespace) -> int:
         (net,) = training.networks(options.name)
         network.save(out, net.layers, net.info)
     except (ChefsHatError, TrainingFileError, OSError, ValueError) as error:
-        if options.json:
-            print(json.dumps({"event": "error", "reason": getattr(error, "reason", "REFUSED"), "message": str(error)}))
-        else:
-            print(f"error: {error}", file=sys.stderr)
-        return 1
+        return failed(error, as_json=options.json)
     told = _told(played)
     if options.json:
         print(json.dumps({"event": "trained", "file": str(out), "training": str(state), **told}))

@@ -7,14 +7,13 @@ the same certainty. How a network decides is in `network`. The command is `pytho
 import argparse
 import dataclasses
 import json
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from chefshat.errors import ChefsHatError
+from chefshat.errors import ChefsHatError, failed
 from chefshat.learn import network as network_file
 from chefshat.learn.network import Network, NetworkFileError
 from chefshat.vector import Rules, Seed, VectorEnv
@@ -116,11 +115,7 @@ def run(options: argparse.Namespace) -> int:
             trained, options.opponents, games=options.games, seed=options.seed, rules=options.rules, address=options.address
         )
     except (ChefsHatError, NetworkFileError, OSError, ValueError) as error:
-        if options.json:
-            print(json.dumps({"event": "error", "reason": getattr(error, "reason", "REFUSED"), "message": str(error)}))
-        else:
-            print(f"error: {error}", file=sys.stderr)
-        return 1
+        return failed(error, as_json=options.json)
     print(json.dumps(dataclasses.asdict(found)) if options.json else found)
     return 0
 

@@ -6,14 +6,13 @@ action, however it was trained. The command `python -m chefshat.learn play` join
 
 import argparse
 import json
-import sys
 
 import numpy as np
 import numpy.typing as npt
 
 import chefshat
 from chefshat import Agent, Decision, SeatInfo, agent
-from chefshat.errors import ChefsHatError
+from chefshat.errors import ChefsHatError, failed
 from chefshat.learn import network
 from chefshat.learn.network import Network, NetworkFileError
 
@@ -81,11 +80,7 @@ def run(options: argparse.Namespace) -> int:
         player = NetworkAgent(network.load(options.file))
         result = chefshat.play(player, options.address, join_code=options.join_code, name=options.name, seat=options.seat)
     except (ChefsHatError, NetworkFileError, RulesDoNotFit, OSError) as error:
-        if options.json:
-            print(json.dumps({"event": "error", "reason": getattr(error, "reason", "REFUSED"), "message": str(error)}))
-        else:
-            print(f"error: {error}", file=sys.stderr)
-        return 1
+        return failed(error, as_json=options.json)
     print(json.dumps(agent.as_json(result)) if options.json else agent.as_table(result), flush=True)
     return 0 if result.finished else 1
 

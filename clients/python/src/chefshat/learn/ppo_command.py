@@ -19,7 +19,7 @@ from google.protobuf import json_format
 from tqdm import tqdm
 
 from chefshat import pb
-from chefshat.errors import ChefsHatError
+from chefshat.errors import ChefsHatError, failed
 from chefshat.learn import network, ppo_checkpoint
 from chefshat.learn.evaluation import Evaluation, evaluate
 from chefshat.learn.network import Network
@@ -61,11 +61,7 @@ def run(options: argparse.Namespace) -> int:
             _tell(lines, _setup(trainer.training))
             evaluations = _train(trainer, options, lines, state)
     except (ChefsHatError, TrainingFileError, OSError, ValueError) as error:
-        if options.json:
-            print(json.dumps({"event": "error", "reason": getattr(error, "reason", "REFUSED"), "message": str(error)}))
-        else:
-            print(f"error: {error}", file=sys.stderr)
-        return 1
+        return failed(error, as_json=options.json)
     if options.json:
         print(json.dumps({"event": "trained", "file": str(out), **_told(trainer.training, evaluations)}))
     else:

@@ -16,7 +16,7 @@ import numpy as np
 import optuna
 from tqdm import tqdm
 
-from chefshat.errors import ChefsHatError
+from chefshat.errors import ChefsHatError, failed
 from chefshat.files import write_whole
 from chefshat.learn import deep_q, deep_q_training
 from chefshat.learn.deep_q import DeepQConfig
@@ -66,11 +66,7 @@ def run(options: argparse.Namespace) -> int:
                 bar.update()
                 bar.set_postfix(best=f"{best(trials).value:.3f}")
     except (ChefsHatError, OSError, ValueError) as error:
-        if options.json:
-            print(json.dumps({"event": "error", "reason": getattr(error, "reason", "REFUSED"), "message": str(error)}))
-        else:
-            print(f"error: {error}", file=sys.stderr)
-        return 1
+        return failed(error, as_json=options.json)
     if options.json:
         print(json.dumps({"event": "tuned", "file": str(options.out), **_as_json(options, trials)}))
     else:
