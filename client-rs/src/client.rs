@@ -1,5 +1,5 @@
-//! The connection to a server and the calls one makes on it. Nothing is kept here but the connection: a `Client` is cheap to clone, and
-//! everything it starts may run at the same time.
+//! The connection to a server and the calls one makes on it, but for those of tournaments (see `tournaments`) and of games of one's own (see
+//! `vector`). Nothing is kept here but the connection: a `Client` is cheap to clone, and everything it starts may run at the same time.
 
 use std::time::Duration;
 

@@ -31,7 +31,11 @@ struct Lost {
 }
 
 /// Plays until every seat of the session is settled.
-pub(crate) async fn run<A: Agent>(channel: Channel, session: &mut Session<A>, backoff: &Backoff) {
+pub(crate) async fn run<A: Agent>(
+    channel: Channel,
+    session: &mut Session<'_, A>,
+    backoff: &Backoff,
+) {
     let mut client = PlayServiceClient::new(channel).max_decoding_message_size(MAX_RESPONSE_BYTES);
     let mut outage = Outage::default();
     while !session.is_over() {
@@ -66,7 +70,7 @@ pub(crate) async fn run<A: Agent>(channel: Channel, session: &mut Session<A>, ba
 /// One stream, until the session is over or the stream breaks.
 async fn converse<A: Agent>(
     client: &mut PlayServiceClient<Channel>,
-    session: &mut Session<A>,
+    session: &mut Session<'_, A>,
 ) -> Result<(), Lost> {
     let attach = session.attach();
     // The attachments must all fit: nothing is read from the queue before the stream is open.

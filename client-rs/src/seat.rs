@@ -45,11 +45,11 @@ pub(crate) struct SeatSession<A> {
 }
 
 impl<A: Agent> SeatSession<A> {
-    pub(crate) fn new(ticket: String, agent: A, options: &PlayOptions) -> Self {
+    pub(crate) fn new(ticket: String, agent: A, entropy: Vec<u8>) -> Self {
         Self {
             agent,
             ticket,
-            entropy: options.entropy.draw(),
+            entropy,
             room_id: String::new(),
             game_id: String::new(),
             seat: 0,
@@ -70,17 +70,12 @@ impl<A: Agent> SeatSession<A> {
         self.open = None;
         self.owed = Owed::Nothing;
         self.substituted = false;
-        command(
-            0,
-            Command::Attach(v1::Attach {
-                ticket: self.ticket.clone(),
-                request_id,
-                from_sequence: self.next_event,
-                snapshot: false,
-                delivery: options.delivery.into(),
-                no_mask: options.no_mask,
-                entropy: self.entropy.clone(),
-            }),
+        attach(
+            &self.ticket,
+            request_id,
+            self.next_event,
+            &self.entropy,
+            options,
         )
     }
 
@@ -88,8 +83,13 @@ impl<A: Agent> SeatSession<A> {
         self.outcome.is_some()
     }
 
-    pub(crate) fn into_outcome(self) -> Option<Result<Outcome, PlayError>> {
-        self.outcome
+    pub(crate) fn take_outcome(&mut self) -> Option<Result<Outcome, PlayError>> {
+        self.outcome.take()
+    }
+
+    /// The game it was last attached to; empty before.
+    pub(crate) fn game_id(&self) -> &str {
+        &self.game_id
     }
 
     pub(crate) fn attached(&mut self, attached: v1::Attached) {
@@ -245,6 +245,28 @@ impl<A: Agent> SeatSession<A> {
             out.push(command(handle, Command::Answer(answer.clone())));
         }
     }
+}
+
+/// The command that attaches a seat, or a participant of a tournament.
+pub(crate) fn attach(
+    ticket: &str,
+    request_id: u32,
+    from_sequence: u64,
+    entropy: &[u8],
+    options: &PlayOptions,
+) -> v1::SeatCommand {
+    command(
+        0,
+        Command::Attach(v1::Attach {
+            ticket: ticket.to_owned(),
+            request_id,
+            from_sequence,
+            snapshot: false,
+            delivery: options.delivery.into(),
+            no_mask: options.no_mask,
+            entropy: entropy.to_vec(),
+        }),
+    )
 }
 
 fn command(handle: u32, command: Command) -> v1::SeatCommand {

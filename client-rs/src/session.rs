@@ -1,8 +1,11 @@
 //! All seats of one stream: turns responses into the commands to send next, without a stream or a clock of its own. What a single
-//! seat makes of an update is in `seat`; who carries the messages is `run`.
+//! seat makes of an update is in `seat`, what a participant of a tournament makes of it in `participant`; who carries the messages is `run`.
+
+use std::collections::BTreeMap;
 
 use prost::Message as _;
 
+use crate::participant::Participant;
 use crate::seat::SeatSession;
 use crate::v1::{self, seat_update::Update};
 use crate::{Agent, Outcome, PlayError, PlayOptions};
@@ -13,45 +16,67 @@ const MAX_COMMANDS: usize = 1024;
 const MAX_REQUEST_BYTES: usize = 32 * 1024;
 /// Upper bound of what an encoded command adds to its message besides its own length: a tag and a length.
 const COMMAND_OVERHEAD_BYTES: usize = 6;
+/// Number of the first seat.
+const FIRST_SEAT: u32 = 1;
+/// Request id of a participant's attachment, far from those of seats.
+const PARTICIPANT: u32 = u32::MAX;
 
 /// The seats of one call of `play`.
-#[derive(Debug)]
-pub(crate) struct Session<A> {
-    seats: Vec<SeatSession<A>>,
+pub(crate) struct Session<'a, A> {
+    /// Seats whose games go on, by number; the number of a seat is the request id of its attachments.
+    seats: BTreeMap<u32, SeatSession<A>>,
+    /// What has come of the others, by number.
+    outcomes: BTreeMap<u32, Result<Outcome, PlayError>>,
+    next_seat: u32,
+    participant: Option<Participant<'a, A>>,
     options: PlayOptions,
     /// The seat behind each handle of the present stream.
-    by_handle: Vec<Option<usize>>,
+    by_handle: BTreeMap<u32, u32>,
     /// Handles whose seats may owe an answer, in the order in which they were told so.
     asked: Vec<u32>,
-    unsettled: usize,
     progress: bool,
 }
 
-impl<A: Agent> Session<A> {
+impl<'a, A: Agent> Session<'a, A> {
+    /// These seats, each with its agent.
     pub(crate) fn new(seats: impl IntoIterator<Item = (String, A)>, options: &PlayOptions) -> Self {
-        let seats: Vec<_> = seats
-            .into_iter()
-            .map(|(ticket, agent)| SeatSession::new(ticket, agent, options))
-            .collect();
-        Self {
-            by_handle: vec![None; seats.len()],
-            asked: Vec::new(),
-            unsettled: seats.len(),
-            seats,
+        let mut session = Self {
+            seats: BTreeMap::new(),
+            outcomes: BTreeMap::new(),
+            next_seat: FIRST_SEAT,
+            participant: None,
             options: options.clone(),
+            by_handle: BTreeMap::new(),
+            asked: Vec::new(),
             progress: false,
+        };
+        for (ticket, agent) in seats {
+            session.add(SeatSession::new(ticket, agent, options.entropy.draw()));
+        }
+        session
+    }
+
+    /// The seats that this participant of a tournament will be given.
+    pub(crate) fn of_participant(participant: Participant<'a, A>, options: &PlayOptions) -> Self {
+        Self {
+            participant: Some(participant),
+            ..Self::new([], options)
         }
     }
 
-    /// What to say first on a new stream: an attachment of every seat whose game goes on.
+    /// What to say first on a new stream: an attachment of every seat whose game goes on. Those of a participant come before itself, each
+    /// with its own ticket: so it is told what it has not seen alone, and how a game ended meanwhile. The server leaves such seats as they are.
     pub(crate) fn attach(&mut self) -> Vec<v1::PlayRequest> {
-        self.by_handle.fill(None);
+        self.by_handle.clear();
         self.asked.clear();
-        let mut commands = Vec::with_capacity(self.unsettled);
-        for (request_id, seat) in (1u32..).zip(&mut self.seats) {
-            if !seat.is_settled() {
-                commands.push(seat.attach(request_id, &self.options));
-            }
+        let seats = self.seats.iter_mut();
+        let mut commands: Vec<_> = seats
+            .map(|(&number, seat)| seat.attach(number, &self.options))
+            .collect();
+        if let Some(participant) = &mut self.participant
+            && !participant.is_settled()
+        {
+            commands.push(participant.attach(PARTICIPANT, &self.options));
         }
         pack(commands)
     }
@@ -64,32 +89,35 @@ impl<A: Agent> Session<A> {
             }
         }
         let mut commands = Vec::with_capacity(self.asked.len());
-        for &handle in &self.asked {
-            if let Some(index) = self.by_handle[handle as usize] {
-                self.seats[index].speak(handle, &mut commands);
+        for handle in self.asked.drain(..) {
+            let number = self.by_handle.get(&handle);
+            if let Some(seat) = number.and_then(|number| self.seats.get_mut(number)) {
+                seat.speak(handle, &mut commands);
             }
         }
-        self.asked.clear();
         pack(commands)
     }
 
     /// The stream is gone: seats whose games are known to be over need no other.
     pub(crate) fn disconnected(&mut self) {
-        for index in 0..self.seats.len() {
-            self.settling(index, SeatSession::finish);
-        }
+        self.settling_all(SeatSession::finish);
     }
 
     /// Gives up all seats whose games go on.
     pub(crate) fn give_up(&mut self, error: &PlayError) {
-        for index in 0..self.seats.len() {
-            self.settling(index, |seat| seat.settle(Err(error.clone())));
+        self.settling_all(|seat| seat.settle(Err(error.clone())));
+        if let Some(participant) = &mut self.participant {
+            participant.settle(Err(error.clone()));
         }
     }
 
-    /// Whether every seat has its outcome.
+    /// Whether every seat has its outcome and no other is to come.
     pub(crate) fn is_over(&self) -> bool {
-        self.unsettled == 0
+        self.seats.is_empty()
+            && self
+                .participant
+                .as_ref()
+                .is_none_or(Participant::is_settled)
     }
 
     /// Whether anything new has happened since this was last asked.
@@ -99,27 +127,47 @@ impl<A: Agent> Session<A> {
 
     /// The outcomes, in the order in which the seats were given.
     pub(crate) fn into_outcomes(self) -> Vec<Result<Outcome, PlayError>> {
-        let outcomes = self.seats.into_iter().map(SeatSession::into_outcome);
-        outcomes
-            .map(|outcome| outcome.unwrap_or(Err(PlayError::EndingUnknown)))
-            .collect()
+        self.outcomes.into_values().collect()
+    }
+
+    /// The outcomes of a participant's games, in the order in which it was seated, unless it could not take part to the end.
+    pub(crate) fn into_played(self) -> Result<Vec<Outcome>, PlayError> {
+        if let Some(participant) = self.participant {
+            participant.into_end()?;
+        }
+        let outcomes = self.outcomes.into_values();
+        Ok(outcomes.filter_map(Result::ok).collect())
+    }
+
+    fn add(&mut self, seat: SeatSession<A>) -> u32 {
+        let number = self.next_seat;
+        self.next_seat += 1;
+        self.seats.insert(number, seat);
+        number
     }
 
     fn update(&mut self, handle: u32, update: Update) {
         match update {
             Update::Attached(attached) => {
-                let index = attached.request_id.wrapping_sub(1) as usize;
-                let slot = self.by_handle.get_mut(handle as usize);
-                if let (Some(seat), Some(slot)) = (self.seats.get_mut(index), slot) {
-                    *slot = Some(index);
-                    seat.attached(attached);
+                if let Some(number) = self.seat_attached(&attached) {
+                    self.by_handle.insert(handle, number);
+                    if let Some(seat) = self.seats.get_mut(&number) {
+                        seat.attached(attached);
+                    }
+                }
+            }
+            Update::Entered(_) => {
+                if let Some(participant) = &mut self.participant {
+                    participant.entered(handle);
+                }
+            }
+            Update::Refused(refused) if refused.request_id == PARTICIPANT => {
+                if let Some(participant) = &mut self.participant {
+                    participant.refused(refused);
                 }
             }
             Update::Refused(refused) if refused.request_id != 0 => {
-                let index = refused.request_id.wrapping_sub(1) as usize;
-                if index < self.seats.len() {
-                    self.settling(index, |seat| seat.refused(refused));
-                }
+                self.settling(refused.request_id, |seat| seat.refused(refused));
             }
             Update::Refused(refused) => {
                 tracing::warn!(handle, reason = refused.reason, "{}", refused.message);
@@ -128,35 +176,75 @@ impl<A: Agent> Session<A> {
         }
     }
 
+    /// Which seat is attached: one that asked for it, or one in a game of a tournament, which may be new.
+    fn seat_attached(&mut self, attached: &v1::Attached) -> Option<u32> {
+        if attached.request_id != 0 {
+            let number = attached.request_id;
+            return self.seats.contains_key(&number).then_some(number);
+        }
+        let participant = self.participant.as_mut()?;
+        let mut seats = self.seats.iter();
+        let known = seats.find(|(_, seat)| seat.game_id() == attached.game_id);
+        if let Some((&number, _)) = known {
+            // The newest handle of a seat is its only one: what becomes of an older does not concern it.
+            self.by_handle.retain(|_, other| *other != number);
+            return Some(number);
+        }
+        let seat = participant.seated(attached);
+        Some(self.add(seat))
+    }
+
     /// Updates of seats that are attached. A handle without a seat is no reason to stop the others.
     fn seat_update(&mut self, handle: u32, update: Update) {
-        let Some(index) = self.by_handle.get(handle as usize).copied().flatten() else {
+        if let (Update::Detached(detached), Some(participant)) = (&update, &mut self.participant)
+            && participant.has(handle)
+        {
+            participant.detached(detached.reason());
+            return;
+        }
+        let number = self.by_handle.get(&handle).copied();
+        let Some((number, seat)) =
+            number.and_then(|number| Some((number, self.seats.get_mut(&number)?)))
+        else {
             tracing::warn!(handle, "update for a seat that is not attached");
             return;
         };
-        let seat = &mut self.seats[index];
         match update {
             Update::Events(batch) => self.progress |= seat.events(batch),
             Update::Decision(request) => seat.decision(request),
             Update::Result(result) => self.progress |= seat.result(&result),
             Update::Detached(detached) => {
-                self.by_handle[handle as usize] = None;
-                self.settling(index, |seat| seat.detached(detached.reason()));
+                self.by_handle.remove(&handle);
+                self.settling(number, |seat| seat.detached(detached.reason()));
                 return;
             }
-            Update::Snapshot(_) | Update::Attached(_) | Update::Refused(_) => {}
+            Update::Snapshot(_) | Update::Attached(_) | Update::Refused(_) | Update::Entered(_) => {
+            }
         }
         if seat.has_to_speak() && self.asked.last() != Some(&handle) {
             self.asked.push(handle);
         }
     }
 
-    /// Does what may settle a seat, and keeps count.
-    fn settling(&mut self, index: usize, act: impl FnOnce(&mut SeatSession<A>)) {
-        let seat = &mut self.seats[index];
-        if !seat.is_settled() {
-            act(seat);
-            self.unsettled -= usize::from(seat.is_settled());
+    fn settling_all(&mut self, mut act: impl FnMut(&mut SeatSession<A>)) {
+        let numbers: Vec<u32> = self.seats.keys().copied().collect();
+        for number in numbers {
+            self.settling(number, &mut act);
+        }
+    }
+
+    /// Does what may settle a seat. Of one that is settled nothing is kept but its outcome, lest a long tournament keep all its agents.
+    fn settling(&mut self, number: u32, act: impl FnOnce(&mut SeatSession<A>)) {
+        let Some(seat) = self.seats.get_mut(&number) else {
+            return;
+        };
+        act(seat);
+        if let Some(outcome) = seat.take_outcome() {
+            if let (Some(_), Err(error)) = (&self.participant, &outcome) {
+                tracing::warn!(game = seat.game_id(), %error, "a game of the tournament was not played to its end");
+            }
+            self.seats.remove(&number);
+            self.outcomes.insert(number, outcome);
         }
     }
 }

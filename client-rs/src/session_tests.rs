@@ -3,6 +3,9 @@
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex};
 
+#[path = "participant_tests.rs"]
+mod participant;
+
 use super::*;
 use crate::v1::game_event::Kind;
 use crate::v1::seat_command::Command;
@@ -49,7 +52,7 @@ impl Agent for Scripted {
 
 /// A session of as many seats as there are lists of actions, and the log of each.
 struct Table {
-    session: Session<Scripted>,
+    session: Session<'static, Scripted>,
     logs: Vec<Arc<Mutex<Vec<String>>>>,
 }
 
@@ -102,6 +105,7 @@ impl Table {
                 next_sequence,
                 room_id: "room".to_owned(),
                 game_id: "game".to_owned(),
+                ..Default::default()
             };
             (handle, Update::Attached(attached))
         });
@@ -112,14 +116,7 @@ impl Table {
 
     /// What the session says to one response, request by request.
     fn hear(&mut self, updates: Vec<(u32, Update)>) -> Vec<String> {
-        let updates = updates.into_iter().map(|(handle, update)| v1::SeatUpdate {
-            handle,
-            update: Some(update),
-        });
-        let response = v1::PlayResponse {
-            updates: updates.collect(),
-        };
-        let requests = self.session.receive(response);
+        let requests = self.session.receive(response(updates));
         requests.iter().map(said).collect()
     }
 
@@ -131,6 +128,16 @@ impl Table {
         for log in &self.logs {
             log.lock().unwrap().clear();
         }
+    }
+}
+
+fn response(updates: Vec<(u32, Update)>) -> v1::PlayResponse {
+    let updates = updates.into_iter().map(|(handle, update)| v1::SeatUpdate {
+        handle,
+        update: Some(update),
+    });
+    v1::PlayResponse {
+        updates: updates.collect(),
     }
 }
 

@@ -30,16 +30,22 @@ function join(address, code, name) {
 export async function play({ address, code, name }) {
   const { ticket, seat } = await join(address, code, name);
   const client = connect(protocol.PlayService, address);
-  let [next, end, lost] = [0, {}, new Error("the server ended the stream")];
+  let [next, end, open, lost] = [0, {}, {}, new Error("the server ended the stream")];
   const told = {
-    events: ({ events }) => events.forEach((event) => {
+    events: ({ events }, handle, stream) => events.forEach((event) => {
       next = event.sequence + 1;
       if (event.game_ended || event.game_aborted) end = event;
+      if (event.substituted?.seat === seat) stream.write({ commands: [{ handle, resume: {} }] }); // Back from being late too often.
     }),
-    decision: ({ decision_id, action_mask }, handle, stream) => {
-      const legal = legalActions(action_mask);
-      const answer = { decision_id, action: legal[randomInt(legal.length)] };
+    decision: (request, handle, stream) => {
+      open = request;
+      const legal = legalActions(request.action_mask);
+      const answer = { decision_id: request.decision_id, action: legal[randomInt(legal.length)] };
       stream.write({ commands: [{ handle, answer }] });
+    },
+    result: ({ decision_id, status }, handle, stream) => {
+      const again = status === "ANSWER_STATUS_INVALID" && decision_id === open.decision_id; // It is not put again.
+      if (again) told.decision(open, handle, stream);
     },
     refused: ({ message, reason }) => { throw new Error(`refused: ${message} (${reason})`); },
     detached: ({ reason }) => {

@@ -47,6 +47,24 @@ pub const MAX_RECORDS_IN_HAND: usize = 2;
 pub const MAX_RECORDS_SENT: usize = 8;
 /// How long a client may take to take in one message of a record.
 pub const RECORD_SEND_TIMEOUT: Duration = Duration::from_secs(30);
+/// Most tournaments, ended ones that are still shown included.
+pub const MAX_TOURNAMENTS: usize = 256;
+/// Messages that wait for one tournament.
+pub const TOURNAMENT_MAILBOX: usize = 256;
+/// Calls to games that wait for one stream: more than its participants can be called to in a moment.
+pub const MAX_CALLS_WAITING: usize = 4_096;
+/// When rooms for games of a tournament that could not be made are tried again.
+pub const TOURNAMENT_RETRY: Duration = Duration::from_secs(1);
+/// Streams that follow tournaments.
+pub const MAX_FOLLOWERS: usize = 256;
+/// How often those who follow a tournament are told of it at most.
+pub const FOLLOW_INTERVAL: Duration = Duration::from_millis(250);
+/// Most games of a tournament in one page.
+pub const MAX_GAMES_PAGE: u32 = 500;
+/// Most lines of a leaderboard.
+pub const MAX_LEADERBOARD_LINES: u32 = 1_000;
+/// How old a leaderboard may be that is shown.
+pub const LEADERBOARD_AGE: Duration = Duration::from_secs(2);
 /// How long streams and connections that do not close may hold up a shutdown.
 pub const DRAIN_LIMIT: Duration = Duration::from_secs(5);
 /// Longest name of a room or participant, characters.

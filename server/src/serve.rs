@@ -26,6 +26,7 @@ use crate::connections::{self, Limits};
 use crate::grpc;
 use crate::rooms::Rooms;
 use crate::store::{Store, StoreError};
+use crate::tournaments::Tournaments;
 
 const KEEPALIVE_INTERVAL: std::time::Duration = std::time::Duration::from_secs(20);
 const KEEPALIVE_TIMEOUT: std::time::Duration = std::time::Duration::from_secs(10);
@@ -71,6 +72,7 @@ pub struct Server {
     config: ServerConfig,
     store: Arc<dyn Store>,
     rooms: Arc<Rooms>,
+    tournaments: Arc<Tournaments>,
     tracker: TaskTracker,
     games: usize,
 }
@@ -84,10 +86,13 @@ impl Server {
         let tracker = TaskTracker::new();
         let rooms = Rooms::new(&config, Arc::clone(&store), tracker.clone());
         let games = rooms.restore().await?;
+        let tournaments = Tournaments::new(Arc::clone(&rooms), tracker.clone());
+        tournaments.restore().await?;
         Ok(Self {
             config,
             store,
             rooms,
+            tournaments,
             tracker,
             games,
         })
@@ -132,12 +137,13 @@ impl Server {
             config,
             store,
             rooms,
+            tournaments,
             tracker,
             ..
         } = self;
         let closing = CancellationToken::new();
         let (health, health_service) = tonic_health::server::health_reporter();
-        let routes = routes(&rooms, &config, &closing)?
+        let routes = routes(&rooms, &tournaments, &config, &closing)?
             .add_service(health_service)
             .add_service(reflection());
         health
@@ -167,6 +173,8 @@ impl Server {
             health
                 .set_service_status("", tonic_health::ServingStatus::NotServing)
                 .await;
+            // Games that end from here on count when the server is back.
+            tournaments.stop();
             rooms.shut_down(config.grace).await;
             closing.cancel();
         };
@@ -180,7 +188,8 @@ impl Server {
             // Nothing can be acknowledged any more: whoever waits is better told at once, by the end of the process.
             failure = store.failed() => return Err(ServeError::Store(failure)),
         }
-        drop(rooms);
+        tournaments.stop();
+        drop((rooms, tournaments));
         tracker.close();
         tracker.wait().await;
         store.close().await;
@@ -190,6 +199,7 @@ impl Server {
 
 fn routes(
     rooms: &Arc<Rooms>,
+    tournaments: &Arc<Tournaments>,
     config: &ServerConfig,
     closing: &CancellationToken,
 ) -> Result<Routes, ServeError> {
@@ -198,12 +208,25 @@ fn routes(
     use v1::room_service_server::RoomServiceServer;
     use v1::server_service_server::ServerServiceServer;
     use v1::spectator_service_server::SpectatorServiceServer;
+    use v1::tournament_service_server::TournamentServiceServer;
     use v1::vector_service_server::VectorServiceServer;
     let recorded = grpc::Recorded::new(Arc::clone(rooms));
     let vectors = grpc::Vectors::new(recorded.clone(), config.vector_threads, closing.clone())?;
     let routes = Routes::new(
-        PlayServiceServer::new(grpc::Play::new(Arc::clone(rooms), closing.clone()))
-            .max_decoding_message_size(MAX_MESSAGE_BYTES),
+        PlayServiceServer::new(grpc::Play::new(
+            Arc::clone(rooms),
+            Arc::clone(tournaments),
+            closing.clone(),
+        ))
+        .max_decoding_message_size(MAX_MESSAGE_BYTES),
+    )
+    .add_service(
+        TournamentServiceServer::new(grpc::TournamentCalls::new(
+            Arc::clone(tournaments),
+            recorded.clone(),
+            closing.clone(),
+        ))
+        .max_decoding_message_size(MAX_MESSAGE_BYTES),
     )
     .add_service(
         RoomServiceServer::new(grpc::RoomCalls::new(Arc::clone(rooms), recorded.clone()))

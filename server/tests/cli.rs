@@ -13,10 +13,12 @@ mod cli {
     mod experiment;
     mod export;
     mod import;
+    mod ratings;
     mod render;
     mod room;
     mod run;
     mod server;
     mod simulate;
+    mod tournament;
     mod verify;
 }

@@ -45,6 +45,7 @@ impl Line {
             room_id: "room".to_owned(),
             game_id: "game".to_owned(),
             next_sequence: attach.from_sequence,
+            ..Default::default()
         };
         self.says(vec![(attach.request_id - 1, Update::Attached(attached))])
             .await;

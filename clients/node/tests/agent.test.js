@@ -103,6 +103,25 @@ test("lost connections are made again and resume after the last event seen", asy
   assert.equal(server.left.length, 0);
 });
 
+test("a refused answer is given anew, a seat is taken over from its substitute", async () => {
+  const heard = [];
+  const server = await serve(async (stream, read) => {
+    await read();
+    stream.write({ updates: [ask(1, 0b0011_0000)] });
+    const hear = async () => { const [{ handle, answer, resume }] = await read(); heard.push([handle, answer?.decision_id, resume]); };
+    await hear();
+    for (const status of ["CLOSED", "INVALID"]) {
+      stream.write({ updates: [{ handle: 4, result: { decision_id: 1, status: `ANSWER_STATUS_${status}` } }] });
+    }
+    await hear();
+    stream.write({ updates: [events({ sequence: 1, substituted: { seat: 1 } }, { sequence: 2, substituted: { seat: 2 } })] });
+    await hear();
+    stream.write({ updates: [events(ended(3)), detached("GAME_OVER")] });
+  });
+  await play({ address: server.address, code: "TABLE", name: "Ada" });
+  assert.deepEqual(heard, [[4, 1, undefined], [4, 1, undefined], [4, undefined, {}]]);
+});
+
 for (const [what, updates, message] of [
   ["a refusal", [{ refused: { reason: "TICKET_UNKNOWN", message: "join again" } }], /refused: join again \(TICKET_UNKNOWN\)/],
   ["a newer connection", [detached("SUPERSEDED")], /the seat is lost \(DETACH_REASON_SUPERSEDED\)/],

@@ -11,7 +11,15 @@ from fake_vector import FakeVector
 from real_server import RealServer
 from stage import Stage, attached
 
-BINARY = "CHEFSHAT_BIN"
+from chefshat.local_server import BINARY
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Lets jax keep what it compiles, on which nearly all the time of the learning tests goes, from run to run."""
+    if config.pluginmanager.hasplugin("cacheprovider"):
+        os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(config.cache.mkdir("jax")))
+        os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
+        os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES", "-1")
 
 
 @pytest.fixture

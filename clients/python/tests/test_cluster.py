@@ -1,18 +1,89 @@
-"""The sample for Ray clusters, on a local one: only where Ray is installed (extra `ray`), which the tests do not ask for."""
+"""The sample for Ray clusters: what its runners play, without Ray; and all of it on a local cluster, only where Ray is installed.
+
+Ray (extra `ray`) is heavy, so the tests do not ask for it.
+"""
 
 import importlib.util
 import json
 import subprocess
 import sys
 from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from typing import Any
 
+import jax
+import numpy as np
 import pytest
 
-from chefshat.learn import network
+from chefshat import pb
+from chefshat.learn import network, runs
+from chefshat.learn.ppo_checkpoint import Plan
 
 SAMPLE = Path(__file__).resolve().parents[1] / "samples" / "cluster" / "rllib_ppo.py"
 # Seconds it may take before it counts as hanging: Ray starts several processes.
 LIMIT_S = 300
+
+
+class Runner:
+    """What of RLlib's `EnvRunner` the sample builds on."""
+
+    def __init__(self, *, config: Any, worker_index: int) -> None:
+        self.config = config
+        self.worker_index = worker_index
+
+
+@pytest.fixture
+def sample(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    """The sample as a module, with next to nothing in the place of Ray."""
+    names: dict[str, dict[str, Any]] = {
+        "ray": {"ObjectRef": object},
+        "ray.rllib": {},
+        "ray.rllib.algorithms": {},
+        "ray.rllib.algorithms.algorithm": {"Algorithm": type("Algorithm", (), {})},
+        "ray.rllib.algorithms.algorithm_config": {"AlgorithmConfig": type("AlgorithmConfig", (), {})},
+        "ray.rllib.env": {},
+        "ray.rllib.env.env_runner": {"EnvRunner": Runner},
+    }
+    for name, contents in names.items():
+        module = ModuleType(name)
+        vars(module).update(contents)
+        monkeypatch.setitem(sys.modules, name, module)
+    spec = importlib.util.spec_from_file_location("rllib_ppo", SAMPLE)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_every_runner_plays_other_deals_by_the_rules_it_is_given(sample: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[dict[str, Any]] = []
+
+    def env(address: str, games: int, **options: Any) -> None:
+        asked.append({"address": address, "games": games, **options})
+
+    chances: list[Any] = []
+
+    def play(collector: object, params: object, chance: Any, plan: Plan) -> None:
+        chances.append(tuple(np.asarray(jax.random.key_data(chance)).tolist()))
+
+    monkeypatch.setattr(sample, "VectorEnv", env)
+    monkeypatch.setattr(sample, "Collector", lambda env, games, steps: None)
+    monkeypatch.setattr(sample, "play", play)
+    rules = pb.RuleSet(players=2, faces=4)
+    setting = {"plan": Plan(games=8), "address": "an address", "rules": rules}
+    for seed in (1, 2):
+        for number in (1, 2):
+            config = SimpleNamespace(env_config=setting, seed=seed)
+            runner = sample.SelfPlayRunner(config=config, worker_index=number)
+            runner.sample(None)
+            runner.sample(None)
+    assert all((one["address"], one["games"], one["rules"]) == ("an address", 8, rules) for one in asked)
+    seeds = [one["seed"] for one in asked]
+    # Neither two runners, nor two trainings, nor a runner and the evaluation have the same.
+    assert len({*seeds, runs.EVALUATION_SEED}) == 5
+    assert min(seeds) >= runs.SEED_STEP > runs.EVALUATION_SEED
+    assert len(set(chances)) == 8
 
 
 @pytest.mark.server

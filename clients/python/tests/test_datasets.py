@@ -19,11 +19,11 @@ import polars
 import pyarrow
 import pyarrow.parquet
 import pytest
-from conftest import BINARY
 from real_server import START_S, RealServer
 
 import chefshat
 from chefshat import Agent, Decision, RandomAgent, pb
+from chefshat.local_server import BINARY
 
 pytestmark = pytest.mark.server
 

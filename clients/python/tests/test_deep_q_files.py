@@ -11,8 +11,9 @@ from test_deep_q import ids, same, transitions
 
 from chefshat import pb
 from chefshat.learn import checkpoint, deep_q, network
-from chefshat.learn.checkpoint import Training, TrainingFileError
+from chefshat.learn.checkpoint import Training
 from chefshat.learn.deep_q import DeepQConfig
+from chefshat.learn.training_file import TrainingFileError
 
 RULES = pb.RuleSet(preset="paper", players=4, faces=11, jokers=2, target_shifts=250)
 SMALL = DeepQConfig(hidden=(16, 8), batch_size=4, memory_size=16, target_every=3)
@@ -24,13 +25,14 @@ def training() -> Training:
     agents = deep_q.start(SMALL, [1, 2])
     for number in range(20):
         agents = deep_q.learn(SMALL, agents, ids(0, 1), transitions(SMALL, 2, number))
-    return Training(SMALL, agents, RULES, "a command")
+    return Training(SMALL, agents, RULES, "a command", "greedy", "validity", 3, 17)
 
 
 def test_a_training_goes_on_where_it_was(training: Training, tmp_path: Path) -> None:
     checkpoint.save(tmp_path / "t.training", training)
     read = checkpoint.load(tmp_path / "t.training")
-    assert (read.config, read.rules, read.trained_by) == (training.config, training.rules, training.trained_by)
+    for name in ("config", "rules", "trained_by", "opponents", "rewards", "seed", "shifts"):
+        assert getattr(read, name) == getattr(training, name), name
     assert same(read.agents, training.agents)
     # Learning consumes agents, and those of the fixture are needed again.
     one, other = checkpoint.load(tmp_path / "t.training").agents, read.agents

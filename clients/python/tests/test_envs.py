@@ -265,6 +265,23 @@ def test_what_cannot_be_made_is_told(toy: FakeVector, make: Any, says: str) -> N
         make(toy.address)
 
 
+def test_many_games_begin_with_a_reset(toy: FakeVector) -> None:
+    env = ChefsHatVectorEnv(toy.address, 3)
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        env.step([199, 199, 199])
+    assert toy.requests == []
+    env.close()
+
+
+@pytest.mark.parametrize("make", [ChefsHatEnv, ChefsHatVectorEnv, chefshat_v1.raw_env])
+def test_what_is_closed_stays_closed(toy: FakeVector, make: Any) -> None:
+    env = make(toy.address)
+    env.reset()
+    env.close()
+    with pytest.raises(gymnasium.error.ClosedEnvironmentError, match="make a new one"):
+        env.reset()
+
+
 def test_a_mask_can_be_drawn_from(toy: FakeVector) -> None:
     env = chefshat.make(address=toy.address)
     _, info = env.reset()

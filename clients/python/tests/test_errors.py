@@ -1,6 +1,7 @@
 """How refusals reach the caller, over a real connection, and how long the waits between attempts are."""
 
 import random
+import re
 
 import grpc
 import pytest
@@ -52,6 +53,7 @@ def test_without_details_the_code_is_the_reason() -> None:
             client.server_info()
         assert caught.value.reason == "UNAVAILABLE"
         assert caught.value.retryable
+        assert re.search(r"127\.0\.0\.1:1\b.*chefshat serve.*HOST:PORT", caught.value.message)
         with pytest.raises(ChefsHatError, match="UNAVAILABLE"):
             client.play(chefshat.RandomAgent(), "ticket")
 

@@ -1,19 +1,22 @@
 """The experiments: intervals, tables, plots and files on figures of our own, and the whole command against the real server."""
 
 import json
+import re
 import struct
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import matplotlib as mpl
 import numpy as np
 import pytest
+from matplotlib.legend import Legend
 
 from chefshat.experiments import Estimate, Figure, Level, Line, Panel, Points, Result, Table, paper, results, stats
 from chefshat.experiments.__main__ import main, parse
 
 # What these are made with comes with the extra `learn`.
-from chefshat.experiments import command, mechanics, page, plots, tables  # isort: skip
+from chefshat.experiments import command, mechanics, page, plots, rules, tables  # isort: skip
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "experiments.md"
 
@@ -159,6 +162,32 @@ def test_a_plot_is_a_picture_that_does_not_change(tmp_path: Path) -> None:
     assert png_size(plots.png(other))[0] < width
 
 
+def test_no_legend_stands_on_a_line() -> None:
+    (figure,) = a_result().figures
+    names = [[text.get_text() for text in legend.get_texts()] for legend in legends_beside_panels(figure)]
+    assert names == [["learner", "paper"], ["ours"]]
+    # Where every name has one look and every look one name, one legend serves all panels.
+    panels = [figure.panels[0], replace(figure.panels[0], levels=())]
+    (legend,) = legends_beside_panels(replace(figure, panels=panels))
+    assert [text.get_text() for text in legend.get_texts()] == ["learner", "paper"]
+
+
+def legends_beside_panels(figure: Figure) -> list[Legend]:
+    """The legends of a figure, none of which touches a panel or leaves the picture."""
+    with mpl.rc_context(plots.STYLE):
+        canvas = plots.drawn(figure)
+        canvas.canvas.draw()
+    found = [*canvas.legends, *(legend for axes in canvas.axes if (legend := axes.get_legend()))]
+    for legend in found:
+        place = legend.get_window_extent()
+        assert not any(place.overlaps(axes.get_window_extent()) for axes in canvas.axes)
+        assert canvas.bbox.containsx(place.x0)
+        assert canvas.bbox.containsx(place.x1)
+        assert canvas.bbox.containsy(place.y0)
+        assert canvas.bbox.containsy(place.y1)
+    return found
+
+
 def test_a_page_is_filled_between_the_marks_alone() -> None:
     result = a_result()
     begin, end = page.marks("mechanics")
@@ -246,6 +275,14 @@ def test_a_quick_run_never_replaces_a_full_one(tmp_path: Path, capsys: pytest.Ca
     assert (tmp_path / "mechanics.json").read_bytes() == before
 
 
+def test_results_need_a_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "a file"
+    file.touch()
+    for out in (file, file / "within"):
+        assert main(["mechanics", "--quick", "--out", str(out), "--address", "127.0.0.1:1"]) == 1
+        assert re.search(rf"--out {out}: .*a folder is wanted", capsys.readouterr().err)
+
+
 def test_a_server_that_is_not_there_is_an_error(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["mechanics", "--quick", "--out", str(tmp_path), "--address", "127.0.0.1:1", "--json"]) == 1
     assert json.loads(capsys.readouterr().out)["reason"] == "UNAVAILABLE"
@@ -315,6 +352,14 @@ def test_what_mechanics_counts(quick_run: Path) -> None:
     assert all(each["target_shifts"] == mechanics.QUICK.shifts_per_game for each in rules.values())
     # No two conditions are the same game.
     assert len({json.dumps(values) for values in result.values.values()}) == len(result.values)
+
+
+@pytest.mark.server
+def test_what_is_taken_by_chance_after_ten_wrong_actions_is_not_wrong(quick_run: Path) -> None:
+    values = results.read(command.results_file(quick_run, "rules")).values
+    assert values["may not pass idly"]["most_attempts_at_a_decision"] == rules.CONDITIONS["may not pass idly"].agent.wrong_limit
+    # Where idle passes are right, there is no such limit.
+    assert values["sees what is legal"]["most_attempts_at_a_decision"] > 10
 
 
 @pytest.mark.server

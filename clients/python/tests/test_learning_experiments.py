@@ -1,5 +1,7 @@
 """Experiments 2 and 3: what is worked out of what the server counts, and where the networks of 3 come from."""
 
+import dataclasses
+import importlib.metadata
 from pathlib import Path
 from typing import Any
 
@@ -54,19 +56,25 @@ def test_the_tables_say_what_was_counted(tmp_path: Path) -> None:
     actions = {str(row[0]): row[2] for row in rules._actions(config, both).rows}
     assert actions["wrong actions of the learner, per Shift"] == stats.spread([10 / 3, 20])
     victories = rules._victories(config, both).rows
-    assert [row[2] for row in victories][:2] == [Estimate(1.5, 1, 2, digits=0), Estimate(1.0, 1, 1, digits=0)]
+    assert [row[2] for row in victories][:2] == [Estimate(1.5, 1, 2), Estimate(1.0, 1, 1)]
     table = winning._four(config, dict.fromkeys(winning.FOUR, SOME))
     assert table.rows[0][1:7] == [117, 45, 55, 33, 117, 33]
     # The seat that wins most is another one in each game, or the same: it wins two, and one.
-    assert table.rows[1][5] == Estimate(1.5, 1, 2, digits=0)
-    assert table.rows[1][6] == Estimate(0.0, 0, 0, digits=0)
+    assert table.rows[1][5] == Estimate(1.5, 1, 2)
+    assert table.rows[1][6] == Estimate(0.0, 0, 0)
 
 
 def test_a_pass_is_wrong_where_something_else_is_legal() -> None:
-    masks = np.array([[False, True, True], [False, False, True], [True, False, True]])
-    sent = deep_q_training._without_idle_passes(np.array([2, 2, 0], np.int32), masks)
-    # The first is sent as an illegal action; the second has nothing else; the third is no pass.
-    assert sent.tolist() == [0, 2, 0]
+    masks = np.array([[False, True, True], [False, False, True], [True, False, False]])
+    right = deep_q_training._without_idle_passes(masks)
+    assert right.tolist() == [[False, True, False], [False, False, True], [True, False, False]]
+    # The first pass is sent as an illegal action; the second has nothing else beside it; the third was illegal before.
+    assert deep_q_training._wrong_as_illegal(np.array([2, 2, 2], np.int32), right).tolist() == [0, 2, 1]
+    assert deep_q_training._wrong_as_illegal(np.array([1, 2, 0], np.int32), right).tolist() == [1, 2, 0]
+
+
+def never(*_: object, **__: object) -> Learned:
+    raise AssertionError("learned again")
 
 
 @pytest.mark.server
@@ -75,19 +83,42 @@ def test_experiment_3_begins_with_the_networks_of_2(real_address: str, tmp_path:
     both = rules.networks(Config(real_address, (1, 2), True, tmp_path), quiet)
     files = sorted(path.name for path in tmp_path.iterdir())
     assert files == ["rules-seed-1.safetensors", "rules-seed-2.safetensors"]
-
-    def never(*_: object, **__: object) -> Learned:
-        raise AssertionError("learned again")
-
     with monkeypatch.context() as patched:
         patched.setattr(learning, "learn", never)
         again = rules.networks(Config(real_address, (1, 2), True, tmp_path), quiet)
-        # Networks of a quick run are none of a full one.
-        with pytest.raises(AssertionError, match="learned again"):
-            rules.networks(Config(real_address, (1, 2), False, tmp_path), quiet)
     # A seed alone learns what it learns beside another.
     (tmp_path / "alone").mkdir()
     alone = rules.networks(Config(real_address, (2,), True, tmp_path / "alone"), quiet)
     for (first, _), (second, _), (third, _) in zip(both, again, alone, strict=True):
         assert np.array_equal(np.asarray(first), np.asarray(second))
         assert np.array_equal(np.asarray(first[1]), np.asarray(third[0]))
+
+
+@pytest.mark.server
+def test_networks_made_otherwise_are_learned_again(real_address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    quick = Config(real_address, (1, 2), True, tmp_path)
+    ruleset = pb.RuleSet(players=4, faces=11, jokers=2)
+    made = rules.CONDITIONS[rules.FIRST].agent
+    agents = deep_q.start(made, quick.seeds)
+    rules._keep(quick, Learned(agents, Played({}, {}, ruleset, 0)))
+    monkeypatch.setattr(learning, "learn", never)
+    kept = rules.networks(quick, Progress(show=False))
+    assert np.array_equal(np.asarray(kept[0][0]), np.asarray(agents.online[0][0]))
+
+    def is_learned_again(config: Config = quick) -> bool:
+        with pytest.raises(AssertionError, match="learned again"):
+            rules.networks(config, Progress(show=False))
+        return True
+
+    assert is_learned_again(dataclasses.replace(quick, quick=False))
+    assert is_learned_again(dataclasses.replace(quick, seeds=(1, 3)))
+    for where, name, value in (
+        (learning, "QUICK_SHIFTS", learning.QUICK_SHIFTS + 1),
+        (learning, "OPPONENTS", "random"),
+        (rules, "REWARDS", "paper"),
+        (rules, "CONDITIONS", {rules.FIRST: rules.Condition(dataclasses.replace(made, discount=0.9))}),
+        (importlib.metadata, "version", lambda package: f"another {package}"),
+    ):
+        with monkeypatch.context() as patched:
+            patched.setattr(where, name, value)
+            assert is_learned_again()

@@ -8,10 +8,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from conftest import BINARY
 
 import chefshat
 from chefshat import ChefsHatError, LocalServer, local_server
+from chefshat.local_server import BINARY
 
 SOURCE = str(Path(chefshat.__file__).parents[1])
 # Seconds to wait for what must happen: generous, because nothing is measured by it.
@@ -90,6 +90,19 @@ def test_a_program_that_does_not_serve_is_told_with_what_it_said(tmp_path: Path)
 def test_the_checkout_is_where_cargo_is_looked_for() -> None:
     found = [path.relative_to(Path(__file__).resolve().parents[3]) for path in local_server._cargo_targets()]
     assert found == [Path("target/release/chefshat"), Path("target/debug/chefshat")]
+
+
+def test_a_package_that_was_installed_finds_the_checkout_it_is_used_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(local_server, "__file__", str(tmp_path / "site-packages" / "chefshat" / "local_server.py"))
+    checkout = tmp_path / "checkout"
+    within = checkout / "docs" / "images"
+    within.mkdir(parents=True)
+    monkeypatch.chdir(within)
+    (checkout / "Cargo.toml").touch()
+    # Some other project of cargo's.
+    assert local_server._cargo_targets() == []
+    (checkout / "proto" / "chefshat").mkdir(parents=True)
+    assert local_server._cargo_targets() == [checkout / "target/release/chefshat", checkout / "target/debug/chefshat"]
 
 
 @pytest.mark.server

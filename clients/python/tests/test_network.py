@@ -77,8 +77,10 @@ def test_what_is_no_network_is_refused_in_words(tmp_path: Path) -> None:
     path.write_bytes(safetensors.numpy.save({**tensors, "layer1.bias": layers[1].bias * np.nan}, metadata=INFO.metadata()))
     with pytest.raises(NetworkFileError, match="not finite"):
         network.load(path)
-    with pytest.raises(FileNotFoundError):
+    with pytest.raises(FileNotFoundError, match=r"there is no file .*nothing: give a network, which .* writes"):
         network.load(tmp_path / "nothing")
+    with pytest.raises(IsADirectoryError, match="is a folder: give the network itself"):
+        network.load(tmp_path)
 
 
 def test_weights_that_float16_cannot_hold_are_not_written(tmp_path: Path) -> None:
@@ -125,6 +127,19 @@ def test_outputs_that_are_no_numbers_never_win() -> None:
     masks = np.full((len(outputs), 1), 0b1110, np.uint8)
     assert network.best_legal(outputs, masks).tolist() == [3, 3, 2, 1, 1]
     assert network.best_legal(outputs, masks * 0).tolist() == [0] * 5
+
+
+def test_a_hidden_unit_that_is_no_number_says_nothing() -> None:
+    """Finite weights may have sums that are none: inf - inf. `chefshat` takes 0 there too; otherwise all outputs would be lost."""
+    huge = np.finfo(np.float32).max
+    layers = chance_layers(INFO)
+    layers[0].weight[0, :2] = huge, -huge
+    inputs = np.full((1, INFO.input_width), 10, np.float32)
+    with np.errstate(over="ignore", invalid="ignore"):
+        assert np.isnan(inputs @ layers[0].weight.T)[0].tolist() == [True, False, False, False, False]
+        outputs = Network(layers, INFO).outputs(inputs)
+    layers[0].weight[0] = layers[0].bias[0] = 0
+    np.testing.assert_allclose(outputs, Network(layers, INFO).outputs(inputs), rtol=1e-5)
 
 
 def test_the_default_decisions() -> None:

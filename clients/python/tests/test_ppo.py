@@ -11,7 +11,8 @@ from hand_made import hand_made
 from chefshat import pb
 from chefshat.learn import features, ppo, ppo_checkpoint
 from chefshat.learn.ppo import Hyper, Samples
-from chefshat.learn.ppo_checkpoint import Plan, Progress, TrainingFileError
+from chefshat.learn.ppo_checkpoint import Plan, Progress
+from chefshat.learn.training_file import TrainingFileError
 
 HYPER = Hyper(policy_widths=(16,), value_widths=(16,), minibatches=4)
 RULES = pb.RuleSet(players=4, faces=11, jokers=2)

@@ -12,8 +12,8 @@ from chefshat.learn import network, ppo_checkpoint
 from chefshat.learn.evaluation import evaluate
 from chefshat.learn.ppo import Hyper
 from chefshat.learn.ppo_checkpoint import Plan
-from chefshat.learn.ppo_command import full_rules
 from chefshat.learn.ppo_training import Trainer
+from chefshat.learn.runs import full_rules
 
 pytestmark = pytest.mark.server
 
@@ -63,7 +63,14 @@ def test_the_command_writes_its_files_and_goes_on(real_address: str, tmp_path: P
     assert [line["event"] for line in lines] == ["setup", "evaluation", "evaluation", "evaluation"]
     assert [line["decisions"] for line in lines[1:]] == [0, 256, 512]
 
-    assert command.main([*options, "--resume", "--looks", "2", "--decisions", "1024"]) == 0
+    options = [*options, "--resume"]
+    for option, given, kept in (("games", 32, 16), ("width", 9, 8), ("seed", 4, 3)):
+        assert command.main([*options, f"--{option}", str(given), "--decisions", "1024"]) == 1
+        assert f"{option} {kept}, not {given}" in json.loads(capsys.readouterr().out)["message"]
+    assert command.main([*options, "--rules", "rulebook", "--decisions", "1024"]) == 1
+    assert "rules points" in json.loads(capsys.readouterr().out)["message"]
+
+    assert command.main([*options, "--looks", "2", "--decisions", "1024"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert (told["decisions"], told["updates"], told["runs"]) == (1024, 4, 2)
     assert [evaluation["games"] for evaluation in told["evaluations"]] == [4, 4]

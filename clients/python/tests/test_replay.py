@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import BINARY
 from fake_vector import FakeVector
 from numpy.typing import NDArray
 
 import chefshat
-from chefshat import ChefsHatError, Transitions, VectorEnv, pb, replay, sample_legal
+from chefshat import ChefsHatError, Transitions, VectorEnv, local_server, pb, replay, sample_legal
+from chefshat.local_server import BINARY
 from chefshat.transitions import concatenate
 
 # A row of a dataset, but for what a test changes.
@@ -91,9 +91,25 @@ def test_decisions_are_paired_by_seat_and_shift(tmp_path: Path) -> None:
     assert by_game.rewards.tolist() == [0] * 5
     turns = replay.from_dataset(tmp_path, decisions="turns", episode="game")
     assert turns.actions.tolist() == [10, 12, 14, 11]
-    nobody = replay.from_dataset(tmp_path, agents=["Bob"])
-    assert len(nobody) == 0
-    assert nobody.before.masks.shape == (0, 214)
+    assert len(replay.from_dataset(tmp_path, agents=["Ada"])) == len(made)
+    with pytest.raises(ValueError, match="called 'Bob': choose of Ada"):
+        replay.from_dataset(tmp_path, agents=["Ada", "Bob"])
+
+
+def test_there_may_be_nothing_to_learn_from(tmp_path: Path) -> None:
+    unfinished = {"shift_place": None, "finished": False, "game_place": None}
+    nothing = replay.from_dataset(dataset(tmp_path, unfinished))
+    assert len(nothing) == 0
+    assert nothing.before.masks.shape == (0, 214)
+
+
+def test_it_is_said_why_records_need_the_program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(BINARY, raising=False)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setattr(local_server, "_cargo_targets", list)
+    with pytest.raises(ChefsHatError, match=r"BINARY_MISSING.*replay the records.*on this machine.*cargo build") as refused:
+        replay.from_records(tmp_path)
+    assert "address" not in refused.value.message
 
 
 def test_invalid_attempts_are_transitions_of_their_own(tmp_path: Path) -> None:

@@ -8,11 +8,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from conftest import BINARY
 from real_server import RealServer
 
 import chefshat
 from chefshat import Agent, Backoff, Decision, RandomAgent, SeatResult, aio, pb
+from chefshat.local_server import BINARY
 
 pytestmark = pytest.mark.server
 

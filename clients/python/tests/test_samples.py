@@ -27,9 +27,9 @@ SAMPLES = sorted(path.name for path in (PACKAGE / "samples").glob("*.py"))
 LIMIT_S = 120
 
 
-def run_python(*arguments: str) -> str:
-    """Runs a Python of its own, and returns what it printed."""
-    done = subprocess.run([sys.executable, *arguments], capture_output=True, text=True, timeout=LIMIT_S, cwd=PACKAGE)
+def run_python(*arguments: str, folder: Path = PACKAGE) -> str:
+    """Runs a Python of its own in a folder, and returns what it printed."""
+    done = subprocess.run([sys.executable, *arguments], capture_output=True, text=True, timeout=LIMIT_S, cwd=folder)
     assert done.returncode == 0, done.stderr
     return done.stdout
 
@@ -41,11 +41,11 @@ def test_there_are_samples() -> None:
 
 
 @pytest.mark.parametrize("number", range(len(README)))
-def test_readme(number: int, address: str, request: pytest.FixtureRequest) -> None:
+def test_readme(number: int, address: str, tmp_path: Path, request: pytest.FixtureRequest) -> None:
     assert PRINTED_ADDRESS in README[number]
     if "replay" in README[number] and "fake" in request.fixturenames:
         pytest.skip("the records of the fake server cannot be replayed")
-    assert run_python("-c", README[number].replace(PRINTED_ADDRESS, address)) != ""
+    assert run_python("-c", README[number].replace(PRINTED_ADDRESS, address), folder=tmp_path) != ""
 
 
 @pytest.mark.parametrize("name", SAMPLES)

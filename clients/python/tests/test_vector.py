@@ -2,11 +2,13 @@
 
 import gc
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from fake_vector import ACTIONS, FACES, HAND_SIZE, PLAYERS, TURN_ACTIONS, FakeVector
+from google.protobuf import json_format
 from numpy.typing import NDArray
 
 from chefshat import ChefsHatError, VectorEnv, pb, sample_legal
@@ -187,12 +189,17 @@ def test_resets(toy: FakeVector) -> None:
             env.reset(games=[2])
 
 
-def test_records_arrive_whole(toy: FakeVector) -> None:
+def test_records_arrive_whole(toy: FakeVector, tmp_path: Path) -> None:
     with VectorEnv(toy.address, 2, records=True) as env:
         records = [record for _ in range(12) for record in env.step(legal(env.batch)).records]
     assert [(record.game, record.index, len(record.lines)) for record in records] == [(0, 7, 2), (1, 7, 2)]
     assert records[1].lines[0].header.game_id == "1"
     assert records[1].lines[1].HasField("footer")
+    records[1].save(tmp_path / "1.jsonl")
+    saved = (tmp_path / "1.jsonl").read_bytes().split(b"\n")
+    assert saved.pop() == b""
+    assert tuple(json_format.Parse(line, pb.RecordLine()) for line in saved) == records[1].lines
+    assert [path.name for path in tmp_path.iterdir()] == ["1.jsonl"]
 
 
 @pytest.mark.parametrize(

@@ -22,16 +22,21 @@ mod fold;
 pub mod mechanics;
 mod network;
 mod play;
+pub mod ratings;
 mod recorded;
 mod rules_form;
 mod seeds;
 mod statistics;
 mod table;
+pub mod tournament;
 pub mod vector;
 
 pub use agents::{AgentKind, BuiltInAgent};
 pub use batch::{Batch, BatchError};
-pub use duplicate::{Comparison, Contender, Duplicate, DuplicateError, Figure, SeatPlan, Seating};
+pub use duplicate::{
+    Comparison, Contender, Duplicate, DuplicateError, Figure, Measured, Newcomer, SameSeat, SeatPlan,
+    Seating,
+};
 pub use network::{
     MAX_FILE_BYTES, Network, NetworkError, NetworkInfo, NetworkInput, NetworkOutput, table_features,
 };

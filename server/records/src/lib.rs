@@ -6,6 +6,7 @@ pub mod convert;
 pub mod dataset;
 pub mod files;
 pub mod jsonl;
+pub mod outcome;
 pub mod picture;
 pub mod players;
 pub mod replay;

@@ -11,6 +11,7 @@ mod records {
     mod dataset;
     mod files;
     mod made;
+    mod outcome;
     mod picture;
     mod table;
     mod verify;

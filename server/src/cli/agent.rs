@@ -10,7 +10,7 @@ use chefshat_client::{Client, Outcome, PlayError, v1};
 use chefshat_records::jsonl;
 use clap::Args;
 
-use super::connect::{KindArg, ServerArg, code_in, free_seats};
+use super::connect::{KindArg, Pass, ServerArg, WayIn, free_seats};
 use super::remote::{MAX_PACE_MS, RemoteAgent, agent_kind, seed_for};
 use super::{CommandError, say};
 use crate::convert::recorded_player;
@@ -83,24 +83,9 @@ impl AgentArg {
     }
 }
 
-/// How a seat is come by.
-#[derive(Debug, Args)]
-#[group(required = true, multiple = false)]
-struct WayIn {
-    /// The room's join code.
-    #[arg(long)]
-    code: Option<String>,
-    /// File with the room's join code; waited for if it is not there yet.
-    #[arg(long, value_name = "FILE")]
-    code_file: Option<PathBuf>,
-    /// Ticket for a seat that was taken before.
-    #[arg(long, env = "CHEFSHAT_TICKET", hide_env_values = true)]
-    ticket: Option<String>,
-}
-
 impl AgentCommand {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
-        if self.games > 1 && self.way_in.code_file.is_none() {
+        if self.games > 1 && !self.way_in.goes_on() {
             return Err("a code or ticket is for one game; for more --games give a --code-file into which new codes are written".into());
         }
         let agent = self.built_in_agent()?;
@@ -147,13 +132,9 @@ impl AgentCommand {
         client: &Client,
         last_code: &mut Option<String>,
     ) -> Result<String, CommandError> {
-        if let Some(ticket) = &self.way_in.ticket {
-            return Ok(ticket.clone());
-        }
-        let code = match (&self.way_in.code, &self.way_in.code_file) {
-            (Some(code), _) => code.clone(),
-            (None, Some(file)) => code_in(file, last_code.as_deref()).await?,
-            (None, None) => return Err("give --code, --code-file or --ticket".into()),
+        let code = match self.way_in.pass(last_code.as_deref()).await? {
+            Pass::Ticket(ticket) => return Ok(ticket),
+            Pass::Code(code) => code,
         };
         let name = self.name.as_deref().unwrap_or(self.agent.name());
         let joined = client
@@ -196,10 +177,23 @@ fn player_of(record: &Path, seat: u32) -> Result<Arc<RecordedPlayer>, CommandErr
 }
 
 fn in_words(played: &Result<Outcome, PlayError>) -> String {
-    let outcome = match played {
-        Ok(outcome) => outcome,
-        Err(error) => return format!("the seat was lost: {error}"),
-    };
+    match played {
+        Ok(outcome) => outcome_in_words(outcome),
+        Err(error) => format!("the seat was lost: {error}"),
+    }
+}
+
+fn as_json(played: &Result<Outcome, PlayError>) -> serde_json::Value {
+    match played {
+        Ok(outcome) => outcome_json(outcome),
+        Err(error) => serde_json::json!({
+            "event": "lost", "reason": error.reason(), "message": error.to_string(),
+        }),
+    }
+}
+
+/// How a game ended for a seat, in a line for people.
+pub(super) fn outcome_in_words(outcome: &Outcome) -> String {
     let (answers, game) = (outcome.answers, &outcome.game_id);
     match (outcome.standing(), outcome.aborted()) {
         (Some(line), _) => format!(
@@ -213,15 +207,8 @@ fn in_words(played: &Result<Outcome, PlayError>) -> String {
     }
 }
 
-fn as_json(played: &Result<Outcome, PlayError>) -> serde_json::Value {
-    let outcome = match played {
-        Ok(outcome) => outcome,
-        Err(error) => {
-            return serde_json::json!({
-                "event": "lost", "reason": error.reason(), "message": error.to_string(),
-            });
-        }
-    };
+/// How a game ended for a seat, for programs.
+pub(super) fn outcome_json(outcome: &Outcome) -> serde_json::Value {
     let (room_id, game_id, seat) = (&outcome.room_id, &outcome.game_id, outcome.seat);
     match (outcome.standing(), outcome.aborted()) {
         (Some(line), _) => serde_json::json!({

@@ -149,6 +149,9 @@ impl Entrant {
             )
             .into());
         }
+        if path.is_dir() {
+            return Err(format!("{given} is a directory: name the network file in it").into());
+        }
         let network = Network::load(path).map_err(|error| format!("{given}: {error}"))?;
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         Ok(Entrant {

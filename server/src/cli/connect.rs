@@ -1,7 +1,7 @@
 //! Reaching a server from the command line: where it is, and waiting for what is about to be there (a server that is starting, a
 //! file with a join code that is being written). What is then said to the server is the commands' own.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use chefshat_client::{Client, v1};
@@ -79,11 +79,54 @@ impl ServerArg {
     }
 }
 
+/// How a place is come by.
+#[derive(Debug, Args)]
+#[group(required = true, multiple = false)]
+pub(super) struct WayIn {
+    /// The join code.
+    #[arg(long)]
+    code: Option<String>,
+    /// File with the join code; waited for if it is not there yet.
+    #[arg(long, value_name = "FILE")]
+    code_file: Option<PathBuf>,
+    /// Ticket for a place that was taken before.
+    #[arg(long, env = "CHEFSHAT_TICKET", hide_env_values = true)]
+    ticket: Option<String>,
+}
+
+/// What a place is come by with.
+pub(super) enum Pass {
+    /// A join code, with which one is to be taken.
+    Code(String),
+    /// The ticket of one that was taken before.
+    Ticket(String),
+}
+
+impl WayIn {
+    /// Whether codes for several games can come, one after the other.
+    pub(super) fn goes_on(&self) -> bool {
+        self.code_file.is_some()
+    }
+
+    /// The pass; a code in a file is waited for until it is another than `last`.
+    ///
+    /// # Errors
+    /// There is no code in time, or the file cannot be read.
+    pub(super) async fn pass(&self, last: Option<&str>) -> Result<Pass, CommandError> {
+        match (&self.ticket, &self.code, &self.code_file) {
+            (Some(ticket), ..) => Ok(Pass::Ticket(ticket.clone())),
+            (None, Some(code), _) => Ok(Pass::Code(code.clone())),
+            (None, None, Some(file)) => Ok(Pass::Code(code_in(file, last).await?)),
+            (None, None, None) => Err("give --code, --code-file or --ticket".into()),
+        }
+    }
+}
+
 /// The join code in a file, once there is one other than `last`; waits for it for [`PATIENCE`].
 ///
 /// # Errors
 /// There is none in time, or the file cannot be read.
-pub(super) async fn code_in(file: &Path, last: Option<&str>) -> Result<String, CommandError> {
+async fn code_in(file: &Path, last: Option<&str>) -> Result<String, CommandError> {
     let give_up_at = Instant::now() + PATIENCE;
     let mut told = false;
     loop {
@@ -102,7 +145,7 @@ pub(super) async fn code_in(file: &Path, last: Option<&str>) -> Result<String, C
         };
         if Instant::now() + PAUSE > give_up_at {
             return Err(format!(
-                "there was not {what} in {} for {patience} seconds; write one with `chefshat room create --code-file`",
+                "there was not {what} in {} for {patience} seconds; `create --code-file` of `chefshat room` or `chefshat tournament` writes one",
                 file.display()
             )
             .into());

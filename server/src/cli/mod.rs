@@ -1,6 +1,8 @@
 //! The command line of `chefshat`: what it understands, and one module for each command. What the commands do is elsewhere.
 
 mod agent;
+mod board;
+mod check_agent;
 mod compare;
 mod conformance;
 mod connect;
@@ -9,17 +11,22 @@ mod demo;
 mod experiment;
 mod export;
 mod import;
+mod leaderboard;
 mod narrator;
 mod numbers;
+mod policy_args;
+mod ratings;
 mod records;
 mod remote;
 mod render;
 mod room;
 mod rules_args;
+mod secret_file;
 mod serve;
 mod sheet;
 mod simulate;
 mod threads;
+mod tournament;
 mod verify;
 
 use std::fmt::Display;
@@ -55,8 +62,14 @@ enum Command {
     Demo(demo::Demo),
     /// Play as a built-in agent on a server.
     Agent(agent::AgentCommand),
+    /// Examine an agent: play cases with it and say what it got wrong.
+    CheckAgent(check_agent::CheckAgent),
     /// Make, list, watch and close rooms of a server.
     Room(room::RoomCommand),
+    /// Hold tournaments: make, join, follow them, and see their results.
+    Tournament(tournament::TournamentCommand),
+    /// Show the ratings of all who have played rated games on a server.
+    Leaderboard(leaderboard::Leaderboard),
     /// List, fetch and add records of games that have ended.
     Records(records::RecordsCommand),
     /// Make a dataset of records: Parquet, CSV or JSON Lines, with a dataset card.
@@ -67,7 +80,9 @@ enum Command {
     Simulate(simulate::Simulate),
     /// Compare two agents on duplicate deals: the same deals for both, in all seats.
     Compare(compare::Compare),
-    /// Repeat an experiment of the paper and print its table next to ours.
+    /// Recompute a leaderboard from records.
+    Ratings(ratings::RatingsCommand),
+    /// Repeat an experiment of the paper, or one that says how far results can be trusted.
     Experiment(experiment::ExperimentCommand),
     /// Check the rule engine against test vectors.
     Conformance(conformance::Conformance),
@@ -84,12 +99,16 @@ pub fn main() -> ExitCode {
         Command::Serve(command) => in_runtime(command.run()),
         Command::Demo(command) => in_runtime(command.run()),
         Command::Agent(command) => in_runtime(command.run()),
+        Command::CheckAgent(command) => in_runtime(command.run()),
         Command::Room(command) => in_runtime(command.run()),
+        Command::Tournament(command) => in_runtime(command.run()),
+        Command::Leaderboard(command) => in_runtime(command.run()),
         Command::Records(command) => in_runtime(command.run()),
         Command::Export(command) => command.run(),
         Command::Render(command) => command.run(),
         Command::Simulate(command) => command.run(),
         Command::Compare(command) => command.run(),
+        Command::Ratings(command) => command.run(),
         Command::Experiment(command) => command.run(),
         Command::Conformance(command) => command.run(),
         Command::Verify(command) => command.run(),

@@ -157,6 +157,7 @@ pub(super) fn rules_of(message: &v1::RuleSet) -> Result<RuleSet, CommandError> {
 pub(super) fn by_flag(field: &str, message: &str) -> String {
     let flag = match field {
         "reward_scheme" => "reward".to_owned(),
+        "clocks" => "clock".to_owned(),
         "spectator_delay_decisions" => "spectator-delay".to_owned(),
         _ => field.replace('_', "-"),
     };

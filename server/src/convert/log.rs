@@ -113,11 +113,11 @@ fn kind(core: &Core, happening: &Happening, viewer: Viewer) -> Kind {
         ),
         Happening::GameEnded => Kind::GameEnded(Box::new(v1::GameEnded {
             standings: standings(core),
-            reveal: reveal(core),
+            reveal: reveal(core, viewer),
         })),
         Happening::GameAborted(reason) => Kind::GameAborted(Box::new(v1::GameAborted {
             reason: abort_reason(*reason).into(),
-            reveal: reveal(core),
+            reveal: reveal(core, viewer),
         })),
         Happening::ServerRestarted => Kind::ServerRestarted(v1::ServerRestarted {}),
         Happening::Expressed(seat, expression) => {
@@ -171,8 +171,13 @@ pub(super) fn standings(core: &Core) -> Vec<v1::Standing> {
         .map_or_else(Vec::new, |standings| final_table(&standings))
 }
 
-fn reveal(core: &Core) -> Option<v1::SeedReveal> {
+/// The seed, which everybody may know once a game has ended; of a series of games that are dealt alike it stands in the record alone, which is
+/// closed as long as one of them is played.
+fn reveal(core: &Core, viewer: Viewer) -> Option<v1::SeedReveal> {
     let game = core.game()?;
+    if core.header().series().is_some() && viewer != Viewer::Everything {
+        return None;
+    }
     let (server_seed, nonce, seat_entropy) = match core.header().seed {
         SeedPlan::Committed { server_seed, nonce } => (
             server_seed.to_vec(),

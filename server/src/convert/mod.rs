@@ -6,9 +6,11 @@ mod log;
 mod played;
 mod players;
 mod policy;
+mod ratings;
 mod record;
 mod room;
 mod start;
+mod tournament;
 mod vector;
 
 pub use decision::{
@@ -19,8 +21,16 @@ pub use log::{game_started, view};
 pub use played::{MAX_RECORDED_ATTEMPTS, Played};
 pub use players::recorded_player;
 pub use policy::{millis, policy_from_proto, policy_to_proto};
+pub use ratings::{leaderboard, rating_to_proto};
 pub use record::{lines_of, record_lines, summary};
-pub use room::{describe, fill_to_proto, fills_from_proto, kind_from_proto, participants};
+pub use room::{
+    describe, fill_to_proto, fills_from_proto, kind_from_proto, kind_to_proto, participants,
+    tournament_id,
+};
+pub use tournament::{
+    TournamentPlan, entrant_kind, is_rated, participant_kind, settings_to_proto, tournament_game,
+    tournament_participants, tournament_plan, tournament_state,
+};
 pub use start::{start_from_proto, start_to_proto};
 pub use vector::{
     Reset, batch_to_proto, reset_from_proto, setup_from_proto, setup_seeds, started_to_proto,

@@ -7,7 +7,8 @@ use chefshat_arena::AgentKind;
 use chefshat_proto::v1;
 use chefshat_records::convert::{FieldProblem, reward_scheme_from_proto, reward_scheme_to_proto};
 
-use crate::room::policy::{AbortPolicy, Durability, Policy};
+use super::room::{kind_from_proto, kind_to_proto};
+use crate::room::policy::{AbortPolicy, Durability, KindClock, Policy};
 
 /// A day, the longest time a policy may name, milliseconds.
 const DAY_MS: u32 = 86_400_000;
@@ -62,6 +63,7 @@ pub fn policy_from_proto(message: &v1::RoomPolicy) -> Result<Policy, FieldProble
             Ok(v1::Durability::Ephemeral) => Durability::Ephemeral,
             Err(_) => return Err(unknown("durability", message.durability)),
         },
+        clocks: clocks(&message.clocks)?,
     };
     if policy.spectators_see_hands && policy.spectator_delay_decisions == 0 {
         return Err(FieldProblem::new(
@@ -99,7 +101,32 @@ pub fn policy_to_proto(policy: &Policy) -> v1::RoomPolicy {
             Durability::Ephemeral => v1::Durability::Ephemeral,
         }
         .into(),
+        clocks: (policy.clocks.iter())
+            .map(|clock| v1::KindClock {
+                kind: kind_to_proto(Some(clock.kind)),
+                decision_time_ms: clock.decision_time.map(millis),
+                bank_ms: clock.bank.map(millis),
+            })
+            .collect(),
     }
+}
+
+/// Clocks for kinds of participants, each kind at most once.
+fn clocks(messages: &[v1::KindClock]) -> Result<Vec<KindClock>, FieldProblem> {
+    let mut clocks: Vec<KindClock> = Vec::new();
+    for message in messages {
+        let kind = kind_from_proto("clocks", message.kind)?
+            .ok_or_else(|| FieldProblem::new("clocks", "say for which kind a clock is"))?;
+        if clocks.iter().any(|clock| clock.kind == kind) {
+            return Err(FieldProblem::new("clocks", "there are two for one kind"));
+        }
+        clocks.push(KindClock {
+            kind,
+            decision_time: time("clocks", message.decision_time_ms, 10..=DAY_MS)?,
+            bank: time("clocks", message.bank_ms, 0..=DAY_MS)?,
+        });
+    }
+    Ok(clocks)
 }
 
 /// The built-in agent of a name; `None` for the empty name.

@@ -12,7 +12,7 @@ use prost::Message as _;
 use super::decision::{decision_kind, mask_bytes, source_to_proto};
 use super::log::{standings, view};
 use super::policy::policy_to_proto;
-use super::room::{aborted_because, participants, state_to_proto};
+use super::room::{aborted_because, participants, series_id, state_to_proto, tournament_id};
 use super::start::{origin, start_to_proto};
 use crate::room::core::Core;
 use crate::store::KeptGame;
@@ -81,6 +81,8 @@ fn record_header(core: &Core) -> v1::RecordHeader {
         server_version: env!("CARGO_PKG_VERSION").into(),
         action_space: Some(action_space(&header.rules.actions())),
         start: start_to_proto(&header.start, header.rules.faces()),
+        tournament_id: tournament_id(header),
+        series_id: series_id(header),
     }
 }
 
@@ -105,6 +107,8 @@ pub fn summary(core: &Core) -> v1::RecordSummary {
         decisions: core.decisions(),
         added: false,
         abort_reason: aborted_because(core.state()).into(),
+        tournament_id: tournament_id(header),
+        substituted: core.was_substituted(),
     }
 }
 

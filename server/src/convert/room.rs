@@ -10,7 +10,7 @@ use super::policy::{agent, policy_to_proto};
 use super::start::{branch_point, origin};
 use crate::ids::Id;
 use crate::room::core::{Core, State};
-use crate::store::journal::{Fill, ParticipantKind, RecordedSeat};
+use crate::store::journal::{Fill, GameHeader, ParticipantKind, RecordedSeat};
 
 /// What fills the seats of a new room; none given means that all are open.
 ///
@@ -99,7 +99,7 @@ pub fn kind_from_proto(
 }
 
 /// The message's name for a kind.
-pub(super) fn kind_to_proto(kind: Option<ParticipantKind>) -> i32 {
+pub fn kind_to_proto(kind: Option<ParticipantKind>) -> i32 {
     match kind {
         None => v1::ParticipantKind::Unspecified,
         Some(ParticipantKind::Agent) => v1::ParticipantKind::Agent,
@@ -127,7 +127,19 @@ pub fn describe(core: &Core) -> v1::Room {
         origin: origin(header).into(),
         branched_from: header.start.branch.as_ref().map(branch_point),
         abort_reason: aborted_because(core.state()).into(),
+        tournament_id: tournament_id(header),
+        series_id: series_id(header),
     }
+}
+
+/// The tournament a game belongs to, or nothing.
+pub fn tournament_id(header: &GameHeader) -> String {
+    (header.tournament).map_or_else(String::new, |game| game.tournament.to_string())
+}
+
+/// The series a game belongs to, or nothing.
+pub(super) fn series_id(header: &GameHeader) -> String {
+    (header.series()).map_or_else(String::new, |series| series.to_string())
 }
 
 /// Why the game has no result, if it has none.

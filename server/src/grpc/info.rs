@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use chefshat_arena::AgentKind;
+use chefshat_arena::tournament::{MAX_GAMES, MAX_PARTICIPANTS};
 use chefshat_arena::vector::MAX_SEATS_PLAYED;
 use chefshat_engine::{Action, ActionSpace, RULES_VERSION, RuleSetSpec};
 use chefshat_proto::v1::{self, server_service_server::ServerService};
@@ -12,8 +13,8 @@ use tonic::{Request, Response, Status};
 
 use super::status::field;
 use crate::config::{
-    MAX_HOSTED_SHIFTS, MAX_MESSAGE_BYTES, MAX_SEATS_PER_STREAM, MAX_SEATS_PER_WATCH,
-    MAX_STREAMS_PER_CONNECTION, MAX_VECTOR_BATCH_BYTES, MAX_VECTOR_MESSAGE_BYTES,
+    MAX_FOLLOWERS, MAX_HOSTED_SHIFTS, MAX_MESSAGE_BYTES, MAX_SEATS_PER_STREAM, MAX_SEATS_PER_WATCH,
+    MAX_STREAMS_PER_CONNECTION, MAX_TOURNAMENTS, MAX_VECTOR_BATCH_BYTES, MAX_VECTOR_MESSAGE_BYTES,
     MAX_VECTOR_RECORDED_GAMES, MAX_VECTOR_SEATS_IN_ALL, MAX_VECTOR_SEEDS, MAX_VECTOR_STREAMS,
     ServerConfig,
 };
@@ -50,6 +51,10 @@ impl Info {
             ("max_seats_per_stream", MAX_SEATS_PER_STREAM),
             ("max_seats_per_watch", MAX_SEATS_PER_WATCH),
             ("max_spectators_per_room", MAX_SPECTATORS),
+            ("max_tournaments", MAX_TOURNAMENTS),
+            ("max_tournament_participants", MAX_PARTICIPANTS),
+            ("max_tournament_games", MAX_GAMES),
+            ("max_followers", MAX_FOLLOWERS),
             (
                 "max_streams_per_connection",
                 usize::try_from(MAX_STREAMS_PER_CONNECTION).unwrap_or(usize::MAX),

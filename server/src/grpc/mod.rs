@@ -9,6 +9,7 @@ mod records;
 mod room_service;
 mod spectate;
 pub mod status;
+mod tournaments;
 mod vector;
 
 pub use info::Info;
@@ -17,4 +18,5 @@ pub use recorded::Recorded;
 pub use records::Records;
 pub use room_service::RoomCalls;
 pub use spectate::Spectate;
+pub use tournaments::TournamentCalls;
 pub use vector::Vectors;

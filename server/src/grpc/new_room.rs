@@ -69,11 +69,12 @@ pub(super) async fn new_room(
         fills,
         start: beginning.start,
         game_seed: beginning.game_seed,
+        seating: None,
     })
 }
 
 /// A policy that promises no more than the server's store can keep.
-fn kept_policy(recorded: &Recorded, message: &v1::RoomPolicy) -> Result<Policy, FieldProblem> {
+pub(super) fn kept_policy(recorded: &Recorded, message: &v1::RoomPolicy) -> Result<Policy, FieldProblem> {
     let mut policy = convert::policy_from_proto(message)?;
     if !recorded.rooms().store().outlives_server() {
         if message.durability() == v1::Durability::Durable {
@@ -92,7 +93,7 @@ fn hosted_rules(message: &v1::RuleSet) -> Result<RuleSet, Status> {
 }
 
 /// Checks that a game by these rules is not longer than one that is hosted may be.
-fn check_length(rules: &RuleSet) -> Result<(), Status> {
+pub(super) fn check_length(rules: &RuleSet) -> Result<(), Status> {
     let (stop_field, length) = match rules.stop() {
         Stop::Points(points) => ("target_points", points),
         Stop::Shifts(shifts) => ("target_shifts", shifts),

@@ -5,43 +5,78 @@ use std::collections::BTreeMap;
 use std::future::poll_fn;
 use std::pin::Pin;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::task::Poll;
 
 use chefshat_proto::v1::{self, act_request, seat_command::Command, seat_update::Update};
 use chefshat_records::convert::FieldProblem;
 use chefshat_records::seeds::MAX_ENTROPY;
 use futures::{Stream, StreamExt as _};
+use tokio::sync::mpsc;
 use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 use tonic::{Code, Request, Response, Status, Streaming};
 
 use super::status::{Refusal, field, refused, room_gone, status, ticket_unknown};
 use crate::config::{
-    HEARTBEAT, MAX_COMMANDS_PER_MESSAGE, MAX_SEATS_PER_STREAM, MAX_SEATS_PER_WATCH,
+    HEARTBEAT, MAX_CALLS_WAITING, MAX_COMMANDS_PER_MESSAGE, MAX_SEATS_PER_STREAM,
+    MAX_SEATS_PER_WATCH,
 };
 use crate::convert;
-use crate::ids::Token;
+use crate::ids::{Id, Token};
 use crate::outbox::{Outbox, OutboxStream};
 use crate::room::core::ConnectionId;
 use crate::room::delivery::Wishes;
 use crate::room::{AttachRequest, Handle, RoomGone, SeatAction};
 use crate::rooms::Rooms;
+use crate::tournaments::{Call, Connection, Hosted, Tournaments};
 use crate::wire::Updates;
 use crate::wire::service::play_service_server::PlayService;
+
+/// First handle of the seats that the server attaches by itself.
+const FIRST_CALLED: u32 = 1 << 31;
+
+/// Numbers of connections of participants.
+static CONNECTIONS: AtomicU64 = AtomicU64::new(1);
 
 /// The service.
 #[derive(Debug, Clone)]
 pub struct Play {
     rooms: Arc<Rooms>,
+    tournaments: Arc<Tournaments>,
     /// Cancelled when all streams are to end.
     closing: CancellationToken,
 }
 
 impl Play {
-    /// The service for these rooms; `closing` ends its streams.
-    pub fn new(rooms: Arc<Rooms>, closing: CancellationToken) -> Self {
-        Self { rooms, closing }
+    /// The service for these rooms and tournaments; `closing` ends its streams.
+    pub fn new(
+        rooms: Arc<Rooms>,
+        tournaments: Arc<Tournaments>,
+        closing: CancellationToken,
+    ) -> Self {
+        Self {
+            rooms,
+            tournaments,
+            closing,
+        }
+    }
+
+    /// The reader of a new stream.
+    fn reader(&self, outbox: &Arc<Outbox<Updates>>, with_decisions: bool) -> Reader {
+        let (calls, called) = mpsc::channel(MAX_CALLS_WAITING);
+        Reader {
+            rooms: Arc::clone(&self.rooms),
+            tournaments: Arc::clone(&self.tournaments),
+            outbox: Arc::clone(outbox),
+            seats: BTreeMap::new(),
+            participants: BTreeMap::new(),
+            next_handle: 0,
+            next_called: FIRST_CALLED,
+            calls,
+            called,
+            with_decisions,
+        }
     }
 }
 
@@ -55,7 +90,7 @@ impl PlayService for Play {
         request: Request<Streaming<v1::PlayRequest>>,
     ) -> Result<Response<Self::PlayStream>, Status> {
         let (outbox, updates) = Outbox::new();
-        let reader = Reader::new(Arc::clone(&self.rooms), Arc::clone(&outbox), true);
+        let reader = self.reader(&outbox, true);
         tokio::spawn(reader.read(request.into_inner()));
         let closing = self.closing.clone();
         tokio::spawn(async move {
@@ -79,7 +114,7 @@ impl PlayService for Play {
             ));
         }
         let (outbox, updates) = Outbox::new();
-        let mut reader = Reader::new(Arc::clone(&self.rooms), Arc::clone(&outbox), false);
+        let mut reader = self.reader(&outbox, false);
         let closing = self.closing.clone();
         tokio::spawn(async move {
             for attach in seats {
@@ -89,6 +124,7 @@ impl PlayService for Play {
             tokio::select! {
                 () = outbox.abandoned() => {}
                 () = closing.cancelled() => outbox.end(Ok(())),
+                () = reader.follow_calls() => {}
             }
             reader.leave_all().await;
         });
@@ -136,42 +172,78 @@ struct BoundSeat {
     room: Handle,
     seat: chefshat_engine::Seat,
     connection: ConnectionId,
+    secret: [u8; 32],
     /// Set when the room has told the seat that it has left the stream.
     ended: Arc<AtomicBool>,
 }
 
-/// Reads the requests of one stream.
+impl BoundSeat {
+    fn has_ended(&self) -> bool {
+        self.ended.load(Ordering::Relaxed)
+    }
+}
+
+/// A participant of a tournament that is attached to a stream.
+struct BoundParticipant {
+    tournament: Arc<Hosted>,
+    participant: usize,
+    connection: u64,
+    /// How it asked to be attached, which holds for its seats too.
+    attach: v1::Attach,
+}
+
+/// Reads the requests of one stream, and attaches seats that participants of tournaments are called to.
 struct Reader {
     rooms: Arc<Rooms>,
+    tournaments: Arc<Tournaments>,
     outbox: Arc<Outbox<Updates>>,
     /// Those attached, by handle.
     seats: BTreeMap<u32, BoundSeat>,
+    participants: BTreeMap<u32, BoundParticipant>,
     next_handle: u32,
+    next_called: u32,
+    /// Where tournaments call participants of this stream, and what they have called.
+    calls: mpsc::Sender<(u32, Call)>,
+    called: mpsc::Receiver<(u32, Call)>,
     /// What unspecified delivery means: on Play with decisions, on Watch at once.
     with_decisions: bool,
 }
 
-impl Reader {
-    fn new(rooms: Arc<Rooms>, outbox: Arc<Outbox<Updates>>, with_decisions: bool) -> Self {
-        Self {
-            rooms,
-            outbox,
-            seats: BTreeMap::new(),
-            next_handle: 0,
-            with_decisions,
-        }
+impl BoundParticipant {
+    async fn leave(self) {
+        self.tournament
+            .left(self.participant, self.connection)
+            .await;
     }
+}
 
+/// What a reader does next.
+enum Next {
+    Message(Option<Result<v1::PlayRequest, Status>>),
+    Call(u32, Call),
+}
+
+impl Reader {
     async fn read(mut self, mut requests: Streaming<v1::PlayRequest>) {
         let outbox = Arc::clone(&self.outbox);
         let end = loop {
-            let message = poll_fn(|context| {
+            let next = poll_fn(|context| {
                 if outbox.poll_hung_up(context) {
-                    return Poll::Ready(None);
+                    return Poll::Ready(Next::Message(None));
                 }
-                requests.poll_next_unpin(context)
+                // The sender is the reader's own: there is always one.
+                if let Poll::Ready(Some((handle, call))) = self.called.poll_recv(context) {
+                    return Poll::Ready(Next::Call(handle, call));
+                }
+                requests.poll_next_unpin(context).map(Next::Message)
             });
-            let message = message.await.transpose();
+            let message = match next.await {
+                Next::Message(message) => message.transpose(),
+                Next::Call(handle, call) => {
+                    self.follow_call(handle, call).await;
+                    continue;
+                }
+            };
             let arrived = Instant::now();
             match message {
                 Ok(Some(request)) if request.commands.len() > MAX_COMMANDS_PER_MESSAGE => {
@@ -234,11 +306,7 @@ impl Reader {
         let handle = self.next_handle;
         self.next_handle = self.next_handle.wrapping_add(1);
         let request_id = attach.request_id;
-        if self.seats.len() >= MAX_SEATS_PER_STREAM {
-            self.seats
-                .retain(|_, bound| !bound.ended.load(Ordering::Relaxed));
-        }
-        if self.seats.len() >= MAX_SEATS_PER_STREAM {
+        if !self.has_space() {
             let refusal = status(
                 Code::ResourceExhausted,
                 "TOO_MANY_SEATS",
@@ -253,7 +321,12 @@ impl Reader {
             let problem = FieldProblem::new("entropy", format!("at most {MAX_ENTROPY} bytes"));
             return self.refuse_field(handle, request_id, "ENTROPY_REFUSED", &problem);
         }
-        match self.bind(attach, handle).await {
+        if let Some(token) = Token::parse(&attach.ticket)
+            && let Some(tournament) = self.tournaments.get(token.room)
+        {
+            return self.enter(tournament, token, attach, handle).await;
+        }
+        match self.bind(attach, handle, None).await {
             Ok(Some(bound)) => {
                 self.seats.insert(handle, bound);
             }
@@ -263,8 +336,107 @@ impl Reader {
         }
     }
 
+    /// Whether the stream can take one more seat.
+    fn has_space(&mut self) -> bool {
+        let full =
+            |reader: &Self| reader.seats.len() + reader.participants.len() >= MAX_SEATS_PER_STREAM;
+        if full(self) {
+            self.seats.retain(|_, bound| !bound.has_ended());
+        }
+        !full(self)
+    }
+
+    /// Attaches a participant of a tournament, which then calls it to its games.
+    async fn enter(
+        &mut self,
+        tournament: Arc<Hosted>,
+        token: Token,
+        attach: v1::Attach,
+        handle: u32,
+    ) {
+        let request_id = attach.request_id;
+        let Some(participant) = tournament.participant_of(&token.secret) else {
+            return self.refuse(handle, request_id, &ticket_unknown());
+        };
+        let entered = Update::Entered(v1::Entered {
+            request_id,
+            tournament_id: tournament.id().to_string(),
+            participant: u32::try_from(participant).unwrap_or(u32::MAX),
+        });
+        self.tell(handle, entered);
+        let connection = CONNECTIONS.fetch_add(1, Ordering::Relaxed);
+        let bound = BoundParticipant {
+            tournament: Arc::clone(&tournament),
+            participant,
+            connection,
+            attach,
+        };
+        self.participants.insert(handle, bound);
+        let calls = self.calls.clone();
+        (tournament.enter(participant, connection, Connection { handle, calls })).await;
+    }
+
+    /// Follows calls to games for as long as it is let.
+    async fn follow_calls(&mut self) {
+        while let Some((handle, call)) = self.called.recv().await {
+            self.follow_call(handle, call).await;
+        }
+    }
+
+    /// Does what a tournament has called a participant of this stream to.
+    async fn follow_call(&mut self, handle: u32, call: Call) {
+        match call {
+            Call::Seat(room) => self.take_seat(handle, room).await,
+            Call::Superseded => self.dismiss(handle, v1::DetachReason::Superseded),
+            Call::Over => self.dismiss(handle, v1::DetachReason::TournamentOver),
+        }
+    }
+
+    /// Attaches a participant to its seat in the room of one of its games.
+    async fn take_seat(&mut self, participant: u32, room: Id) {
+        let Some(bound) = self.participants.get(&participant) else {
+            return;
+        };
+        let Some(token) = Token::parse(&bound.attach.ticket) else {
+            return;
+        };
+        let ticket = Token { room, ..token };
+        let attach = v1::Attach {
+            ticket: ticket.word(),
+            request_id: 0,
+            ..bound.attach.clone()
+        };
+        // A seat that the client attached by itself with the same ticket stays where it is.
+        let is_there = (self.seats.values()).any(|seat| {
+            seat.secret == ticket.secret && seat.room.id() == room && !seat.has_ended()
+        });
+        if is_there || !self.has_space() {
+            return;
+        }
+        let handle = self.next_called;
+        self.next_called = self.next_called.wrapping_add(1).max(FIRST_CALLED);
+        match self.bind(attach, handle, Some(ticket)).await {
+            Ok(Some(bound)) => drop(self.seats.insert(handle, bound)),
+            // The game ended before its seat was taken: there is nothing left to play.
+            Ok(None) | Err(RoomGone) => {}
+        }
+    }
+
+    /// Tells a participant that it will not be seated again on this stream. Its seats stay.
+    fn dismiss(&mut self, handle: u32, reason: v1::DetachReason) {
+        if self.participants.remove(&handle).is_some() {
+            let reason = reason.into();
+            self.tell(handle, Update::Detached(v1::Detached { reason }));
+        }
+    }
+
     /// Attaches a seat; `None` if nobody has such a ticket.
-    async fn bind(&self, attach: v1::Attach, handle: u32) -> Result<Option<BoundSeat>, RoomGone> {
+    async fn bind(
+        &self,
+        attach: v1::Attach,
+        handle: u32,
+        told_ticket: Option<Token>,
+    ) -> Result<Option<BoundSeat>, RoomGone> {
         let Some(token) = Token::parse(&attach.ticket) else {
             return Ok(None);
         };
@@ -292,12 +464,14 @@ impl Reader {
             entropy: attach.entropy,
             arrived: Instant::now(),
             ended: Arc::clone(&ended),
+            told_ticket,
         };
         let attached = room.attach(request).await?;
         Ok(attached.map(|(seat, connection)| BoundSeat {
             room,
             seat,
             connection,
+            secret: token.secret,
             ended,
         }))
     }
@@ -313,9 +487,17 @@ impl Reader {
                 )
                 .await;
         }
+        if let Some(bound) = self.participants.remove(&handle) {
+            let requested = v1::DetachReason::Requested.into();
+            self.tell(handle, Update::Detached(v1::Detached { reason: requested }));
+            bound.leave().await;
+        }
     }
 
     async fn leave_all(&mut self) {
+        for bound in std::mem::take(&mut self.participants).into_values() {
+            bound.leave().await;
+        }
         for bound in std::mem::take(&mut self.seats).into_values() {
             bound.room.lost(bound.seat, bound.connection, None).await;
         }
@@ -330,9 +512,13 @@ impl Reader {
     }
 
     fn refuse(&self, handle: u32, request_id: u32, refusal: &Status) {
+        self.tell(handle, Update::Refused(refused(request_id, refusal)));
+    }
+
+    fn tell(&self, handle: u32, update: Update) {
         let mut updates = Updates::default();
-        updates.add(handle, Update::Refused(refused(request_id, refusal)));
-        // A client that does not read its refusals does not get more of them.
+        updates.add(handle, update);
+        // A client that does not read what it is told is not told more.
         self.outbox.push(&mut updates, None, None);
     }
 }

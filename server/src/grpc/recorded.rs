@@ -14,6 +14,9 @@ use crate::ids::Id;
 use crate::rooms::Rooms;
 use crate::store::StoreError;
 
+/// Why a record is withheld for a while.
+pub(super) const SERIES_OPEN: &str = "SERIES_OPEN";
+
 /// The recorded games of a server.
 #[derive(Debug, Clone)]
 pub struct Recorded {
@@ -65,6 +68,14 @@ impl Recorded {
         let kept = (self.rooms.store().finished(game).await)
             .map_err(not_read)?
             .ok_or_else(unknown)?;
+        if (kept.series()).is_some_and(|series| self.rooms.is_series_closed(series)) {
+            return Err(status(
+                Code::FailedPrecondition,
+                SERIES_OPEN,
+                "other games with the same deals are being played; its record can be had when they have ended",
+                [("field", "game_id")],
+            ));
+        }
         in_background(turn, move || work(lines_of(&kept).into_owned())).await
     }
 

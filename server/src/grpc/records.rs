@@ -17,8 +17,8 @@ use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Code, Request, Response, Status, Streaming};
 
 use super::pages;
-use super::recorded::{Recorded, not_read, turn};
-use super::status::{disk_nearly_full, field, status};
+use super::recorded::{Recorded, SERIES_OPEN, not_read, turn};
+use super::status::{disk_nearly_full, field, has_reason, status};
 use crate::config::{
     IMPORT_TIMEOUT, MAX_IMPORT_BYTES, MAX_IMPORT_LINES, MAX_IMPORTS, MAX_RECORDS_SENT,
     RECORD_SEND_TIMEOUT,
@@ -77,10 +77,12 @@ impl Records {
             after = *last;
             for (_, summary) in page {
                 let _turn = turn(&self.sending).await;
-                let lines = self
-                    .recorded
-                    .of_game(&summary.game_id, |lines| lines)
-                    .await?;
+                let lines = self.recorded.of_game(&summary.game_id, |lines| lines).await;
+                let lines = match lines {
+                    // It can be had when the games with the same deals have ended.
+                    Err(status) if has_reason(&status, SERIES_OPEN) => continue,
+                    lines => lines?,
+                };
                 let response = |lines| v1::StreamRecordsResponse { lines };
                 send(sender, lines, response).await?;
             }

@@ -33,6 +33,11 @@ pub fn status<const N: usize>(
     )
 }
 
+/// Whether a status has this reason.
+pub fn has_reason(status: &Status, reason: &str) -> bool {
+    (status.get_details_error_info()).is_some_and(|info| info.reason == reason)
+}
+
 /// A status as the message that refuses a command on a stream.
 pub fn refused(request_id: u32, status: &Status) -> v1::Refused {
     let (reason, metadata) = status

@@ -16,6 +16,7 @@ use tonic::Status;
 use super::core::{ConnectionId, Core};
 use super::log::Happening;
 use crate::convert;
+use crate::ids::Token;
 use crate::outbox::{HandStamp, OnSpace, Outbox, Pile as _};
 use crate::wire::{Events, Updates, encode_decision, put_event};
 
@@ -106,7 +107,8 @@ impl Attachment {
     }
 
     /// Says that the seat is attached, with a snapshot if one was wished for.
-    pub fn greet(&mut self, core: &Core, seat: Seat, request_id: u32) {
+    /// `told_ticket`: the server attached a participant of a tournament by itself.
+    pub fn greet(&mut self, core: &Core, seat: Seat, request_id: u32, told_ticket: Option<Token>) {
         let header = core.header();
         let next_sequence = u64::try_from(core.log().len()).unwrap_or(u64::MAX) + 1;
         self.hold(Update::Attached(v1::Attached {
@@ -115,6 +117,11 @@ impl Attachment {
             game_id: header.game_id.to_string(),
             seat: seat_number(seat),
             next_sequence,
+            tournament_id: match &told_ticket {
+                Some(_) => convert::tournament_id(header),
+                None => String::new(),
+            },
+            ticket: told_ticket.map_or_else(String::new, |ticket| ticket.word()),
         }));
         if self.wishes.snapshot {
             self.position = core.log().len();

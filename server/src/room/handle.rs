@@ -62,6 +62,8 @@ pub struct AttachRequest {
     pub arrived: Instant,
     /// Set when the seat has left the stream.
     pub ended: Arc<AtomicBool>,
+    /// The seat's ticket, to be told to a client that the server attaches by itself.
+    pub told_ticket: Option<Token>,
 }
 
 /// Asks to watch.
@@ -262,6 +264,12 @@ impl Handle {
         };
         // A room that is gone has nothing left to end.
         let _ = self.mailbox.send(message).await;
+    }
+
+    /// Closes the room for a tournament that is closed; a running game is aborted.
+    pub async fn give_up(&self) {
+        // A room that is gone has nothing left to end.
+        let _ = self.mailbox.send(Message::Abort(AbortReason::Closed)).await;
     }
 
     async fn ask<T>(

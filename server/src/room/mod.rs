@@ -18,4 +18,4 @@ pub use handle::{
     SpectateRequest,
 };
 pub use spectators::{MAX_SPECTATOR_LAG, MAX_SPECTATORS};
-pub use task::{RoomWatcher, TaskContext, go_on, start};
+pub use task::{RoomWatcher, TaskContext, go_on};

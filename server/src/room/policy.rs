@@ -5,6 +5,8 @@ use std::time::Duration;
 use chefshat_arena::AgentKind;
 use chefshat_engine::RewardScheme;
 
+use crate::store::journal::ParticipantKind;
+
 /// When a game is given up because its participants are gone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AbortPolicy {
@@ -23,6 +25,17 @@ pub enum Durability {
     Durable,
     /// Nothing: it is kept when it ends.
     Ephemeral,
+}
+
+/// Times for participants of one kind, in place of the room's.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct KindClock {
+    /// The kind.
+    pub kind: ParticipantKind,
+    /// Time for a decision, if it is another.
+    pub decision_time: Option<Duration>,
+    /// The bank, if it is another.
+    pub bank: Option<Duration>,
 }
 
 /// A room's policy. Made by `convert::policy`, which checks the ranges stated in `room.proto`.
@@ -54,6 +67,24 @@ pub struct Policy {
     pub spectators_see_hands: bool,
     /// What the game outlives.
     pub durability: Durability,
+    /// Other times for participants of some kinds, each at most once.
+    pub clocks: Vec<KindClock>,
+}
+
+impl Policy {
+    /// Time for a decision of a participant; of a built-in agent (`None`) it is the room's.
+    pub fn decision_time_of(&self, kind: Option<ParticipantKind>) -> Duration {
+        (self.clock_of(kind).and_then(|clock| clock.decision_time)).unwrap_or(self.decision_time)
+    }
+
+    /// What a participant may use beyond that over the whole game.
+    pub fn bank_of(&self, kind: Option<ParticipantKind>) -> Duration {
+        (self.clock_of(kind).and_then(|clock| clock.bank)).unwrap_or(self.bank)
+    }
+
+    fn clock_of(&self, kind: Option<ParticipantKind>) -> Option<&KindClock> {
+        self.clocks.iter().find(|clock| Some(clock.kind) == kind)
+    }
 }
 
 impl Default for Policy {
@@ -72,6 +103,7 @@ impl Default for Policy {
             spectator_delay_decisions: 0,
             spectators_see_hands: false,
             durability: Durability::Durable,
+            clocks: Vec::new(),
         }
     }
 }

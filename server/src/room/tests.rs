@@ -13,10 +13,12 @@ use prost::Message as _;
 use tokio::time::Instant;
 use tokio_util::task::TaskTracker;
 
-use super::core::ConnectionId;
+use super::core::{ConnectionId, Core};
 use super::delivery::Wishes;
 use super::policy::{AbortPolicy, Policy};
-use super::{AttachRequest, Handle, JoinRequest, RoomWatcher, SeatAction, TaskContext, start};
+use super::{
+    AttachRequest, Handle, JoinRequest, RoomClock, RoomWatcher, SeatAction, TaskContext, go_on,
+};
 use crate::filing::Filing;
 use crate::ids::{Id, SecretHash, Token};
 use crate::outbox::{Outbox, OutboxStream};
@@ -51,14 +53,17 @@ async fn room(policy: Policy, shifts: u32) -> Handle {
         created_at_ms: 0,
         join_code: "CODE".into(),
         owner: SecretHash::of(b"owner"),
+        tournament: None,
     });
     let store = Arc::new(MemoryStore::default());
     let journal = store
         .create(Arc::clone(&header))
         .await
         .expect("memory keeps it");
-    start(
-        header,
+    go_on(
+        Core::new(header),
+        RoomClock::of_age(Duration::ZERO),
+        None,
         journal,
         TaskContext {
             filing: Filing::new(store.clone(), None, TaskTracker::new()),
@@ -108,6 +113,7 @@ async fn attach(room: &Handle, ticket: Token) -> AttachedSeat {
             entropy: Vec::new(),
             arrived: Instant::now(),
             ended: Arc::default(),
+            told_ticket: None,
         })
         .await
         .expect("the room is there")

@@ -3,23 +3,25 @@
 mod restore;
 mod table;
 
-use std::collections::{BTreeMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex, MutexGuard, Weak};
 use std::time::Duration;
 
 use chefshat_arena::RecordedPlayer;
-use chefshat_engine::{RULES_VERSION, RuleSet};
+use chefshat_engine::{RULES_VERSION, RuleSet, Seat};
 use chefshat_records::seeds::SeedPlan;
 use tokio::sync::Notify;
+use tokio::sync::futures::Notified;
 use tokio_util::task::TaskTracker;
 
 use crate::config::ServerConfig;
 use crate::filing::Filing;
 use crate::ids::{Id, Token, join_code, normal_code, random_bytes};
+use crate::room::core::Core;
 use crate::room::policy::{Durability, Policy};
-use crate::room::{Handle, RoomWatcher, TaskContext, since_epoch_ms, start};
-use crate::store::journal::{Fill, GameHeader, GameStart};
+use crate::room::{Handle, RoomClock, RoomWatcher, TaskContext, go_on, since_epoch_ms};
+use crate::store::journal::{Fill, GameHeader, GameStart, SeatedParticipant, TournamentGame};
 use crate::store::{Store, StoreError};
 use table::{Entry, Table};
 
@@ -40,6 +42,23 @@ pub struct NewRoom {
     pub start: GameStart,
     /// The game seed, if its creator fixes it.
     pub game_seed: Option<[u8; 32]>,
+    /// Who sits there from the beginning, if a tournament makes the room.
+    pub seating: Option<Seating>,
+}
+
+/// What a tournament decides about a room for one of its games.
+#[derive(Debug)]
+pub struct Seating {
+    /// The game's place in it.
+    pub game: TournamentGame,
+    /// The room's id, which the tournament has kept before the room is made.
+    pub room_id: Id,
+    /// The game's.
+    pub game_id: Id,
+    /// Who sits on the open seats.
+    pub participants: BTreeMap<usize, SeatedParticipant>,
+    /// The server's part of the seed, if games are dealt alike.
+    pub server_seed: Option<[u8; 32]>,
 }
 
 /// A room that was made, with its secrets.
@@ -73,6 +92,8 @@ pub enum CreateError {
 /// The rooms of a server.
 pub struct Rooms {
     table: Mutex<Table>,
+    /// Series of games that are dealt alike, some of which are still to be played.
+    open_series: Mutex<BTreeSet<Id>>,
     /// Notified when a game has ended or a room has gone.
     changed: Notify,
     context: TaskContext,
@@ -84,6 +105,7 @@ impl Rooms {
     pub fn new(config: &ServerConfig, store: Arc<dyn Store>, tracker: TaskTracker) -> Arc<Self> {
         Arc::new_cyclic(|rooms: &Weak<Self>| Self {
             table: Mutex::default(),
+            open_series: Mutex::default(),
             changed: Notify::new(),
             context: TaskContext {
                 filing: Filing::new(Arc::clone(&store), config.data_dir.clone(), tracker.clone()),
@@ -155,6 +177,37 @@ impl Rooms {
             .by_number
             .values()
             .any(|entry| entry.game_id == game && !entry.over)
+    }
+
+    /// Whether the game of a room is over; `None` if there is no such room, or it was put down.
+    pub fn is_over(&self, id: Id) -> Option<bool> {
+        let table = self.lock();
+        let entry = table.by_number.get(table.numbers.get(&id)?)?;
+        (!entry.put_down).then_some(entry.over)
+    }
+
+    /// Ready when a game has ended or a room has gone after this was called.
+    pub fn changed(&self) -> Notified<'_> {
+        self.changed.notified()
+    }
+
+    /// Closes a series of games that are dealt alike, or opens it when all of them have ended.
+    pub fn close_series(&self, series: Id, closed: bool) {
+        let mut open = self.open_series();
+        if closed {
+            open.insert(series);
+        } else {
+            open.remove(&series);
+        }
+    }
+
+    /// Whether what could tell the deals of a series is still to be withheld.
+    pub fn is_series_closed(&self, series: Id) -> bool {
+        self.open_series().contains(&series)
+    }
+
+    fn open_series(&self) -> MutexGuard<'_, BTreeSet<Id>> {
+        (self.open_series.lock()).expect("nothing that holds this lock can panic")
     }
 
     /// Rooms in which a game is being played or awaited.
@@ -259,11 +312,13 @@ impl Place {
 
     async fn make(self, new: NewRoom) -> Result<Created, CreateError> {
         let rooms = &self.0;
-        let room_id = Id::random();
+        let seating = new.seating.as_ref();
+        let room_id = seating.map_or_else(Id::random, |seating| seating.room_id);
+        let server_seed = seating.and_then(|seating| seating.server_seed);
         let owner = Token::random(room_id);
         let header = Arc::new(GameHeader {
             room_id,
-            game_id: Id::random(),
+            game_id: seating.map_or_else(Id::random, |seating| seating.game_id),
             name: new.name,
             rules: new.rules,
             policy: new.policy,
@@ -274,19 +329,28 @@ impl Place {
             seed: match new.game_seed {
                 Some(game_seed) => SeedPlan::Fixed { game_seed },
                 None => SeedPlan::Committed {
-                    server_seed: random_bytes(),
+                    server_seed: server_seed.unwrap_or_else(random_bytes),
                     nonce: random_bytes(),
                 },
             },
             created_at_ms: since_epoch_ms(),
             join_code: join_code(),
             owner: owner.hash(),
+            tournament: seating.map(|seating| seating.game),
         });
         let mut journal = rooms.context.store.create(Arc::clone(&header)).await?;
+        let mut core = Core::new(Arc::clone(&header));
+        for (seat, participant) in new.seating.into_iter().flat_map(|it| it.participants) {
+            core.seat(Seat::new(seat), participant);
+        }
+        if !core.unkept().is_empty() {
+            journal.append(core.unkept()).await?;
+        }
         // Looked at and entered under one lock, so that a shutdown cannot slip in between and miss the room.
         if let Some(mut table) = Some(rooms.lock()).filter(|table| !table.shutting_down) {
             table.make_space(rooms.max_rooms);
-            let handle = start(Arc::clone(&header), journal, rooms.context.clone());
+            let clock = RoomClock::of_age(Duration::ZERO);
+            let handle = go_on(core, clock, None, journal, rooms.context.clone());
             table.enter(Entry {
                 handle: handle.clone(),
                 game_id: header.game_id,

@@ -9,6 +9,7 @@ use futures::future::{BoxFuture, ready};
 use tokio::sync::watch;
 
 use super::journal::{Entry, GameHeader};
+use super::tournaments::{KeptTournament, TournamentEntry, TournamentHeader};
 use super::{Journal, KeptGame, LeftGame, MemoryStore, Store, StoreError};
 use crate::ids::Id;
 
@@ -90,6 +91,26 @@ impl Store for FailingStore {
 
     fn note_filed(&self, game: Id) -> BoxFuture<'_, Result<(), StoreError>> {
         self.inner.note_filed(game)
+    }
+
+    fn create_tournament(
+        &self,
+        header: Arc<TournamentHeader>,
+    ) -> BoxFuture<'_, Result<(), StoreError>> {
+        self.inner.create_tournament(header)
+    }
+
+    fn append_tournament(
+        &self,
+        tournament: Id,
+        row: u64,
+        entries: Vec<TournamentEntry>,
+    ) -> BoxFuture<'_, Result<(), StoreError>> {
+        self.inner.append_tournament(tournament, row, entries)
+    }
+
+    fn tournaments(&self) -> BoxFuture<'_, Result<Vec<KeptTournament>, StoreError>> {
+        self.inner.tournaments()
     }
 
     fn failed(&self) -> BoxFuture<'static, StoreError> {

@@ -74,6 +74,15 @@ pub enum ParticipantKind {
     Robot,
 }
 
+/// The tournament a game belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TournamentGame {
+    /// The tournament.
+    pub tournament: Id,
+    /// The games that are dealt like it; until all of them have ended, what could tell the deals is withheld.
+    pub series: Option<Id>,
+}
+
 /// Everything about a game that stands before it begins.
 #[derive(Debug, Clone)]
 pub struct GameHeader {
@@ -103,6 +112,15 @@ pub struct GameHeader {
     pub join_code: String,
     /// The creator's token, hashed.
     pub owner: SecretHash,
+    /// The tournament it belongs to.
+    pub tournament: Option<TournamentGame>,
+}
+
+impl GameHeader {
+    /// The games that are dealt like this one.
+    pub fn series(&self) -> Option<Id> {
+        self.tournament.and_then(|game| game.series)
+    }
 }
 
 /// One change of a game.

@@ -8,6 +8,7 @@ use futures::FutureExt as _;
 use futures::future::{BoxFuture, pending, ready};
 
 use super::journal::{Entry, GameHeader};
+use super::tournaments::{KeptTournament, TournamentEntry, TournamentHeader};
 use super::{Journal, KeptGame, LeftGame, Store, StoreError, lets_through};
 use crate::ids::Id;
 
@@ -135,6 +136,26 @@ impl Store for MemoryStore {
 
     fn note_filed(&self, _game: Id) -> BoxFuture<'_, Result<(), StoreError>> {
         ready(Ok(())).boxed()
+    }
+
+    fn create_tournament(
+        &self,
+        _header: Arc<TournamentHeader>,
+    ) -> BoxFuture<'_, Result<(), StoreError>> {
+        ready(Ok(())).boxed()
+    }
+
+    fn append_tournament(
+        &self,
+        _tournament: Id,
+        _row: u64,
+        _entries: Vec<TournamentEntry>,
+    ) -> BoxFuture<'_, Result<(), StoreError>> {
+        ready(Ok(())).boxed()
+    }
+
+    fn tournaments(&self) -> BoxFuture<'_, Result<Vec<KeptTournament>, StoreError>> {
+        ready(Ok(Vec::new())).boxed()
     }
 
     fn failed(&self) -> BoxFuture<'static, StoreError> {

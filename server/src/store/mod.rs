@@ -5,6 +5,7 @@ mod failing;
 pub mod journal;
 mod memory;
 mod sqlite;
+pub mod tournaments;
 
 use std::sync::Arc;
 
@@ -17,6 +18,7 @@ pub use sqlite::{OpenError, SqliteStore};
 
 use crate::ids::Id;
 use journal::{Entry, GameHeader};
+use tournaments::{KeptTournament, TournamentEntry, TournamentHeader};
 
 /// Why a store could not do what it was asked, and what to do about it.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -30,6 +32,16 @@ pub enum KeptGame {
     Hosted(Arc<GameHeader>, Arc<[Entry]>),
     /// A game that was imported: the lines of its record.
     Imported(Arc<[v1::RecordLine]>),
+}
+
+impl KeptGame {
+    /// The games that were dealt like this one, if a tournament of this server says so.
+    pub fn series(&self) -> Option<Id> {
+        match self {
+            Self::Hosted(header, _) => header.series(),
+            Self::Imported(_) => None,
+        }
+    }
 }
 
 /// A game whose room is to be there again after the server ended.
@@ -80,6 +92,20 @@ pub trait Store: Send + Sync + 'static {
     fn unfiled(&self) -> BoxFuture<'_, Result<Vec<Id>, StoreError>>;
     /// Notes that the record of a game has been written to a file.
     fn note_filed(&self, game: Id) -> BoxFuture<'_, Result<(), StoreError>>;
+    /// Begins a tournament.
+    fn create_tournament(
+        &self,
+        header: Arc<TournamentHeader>,
+    ) -> BoxFuture<'_, Result<(), StoreError>>;
+    /// Adds to a tournament the `row`-th part, from 0, of what moved it.
+    fn append_tournament(
+        &self,
+        tournament: Id,
+        row: u64,
+        entries: Vec<TournamentEntry>,
+    ) -> BoxFuture<'_, Result<(), StoreError>>;
+    /// All tournaments, oldest first. One that cannot be read is left as it is, and logged.
+    fn tournaments(&self) -> BoxFuture<'_, Result<Vec<KeptTournament>, StoreError>>;
     /// Returns when the store can keep nothing any more; until then it waits.
     fn failed(&self) -> BoxFuture<'static, StoreError>;
     /// Ends in good order; nothing is asked of it afterwards.

@@ -2,10 +2,8 @@
 
 use serde_json::Value;
 
-use super::run::{Ended, chefshat};
+use super::run::{Ended, typed};
 
-/// Widest line of the table.
-const COLUMNS: usize = 100;
 /// Networks of chance weights.
 const TABLE: &str = concat!(
     env!("CARGO_MANIFEST_DIR"),
@@ -17,22 +15,17 @@ const SMALL: &str = concat!(
 );
 
 fn compare(a: &str, b: &str, flags: &str) -> Ended {
-    let mut arguments = vec!["compare", a, b];
-    arguments.extend(flags.split_whitespace());
-    chefshat(&arguments)
+    typed(&["compare", a, b], flags)
 }
 
 fn json(a: &str, b: &str, flags: &str) -> Value {
-    let ended = compare(a, b, &format!("{flags} --json"));
-    assert_eq!(ended.code, Some(0), "{}", ended.stderr);
-    serde_json::from_str(&ended.stdout).unwrap()
+    compare(a, b, &format!("{flags} --json")).well().json()
 }
 
 #[test]
 fn the_table_is_readable_and_the_same_for_the_same_seed() {
     let flags = "--deals 50 --seed 7";
-    let ended = compare("greedy", "random", flags);
-    assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+    let ended = compare("greedy", "random", flags).well();
     assert_eq!(ended.stderr, "", "no progress where there is no terminal");
     assert_eq!(ended.stdout, include_str!("compare.txt"));
     for threads in ["--threads 1", "--threads 3"] {
@@ -55,16 +48,7 @@ fn lines_keep_within_100_columns() {
             "--deals 3 --players 5 --preset original2020 --no-exchange --no-special-actions --points 1000,100,50,10,1",
         ),
     ] {
-        let ended = compare(a, b, flags);
-        assert_eq!(ended.code, Some(0), "{}", ended.stderr);
-        assert!(ended.stdout.lines().count() > 8);
-        for line in ended.stdout.lines() {
-            assert!(line.chars().count() <= COLUMNS, "{line}");
-            assert!(
-                !line.contains('\x1b'),
-                "colours where there is no terminal: {line}"
-            );
-        }
+        compare(a, b, flags).well().assert_table_fits(8);
     }
 }
 
@@ -121,7 +105,12 @@ fn mistakes_are_explained() {
     for (a, b, flags, expected) in [
         ("clever", "greedy", "", "neither a built-in agent (random, "),
         ("greedy", manifest, "", "Cargo.toml: not a safetensors file"),
-        ("greedy", folder, "", "directory"),
+        (
+            "greedy",
+            folder,
+            "",
+            "is a directory: name the network file",
+        ),
         (
             SMALL,
             "greedy",
@@ -145,33 +134,17 @@ fn mistakes_are_explained() {
             "possible values: half, one",
         ),
     ] {
-        let ended = compare(a, b, flags);
-        assert!(
-            matches!(ended.code, Some(1 | 2)),
-            "{a} {b} {flags}: {ended:?}"
-        );
-        assert!(
-            ended.stderr.contains(expected),
-            "{a} {b} {flags}: {}",
-            ended.stderr
-        );
-        assert_eq!(ended.stdout, "", "{flags}");
+        compare(a, b, flags).assert_refused(expected);
     }
-    let fits = compare(
+    compare(
         SMALL,
         "greedy",
         "--deals 2 --players 3 --faces 5 --jokers 1",
-    );
-    assert_eq!(fits.code, Some(0), "{}", fits.stderr);
+    )
+    .well();
 }
 
 #[test]
 fn help_shows_an_example() {
-    let help = chefshat(&["compare", "--help"]);
-    assert_eq!(help.code, Some(0));
-    assert!(
-        help.stdout.contains("chefshat compare greedy random"),
-        "{}",
-        help.stdout
-    );
+    typed(&["compare"], "--help").assert_helps("chefshat compare greedy random");
 }

@@ -2,21 +2,15 @@
 
 use serde_json::Value;
 
-use super::run::{Ended, chefshat};
-
-/// Widest line of the table.
-const COLUMNS: usize = 100;
+use super::run::{Ended, typed};
 
 fn mechanics(flags: &str) -> Ended {
-    let mut arguments = vec!["experiment", "mechanics"];
-    arguments.extend(flags.split_whitespace());
-    chefshat(&arguments)
+    typed(&["experiment", "mechanics"], flags)
 }
 
 #[test]
 fn the_table_stands_next_to_the_paper_s() {
-    let ended = mechanics("");
-    assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+    let ended = mechanics("").well();
     assert_eq!(ended.stderr, "", "no progress where there is no terminal");
     assert_eq!(ended.stdout, include_str!("mechanics.txt"));
     assert_eq!(mechanics("--threads 1").stdout, ended.stdout);
@@ -26,29 +20,17 @@ fn the_table_stands_next_to_the_paper_s() {
 #[test]
 fn large_adds_a_column_that_fits() {
     // Not the hundred thousand of --large, which would take long: as many digits.
-    let ended = mechanics("--shifts 1234 --preset paper");
-    assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+    let ended = mechanics("--shifts 1234 --preset paper").well();
     assert!(ended.stdout.contains("1,234 Shifts"), "{}", ended.stdout);
-    let help = mechanics("--help").stdout;
-    assert!(help.contains("100,000 Shifts"), "{help}");
-    assert!(
-        help.contains("chefshat experiment mechanics --large"),
-        "{help}"
-    );
-    for line in ended.stdout.lines() {
-        assert!(line.chars().count() <= COLUMNS, "{line}");
-        assert!(
-            !line.contains('\x1b'),
-            "colours where there is no terminal: {line}"
-        );
-    }
+    ended.assert_table_fits(8);
+    let help = mechanics("--help");
+    help.assert_helps("100,000 Shifts");
+    help.assert_helps("chefshat experiment mechanics --large");
 }
 
 #[test]
 fn json_says_the_same_with_the_rules() {
-    let ended = mechanics("--json --preset original2020");
-    assert_eq!(ended.code, Some(0), "{}", ended.stderr);
-    let result: Value = serde_json::from_str(&ended.stdout).unwrap();
+    let result = mechanics("--json --preset original2020").well().json();
     assert_eq!(
         (&result["seed"], &result["shifts_per_game"]),
         (&0.into(), &250.into())
@@ -98,11 +80,49 @@ fn mistakes_are_explained() {
             "possible values: paper, rulebook, original2020",
         ),
     ] {
-        let ended = mechanics(flags);
-        assert_eq!(ended.code, Some(2), "{ended:?}");
-        assert!(ended.stderr.contains(expected), "{}", ended.stderr);
+        mechanics(flags).assert_refused(expected);
     }
-    let ended = chefshat(&["experiment"]);
-    assert_eq!(ended.code, Some(2));
-    assert!(ended.stderr.contains("mechanics"), "{}", ended.stderr);
+    typed(&["experiment"], "").assert_refused("mechanics");
+}
+
+#[test]
+fn ratings_of_known_skills_are_held_against_them() {
+    let ratings = |flags: &str| typed(&["experiment", "ratings", "--participants", "80"], flags);
+    let told = ratings("--json").well().json();
+    let rows = told["rows"].as_array().unwrap();
+    assert_eq!(rows.len(), 36);
+    for row in rows {
+        let covered = row["covered"].as_f64().unwrap();
+        assert!((0.8..=1.0).contains(&covered), "{row}");
+    }
+    let table = ratings("").well();
+    table.assert_table_fits(36);
+    assert_eq!(ratings("--threads 1").stdout, table.stdout);
+    assert_ne!(ratings("--seed 1").stdout, table.stdout);
+    ratings("--help").assert_helps("chefshat experiment ratings --players 6");
+    ratings("--players 7").assert_refused("--players");
+}
+
+#[test]
+fn duplicate_deals_are_held_against_others() {
+    let duplicates = |flags: &str| typed(&["experiment", "duplicates", "--games", "120"], flags);
+    let told = duplicates("--json").well().json();
+    let rows = told["rows"].as_array().unwrap();
+    let games: Vec<u64> = rows
+        .iter()
+        .map(|row| row["games"].as_u64().unwrap())
+        .collect();
+    assert_eq!(games, [50, 100, 120].repeat(6));
+    let error = |row: &Value, of: &str| row[of].as_f64().unwrap();
+    for alike in rows[..3].iter() {
+        assert!(
+            error(alike, "duplicate_error") < 0.8 * error(alike, "independent_error"),
+            "{alike}"
+        );
+    }
+    let table = duplicates("").well();
+    table.assert_table_fits(8);
+    assert_eq!(duplicates("--threads 1").stdout, table.stdout);
+    assert_ne!(duplicates("--seed 1").stdout, table.stdout);
+    duplicates("--help").assert_helps("chefshat experiment duplicates --games 6400");
 }

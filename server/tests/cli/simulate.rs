@@ -2,33 +2,21 @@
 
 use serde_json::Value;
 
-use super::run::chefshat;
+use super::run::{Ended, typed};
 
-/// Widest line of the table.
-const COLUMNS: usize = 100;
-
-fn words(line: &str) -> Vec<&str> {
-    line.split_whitespace().collect()
-}
-
-fn simulate(flags: &str) -> super::run::Ended {
-    let mut arguments = vec!["simulate"];
-    arguments.extend(words(flags));
-    chefshat(&arguments)
+fn simulate(flags: &str) -> Ended {
+    typed(&["simulate"], flags)
 }
 
 fn json(flags: &str) -> Value {
-    let ended = simulate(&format!("{flags} --json"));
-    assert_eq!(ended.code, Some(0), "{}", ended.stderr);
-    serde_json::from_str(&ended.stdout).unwrap()
+    simulate(&format!("{flags} --json")).well().json()
 }
 
 #[test]
 fn the_same_seed_prints_the_same_on_any_number_of_threads() {
     let flags = "--games 2000 --seed 7 --reward paper";
     for form in ["", " --json"] {
-        let first = simulate(&format!("{flags}{form}"));
-        assert_eq!(first.code, Some(0), "{}", first.stderr);
+        let first = simulate(&format!("{flags}{form}")).well();
         assert_eq!(first.stderr, "", "no progress where there is no terminal");
         for threads in [
             "",
@@ -51,10 +39,8 @@ fn the_same_seed_prints_the_same_on_any_number_of_threads() {
 
 #[test]
 fn the_table_is_readable() {
-    let ended = simulate("--games 60 --seed 7");
-    assert_eq!(ended.code, Some(0), "{}", ended.stderr);
-    let text = include_str!("simulate.txt");
-    assert_eq!(ended.stdout, text);
+    let ended = simulate("--games 60 --seed 7").well();
+    assert_eq!(ended.stdout, include_str!("simulate.txt"));
 }
 
 #[test]
@@ -64,16 +50,7 @@ fn lines_keep_within_100_columns() {
         "--games 50 --players 6 --faces 15 --preset original2020 --no-exchange --no-special-actions --max-idle-pizzas 1000000 \
          --max-turns 4000000000 --target-shifts 12 --points 1000000,200000,30000,4000,500,60 --max-invalid-attempts 4000000000",
     ] {
-        let ended = simulate(flags);
-        assert_eq!(ended.code, Some(0), "{}", ended.stderr);
-        assert!(ended.stdout.lines().count() > 10);
-        for line in ended.stdout.lines() {
-            assert!(line.chars().count() <= COLUMNS, "{line}");
-            assert!(
-                !line.contains('\x1b'),
-                "colours where there is no terminal: {line}"
-            );
-        }
+        simulate(flags).well().assert_table_fits(10);
     }
 }
 
@@ -151,6 +128,10 @@ fn mistakes_are_explained() {
         ("--players 7", "--players: 7 players: choose 2 to 6"),
         (
             "--preset rulebook --players 3",
+            "--points: the preset rulebook has points for 4 players, not for 3: give the points of each place",
+        ),
+        (
+            "--preset rulebook --players 3 --points 3,2,1,0",
             "--points: 4 numbers of points for 3 players",
         ),
         ("--target-shifts 0", "--target-shifts: a game of 0 Shifts"),
@@ -162,21 +143,11 @@ fn mistakes_are_explained() {
         ("--max-invalid-attempts 0", "--max-invalid-attempts"),
     ];
     for (flags, expected) in table {
-        let ended = simulate(flags);
-        assert!(matches!(ended.code, Some(1 | 2)), "{flags}: {ended:?}");
-        assert!(ended.stderr.contains(expected), "{flags}: {}", ended.stderr);
-        assert_eq!(ended.stdout, "", "{flags}");
+        simulate(flags).assert_refused(expected);
     }
 }
 
 #[test]
 fn help_shows_an_example() {
-    let help = simulate("--help");
-    assert_eq!(help.code, Some(0));
-    assert!(
-        help.stdout
-            .contains("chefshat simulate --games 2000 --seed 7"),
-        "{}",
-        help.stdout
-    );
+    simulate("--help").assert_helps("chefshat simulate --games 2000 --seed 7");
 }

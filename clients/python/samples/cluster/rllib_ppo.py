@@ -29,8 +29,8 @@ from chefshat.learn import network, ppo, ppo_checkpoint
 from chefshat.learn.evaluation import evaluate
 from chefshat.learn.ppo import Params, Samples
 from chefshat.learn.ppo_checkpoint import Plan
-from chefshat.learn.ppo_command import full_rules
 from chefshat.learn.ppo_training import joined, play
+from chefshat.learn.runs import EVALUATION_SEED, SEED_STEP, full_rules
 from chefshat.learn.self_play import Collector
 from chefshat.vector import VectorEnv
 
@@ -40,16 +40,25 @@ class SelfPlayRunner(EnvRunner):  # type: ignore[misc]  # Ray has no types.
 
     def __init__(self, *, config: AlgorithmConfig, **kwargs: Any) -> None:  # noqa: ANN401 - RLlib's.
         super().__init__(config=config, **kwargs)
-        self._plan: Plan = config.env_config["plan"]
-        self._seed = int(config.seed + self.worker_index)
+        setting = config.env_config
+        self._plan: Plan = setting["plan"]
+        # Every runner has deals and chance of its own, and none the deals that the policy is evaluated with.
+        self._chance = jax.random.fold_in(jax.random.key(config.seed), self.worker_index)
         self._calls = 0
-        self.env = VectorEnv(config.env_config["address"], self._plan.games, skip_forced=True, episode="shift", seed=self._seed)
+        self.env = VectorEnv(
+            setting["address"],
+            self._plan.games,
+            skip_forced=True,
+            episode="shift",
+            seed=config.seed + SEED_STEP * self.worker_index,
+            rules=setting["rules"],
+        )
         self._collector = Collector(self.env, self._plan.games, self._plan.steps)
 
     def sample(self, params: Params, **_: Any) -> Samples:  # noqa: ANN401 - RLlib's.
         """Plays `plan.steps` steps."""
         self._calls += 1
-        return play(self._collector, params, jax.random.fold_in(jax.random.key(self._seed), self._calls), self._plan)
+        return play(self._collector, params, jax.random.fold_in(self._chance, self._calls), self._plan)
 
     def assert_healthy(self) -> None:
         """Asks whether the games are there."""
@@ -64,7 +73,7 @@ class SelfPlayRunner(EnvRunner):  # type: ignore[misc]  # Ray has no types.
 
 
 class JaxPPOConfig(AlgorithmConfig):  # type: ignore[misc]
-    """Runners are as above, the rest of what RLlib configures is not needed. `env_config` holds the plan and the address."""
+    """Runners are as above; most of what RLlib configures is not needed. `env_config` holds the plan, the address and the rules."""
 
     def __init__(self, algo_class: type[Algorithm] | None = None) -> None:
         super().__init__(algo_class=algo_class or JaxPPO)
@@ -124,13 +133,14 @@ def main() -> None:
     parser.add_argument("--runners", type=int, default=2, help="runners (default: 2)")
     parser.add_argument("--games", type=int, default=128, help="games of each (default: 128)")
     parser.add_argument("--iterations", type=int, default=3, help="iterations (default: 3)")
-    parser.add_argument("--seed", type=int, default=1, help="where chance comes from (default: 1)")
+    parser.add_argument("--rules", default="paper", metavar="PRESET", help="the rule set (default: paper)")
+    parser.add_argument("--seed", type=int, default=1, help="where chance comes from, 0 to 2147483647 (default: 1)")
     parser.add_argument("--out", type=Path, metavar="FILE", help="write the network to this file")
     options = parser.parse_args()
 
     ray.init(address=options.ray, include_dashboard=False, log_to_driver=False)
     plan = Plan(games=options.games, steps=64)
-    setting = {"plan": plan, "address": options.address, "rules": full_rules(None, options.address)}
+    setting = {"plan": plan, "address": options.address, "rules": full_rules(options.rules, options.address)}
     config = (
         JaxPPOConfig().environment(env_config=setting).env_runners(num_env_runners=options.runners).debugging(seed=options.seed)
     )
@@ -143,7 +153,7 @@ def main() -> None:
             )
         trained = algorithm.network("rllib")
         for opponents in ("random", "greedy"):
-            print(evaluate(trained, opponents, games=200, seed=2, address=options.address))
+            print(evaluate(trained, opponents, games=200, seed=EVALUATION_SEED, rules=setting["rules"], address=options.address))
         if options.out:
             network.save(options.out, trained.layers, trained.info, dtype=np.float16)
     finally:

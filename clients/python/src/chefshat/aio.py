@@ -6,7 +6,7 @@ The protocol of playing is not here but in `session`; here are the connection, i
 import asyncio
 import random
 from collections.abc import AsyncIterator, Awaitable, Mapping, Sequence
-from typing import Self, TypeAlias, TypeVar
+from typing import Self, TypeAlias
 
 import grpc
 import grpc.aio
@@ -17,21 +17,24 @@ from chefshat._gen.chefshat.v1.record_service_pb2_grpc import RecordServiceStub
 from chefshat._gen.chefshat.v1.room_service_pb2_grpc import RoomServiceStub
 from chefshat._gen.chefshat.v1.server_service_pb2_grpc import ServerServiceStub
 from chefshat._gen.chefshat.v1.spectator_service_pb2_grpc import SpectatorServiceStub
+from chefshat._gen.chefshat.v1.tournament_service_pb2_grpc import TournamentServiceStub
 from chefshat.agents import Agent
 from chefshat.backoff import Backoff
 from chefshat.errors import ChefsHatError, connection_lost, from_rpc_error
+from chefshat.participant import MakeAgent
 from chefshat.place import Ask
+from chefshat.requests import awaited
 from chefshat.result import SeatResult
 from chefshat.session import PlayOptions, PlaySession
+from chefshat.tournaments import AsyncTournamentCalls
 
 # Seconds the server has to end a stream whose seats are all done.
 FAREWELL_S = 1.0
 
-Answered = TypeVar("Answered")
 PlayCall: TypeAlias = "grpc.aio.StreamStreamCall[pb.PlayRequest, pb.PlayResponse]"
 
 
-class Client:
+class Client(AsyncTournamentCalls):
     """A connection to a server, made when first needed. Close it, or use it as an asynchronous context manager.
 
     Make it where the event loop runs. Every method raises `ChefsHatError` with the server's reason when the server refuses, or
@@ -53,6 +56,7 @@ class Client:
         self._server = ServerServiceStub(self._channel)
         self._records = RecordServiceStub(self._channel)
         self._spectators = SpectatorServiceStub(self._channel)
+        self._tournaments = TournamentServiceStub(self._channel)
 
     async def __aenter__(self) -> Self:
         return self
@@ -78,7 +82,7 @@ class Client:
     ) -> pb.CreateRoomResponse:
         """Makes a room; the arguments are those of the blocking client."""
         request = requests.create_room(name, rules, seats, policy, game_seed, branch, hands, durability)
-        return await _called(self._rooms.CreateRoom(request))
+        return await awaited(self._rooms.CreateRoom(request))
 
     async def join_room(
         self,
@@ -91,17 +95,17 @@ class Client:
     ) -> pb.JoinRoomResponse:
         """Takes a seat: the one named, or the first free one that admits the kind. Returns the room, the seat and its ticket."""
         request = pb.JoinRoomRequest(room_id=room_id, join_code=join_code, name=name, kind=kind, seat=seat)
-        return await _called(self._rooms.JoinRoom(request))
+        return await awaited(self._rooms.JoinRoom(request))
 
     async def get_room(self, room_id: str) -> pb.Room:
         """The room as everybody sees it."""
-        return (await _called(self._rooms.GetRoom(pb.GetRoomRequest(room_id=room_id)))).room
+        return (await awaited(self._rooms.GetRoom(pb.GetRoomRequest(room_id=room_id)))).room
 
     async def list_rooms(self, state: pb.RoomState.ValueType = pb.ROOM_STATE_UNSPECIFIED) -> AsyncIterator[pb.Room]:
         """The server's rooms, newest last; those in one state alone if it is given. Pages are fetched as they are needed."""
         token = ""
         while True:
-            page = await _called(self._rooms.ListRooms(pb.ListRoomsRequest(state=state, page_token=token)))
+            page = await awaited(self._rooms.ListRooms(pb.ListRoomsRequest(state=state, page_token=token)))
             for room in page.rooms:
                 yield room
             token = page.next_page_token
@@ -111,21 +115,21 @@ class Client:
     async def close_room(self, room_id: str, owner_token: str) -> pb.Room:
         """Closes a room with the token its creator got; a running game is aborted."""
         request = pb.CloseRoomRequest(room_id=room_id, owner_token=owner_token)
-        return (await _called(self._rooms.CloseRoom(request))).room
+        return (await awaited(self._rooms.CloseRoom(request))).room
 
     async def server_info(self) -> pb.GetServerInfoResponse:
         """Version, limits, presets and built-in agents of the server."""
-        return await _called(self._server.GetServerInfo(pb.GetServerInfoRequest()))
+        return await awaited(self._server.GetServerInfo(pb.GetServerInfoRequest()))
 
     async def action_table(self, faces: int = 0) -> pb.GetActionTableResponse:
         """The text of every action for decks of so many faces (0: the standard 11)."""
-        return await _called(self._server.GetActionTable(pb.GetActionTableRequest(faces=faces)))
+        return await awaited(self._server.GetActionTable(pb.GetActionTableRequest(faces=faces)))
 
     async def records(self, wanted: pb.RecordFilter | None = None) -> AsyncIterator[pb.RecordSummary]:
         """The records the server holds, oldest first; those a filter lets through if one is given. Pages are fetched as needed."""
         token = ""
         while True:
-            page = await _called(self._records.ListRecords(pb.ListRecordsRequest(filter=wanted, page_token=token)))
+            page = await awaited(self._records.ListRecords(pb.ListRecordsRequest(filter=wanted, page_token=token)))
             for summary in page.records:
                 yield summary
             token = page.next_page_token
@@ -170,11 +174,11 @@ class Client:
 
     async def express(self, ticket: str, expression: pb.Expression) -> None:
         """Expresses something for the seat of the ticket, at any time."""
-        await _called(self._play.Act(pb.ActRequest(ticket=ticket, express=expression)))
+        await awaited(self._play.Act(pb.ActRequest(ticket=ticket, express=expression)))
 
     async def resume_seat(self, ticket: str) -> None:
         """Says that the seat's agent plays itself again after a substitute has."""
-        await _called(self._play.Act(pb.ActRequest(ticket=ticket, resume=pb.ResumeSeat())))
+        await awaited(self._play.Act(pb.ActRequest(ticket=ticket, resume=pb.ResumeSeat())))
 
     async def play(self, agent: Agent, ticket: str, *, options: PlayOptions | None = None) -> SeatResult:
         """Plays one seat until its game is over. Raises the seat's error if it leaves before that."""
@@ -197,6 +201,22 @@ class Client:
             The result of each ticket.
         """
         session = PlaySession(agents, options)
+        await self._play_session(session)
+        return session.results()
+
+    async def play_tournament(self, ticket: str, make_agent: MakeAgent, *, options: PlayOptions | None = None) -> list[SeatResult]:
+        """Takes part in a tournament until it is over, in as many games at a time as the participant said it can play.
+
+        The server seats the participant in its games; all are played over one stream. A lost connection is made again, and the
+        agents go on with their games. Those whose `decide` is a coroutine think at the same time. The arguments, the results and
+        what is raised are those of the blocking client.
+        """
+        session = PlaySession.of_participant(ticket, make_agent, options)
+        await self._play_session(session)
+        return session.played()
+
+    async def _play_session(self, session: PlaySession) -> None:
+        """Plays until the session is done, over as many connections as it takes."""
         failures = 0
         run = _Run(session)
         try:
@@ -213,7 +233,6 @@ class Client:
                     session.give_up(final)
         finally:
             await run.end()
-        return session.results()
 
     async def _wait(self, failures: int, error: ChefsHatError) -> None:
         """Waits before the next attempt to connect, or raises the error if there is to be none."""
@@ -316,11 +335,3 @@ async def _part(call: PlayCall) -> None:
                 pass
     except TimeoutError:
         return  # The caller cancels the call.
-
-
-async def _called(call: Awaitable[Answered]) -> Answered:
-    """Awaits one unary call, turning gRPC's error into ours."""
-    try:
-        return await call
-    except grpc.RpcError as error:
-        raise from_rpc_error(error) from error

@@ -3,6 +3,7 @@
 Columns themselves are in `columns`; the stream that batches come over is in `vector`.
 """
 
+import os
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,6 +11,7 @@ import numpy as np
 
 from chefshat import pb
 from chefshat.columns import Beginnings, Column, Endings, ShiftStatistics, Situations, Sizes, Totals
+from chefshat.files import write_record
 from chefshat.transitions import Memory, RewardFunction, Transitions
 
 
@@ -27,12 +29,22 @@ class GameRecord:
     index: int
     lines: tuple[pb.RecordLine, ...]
 
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes it as a file, whole or not at all, in the form that `chefshat verify` and `replay.from_records` read.
+
+        Raises `OSError` if it cannot be written.
+        """
+        write_record(path, self.lines)
+
 
 class Batch(Situations):
     """The decisions that wait for the client, a row for each, and what has happened since the batch before.
 
     A game has one row at most. It has none when it is over and no other follows it, and in the rare case that its other seats took
     so many decisions that they are left for the next step.
+
+    Besides the columns there are tables of their own, `endings` and `beginnings`, and `shifts` and `transitions` if they were asked
+    for; the counts `totals`; and with `records=True` the `records`, a `GameRecord` of each game that has ended since.
     """
 
     games = Column[np.uint32]("<u4")

@@ -7,8 +7,8 @@ import random
 import threading
 import time
 from collections import deque
-from collections.abc import Awaitable, Callable, Coroutine, Iterator, Mapping, Sequence
-from typing import Self, TypeAlias, TypeVar
+from collections.abc import Awaitable, Coroutine, Iterator, Mapping, Sequence
+from typing import Self, TypeAlias
 
 import grpc
 
@@ -18,24 +18,27 @@ from chefshat._gen.chefshat.v1.record_service_pb2_grpc import RecordServiceStub
 from chefshat._gen.chefshat.v1.room_service_pb2_grpc import RoomServiceStub
 from chefshat._gen.chefshat.v1.server_service_pb2_grpc import ServerServiceStub
 from chefshat._gen.chefshat.v1.spectator_service_pb2_grpc import SpectatorServiceStub
+from chefshat._gen.chefshat.v1.tournament_service_pb2_grpc import TournamentServiceStub
 from chefshat.agents import Agent
 from chefshat.backoff import Backoff
 from chefshat.errors import ChefsHatError, connection_lost, from_rpc_error
+from chefshat.participant import MakeAgent
 from chefshat.place import Ask
+from chefshat.requests import called
 from chefshat.result import SeatResult
 from chefshat.session import PlayOptions, PlaySession
+from chefshat.tournaments import TournamentCalls
 
 # Seconds an answer waits for those of the stream's other seats before it is sent.
 FLUSH_AFTER_S = 0.002
 # Seconds the server has to end a stream whose seats are all done.
 FAREWELL_S = 1.0
 
-Answered = TypeVar("Answered")
 # The name exists in grpc's type stubs alone.
 PlayCall: TypeAlias = "grpc._CallIterator[pb.PlayResponse]"
 
 
-class Client:
+class Client(TournamentCalls):
     """A connection to a server, made when first needed. Close it, or use it as a context manager. Threads may share it.
 
     Every method raises `ChefsHatError` with the server's reason when the server refuses, or "UNAVAILABLE" when there is none.
@@ -56,6 +59,7 @@ class Client:
         self._server = ServerServiceStub(self._channel)
         self._records = RecordServiceStub(self._channel)
         self._spectators = SpectatorServiceStub(self._channel)
+        self._tournaments = TournamentServiceStub(self._channel)
 
     def __enter__(self) -> Self:
         return self
@@ -95,7 +99,7 @@ class Client:
             The room, its join code, and the token that closes it.
         """
         request = requests.create_room(name, rules, seats, policy, game_seed, branch, hands, durability)
-        return _called(lambda: self._rooms.CreateRoom(request))
+        return called(lambda: self._rooms.CreateRoom(request))
 
     def join_room(
         self,
@@ -108,11 +112,11 @@ class Client:
     ) -> pb.JoinRoomResponse:
         """Takes a seat: the one named, or the first free one that admits the kind. Returns the room, the seat and its ticket."""
         request = pb.JoinRoomRequest(room_id=room_id, join_code=join_code, name=name, kind=kind, seat=seat)
-        return _called(lambda: self._rooms.JoinRoom(request))
+        return called(lambda: self._rooms.JoinRoom(request))
 
     def get_room(self, room_id: str) -> pb.Room:
         """The room as everybody sees it."""
-        return _called(lambda: self._rooms.GetRoom(pb.GetRoomRequest(room_id=room_id))).room
+        return called(lambda: self._rooms.GetRoom(pb.GetRoomRequest(room_id=room_id))).room
 
     def list_rooms(self, state: pb.RoomState.ValueType = pb.ROOM_STATE_UNSPECIFIED) -> Iterator[pb.Room]:
         """The server's rooms, newest last; those in one state alone if it is given. Pages are fetched as they are needed."""
@@ -125,20 +129,20 @@ class Client:
                 return
 
     def _rooms_page(self, request: pb.ListRoomsRequest) -> pb.ListRoomsResponse:
-        return _called(lambda: self._rooms.ListRooms(request))
+        return called(lambda: self._rooms.ListRooms(request))
 
     def close_room(self, room_id: str, owner_token: str) -> pb.Room:
         """Closes a room with the token its creator got; a running game is aborted."""
         request = pb.CloseRoomRequest(room_id=room_id, owner_token=owner_token)
-        return _called(lambda: self._rooms.CloseRoom(request)).room
+        return called(lambda: self._rooms.CloseRoom(request)).room
 
     def server_info(self) -> pb.GetServerInfoResponse:
         """Version, limits, presets and built-in agents of the server."""
-        return _called(lambda: self._server.GetServerInfo(pb.GetServerInfoRequest()))
+        return called(lambda: self._server.GetServerInfo(pb.GetServerInfoRequest()))
 
     def action_table(self, faces: int = 0) -> pb.GetActionTableResponse:
         """The text of every action for decks of so many faces (0: the standard 11)."""
-        return _called(lambda: self._server.GetActionTable(pb.GetActionTableRequest(faces=faces)))
+        return called(lambda: self._server.GetActionTable(pb.GetActionTableRequest(faces=faces)))
 
     def records(self, wanted: pb.RecordFilter | None = None) -> Iterator[pb.RecordSummary]:
         """The records the server holds, oldest first; those a filter lets through if one is given. Pages are fetched as needed."""
@@ -151,7 +155,7 @@ class Client:
                 return
 
     def _records_page(self, request: pb.ListRecordsRequest) -> pb.ListRecordsResponse:
-        return _called(lambda: self._records.ListRecords(request))
+        return called(lambda: self._records.ListRecords(request))
 
     def record(self, game_id: str) -> Iterator[pb.RecordLine]:
         """The record of a game that has ended, line by line."""
@@ -190,11 +194,11 @@ class Client:
 
     def express(self, ticket: str, expression: pb.Expression) -> None:
         """Expresses something for the seat of the ticket, at any time and from any thread."""
-        _called(lambda: self._play.Act(pb.ActRequest(ticket=ticket, express=expression)))
+        called(lambda: self._play.Act(pb.ActRequest(ticket=ticket, express=expression)))
 
     def resume_seat(self, ticket: str) -> None:
         """Says that the seat's agent plays itself again after a substitute has."""
-        _called(lambda: self._play.Act(pb.ActRequest(ticket=ticket, resume=pb.ResumeSeat())))
+        called(lambda: self._play.Act(pb.ActRequest(ticket=ticket, resume=pb.ResumeSeat())))
 
     def play(self, agent: Agent, ticket: str, *, options: PlayOptions | None = None) -> SeatResult:
         """Plays one seat until its game is over. Raises the seat's error if it leaves before that."""
@@ -217,6 +221,34 @@ class Client:
             The result of each ticket.
         """
         session = PlaySession(agents, options)
+        self._play_session(session)
+        return session.results()
+
+    def play_tournament(self, ticket: str, make_agent: MakeAgent, *, options: PlayOptions | None = None) -> list[SeatResult]:
+        """Takes part in a tournament until it is over, in as many games at a time as the participant said it can play.
+
+        The server seats the participant in its games; all are played over one stream. A lost connection is made again, and the
+        agents go on with their games. They decide one after the other, as in `play_many`.
+
+        Args:
+            ticket: the participant's, from `join_tournament`.
+            make_agent: called with the seat for every game the participant is seated in; gives the game's agent.
+            options: how the seats attach.
+
+        Returns:
+            What came of each game, in the order in which the participant was seated. One that was aborted, or that could not be
+            played to its end here (`error`), is among them; the server counts it as it ended, or calls it again.
+
+        Raises:
+            ChefsHatError: the ticket was refused, a newer connection takes part in this one's place ("SUPERSEDED"), or the server
+                stayed unreachable. What had come of games by then their agents were told (`on_game_over`).
+        """
+        session = PlaySession.of_participant(ticket, make_agent, options)
+        self._play_session(session)
+        return session.played()
+
+    def _play_session(self, session: PlaySession) -> None:
+        """Plays until the session is done, over as many connections as it takes."""
         failures = 0
         while not session.done:
             before = session.progress
@@ -228,7 +260,6 @@ class Client:
                 self._wait(failures, error)
             except ChefsHatError as final:
                 session.give_up(final)
-        return session.results()
 
     def _wait(self, failures: int, error: ChefsHatError) -> None:
         """Waits before the next attempt to connect, or raises the error if there is to be none."""
@@ -350,11 +381,3 @@ def _part(call: "PlayCall") -> None:
         return  # However the stream ended, the games are over.
     finally:
         limit.cancel()
-
-
-def _called(call: Callable[[], Answered]) -> Answered:
-    """Runs one unary call, turning gRPC's error into ours."""
-    try:
-        return call()
-    except grpc.RpcError as error:
-        raise from_rpc_error(error) from error

@@ -82,6 +82,9 @@ def from_rpc_error(error: grpc.RpcError) -> ChefsHatError:
     message = getattr(error, "details", lambda: None)() or ""
     trailers = getattr(error, "trailing_metadata", lambda: None)() or ()
     reason, metadata = _error_info(trailers)
+    if code is grpc.StatusCode.UNAVAILABLE and not reason:
+        # These are gRPC's own words, which say where it tried.
+        message = f"no server answers ({message}): see that `chefshat serve` runs there, and give its address as HOST:PORT"
     return ChefsHatError(reason or code.name, message, metadata, code)
 
 

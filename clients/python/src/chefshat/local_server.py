@@ -25,11 +25,19 @@ START_S = 60.0
 STOP_S = 5.0
 #: Options of a server that keeps nothing, and that nobody waits for.
 IN_MEMORY = ("--no-records", "--grace", "0")
+# What the program is needed for, unless it is something else.
+SERVING = "start a server"
 _NAME = "chefshat.exe" if os.name == "nt" else "chefshat"
 
 
-def find_binary() -> Path:
-    """Finds the program: `CHEFSHAT_BIN`, else `chefshat` on the PATH, else what cargo built in the repository this package lies in.
+def find_binary(purpose: str = SERVING, instead: str = "; or give the address of a server that runs already") -> Path:
+    """Finds the program: `CHEFSHAT_BIN`, else `chefshat` on the PATH, else what cargo built in the repository.
+
+    The repository is the one this package lies in, else the one the process was started in.
+
+    Args:
+        purpose: what it is needed for, in words.
+        instead: how to do without it, in words; may be empty.
 
     Raises:
         ChefsHatError: there is none; the message says how to get one.
@@ -49,14 +57,15 @@ def find_binary() -> Path:
         return max(built, key=lambda path: path.stat().st_mtime)
     raise ChefsHatError(
         "BINARY_MISSING",
-        "there is no chefshat program to start a server with. Build it (in the repository: cargo build --release --bin chefshat), "
-        f"put it on the PATH or name it in the environment variable {BINARY}; or give the address of a server that runs already",
+        f"there is no chefshat program to {purpose}. Build it (in the repository: cargo build --release --bin chefshat), then run "
+        f"this within the repository, put the program on the PATH or name it in the environment variable {BINARY}{instead}",
     )
 
 
 def _cargo_targets() -> list[Path]:
-    """Where cargo puts the program, if this file lies in a checkout of the project."""
-    for folder in Path(__file__).resolve().parents:
+    """Where cargo puts the program, if this file or else the working directory lies in a checkout of the project."""
+    here = Path.cwd()
+    for folder in (*Path(__file__).resolve().parents, here, *here.parents):
         if (folder / "Cargo.toml").is_file() and (folder / "proto" / "chefshat").is_dir():
             return [folder / "target" / profile / _NAME for profile in ("release", "debug")]
     return []

@@ -5,7 +5,7 @@ from typing import NamedTuple
 from chefshat import pb
 from chefshat.agents import Agent
 from chefshat.decision import Decision, SeatInfo
-from chefshat.result import SeatResult, Standing
+from chefshat.result import Standing
 
 
 class Ask(NamedTuple):
@@ -51,7 +51,6 @@ class SeatPlace:
         self.invalid = 0
         self.late = 0
         self.annotations_dropped = 0
-        self.result: SeatResult | None = None
         # Agents that do not listen cost no call per event.
         self.hears_events = type(agent).on_event is not Agent.on_event
         self.hears_results = type(agent).on_result is not Agent.on_result

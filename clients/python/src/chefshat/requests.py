@@ -1,11 +1,14 @@
-"""What both clients share around a call: where the server is, how the channel behaves, and how arguments become requests."""
+"""What both clients share around a call: where the server is, how the channel behaves, what becomes of arguments and of errors."""
 
-from collections.abc import Sequence
-from typing import NamedTuple, TypeAlias
+from collections.abc import Awaitable, Callable, Sequence
+from typing import NamedTuple, TypeAlias, TypeVar
 
 import grpc
 
 from chefshat import pb
+from chefshat.errors import from_rpc_error
+
+Answered = TypeVar("Answered")
 
 # Times in milliseconds. Waits between attempts to connect are `Backoff`'s business, so the channel's own are kept short. (But not
 # "grpc.min_reconnect_backoff_ms", which despite its name bounds how long one attempt may take.) Pings notice a peer that is gone
@@ -91,3 +94,32 @@ def seat_config(seat: SeatSpec) -> pb.SeatConfig:
 def watch_request(room_id: str, last_sequence: int) -> pb.SpectatorServiceWatchRequest:
     """The request for a room's events after `last_sequence`; all of them if that is 0."""
     return pb.SpectatorServiceWatchRequest(room_id=room_id, from_sequence=last_sequence + 1 if last_sequence else 0)
+
+
+def attach(
+    ticket: str, request_id: int, last_sequence: int, entropy: bytes, delivery: pb.EventDelivery.ValueType
+) -> pb.SeatCommand:
+    """The command that attaches a seat, from the event after `last_sequence` (0: from the first), or a tournament's participant."""
+    command = pb.SeatCommand()
+    command.attach.ticket = ticket
+    command.attach.request_id = request_id
+    command.attach.from_sequence = last_sequence + 1 if last_sequence else 0
+    command.attach.delivery = delivery
+    command.attach.entropy = entropy
+    return command
+
+
+def called(call: Callable[[], Answered]) -> Answered:
+    """Runs one unary call, turning gRPC's error into ours."""
+    try:
+        return call()
+    except grpc.RpcError as error:
+        raise from_rpc_error(error) from error
+
+
+async def awaited(call: Awaitable[Answered]) -> Answered:
+    """Awaits one unary call, turning gRPC's error into ours."""
+    try:
+        return await call
+    except grpc.RpcError as error:
+        raise from_rpc_error(error) from error

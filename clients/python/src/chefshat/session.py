@@ -1,7 +1,8 @@
 """The protocol of a `Play` stream without the stream: responses go in, requests come out.
 
-Both clients, blocking and asyncio, drive one `PlaySession` for any number of seats and through any number of connections, so that
-attaching, resuming, answering and ending exist once. There is no IO, clock, thread or waiting here, and no knowledge of the rules.
+Both clients, blocking and asyncio, drive one `PlaySession` for any number of seats, or for those that a participant of a
+tournament is given, and through any number of connections, so that attaching, resuming, answering and ending exist once. There is
+no IO, clock, thread or waiting here, and no knowledge of the rules.
 
 A connection's life, as its driver sees it: `connected()`, send `take_requests()`; for each response `receive(response)`, decide
 what it returns, `answer(...)` each, send `take_requests()`; stop when `done`. When it is lost, `lost()`, and begin again.
@@ -11,14 +12,16 @@ import logging
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import SupportsIndex
+from typing import Self, SupportsIndex
 
 from chefshat import pb
 from chefshat.agents import Agent
 from chefshat.decision import Decision, SeatInfo
 from chefshat.errors import ChefsHatError, from_refused
 from chefshat.limits import MAX_ENTROPY_BYTES, pack, why_not_recorded
+from chefshat.participant import REQUEST_ID, MakeAgent, Participant
 from chefshat.place import Ask, SeatPlace
+from chefshat.requests import attach
 from chefshat.result import SeatResult, abort_reason_of, standings_of
 
 LOG = logging.getLogger("chefshat")
@@ -30,7 +33,8 @@ class PlayOptions:
 
     Attributes:
         entropy: every seat's own part of the game seed, 0..=32 bytes; None: 32 fresh random bytes for each seat, so that nobody
-            alone chose the deals. Counts where it is given before the game starts. The result says what it was.
+            alone chose the deals. Counts where it is given before the game starts. The result says what it was. A participant of a
+            tournament has one for all its games, which counts in those that are dealt independently.
         delivery: how events reach the seats; unspecified means together with the next decision.
 
     Raises:
@@ -45,7 +49,7 @@ class PlayOptions:
             raise ValueError(f"entropy is {len(self.entropy)} bytes long, and {MAX_ENTROPY_BYTES} are allowed")
 
     def draw_entropy(self) -> bytes:
-        """The bytes for one seat."""
+        """The bytes for one seat or participant."""
         return os.urandom(MAX_ENTROPY_BYTES) if self.entropy is None else self.entropy
 
 
@@ -60,41 +64,71 @@ class PlaySession:
             options: how the seats attach.
         """
         self._options = options or PlayOptions()
-        # Request ids count from 1, so that 0 (not set) is no seat's.
-        self._places = [
-            SeatPlace(ticket, index, agent, self._options.draw_entropy()) for index, (ticket, agent) in enumerate(agents.items(), 1)
-        ]
+        # Seats whose games go on, by their request ids, which count from 1, so that 0 (not set) is no seat's.
+        self._places: dict[int, SeatPlace] = {}
+        # Of a seat that is done nothing is kept but its result, lest a long tournament keep all its agents.
+        self._results: dict[int, tuple[str, SeatResult]] = {}
+        self._added = 0
+        self._participant: Participant | None = None
         self._by_handle: dict[int, SeatPlace] = {}
         self._outbox: list[pb.SeatCommand] = []
-        self._open = len(self._places)
         #: Grows whenever the game has moved on for a seat. A connection that brought none was of no use.
         self.progress = 0
+        for ticket, agent in agents.items():
+            self._add(ticket, agent, self._options.draw_entropy())
+
+    @classmethod
+    def of_participant(cls, ticket: str, make_agent: MakeAgent, options: PlayOptions | None = None) -> Self:
+        """Begins a session of the seats that a participant of a tournament will be given, each with an agent of its own."""
+        session = cls({}, options)
+        session._participant = Participant(ticket, make_agent, session._options.draw_entropy())
+        return session
+
+    def _add(self, ticket: str, agent: Agent, entropy: bytes) -> SeatPlace:
+        self._added += 1
+        place = SeatPlace(ticket, self._added, agent, entropy)
+        self._places[place.request_id] = place
+        return place
 
     @property
     def done(self) -> bool:
-        """Whether every seat has its result."""
-        return self._open == 0
+        """Whether every seat has its result and no other is to come."""
+        return not self._places and (self._participant is None or self._participant.over)
 
     def results(self) -> dict[str, SeatResult]:
         """The result of each ticket whose seat is done, in the order of the tickets given."""
-        return {place.ticket: place.result for place in self._places if place.result is not None}
+        return dict(self._in_order())
+
+    def _in_order(self) -> list[tuple[str, SeatResult]]:
+        return [self._results[request_id] for request_id in sorted(self._results)]
+
+    def played(self) -> list[SeatResult]:
+        """What has come of the games of a participant that are over, in the order in which it was seated.
+
+        Raises:
+            ChefsHatError: why it could not take part to the end of the tournament.
+        """
+        if self._participant is not None and self._participant.error is not None:
+            raise self._participant.error
+        return [result for _, result in self._in_order()]
 
     def connected(self) -> None:
-        """A new connection stands: attaches every seat that is not done, from the event after the last one seen."""
+        """A new connection stands: attaches every seat that is not done, from the event after the last one seen.
+
+        Those of a participant come before itself, each with its own ticket: so it is told what it has not seen alone, and how a
+        game ended meanwhile. The server leaves such seats as they are.
+        """
         self._by_handle.clear()
         self._outbox.clear()
-        for place in self._places:
+        delivery = self._options.delivery
+        for place in self._places.values():
             place.handle = None
             place.substituted = False
-            if place.result is not None:
-                continue
-            command = pb.SeatCommand()
-            command.attach.ticket = place.ticket
-            command.attach.request_id = place.request_id
-            command.attach.from_sequence = place.last_sequence + 1 if place.last_sequence else 0
-            command.attach.delivery = self._options.delivery
-            command.attach.entropy = place.entropy
-            self._outbox.append(command)
+            self._outbox.append(attach(place.ticket, place.request_id, place.last_sequence, place.entropy, delivery))
+        participant = self._participant
+        if participant is not None and not participant.over:
+            participant.handle = None
+            self._outbox.append(attach(participant.ticket, REQUEST_ID, 0, participant.entropy, delivery))
 
     def lost(self, unasked: Iterable[Ask] = ()) -> None:
         """The connection is gone. Seats that have seen their game end are done; the others wait for `connected`.
@@ -107,16 +141,17 @@ class PlaySession:
                 place.asked = None
         self._by_handle.clear()
         self._outbox.clear()
-        for place in self._places:
+        for place in list(self._places.values()):
             place.handle = None
-            if place.result is None and place.game_is_over:
+            if place.game_is_over:
                 self._finish(place)
 
     def give_up(self, error: ChefsHatError) -> None:
         """No connection will come any more: every seat that is not done gets this error as its result."""
-        for place in self._places:
-            if place.result is None:
-                self._finish(place, error)
+        for place in list(self._places.values()):
+            self._finish(place, error)
+        if self._participant is not None:
+            self._participant.end(error)
 
     def take_requests(self) -> list[pb.PlayRequest]:
         """What is to be sent now, in order; usually nothing or one request."""
@@ -146,6 +181,8 @@ class PlaySession:
                 continue
             place = by_handle.get(update.handle)
             if place is None:
+                if self._participant is not None:
+                    self._participant_told(self._participant, update)
                 continue
             if what == "decision":
                 self._decision(place, update.decision, asks)
@@ -204,8 +241,28 @@ class PlaySession:
         if place.handle is not None and place.unacknowledged is not None:
             self._outbox.append(pb.SeatCommand(handle=place.handle, answer=place.unacknowledged))
 
+    def _participant_told(self, participant: Participant, update: pb.SeatUpdate) -> None:
+        """What a participant is told on the handle of its own."""
+        if update.HasField("entered"):
+            participant.handle = update.handle
+        elif update.HasField("detached") and update.handle == participant.handle:
+            participant.detached(update.detached.reason)
+
+    def _seated(self, participant: Participant, attached: pb.Attached) -> SeatPlace:
+        """The seat that the server has given a participant: one it has already, or a new one."""
+        for place in self._places.values():
+            if place.info is not None and place.info.game_id == attached.game_id:
+                # The newest handle of a seat is its only one: what becomes of an older does not concern it.
+                if place.handle is not None:
+                    self._by_handle.pop(place.handle, None)
+                return place
+        agent = participant.make_agent(SeatInfo(attached.room_id, attached.game_id, attached.seat))
+        return self._add(attached.ticket, agent, participant.entropy)
+
     def _attached(self, handle: int, attached: pb.Attached) -> None:
-        place = self._place_of_request(attached.request_id)
+        place = self._places.get(attached.request_id)
+        if attached.request_id == 0 and self._participant is not None:
+            place = self._seated(self._participant, attached)
         if place is None:
             return
         place.handle = handle
@@ -220,7 +277,10 @@ class PlaySession:
         self._send_answer(place)
 
     def _refused(self, handle: int, refused: pb.Refused) -> None:
-        place = self._place_of_request(refused.request_id)
+        if refused.request_id == REQUEST_ID and self._participant is not None:
+            self._participant.end(from_refused(refused))
+            return
+        place = self._places.get(refused.request_id)
         if place is not None and place.handle is None:
             self._finish(place, None if place.game_is_over else from_refused(refused))
             return
@@ -319,7 +379,7 @@ class PlaySession:
         place.asked = None
         place.unacknowledged = None
         place.answered = None
-        place.result = SeatResult(
+        result = SeatResult(
             room_id=info.room_id if info else "",
             game_id=info.game_id if info else "",
             seat=info.seat if info else -1,
@@ -334,9 +394,7 @@ class PlaySession:
             entropy=place.entropy,
             error=error,
         )
-        self._open -= 1
+        del self._places[place.request_id]
+        self._results[place.request_id] = (place.ticket, result)
         if error is None:
-            place.agent.on_game_over(place.result)
-
-    def _place_of_request(self, request_id: int) -> SeatPlace | None:
-        return self._places[request_id - 1] if 1 <= request_id <= len(self._places) else None
+            place.agent.on_game_over(result)

@@ -187,6 +187,11 @@ class VectorEnv:
     def __exit__(self, *_: object) -> None:
         self.close()
 
+    @property
+    def closed(self) -> bool:
+        """Whether `close` has been called."""
+        return self._ended is not None and self._ended.reason == "ENV_CLOSED"
+
     def __repr__(self) -> str:
         state = "open" if self._ended is None else self._ended.reason
         return f"VectorEnv(games={self.games}, client_seats={self.client_seats}, {state})"
@@ -253,7 +258,7 @@ class VectorEnv:
     def _check_open(self) -> None:
         if self._ended is None:
             return
-        if self._ended.reason == "ENV_CLOSED":
+        if self.closed:
             raise self._ended
         raise ChefsHatError("ENV_ENDED", f"this VectorEnv has ended ({self._ended}); make a new one") from self._ended
 

@@ -7,6 +7,7 @@
 //! seat, since all games of such a deal tell the same.
 
 mod figures;
+mod same_seat;
 
 use std::num::NonZeroU32;
 use std::sync::Arc;
@@ -21,6 +22,7 @@ use crate::seeds::seating_agent_seed;
 use crate::{AgentKind, BuiltInAgent, Listener, Network, game_seed, play};
 use figures::Tally;
 pub use figures::{Comparison, Figure};
+pub use same_seat::{Measured, Newcomer, SameSeat};
 
 /// Deals that one thread plays at a time. Part of the result: it decides in which groups figures are summed.
 const CHUNK: u64 = 4;

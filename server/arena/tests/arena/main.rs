@@ -13,5 +13,8 @@ mod mechanics;
 mod network;
 mod network_file;
 mod play;
+mod ratings;
 mod recorded;
+mod same_seat;
+mod tournament;
 mod vector;

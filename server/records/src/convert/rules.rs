@@ -1,7 +1,7 @@
 //! Rule sets, roles and the numbering of actions, in both directions.
 
 use chefshat_engine::{
-    ActionSpace, Opening, PassScope, RewardScheme, Role, RuleSet, RuleSetSpec, Stop,
+    ActionSpace, Opening, PassScope, RewardScheme, Role, RuleSet, RuleSetError, RuleSetSpec, Stop,
 };
 use chefshat_proto::v1;
 
@@ -88,8 +88,17 @@ pub fn rules_from_proto(message: &v1::RuleSet) -> Result<RuleSet, FieldProblem> 
     if let Some(max_turns) = message.max_turns {
         spec.max_turns = max_turns;
     }
-    spec.validate()
-        .map_err(|error| FieldProblem::new(error.field(), error.to_string()))
+    spec.validate().map_err(|error| {
+        let said = match error {
+            // Whoever left the points to the preset has not given any number of them.
+            RuleSetError::PointsCount { given, players } if message.points.is_empty() => format!(
+                "the preset {preset} has points for {given} players, not for {players}: give the points of each place \
+                 as well, or choose another preset"
+            ),
+            _ => error.to_string(),
+        };
+        FieldProblem::new(error.field(), said)
+    })
 }
 
 /// A rule set with every field set. The preset is left empty: the fields say it all.

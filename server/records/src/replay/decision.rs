@@ -16,6 +16,8 @@ const MAX_ATTEMPTS: u32 = 10_000;
 pub(super) struct SeatClock {
     /// Decisions it has taken.
     pub(super) decisions: u64,
+    /// Its time for a decision before the bank is touched, milliseconds.
+    pub(super) decision_time_ms: u32,
     /// What is left of its bank, milliseconds.
     pub(super) bank_ms: u32,
     /// Whether a built-in agent holds the seat.
@@ -195,7 +197,7 @@ impl Asked<'_> {
                 self.since_last_ms
             ));
         }
-        let beyond_us = time.saturating_sub(u64::from(self.setup.decision_time_ms) * 1000);
+        let beyond_us = time.saturating_sub(u64::from(self.clock.decision_time_ms) * 1000);
         let bank_us = u64::from(self.clock.bank_ms) * 1000;
         let left = bank_us.saturating_sub(beyond_us) / 1000;
         // The time was cut to whole microseconds after the bank was counted.

@@ -47,7 +47,7 @@ impl<'a> Replay<'a> {
     ) -> Result<Self, Fault> {
         let setup = check(header)?;
         Ok(Self {
-            seats: Seats::new(header, setup.bank_ms),
+            seats: Seats::new(header),
             header,
             lines,
             seeds: None,

@@ -1,6 +1,7 @@
 //! Checking a record's first line: its own form, and that its parts go together. What it says of the seed is checked where the seed is
 //! revealed.
 
+use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
 
 use chefshat_engine::{RULES_VERSION, RewardScheme, RuleSet, Script};
@@ -26,10 +27,6 @@ pub(super) struct Setup {
     pub(super) rules: RuleSet,
     pub(super) scheme: Option<RewardScheme>,
     pub(super) origin: v1::GameOrigin,
-    /// Time for a decision before the bank is touched, milliseconds.
-    pub(super) decision_time_ms: u32,
-    /// The bank of each seat at the beginning, milliseconds.
-    pub(super) bank_ms: u32,
     /// Invalid attempts at one decision after which the default is taken; 0: unlimited.
     pub(super) max_invalid_attempts: u32,
     /// The first Shift, where its hands were given.
@@ -95,8 +92,6 @@ pub(super) fn check(header: &v1::RecordHeader) -> Result<Setup, String> {
         rules,
         scheme: reward_scheme_from_proto(policy.reward_scheme()),
         origin,
-        decision_time_ms: policy.decision_time_ms(),
-        bank_ms: policy.bank_ms(),
         max_invalid_attempts: policy.max_invalid_attempts(),
         script,
         table,
@@ -161,6 +156,18 @@ fn check_policy(policy: &v1::RoomPolicy) -> Result<(), String> {
                 range.start(),
                 range.end()
             ));
+        }
+    }
+    let mut kinds = BTreeSet::new();
+    for clock in &policy.clocks {
+        let times = [
+            (clock.decision_time_ms, 10..=DAY_MS),
+            (clock.bank_ms, 0..=DAY_MS),
+        ];
+        let fits = (times.iter()).all(|(ms, range)| ms.is_none_or(|ms| range.contains(&ms)));
+        let named = clock.kind() != v1::ParticipantKind::Unspecified;
+        if !(fits && named && kinds.insert(clock.kind)) {
+            return Err("policy.clocks has a kind or a time that cannot be".into());
         }
     }
     let known = [

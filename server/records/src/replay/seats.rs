@@ -17,17 +17,29 @@ pub(super) struct Seats {
 }
 
 impl Seats {
-    pub(super) fn new(header: &v1::RecordHeader, bank_ms: u32) -> Self {
+    pub(super) fn new(header: &v1::RecordHeader) -> Self {
+        let policy = header.policy.clone().unwrap_or_default();
         Self {
             occupants: vec![None; header.seats.len()],
             clocks: header
                 .seats
                 .iter()
-                .map(|seat| SeatClock {
-                    decisions: 0,
-                    bank_ms,
-                    built_in: !seat.built_in_agent.is_empty(),
-                    substituted: false,
+                .map(|seat| {
+                    let built_in = !seat.built_in_agent.is_empty();
+                    // The room's own clock goes for its built-in agents, whatever their kind.
+                    let own =
+                        (policy.clocks.iter()).find(|clock| !built_in && clock.kind == seat.kind);
+                    SeatClock {
+                        decisions: 0,
+                        decision_time_ms: own
+                            .and_then(|clock| clock.decision_time_ms)
+                            .unwrap_or(policy.decision_time_ms()),
+                        bank_ms: own
+                            .and_then(|clock| clock.bank_ms)
+                            .unwrap_or(policy.bank_ms()),
+                        built_in,
+                        substituted: false,
+                    }
                 })
                 .collect(),
             begun: false,

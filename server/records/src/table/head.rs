@@ -67,5 +67,6 @@ fn policy(scheme: v1::RewardScheme) -> v1::RoomPolicy {
         spectator_delay_decisions: Some(0),
         spectators_see_hands: Some(false),
         durability: v1::Durability::Durable.into(),
+        clocks: Vec::new(),
     }
 }

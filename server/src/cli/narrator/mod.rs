@@ -13,7 +13,7 @@ use chefshat_engine::{Opening, PassScope, RuleSet, RuleSetSpec, Stop};
 use chefshat_records::convert::rules_from_proto;
 
 use chain::Chain;
-pub(super) use tables::abort_reason;
+pub(super) use tables::{abort_reason, ordinal};
 use text::{BOLD, DIM, GOLD, MAX_NAME, PLAIN, Piece, label, seat_style, wrapped};
 pub(super) use text::{clean, heading, row};
 

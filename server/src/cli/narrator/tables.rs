@@ -112,7 +112,7 @@ impl Narrator {
 }
 
 /// A place: 1st, 2nd, …
-pub(super) fn ordinal(place: u32) -> String {
+pub(in crate::cli) fn ordinal(place: u32) -> String {
     let ending = match place {
         1 => "st",
         2 => "nd",

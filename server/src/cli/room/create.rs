@@ -1,24 +1,19 @@
-//! `chefshat room create`: a room as the flags describe it, and the secrets it comes with. How its game begins is in `start`, the file
-//! with a join code in `code_file`.
+//! `chefshat room create`: a room as the flags describe it, and the secrets it comes with. How its game begins is in `start`.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use chefshat_arena::AgentKind;
 use chefshat_client::v1::{self, create_room_request::Start, seat_config::FilledBy};
-use chefshat_engine::{RewardScheme, RuleSet};
-use chefshat_records::convert::reward_scheme_to_proto;
-use clap::builder::PossibleValuesParser;
-use clap::{Args, ValueEnum};
+use chefshat_engine::RuleSet;
+use clap::Args;
 
 use super::super::connect::{ServerArg, free_seats};
+use super::super::policy_args::PolicyArgs;
 use super::super::rules_args::{RulesArgs, by_flag};
+use super::super::secret_file::SecretFile;
 use super::super::{CommandError, say};
-use super::code_file::CodeFile;
 use super::start::{StartArgs, players_of};
-
-/// Names of the reward schemes, in the order of the protocol's numbers from 1.
-const REWARDS: [&str; 5] = ["validity", "paper", "paper_intended", "winning", "points"];
 
 /// Make a room and say how to join it.
 #[derive(Debug, Args)]
@@ -55,47 +50,9 @@ pub(super) struct Create {
     rules: RulesArgs,
     #[command(flatten)]
     policy: PolicyArgs,
-}
-
-/// Times and limits of a room.
-#[derive(Debug, Args)]
-#[command(next_help_heading = "Times and limits")]
-struct PolicyArgs {
-    /// Milliseconds for a decision; standard 10000.
-    #[arg(long, value_name = "MS")]
-    decision_time_ms: Option<u32>,
-    /// Milliseconds each seat may use beyond that over the whole game; standard 60000.
-    #[arg(long, value_name = "MS")]
-    bank_ms: Option<u32>,
-    /// Invalid attempts at one decision before the default is taken, 0 for no limit; standard 10.
-    #[arg(long, value_name = "N")]
-    max_invalid_attempts: Option<u32>,
-    /// Decisions in a row lost to the clock before a seat is substituted; standard 3.
-    #[arg(long, value_name = "N")]
-    max_timeouts: Option<u32>,
-    /// Milliseconds that the server's own agents wait before they decide; standard 0.
-    #[arg(long, value_name = "MS")]
-    pace_ms: Option<u32>,
     /// Milliseconds to wait for the seats to be filled; standard 3600000.
-    #[arg(long, value_name = "MS")]
+    #[arg(long, value_name = "MS", help_heading = "Times and limits")]
     waiting_time_ms: Option<u32>,
-    /// Rewards told to the seats.
-    #[arg(long, value_name = "SCHEME", value_parser = PossibleValuesParser::new(REWARDS))]
-    reward: Option<String>,
-    /// Decisions by which spectators are behind; standard 0.
-    #[arg(long, value_name = "N")]
-    spectator_delay: Option<u32>,
-    /// What the game outlives; standard durable.
-    #[arg(long)]
-    durability: Option<DurabilityArg>,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum DurabilityArg {
-    /// The death of the server: it goes on where it stood.
-    Durable,
-    /// Nothing; takes less time, and its record is kept when it ends.
-    Ephemeral,
 }
 
 impl Create {
@@ -117,7 +74,7 @@ impl Create {
         let request = self.request(start, players)?;
         // Before there is a room: whoever cannot be told its code has no use for it.
         let code_file = (self.code_file.as_deref())
-            .map(CodeFile::prepare)
+            .map(|file| SecretFile::prepare(file, "--code-file", "a join code"))
             .transpose()?;
         let made = client.create_room(request).await.map_err(refused)?;
         let room = made
@@ -180,33 +137,13 @@ impl Create {
                     filled_by: Some(filled_by),
                 })
                 .collect(),
-            policy: Some(self.policy.message()),
+            policy: Some(v1::RoomPolicy {
+                waiting_time_ms: self.waiting_time_ms,
+                ..self.policy.message()
+            }),
             game_seed: self.game_seed.map_or_else(Vec::new, |seed| seed.to_vec()),
             start,
         })
-    }
-}
-
-impl PolicyArgs {
-    fn message(&self) -> v1::RoomPolicy {
-        let scheme = self.reward.as_deref().and_then(RewardScheme::from_name);
-        v1::RoomPolicy {
-            decision_time_ms: self.decision_time_ms,
-            bank_ms: self.bank_ms,
-            max_invalid_attempts: self.max_invalid_attempts,
-            max_timeouts: self.max_timeouts,
-            pace_ms: self.pace_ms,
-            waiting_time_ms: self.waiting_time_ms,
-            reward_scheme: reward_scheme_to_proto(scheme).into(),
-            spectator_delay_decisions: self.spectator_delay,
-            durability: match self.durability {
-                None => v1::Durability::Unspecified,
-                Some(DurabilityArg::Durable) => v1::Durability::Durable,
-                Some(DurabilityArg::Ephemeral) => v1::Durability::Ephemeral,
-            }
-            .into(),
-            ..v1::RoomPolicy::default()
-        }
     }
 }
 
@@ -348,34 +285,10 @@ mod tests {
     }
 
     #[test]
-    fn a_room_is_durable_or_not() {
-        for (flags, expected) in [
-            ("", v1::Durability::Unspecified),
-            ("--durability durable", v1::Durability::Durable),
-            ("--durability ephemeral", v1::Durability::Ephemeral),
-        ] {
-            let policy = request(flags).expect("a room").policy.expect("a policy");
-            assert_eq!(policy.durability(), expected);
-        }
-    }
-
-    #[test]
     fn too_many_seats_are_refused() {
         let error = request("--players 2 --seat open --seat open --seat open")
             .expect_err("three seats for two");
         assert!(error.to_string().contains("3 seats"), "{error}");
-    }
-
-    #[test]
-    fn every_reward_has_its_scheme() {
-        for name in REWARDS {
-            let policy = request(&format!("--reward {name}"))
-                .expect("a room")
-                .policy
-                .expect("a policy");
-            let wire = policy.reward_scheme().as_str_name();
-            assert_eq!(wire, format!("REWARD_SCHEME_{}", name.to_uppercase()));
-        }
     }
 
     #[test]

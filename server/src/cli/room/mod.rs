@@ -1,6 +1,5 @@
 //! `chefshat room`: rooms of a server, made, listed, shown, watched and closed from the command line.
 
-mod code_file;
 mod create;
 mod show;
 mod start;

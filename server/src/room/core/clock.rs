@@ -79,14 +79,21 @@ impl Core {
         if replayed { REPLAY_COST } else { 1 }
     }
 
+    /// Time a seat has for a decision before its bank is touched.
+    fn decision_time(&self, seat: Seat) -> Duration {
+        let participant = self.seats[seat.index()].participant.as_ref();
+        let policy = &self.header.policy;
+        policy.decision_time_of(participant.map(|participant| participant.kind))
+    }
+
     /// Time a seat has for a decision, its bank included.
-    fn time_allowed(&self, seat: Seat) -> Duration {
-        self.header.policy.decision_time + self.seats[seat.index()].bank_left
+    pub(super) fn time_allowed(&self, seat: Seat) -> Duration {
+        self.decision_time(seat) + self.seats[seat.index()].bank_left
     }
 
     /// What is left of a seat's bank after a decision that took `time`.
     pub(super) fn bank_after(&self, seat: Seat, time: Duration) -> Duration {
-        let beyond = time.saturating_sub(self.header.policy.decision_time);
+        let beyond = time.saturating_sub(self.decision_time(seat));
         self.seats[seat.index()].bank_left.saturating_sub(beyond)
     }
 
@@ -97,7 +104,7 @@ impl Core {
         };
         let used = now.saturating_sub(open.start.unwrap_or(now));
         (
-            self.header.policy.decision_time.saturating_sub(used),
+            self.decision_time(open.decision.seat).saturating_sub(used),
             self.bank_after(open.decision.seat, used),
         )
     }
@@ -152,8 +159,9 @@ impl Core {
     fn holds(&self) -> impl Iterator<Item = (Seat, Duration)> + '_ {
         self.all_seats().filter_map(|seat| {
             let state = &self.seats[seat.index()];
-            (state.participant.is_some() && !state.ever_attached)
-                .then_some((seat, state.joined_at + JOIN_HOLD))
+            // A participant of a tournament has its seat, whenever it comes.
+            let held = self.header.tournament.is_none() && !state.ever_attached;
+            (state.participant.is_some() && held).then_some((seat, state.joined_at + JOIN_HOLD))
         })
     }
 

@@ -16,6 +16,7 @@ impl Core {
             Change::Seated { seat, participant } => {
                 let state = &mut self.seats[seat.index()];
                 state.participant = Some(participant.clone());
+                state.bank_left = self.header.policy.bank_of(Some(participant.kind));
                 state.joined_at = at;
                 state.ever_attached = false;
                 self.log
@@ -44,7 +45,9 @@ impl Core {
                 }
             }
             Change::Substituted(seat) => {
-                self.seats[seat.index()].substituted = true;
+                let state = &mut self.seats[seat.index()];
+                state.substituted = true;
+                state.ever_substituted = true;
                 self.log.push(at, Happening::Substituted(*seat));
             }
             Change::Attempted { .. } => {

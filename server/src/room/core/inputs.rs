@@ -74,6 +74,12 @@ impl Core {
         Ok(seat)
     }
 
+    /// Seats a participant before anybody is told of the room.
+    pub fn seat(&mut self, seat: Seat, participant: SeatedParticipant) {
+        let participant = Box::new(participant);
+        self.commit(Duration::ZERO, Change::Seated { seat, participant });
+    }
+
     /// Attaches a connection to a seat, which asked for it at `arrived`. Whoever was attached before has lost the seat.
     pub fn attach(
         &mut self,
@@ -93,7 +99,9 @@ impl Core {
         state.recalled = false;
         state.connection = Some(connection);
         state.ever_attached = true;
-        if self.state == State::Waiting {
+        // What one table adds to the seed would make its deals other than those of the series.
+        let dealt_alike = self.header.series().is_some();
+        if self.state == State::Waiting && !dealt_alike {
             state.entropy = entropy;
         }
         if state.away || state.substituted {
@@ -186,7 +194,7 @@ impl Core {
             .and_then(|open| open.start)
             .unwrap_or(open.released);
         let time = input.arrived.saturating_sub(start);
-        if time >= self.header.policy.decision_time + self.seats[seat.index()].bank_left {
+        if time >= self.time_allowed(seat) {
             // It arrived after the deadline, before the room was told that the time was up.
             self.tick(now, input.handed);
             return Answered {

@@ -118,6 +118,7 @@ struct SeatState {
     expressions: u32,
     agent: Option<Box<BuiltInAgent>>,
     substituted: bool,
+    ever_substituted: bool,
     decisions: u64,
     timeouts: u32,
     bank_left: Duration,
@@ -198,6 +199,7 @@ impl Core {
                         Fill::Open { .. } => None,
                     },
                     substituted: false,
+                    ever_substituted: false,
                     decisions: 0,
                     timeouts: 0,
                     bank_left: header.policy.bank,
@@ -289,6 +291,11 @@ impl Core {
             .policy
             .max_invalid_attempts
             .unwrap_or(MAX_ATTEMPTS)
+    }
+
+    /// Whether a substitute has played for any seat.
+    pub fn was_substituted(&self) -> bool {
+        self.seats.iter().any(|seat| seat.ever_substituted)
     }
 
     /// Number of decisions taken.

@@ -24,7 +24,6 @@ use crate::room::core::Core;
 use crate::room::delivery::{Attachment, PublicLog};
 use crate::room::handle::{Handle, Message, TellSpace};
 use crate::room::spectators::Spectator;
-use crate::store::journal::GameHeader;
 use crate::store::{Journal, Store};
 
 /// Inputs that are applied before the store is asked once for all of them.
@@ -55,13 +54,7 @@ pub trait RoomWatcher: Send + Sync {
     fn gone(&self, room: Id);
 }
 
-/// Starts a room.
-pub fn start(header: Arc<GameHeader>, journal: Box<dyn Journal>, context: TaskContext) -> Handle {
-    let clock = RoomClock::of_age(Duration::ZERO);
-    go_on(Core::new(header), clock, None, journal, context)
-}
-
-/// Starts a room whose game may have begun before. `over_since`: the game is over, and everything that follows from that has been done.
+/// Starts a room, whose game may have begun before. `over_since`: the game is over, and everything that follows from that has been done.
 pub fn go_on(
     core: Core,
     clock: RoomClock,

@@ -127,7 +127,7 @@ impl Task {
             request.ended,
             Arc::clone(&self.on_space),
         );
-        attachment.greet(&self.core, seat, request.request_id);
+        attachment.greet(&self.core, seat, request.request_id, request.told_ticket);
         let older = self.attachments[seat.index()].replace(attachment);
         if let Some(mut older) = older {
             older.detach(v1::DetachReason::Superseded);

@@ -25,6 +25,7 @@ use tracing::error;
 pub use open::OpenError;
 
 use super::journal::GameHeader;
+use super::tournaments::{KeptTournament, TournamentEntry, TournamentHeader};
 use super::{Journal, KeptGame, LeftGame, Store, StoreError};
 use crate::ids::Id;
 use crate::room::policy::Durability;
@@ -179,6 +180,35 @@ impl Store for SqliteStore {
 
     fn note_filed(&self, game_id: Id) -> BoxFuture<'_, Result<(), StoreError>> {
         self.orders.give(Order::Filed { game_id }).boxed()
+    }
+
+    fn create_tournament(
+        &self,
+        header: Arc<TournamentHeader>,
+    ) -> BoxFuture<'_, Result<(), StoreError>> {
+        let order = Order::Tournament {
+            id: header.id,
+            header: form::tournament_to_bytes(&header),
+        };
+        self.orders.give(order).boxed()
+    }
+
+    fn append_tournament(
+        &self,
+        tournament: Id,
+        row: u64,
+        entries: Vec<TournamentEntry>,
+    ) -> BoxFuture<'_, Result<(), StoreError>> {
+        let order = Order::TournamentEntries {
+            id: tournament,
+            position: i64::try_from(row).unwrap_or(i64::MAX),
+            entries: form::tournament_entries_to_bytes(&entries),
+        };
+        self.orders.give(order).boxed()
+    }
+
+    fn tournaments(&self) -> BoxFuture<'_, Result<Vec<KeptTournament>, StoreError>> {
+        self.reader.tournaments().boxed()
     }
 
     fn failed(&self) -> BoxFuture<'static, StoreError> {

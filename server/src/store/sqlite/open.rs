@@ -29,8 +29,14 @@ const READERS: u32 = 4;
 /// Statements that a connection keeps prepared.
 const STATEMENTS: usize = 64;
 /// The migrations, oldest first. Once released, one is never changed.
-const MIGRATIONS: [(i64, &str, &str); 1] =
-    [(1, "games", include_str!("migrations/0001_games.sql"))];
+const MIGRATIONS: [(i64, &str, &str); 2] = [
+    (1, "games", include_str!("migrations/0001_games.sql")),
+    (
+        2,
+        "tournaments",
+        include_str!("migrations/0002_tournaments.sql"),
+    ),
+];
 /// SQLite's codes for a file that is no database, and for one that is damaged.
 const NOT_A_DATABASE: i32 = 26;
 const CORRUPT: i32 = 11;

@@ -15,6 +15,7 @@ use super::form::{self, FORM, Unreadable};
 use super::journals::{DurableJournal, Orders};
 use crate::ids::Id;
 use crate::store::journal::{Entry, GameHeader};
+use crate::store::tournaments::{KeptTournament, TournamentEntry};
 use crate::store::{KeptGame, LeftGame, StoreError};
 
 /// Games that had ended of which the rooms are there again; the last ones, since of earlier ones everybody has heard.
@@ -101,6 +102,48 @@ impl Reader {
             Arc::new(header),
             journal.entries.into(),
         )))
+    }
+
+    /// See `Store::tournaments`.
+    pub(super) async fn tournaments(&self) -> Result<Vec<KeptTournament>, StoreError> {
+        let tournaments =
+            sqlx::query("SELECT number, form, header FROM tournaments ORDER BY number")
+                .fetch_all(&self.0)
+                .await
+                .map_err(failure)?;
+        let mut kept = Vec::with_capacity(tournaments.len());
+        for row in tournaments {
+            let number: i64 = row.get(0);
+            let parts: Vec<Vec<u8>> = sqlx::query_scalar(
+                "SELECT entries FROM tournament_entries WHERE tournament = $1 ORDER BY position",
+            )
+            .bind(number)
+            .fetch_all(&self.0)
+            .await
+            .map_err(failure)?;
+            let header = check_form(row.get(1)).and_then(|()| {
+                let header: Vec<u8> = row.get(2);
+                form::tournament_from_bytes(&header)
+            });
+            let mut entries: Result<Vec<TournamentEntry>, Unreadable> = Ok(Vec::new());
+            for part in &parts {
+                entries = entries.and_then(|mut all| {
+                    all.extend(form::tournament_entries_from_bytes(part)?);
+                    Ok(all)
+                });
+            }
+            match header.and_then(|header| Ok((header, entries?))) {
+                Ok((header, entries)) => kept.push(KeptTournament {
+                    header,
+                    entries,
+                    rows: u64::try_from(parts.len()).unwrap_or(u64::MAX),
+                }),
+                Err(problem) => {
+                    error!(number, %problem, "a tournament cannot be read; it is left as it is");
+                }
+            }
+        }
+        Ok(kept)
     }
 
     /// The journals of all games that go on, by the games' numbers; inside, why one cannot be read. They are found by looking through all

@@ -1,6 +1,7 @@
 //! The database: what is kept is found again. Folders and files that cannot be used are in `opening`.
 
 mod opening;
+mod tournaments;
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -72,6 +73,7 @@ fn header(game: u8, durability: Durability) -> GameHeader {
         created_at_ms: 1_700_000_000_000,
         join_code: "ABCDEFGH".into(),
         owner: SecretHash::of(b"owner"),
+        tournament: None,
     }
 }
 

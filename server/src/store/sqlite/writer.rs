@@ -60,6 +60,14 @@ pub(super) enum Order {
     },
     /// The record of a game has been written to a file.
     Filed { game_id: Id },
+    /// A tournament begins.
+    Tournament { id: Id, header: Vec<u8> },
+    /// A tournament goes on.
+    TournamentEntries {
+        id: Id,
+        position: i64,
+        entries: Vec<u8>,
+    },
     /// Nothing more will be ordered.
     Close,
 }
@@ -207,6 +215,31 @@ async fn write(connection: &mut SqliteConnection, pending: &mut [Pending]) -> sq
                         .await?;
                     summarise(connection, *number, summary).await?;
                 }
+            }
+            Order::Tournament { id, header } => {
+                sqlx::query(
+                    "INSERT INTO tournaments (tournament_id, form, header) VALUES ($1, $2, $3)",
+                )
+                .bind(id.0.as_slice())
+                .bind(FORM)
+                .bind(header.as_slice())
+                .execute(&mut *connection)
+                .await?;
+            }
+            Order::TournamentEntries {
+                id,
+                position,
+                entries,
+            } => {
+                sqlx::query(
+                    "INSERT INTO tournament_entries (tournament, position, entries)
+                     VALUES ((SELECT number FROM tournaments WHERE tournament_id = $1), $2, $3)",
+                )
+                .bind(id.0.as_slice())
+                .bind(*position)
+                .bind(entries.as_slice())
+                .execute(&mut *connection)
+                .await?;
             }
             Order::Filed { game_id } => {
                 sqlx::query("UPDATE games SET filed = 1 WHERE game_id = $1")

@@ -17,9 +17,9 @@ except ImportError as error:
 
 from chefshat import pb
 from chefshat.columns import Situations
-from chefshat.envs.gymnasium_env import wait_for_a_row
+from chefshat.envs.gymnasium_env import check_open, wait_for_a_row
 from chefshat.envs.seeing import Form, ObservationFunction, mask_space
-from chefshat.envs.showing import action_texts, as_text
+from chefshat.envs.showing import RENDER_MODES, action_texts, as_text, check_render_mode
 from chefshat.vector import Batch, VectorEnv
 
 __all__ = ["env", "raw_env"]
@@ -45,7 +45,7 @@ class raw_env(AECEnv[str, Any, Any]):  # type: ignore[misc]  # PettingZoo has no
     """
 
     metadata: ClassVar[dict[str, Any]] = {
-        "render_modes": ["ansi", "human"],
+        "render_modes": list(RENDER_MODES),
         "name": "chefshat_v1",
         "is_parallelizable": False,
         "render_fps": 4,
@@ -72,8 +72,7 @@ class raw_env(AECEnv[str, Any, Any]):  # type: ignore[misc]  # PettingZoo has no
             options: what else `VectorEnv` takes: `episode`, `decisions`, `rules`, `reward_function` and so on.
         """
         super().__init__()
-        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
-            raise ValueError(f'render_mode={render_mode!r}: choose "ansi" or "human", or leave it out')
+        check_render_mode(render_mode)
         if "client_seats" in options or "games" in options:
             raise ValueError("this environment has one game and all seats; for other ways use chefshat.VectorEnv")
         self.render_mode = render_mode
@@ -111,6 +110,7 @@ class raw_env(AECEnv[str, Any, Any]):  # type: ignore[misc]  # PettingZoo has no
 
     def reset(self, seed: int | None = None, options: dict[str, Any] | None = None) -> None:
         """Begins the next episode; games follow from the last seed that was given."""
+        check_open(self.vector)
         if seed is not None:
             self.vector.reset(seed)
         elif self._stepped:

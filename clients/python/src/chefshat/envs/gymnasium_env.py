@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from chefshat import pb
 from chefshat.columns import Situations
-from chefshat.envs.seeing import Form, ObservationFunction, mask_space
-from chefshat.envs.showing import action_texts, as_text
+from chefshat.envs.seeing import Form, ObservationFunction
+from chefshat.envs.showing import RENDER_MODES, action_texts, as_text, check_render_mode
 from chefshat.errors import ChefsHatError
 from chefshat.vector import VectorEnv
 
@@ -30,6 +30,12 @@ def wait_for_a_row(vector: VectorEnv, *, or_an_end: bool = False) -> None:
         vector.step(np.zeros(0, np.uint16))
 
 
+def check_open(vector: VectorEnv) -> None:
+    """Raises Gymnasium's error if the games have been closed."""
+    if vector.closed:
+        raise gymnasium.error.ClosedEnvironmentError("the environment has been closed: make a new one")
+
+
 class ChefsHatEnv(gymnasium.Env[Any, Any]):
     """One seat of a game; the other seats are built-in agents of the server.
 
@@ -44,7 +50,7 @@ class ChefsHatEnv(gymnasium.Env[Any, Any]):
     this decision), and at the end of an episode "place", from 1.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["ansi", "human"], "render_fps": 4}  # type: ignore[misc]
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": list(RENDER_MODES), "render_fps": 4}  # type: ignore[misc]
 
     def __init__(
         self,
@@ -68,8 +74,7 @@ class ChefsHatEnv(gymnasium.Env[Any, Any]):
             render_mode: "ansi": `render()` returns a text; "human": it is printed with each step.
             options: what else `VectorEnv` takes: `opponents`, `episode`, `decisions`, `rules`, `reward_function` and so on.
         """
-        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
-            raise ValueError(f'render_mode={render_mode!r}: choose "ansi" or "human", or leave it out')
+        check_render_mode(render_mode)
         if "client_seats" in options or "games" in options:
             raise ValueError("this environment has one game and one seat: name the seat with seat=, or use chefshat.VectorEnv")
         self.render_mode = render_mode
@@ -77,9 +82,7 @@ class ChefsHatEnv(gymnasium.Env[Any, Any]):
         sizes = self.vector.sizes
         self.action_space = spaces.Discrete(sizes.num_actions)
         self._form = Form(observation, sizes, self.vector.batch)
-        self.observation_space = self._form.space
-        if isinstance(self._form.space, spaces.Dict):
-            self.observation_space = spaces.Dict({**self._form.space, "action_mask": mask_space(sizes)})
+        self.observation_space = self._form.space_with_mask
         #: What the seat sees now, in row 0.
         self._now: Situations = self.vector.batch
         # Whether an episode has begun, and whether a step has been taken in it.
@@ -88,6 +91,7 @@ class ChefsHatEnv(gymnasium.Env[Any, Any]):
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Begins the next episode. Games and their opponents' chance follow from the last seed that was given."""
+        check_open(self.vector)
         super().reset(seed=seed)
         if seed is not None:
             self.vector.reset(seed)
@@ -103,6 +107,7 @@ class ChefsHatEnv(gymnasium.Env[Any, Any]):
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:  # noqa: ANN401 - As Gymnasium has it.
         """Takes the open decision; returns what the seat sees when it decides next, or at the end of the episode."""
+        check_open(self.vector)
         if not self._running:
             raise gymnasium.error.ResetNeeded("the episode is over, or none has begun: call reset()")
         self.vector.step(np.asarray([action]))

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from chefshat import pb
 from chefshat.columns import Endings
-from chefshat.envs.seeing import Form, ObservationFunction, Observed, mask_space
+from chefshat.envs.gymnasium_env import check_open
+from chefshat.envs.seeing import Form, ObservationFunction, Observed
 from chefshat.vector import Batch, VectorEnv
 
 
@@ -24,6 +25,10 @@ class ChefsHatVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
     one of the old is in `infos["final_obs"]`, an array of objects, None where none has ended; `infos["final_info"]` has what goes
     with it. `infos["action_mask"]` is an array of n rows of A numbers, 0 or 1. As in Gymnasium's own, `infos["_key"]` says which
     rows of `infos["key"]` count.
+
+    There is no other mode: the games play on together, so none can stand still for a step as `NEXT_STEP` has it. Gymnasium's
+    `NormalizeObservation` asks for that mode and refuses this environment; most other wrappers know both. The forms "classic" and
+    "table" need no normalizing.
 
     In the rare case that a game's other seats take so many decisions that some are left for the next step, its row stays as it was,
     and its next action is ignored.
@@ -68,9 +73,7 @@ class ChefsHatVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         self.single_action_space = spaces.Discrete(sizes.num_actions)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._form = Form(observation, sizes, self.vector.batch)
-        self.single_observation_space = self._form.space
-        if isinstance(self._form.space, spaces.Dict):
-            self.single_observation_space = spaces.Dict({**self._form.space, "action_mask": mask_space(sizes)})
+        self.single_observation_space = self._form.space_with_mask
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         # What each game was last seen like, for those that have no row in a batch.
         self._seen: Observed | None = None
@@ -91,6 +94,7 @@ class ChefsHatVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         """
         if seed is not None and not isinstance(seed, (int, np.integer)):
             raise TypeError("all games follow from one seed: give a number")
+        check_open(self.vector)
         super().reset(seed=seed)
         chosen = None if options is None else options.get("reset_mask")
         if chosen is not None:
@@ -104,6 +108,9 @@ class ChefsHatVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
 
     def step(self, actions: Any) -> tuple[Any, NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]:  # noqa: ANN401
         """Takes the open decision of each game; `actions` are n integers."""
+        check_open(self.vector)
+        if self._seen is None:
+            raise gymnasium.error.ResetNeeded("no episode has begun: call reset()")
         chosen = np.asarray(actions)
         waiting = self.vector.batch
         if len(waiting) < self.num_envs and chosen.shape == (self.num_envs,):

@@ -30,10 +30,12 @@ class Form:
 
     Attributes:
         space: the space of one observation.
+        space_with_mask: the same, with "action_mask" in it if observations are dictionaries: that of Gymnasium's environments.
         has_parts: whether an observation is a dictionary.
     """
 
     space: "spaces.Space[Any]"
+    space_with_mask: "spaces.Space[Any]"
 
     def __init__(self, observation: str | ObservationFunction, sizes: Sizes, sample: Situations) -> None:
         """Chooses a form.
@@ -64,6 +66,9 @@ class Form:
         else:
             known = ", ".join(map(repr, FORMS))
             raise ValueError(f"observation={observation!r}: choose one of {known}, or give a function of the situations")
+        self.space_with_mask = self.space
+        if isinstance(self.space, spaces.Dict):
+            self.space_with_mask = spaces.Dict({**self.space, "action_mask": mask_space(sizes)})
 
     def of(self, situations: Situations) -> Observed:
         """The observations of all rows."""

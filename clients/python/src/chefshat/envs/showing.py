@@ -8,8 +8,15 @@ from chefshat import pb
 from chefshat.client import Client
 from chefshat.columns import Situations
 
+RENDER_MODES = ("ansi", "human")
 # Legal actions that are listed; the others are counted.
 MAX_LISTED = 12
+
+
+def check_render_mode(render_mode: str | None) -> None:
+    """Raises ValueError if it is neither None nor one of `RENDER_MODES`."""
+    if render_mode is not None and render_mode not in RENDER_MODES:
+        raise ValueError(f'render_mode={render_mode!r}: choose "ansi" or "human", or leave it out')
 
 
 @functools.cache

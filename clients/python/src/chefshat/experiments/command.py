@@ -131,7 +131,10 @@ def _experiment(name: str) -> Callable[[Config, Progress], Result]:
 
 
 def _folder(path: Path) -> Path:
-    path.mkdir(parents=True, exist_ok=True)
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError) as error:
+        raise Refused(f"--out {path}: a file is in the way ({error.filename}), and a folder is wanted") from error
     return path
 
 
@@ -183,4 +186,4 @@ def _finish(made: list[Result], files: list[Path], options: argparse.Namespace) 
         shown = [{key: value for key, value in results.as_json(result).items() if key != "figures"} for result in made]
         print(json.dumps({"results": shown, "files": [str(file) for file in files]}))
     else:
-        print("written: " + ", ".join(str(file) for file in files))
+        print("\n  ".join(["written:", *(str(file) for file in files)]))

@@ -26,6 +26,8 @@ QUICK_SHIFTS = 2
 # Random agents choose among all 200 actions, as the paper's do. Who wins does not depend on it: in the end they take every legal
 # action as often as `random` does.
 OPPONENTS = "random_unmasked"
+# The game, which has as many Shifts as are learned in.
+RULES = "paper"
 # Shifts that curves are averaged over.
 SMOOTHED = 10
 # The beginning and the end of the learning, in Shifts.
@@ -127,7 +129,7 @@ def learn(
         invalid="ask_again",
         total_games=len(config.seeds),
         seed=[_digest(seed) for seed in config.seeds],
-        rules={"preset": "paper", "target_shifts": shifts},
+        rules={"preset": RULES, "target_shifts": shifts},
         shift_statistics=True,
     )
     with env, progress.task(what, total=shifts * len(config.seeds), unit="Shifts") as advance:
@@ -169,9 +171,19 @@ def rules_json(played: Played) -> Mapping[str, object]:
     return dict(MessageToDict(played.rules, preserving_proto_field_name=True))
 
 
-def whole(values: Sequence[float]) -> Estimate:
-    """A count over seeds."""
-    return stats.spread(values, digits=0)
+def count(config: Config, values: Sequence[float]) -> Estimate:
+    """A count over seeds. The mean of a few small ones needs a digit behind the point."""
+    return stats.spread(values, digits=1 if config.quick else 0)
+
+
+def in_words(shifts: int) -> str:
+    """For "the last 50 Shifts", or "the last Shift"."""
+    return "Shift" if shifts == 1 else f"{shifts} Shifts"
+
+
+def of_all(config: Config, name: str) -> str:
+    """What the paper's counts are called: where ours are of fewer Shifts, of how many they are."""
+    return f"{name}, of {paper.SHIFTS}" if config.quick else name
 
 
 def by_seed(config: Config, values: Sequence[float], digits: int = 4) -> dict[str, float]:

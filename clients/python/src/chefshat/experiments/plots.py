@@ -12,6 +12,7 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as Canvas
+from matplotlib.transforms import ScaledTranslation
 
 from chefshat.experiments.results import Figure, Panel
 
@@ -24,10 +25,15 @@ LEVEL_STYLES = ("--", ":", "-.")
 DOTS_PER_INCH = 110
 # Inches.
 PANEL_SIZE = (4.6, 3.2)
+TITLE_HEIGHT = 0.4
 # How far the points of a category stand apart, in all, where categories are 1 apart.
 DODGE = 0.5
-# What fits side by side below two panels.
-MAX_LEGEND_COLUMNS = 3
+# What of a legend fits side by side below two panels or more, and below one.
+LEGEND_COLUMNS = 3
+PANEL_LEGEND_COLUMNS = 2
+# Inches: a line of a legend, and the ticks and the name of x, below which a panel's legend stands.
+LEGEND_LINE = 0.2
+BELOW_TICKS = 0.45
 
 # Of no type, because the stubs of matplotlib want every key spelled out.
 STYLE: Any = {
@@ -40,9 +46,10 @@ STYLE: Any = {
     "axes.axisbelow": True,
     "grid.color": "#E3E3E3",
     "grid.linewidth": 0.7,
-    # Words stay readable where lines pass behind them.
-    "legend.framealpha": 0.8,
-    "legend.edgecolor": "none",
+    "legend.frameon": False,
+    # Inches around a panel.
+    "figure.constrained_layout.w_pad": 0.08,
+    "figure.constrained_layout.h_pad": 0.06,
     "legend.fontsize": 8,
     "lines.linewidth": 1.4,
 }
@@ -50,20 +57,29 @@ STYLE: Any = {
 
 def png(figure: Figure) -> bytes:
     """The figure as a PNG; the same figure gives the same bytes (with the same matplotlib)."""
-    columns = min(figure.columns, len(figure.panels))
-    rows = ceil(len(figure.panels) / columns)
     with mpl.rc_context(STYLE):
-        canvas = Canvas(figsize=(PANEL_SIZE[0] * columns, PANEL_SIZE[1] * rows + 0.6), layout="constrained")
-        FigureCanvasAgg(canvas)
-        canvas.suptitle(figure.title, fontsize=11)
-        drawn = [canvas.add_subplot(rows, columns, number + 1) for number in range(len(figure.panels))]
-        for panel, axes in zip(figure.panels, drawn, strict=True):
-            _draw(panel, axes)
-        _explain(figure, canvas, drawn)
         out = io.BytesIO()
         # Without the version of matplotlib, which is all that would differ.
-        canvas.savefig(out, format="png", dpi=DOTS_PER_INCH, metadata={"Software": None})
+        drawn(figure).savefig(out, format="png", dpi=DOTS_PER_INCH, metadata={"Software": None})
     return out.getvalue()
+
+
+def drawn(figure: Figure) -> Canvas:
+    """The figure as one of matplotlib's; panels keep their size whatever legends stand below them."""
+    columns = min(figure.columns, len(figure.panels))
+    rows = ceil(len(figure.panels) / columns)
+    canvas = Canvas(figsize=(PANEL_SIZE[0] * columns, PANEL_SIZE[1] * rows + TITLE_HEIGHT), layout="constrained")
+    FigureCanvasAgg(canvas)
+    canvas.suptitle(figure.title, fontsize=11)
+    panels = [canvas.add_subplot(rows, columns, number + 1) for number in range(len(figure.panels))]
+    for panel, axes in zip(figure.panels, panels, strict=True):
+        _draw(panel, axes)
+    if _one_legend_serves(figure):
+        lines = _explain_all(figure, canvas, panels, columns)
+    else:
+        lines = rows * max(_explain(axes) for axes in panels)
+    canvas.set_figheight(canvas.get_figheight() + LEGEND_LINE * lines)
+    return canvas
 
 
 def _draw(panel: Panel, axes: Axes) -> None:
@@ -83,20 +99,47 @@ def _draw(panel: Panel, axes: Axes) -> None:
         axes.set_ylim(panel.y_range)
 
 
-def _explain(figure: Figure, canvas: Canvas, drawn: Sequence[Axes]) -> None:
-    """Adds the legend: one below all panels where they show the same, else one in each."""
-    shown = [[line.label for line in panel.lines] + [points.label for points in panel.points] for panel in figure.panels]
-    if len(shown) == 1 or any(labels != shown[0] for labels in shown):
-        for axes in drawn:
-            if axes.get_legend_handles_labels()[0]:
-                axes.legend()
-        return
+def _one_legend_serves(figure: Figure) -> bool:
+    """Whether in all panels the same name has the same look, and the same look the same name."""
+    pairs: set[tuple[str, str]] = set()
+    for panel in figure.panels:
+        pairs |= {(line.label, f"colour {number}") for number, line in enumerate(panel.lines)}
+        pairs |= {(points.label, f"colour {number}") for number, points in enumerate(panel.points)}
+        pairs |= {(level.label, f"level {number}") for number, level in enumerate(panel.levels)}
+    return len({name for name, _ in pairs}) == len({look for _, look in pairs}) == len(pairs)
+
+
+def _explain_all(figure: Figure, canvas: Canvas, panels: Sequence[Axes], columns: int) -> int:
+    """Adds one legend below all panels; returns how many lines it has."""
     handles: dict[str, Any] = {}
-    for axes in drawn:
-        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
-            handles.setdefault(label, handle)
-    columns = min(len(handles), MAX_LEGEND_COLUMNS)
-    canvas.legend(list(handles.values()), list(handles), loc="outside lower center", ncols=columns)
+    for axes in panels:
+        handles |= _handles(axes)
+    levels = {level.label for panel in figure.panels for level in panel.levels}
+    names = sorted(handles, key=lambda name: name in levels)
+    lines = ceil(len(names) / (PANEL_LEGEND_COLUMNS if columns == 1 else LEGEND_COLUMNS))
+    canvas.legend([handles[name] for name in names], names, loc="outside lower center", ncols=ceil(len(names) / lines))
+    return lines
+
+
+def _explain(axes: Axes) -> int:
+    """Adds a legend below one panel, where no line is hidden by it; returns how many lines it has."""
+    handles = _handles(axes)
+    below = ScaledTranslation(0, -BELOW_TICKS, axes.figure.dpi_scale_trans)
+    axes.legend(
+        list(handles.values()),
+        list(handles),
+        loc="upper center",
+        bbox_to_anchor=(0.5, 0.0),
+        bbox_transform=axes.transAxes + below,
+        ncols=PANEL_LEGEND_COLUMNS,
+    )
+    return ceil(len(handles) / PANEL_LEGEND_COLUMNS)
+
+
+def _handles(axes: Axes) -> dict[str, Any]:
+    """What a legend shows, by name."""
+    handles, labels = axes.get_legend_handles_labels()
+    return dict(zip(labels, handles, strict=True))
 
 
 def _draw_points(panel: Panel, axes: Axes) -> None:

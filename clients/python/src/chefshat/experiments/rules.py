@@ -8,16 +8,20 @@ The most attempts that a decision took are among the values.) It is done three t
   results, where Experiment 3 begins with them;
 - with the hand and the board alone, 28 numbers, which is how the paper's text describes the state;
 - with the classic vector, while a pass counts as a wrong action wherever something else is legal, as it does in an early public
-  version of the paper's environment. Since that alone takes thousands of attempts until it is learned, a legal action is taken by
-  chance after ten wrong ones at one decision, as a later version of that environment does (and once more where that is a pass).
+  version of the paper's environment. Since that alone takes thousands of attempts until it is learned, one of the actions that
+  are not wrong is taken by chance after ten wrong ones at one decision, as a later version of that environment does.
 """
 
+import hashlib
+import importlib.metadata
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+import chefshat
 from chefshat.experiments import learning, paper, stats
 from chefshat.experiments.learning import Learned
 from chefshat.experiments.progress import Progress
@@ -47,6 +51,9 @@ CONDITIONS: Mapping[str, Condition] = {
 }
 # The one that Experiment 3 goes on with.
 FIRST = "sees what is legal"
+REWARDS = "validity"
+# Characters of the digest of settings: more than enough to tell apart what lies in one folder.
+DIGEST_LENGTH = 16
 
 
 def run(config: Config, progress: Progress) -> Result:
@@ -58,10 +65,7 @@ def run(config: Config, progress: Progress) -> Result:
         title="Experiment 2: learning the rules",
         seeds=list(config.seeds),
         quick=config.quick,
-        settings={
-            name: {**learning.settings(config, condition.agent), "idle_pass_is_wrong": condition.idle_pass_is_wrong}
-            for name, condition in CONDITIONS.items()
-        },
+        settings={name: _settings(config, name) for name in CONDITIONS},
         rules={name: learning.rules_json(each.played) for name, each in learned.items()},
         tables=[_actions(config, learned), _victories(config, learned)],
         figures=[_figure(learned)],
@@ -70,14 +74,18 @@ def run(config: Config, progress: Progress) -> Result:
 
 
 def networks(config: Config, progress: Progress) -> Layers:
-    """The networks of this experiment, one for each seed: those in the folder if they are of these seeds, else learned now."""
+    """The networks of this experiment, one for each seed.
+
+    Those in the folder, if they were learned with these seeds and settings and by this version; else they are learned now.
+    """
+    digest = _digest(config)
     read = []
     for seed in config.seeds:
         try:
             kept = network.load(_file(config.out, seed))
         except (OSError, NetworkFileError):
             break
-        if kept.info.trained_by != _trained_by(config, seed):
+        if kept.info.trained_by != _trained_by(config, seed, digest):
             break
         read.append(kept)
     else:
@@ -87,6 +95,12 @@ def networks(config: Config, progress: Progress) -> Layers:
     return learned.agents.online
 
 
+def _settings(config: Config, name: str) -> dict[str, object]:
+    """How a condition is learned, as plain values."""
+    condition = CONDITIONS[name]
+    return {**learning.settings(config, condition.agent), "idle_pass_is_wrong": condition.idle_pass_is_wrong}
+
+
 def _learn(config: Config, progress: Progress, name: str) -> Learned:
     condition = CONDITIONS[name]
     return learning.learn(
@@ -94,7 +108,7 @@ def _learn(config: Config, progress: Progress, name: str) -> Learned:
         progress,
         f"rules, {name}",
         agent=condition.agent,
-        rewards="validity",
+        rewards=REWARDS,
         seats=[LEARNER],
         idle_pass_is_wrong=condition.idle_pass_is_wrong,
     )
@@ -102,8 +116,9 @@ def _learn(config: Config, progress: Progress, name: str) -> Learned:
 
 def _keep(config: Config, learned: Learned) -> None:
     """Writes the network of every seed."""
+    digest = _digest(config)
     for number, seed in enumerate(config.seeds):
-        training = Training(CONDITIONS[FIRST].agent, learned.agents, learned.played.rules, _trained_by(config, seed))
+        training = Training(CONDITIONS[FIRST].agent, learned.agents, learned.played.rules, _trained_by(config, seed, digest))
         kept = training.networks(f"deep-q-rules-{seed}")[number]
         network.save(_file(config.out, seed), kept.layers, kept.info)
 
@@ -112,13 +127,29 @@ def _file(folder: Path, seed: int) -> Path:
     return folder / f"rules-seed-{seed}.safetensors"
 
 
-def _trained_by(config: Config, seed: int) -> str:
-    """The command that makes the network of a seed again."""
-    return f"python -m chefshat.experiments rules --seed {seed} --seeds 1{' --quick' if config.quick else ''}"
+def _digest(config: Config) -> str:
+    """Of everything but its seed that a kept network follows from: settings and versions. Others make another network."""
+    with chefshat.Client(config.address) as client:
+        server_version = client.server_info().server_version
+    made_by = {
+        **_settings(config, FIRST),
+        "rules": learning.RULES,
+        "rewards": REWARDS,
+        "seat": LEARNER,
+        "package_version": importlib.metadata.version("chefshat"),
+        "server_version": server_version,
+    }
+    return hashlib.sha256(json.dumps(made_by, sort_keys=True).encode()).hexdigest()[:DIGEST_LENGTH]
+
+
+def _trained_by(config: Config, seed: int, digest: str) -> str:
+    """The command that makes the network of a seed again, and what it was made with."""
+    quick = " --quick" if config.quick else ""
+    return f"python -m chefshat.experiments rules --seed {seed} --seeds 1{quick}  # settings {digest}"
 
 
 def _actions(config: Config, learned: Mapping[str, Learned]) -> Table:
-    begin, end, width = learning.first(config), learning.last(config), learning.window(config)
+    begin, end, width = learning.first(config), learning.last(config), learning.in_words(learning.window(config))
 
     def best_random(each: Learned) -> Estimate:
         return stats.spread(np.max([each.mean_reward(seat) for seat in RANDOM], axis=0).tolist(), digits=2)
@@ -140,8 +171,8 @@ def _actions(config: Config, learned: Mapping[str, Learned]) -> Table:
         row(
             "mean reward of the learner", paper.RULES_REWARD_LEARNER, {n: reward(each, slice(None)) for n, each in learned.items()}
         ),
-        row(f"… in the first {width} Shifts", None, {n: reward(each, begin) for n, each in learned.items()}),
-        row(f"… in the last {width} Shifts", None, {n: reward(each, end) for n, each in learned.items()}),
+        row(f"… in the first {width}", None, {n: reward(each, begin) for n, each in learned.items()}),
+        row(f"… in the last {width}", None, {n: reward(each, end) for n, each in learned.items()}),
         row(
             "mean reward of the best random agent", paper.RULES_REWARD_BEST_RANDOM, {n: best_random(e) for n, e in learned.items()}
         ),
@@ -151,7 +182,7 @@ def _actions(config: Config, learned: Mapping[str, Learned]) -> Table:
             {n: stats.spread(each.mean_wrong(LEARNER)) for n, each in learned.items()},
         ),
         row(
-            f"… in the last {width} Shifts",
+            f"… in the last {width}",
             None,
             {n: stats.spread(each.mean_wrong(LEARNER, end)) for n, each in learned.items()},
         ),
@@ -166,7 +197,7 @@ def _actions(config: Config, learned: Mapping[str, Learned]) -> Table:
             {n: compared(each) for n, each in learned.items()},
         ),
         row(
-            f"passes of the learner, of its turns, last {width} Shifts",
+            f"passes of the learner, of its turns, last {width}",
             None,
             {n: stats.spread(each.share_of_turns("passes", LEARNER, end), percent=True) for n, each in learned.items()},
         ),
@@ -186,14 +217,14 @@ def _victories(config: Config, learned: Mapping[str, Learned]) -> Table:
         [
             f"seat {seat + 1}, {'the learner' if seat == LEARNER else 'random'}",
             printed,
-            *(learning.whole(each.wins(seat)) for each in learned.values()),
+            *(learning.count(config, each.wins(seat)) for each in learned.values()),
         ]
         for seat, printed in enumerate(paper.RULES_WINS)
     ]
     return Table(
         name="victories",
         title=f"Experiment 2: Shifts won of {learning.shifts_of(config)}",
-        columns=["", "paper", *learned],
+        columns=["", learning.of_all(config, "paper"), *learned],
         rows=rows,
         note="Means over the seeds, in brackets the least and the most. The paper speaks of 100 simulations here; its numbers add "
         "up to 250.",

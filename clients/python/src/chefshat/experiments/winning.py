@@ -94,7 +94,14 @@ def _one(config: Config, learned: Mapping[Condition, Learned]) -> Table:
     def share(each: Learned, shifts: slice) -> Estimate:
         return stats.spread([float(won) for won in each.won[:, shifts, LEARNER].mean(axis=1)], percent=True, digits=0)
 
-    printed: list[Cell] = ["the 2020 paper", paper.WINNING_WINS_LEARNER, None, Estimate(1.0, percent=True, digits=0), None, None]
+    printed: list[Cell] = [
+        learning.of_all(config, "the 2020 paper"),
+        paper.WINNING_WINS_LEARNER,
+        None,
+        Estimate(1.0, percent=True, digits=0),
+        None,
+        None,
+    ]
     rows = [printed]
     for condition in ONE:
         each = learned[condition]
@@ -102,8 +109,8 @@ def _one(config: Config, learned: Mapping[Condition, Learned]) -> Table:
         rows.append(
             [
                 condition.name,
-                learning.whole(each.wins(LEARNER)),
-                learning.whole(randoms),
+                learning.count(config, each.wins(LEARNER)),
+                learning.count(config, randoms),
                 share(each, after),
                 share(each, learning.last(config)),
                 stats.spread(each.starter_wins(), percent=True, digits=0),
@@ -116,8 +123,8 @@ def _one(config: Config, learned: Mapping[Condition, Learned]) -> Table:
             "agent, reward",
             "Shifts won by the learner",
             "by a random agent",
-            f"won after the {after.start}th",
-            f"in the last {learning.window(config)}",
+            "won after the first" if after.start == 1 else f"won after the {after.start}th",
+            "in the last one" if learning.window(config) == 1 else f"in the last {learning.window(config)}",
             "starter wins",
         ],
         rows=rows,
@@ -129,7 +136,7 @@ def _one(config: Config, learned: Mapping[Condition, Learned]) -> Table:
 def _four(config: Config, learned: Mapping[Condition, Learned]) -> Table:
     ranked = sorted(paper.WINNING_WINS_FOUR, reverse=True)
     printed: list[Cell] = [
-        "the 2020 paper",
+        learning.of_all(config, "the 2020 paper"),
         *paper.WINNING_WINS_FOUR,
         ranked[0],
         ranked[-1],
@@ -142,9 +149,9 @@ def _four(config: Config, learned: Mapping[Condition, Learned]) -> Table:
         rows.append(
             [
                 condition.name,
-                *(learning.whole(each.wins(seat)) for seat in ALL_SEATS),
-                learning.whole(wins.max(axis=0).tolist()),
-                learning.whole(wins.min(axis=0).tolist()),
+                *(learning.count(config, each.wins(seat)) for seat in ALL_SEATS),
+                learning.count(config, wins.max(axis=0).tolist()),
+                learning.count(config, wins.min(axis=0).tolist()),
                 stats.spread(each.starter_wins(), percent=True, digits=0),
             ]
         )
@@ -179,7 +186,7 @@ def _behaviour(config: Config, learned: Mapping[Condition, Learned]) -> Table:
         )
     return Table(
         name="behaviour",
-        title=f"Experiment 3: what the learners do in the last {learning.window(config)} Shifts",
+        title=f"Experiment 3: what the learners do in the last {learning.in_words(learning.window(config))}",
         columns=["learners", "agent, reward", "mean reward", "wrong actions per Shift", "passes, of turns", "turns of a Shift"],
         rows=rows,
         note="Means over the learners and the seeds, in brackets the least and the most of the seeds. Mean rewards of the two "

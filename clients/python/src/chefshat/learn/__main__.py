@@ -9,6 +9,7 @@ import shlex
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 EXAMPLES = """examples:
   python -m chefshat.learn ppo --out strong.safetensors --minutes 30 --seed 1
@@ -20,7 +21,7 @@ EXAMPLES = """examples:
 
 Without --address a server is started for as long as it is needed.
 
-exit code: 0 done, 1 it failed and the last line says why, 2 the arguments are wrong
+exit code: 0 done, 1 it failed and the last line says why, 2 the arguments are wrong, 130 interrupted
 """
 # Packages of the extra; another one that is missing is a fault of ours.
 EXTRA = ("jax", "jaxlib", "optax", "optuna", "safetensors", "tqdm")
@@ -39,11 +40,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 1
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
-        return 1
+        return 130
 
 
 def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
-    """Reads the options; ends the process with 2 where they are wrong, with 0 after --help."""
+    """Reads the options; ends the process with 2 where they are wrong, with 0 after --help.
+
+    Those that were given, rather than left at their defaults, are also in `given`, by name.
+    """
     parser = argparse.ArgumentParser(
         prog="python -m chefshat.learn",
         description="Trains agents, and lets them play.",
@@ -56,10 +60,20 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         command = commands.add_parser(
             name, help=summary, description=summary, epilog=f"example:\n{example}", formatter_class=_WithDefaults
         )
-        command.set_defaults(module=f"chefshat.learn.{module}")
+        command.register("action", None, _Given)
+        command.set_defaults(module=f"chefshat.learn.{module}", given={})
         command.add_argument("--json", action="store_true", help="print one line of JSON instead of text")
         add_options(command)
     return parser.parse_args(arguments)
+
+
+class _Given(argparse.Action):
+    """Stores a value, and that it was given: a training that goes on must not be contradicted. With nargs=0 it stores `const`."""
+
+    def __call__(self, parser: Any, namespace: Any, values: Any, option: str | None = None) -> None:  # noqa: ANN401 - argparse's.
+        value = self.const if self.nargs == 0 else values
+        setattr(namespace, self.dest, value)
+        namespace.given = {**namespace.given, self.dest: value}
 
 
 class _WithDefaults(argparse.RawDescriptionHelpFormatter, argparse.ArgumentDefaultsHelpFormatter):
@@ -125,7 +139,12 @@ def _deep_q(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--parameters", type=Path, metavar="FILE", help="hyper-parameters that `tune` found (default: the paper's)"
     )
-    command.add_argument("--resume", action="store_true", help="go on from the checkpoint, by its rule set and hyper-parameters")
+    command.add_argument(
+        "--resume",
+        action="store_true",
+        help="go on from the checkpoint, by what it was begun with; the Shifts count from the start",
+    )
+    command.add_argument("--save-every", type=_count, default=50, metavar="SHIFTS", help="how often both files are written")
     command.add_argument("--checkpoint", type=Path, metavar="FILE", help="what a training goes on from (default: OUT as .training)")
 
 
@@ -141,7 +160,9 @@ def _deep_q_games(command: argparse.ArgumentParser) -> None:
     command.add_argument("--seed", type=_natural, default=1, help="where chance comes from")
     command.add_argument("--opponents", default="random", metavar="NAME", help="the built-in agent of the three other seats")
     command.add_argument("--rewards", default="paper", metavar="SCHEME", help="how turns are rewarded")
-    command.add_argument("--mask", action="store_true", help="choose and learn among legal actions alone")
+    command.add_argument(
+        "--mask", action=_Given, nargs=0, const=True, default=False, help="choose and learn among legal actions alone"
+    )
     command.add_argument("--address", metavar="HOST:PORT", help="a server that runs already")
 
 

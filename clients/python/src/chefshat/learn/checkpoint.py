@@ -1,8 +1,8 @@
 """Deep Q agents in files: a network that plays, and a training that goes on where it was.
 
-A network file (see `network`) holds what an agent decides by. A training file holds everything that `deep_q.learn` goes on from,
-to the last bit: networks, optimiser, memories, exploration and chance of all agents; and the rule set. The games that were being
-played are not in it: a training goes on with new ones.
+A network file (see `network`) holds what an agent decides by. A training file (see `training_file`) holds everything that
+`deep_q.learn` goes on from, to the last bit: networks, optimiser, memories, exploration and chance of all agents; and what they are
+trained by. The games that were being played are not in it: a training goes on with new ones.
 """
 
 import dataclasses
@@ -16,21 +16,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import numpy.typing as npt
-import safetensors
-import safetensors.numpy
-from google.protobuf import json_format
 
 from chefshat import pb
-from chefshat.files import write_whole
-from chefshat.learn import deep_q
+from chefshat.learn import deep_q, training_file
 from chefshat.learn.deep_q import Agents, DeepQConfig, Layers
-from chefshat.learn.network import Layer, Network, NetworkInfo
+from chefshat.learn.network import Layer, Network
+from chefshat.learn.training_file import network_info, opened
 
 FORMAT = "chefshat-deep-q-training-1"
-
-
-class TrainingFileError(ValueError):
-    """A file is not a training of this format. The message names the file and what is wrong with it."""
 
 
 @dataclass(frozen=True)
@@ -41,29 +34,26 @@ class Training:
         config: their hyper-parameters.
         agents: the stack.
         rules: the rule set, every field set.
-        trained_by: the command.
+        trained_by: the command, or the commands.
+        opponents: the built-in agent of the other seats; empty: not said.
+        rewards: the scheme that turns are rewarded by; empty: not said.
+        seed: where chance comes from.
+        shifts: Shifts that were played so far.
     """
 
     config: DeepQConfig
     agents: Agents
     rules: pb.RuleSet
     trained_by: str
+    opponents: str = ""
+    rewards: str = ""
+    seed: int = 0
+    shifts: int = 0
 
     def networks(self, name: str) -> list[Network]:
         """The network of every agent, all under one name. Its outputs are those of `deep_q.outputs`, before the tanh."""
-        info = NetworkInfo(
-            input="classic",
-            output="turns",
-            # Without tanh, which changes no order but rounds much to the same 1 or -1: a player would no longer see what is best.
-            output_activation="none",
-            masked=self.config.mask,
-            players=self.rules.players,
-            faces=self.rules.faces,
-            jokers=self.rules.jokers,
-            rules=json_format.MessageToJson(self.rules, indent=None),
-            name=name,
-            trained_by=self.trained_by,
-        )
+        # Tanh changes no order but rounds much to the same 1 or -1: a player would no longer see what is best.
+        info = network_info(self.rules, name, self.trained_by, input="classic", output="turns", masked=self.config.mask)
         return [Network(_layers_of(self.config, self.agents.online, agent), info) for agent in range(len(self.agents.epsilon))]
 
 
@@ -89,58 +79,36 @@ def stacked(config: DeepQConfig, networks: Sequence[Network]) -> Layers:
 
 def save(path: str | os.PathLike[str], training: Training) -> None:
     """Writes a training to a file, whole or not at all. Raises OSError if it cannot be written."""
-    metadata = {
-        "format": FORMAT,
+    texts = {
         "config": json.dumps(dataclasses.asdict(training.config)),
-        "rules": json_format.MessageToJson(training.rules, indent=None),
         "trained_by": training.trained_by,
+        "opponents": training.opponents,
+        "rewards": training.rewards,
+        "seed": str(training.seed),
+        "shifts": str(training.shifts),
     }
-    tensors = {name: np.asarray(leaf) for name, leaf in _named(_plain(training.agents))}
-    write_whole(path, safetensors.numpy.save(tensors, metadata=metadata))
+    training_file.save(path, FORMAT, training.agents, training.rules, texts)
 
 
 def load(path: str | os.PathLike[str]) -> Training:
     """Reads a training from a file. Raises `TrainingFileError` if it is none, OSError if it cannot be read."""
-    with open(path, "rb"):
-        pass  # What cannot be read is an OSError in its own words, not safetensors'.
-    try:
-        with safetensors.safe_open(path, framework="np") as file:
-            metadata = file.metadata() or {}
-            if metadata.get("format") != FORMAT:
-                raise ValueError(f"its format is {metadata.get('format')!r}, not {FORMAT!r}")
-            config_plain = json.loads(metadata["config"])
-            config = DeepQConfig(**{**config_plain, "hidden": tuple(config_plain["hidden"])})
-            rules = json_format.Parse(metadata["rules"], pb.RuleSet())
-            number = len(file.get_tensor("epsilon"))
-            if number == 0:
-                raise ValueError("it holds no agents")
-            # What the arrays must look like, without making them.
-            template = jax.eval_shape(lambda: _plain(deep_q.start(config, range(number))))
-            leaves = []
-            for name, leaf in _named(template):
-                tensor = file.get_tensor(name)
-                if (tensor.shape, tensor.dtype) != (leaf.shape, leaf.dtype):
-                    raise ValueError(f"its {name} is {tensor.dtype}{list(tensor.shape)}, not {leaf.dtype}{list(leaf.shape)}")
-                leaves.append(jnp.asarray(tensor))
-        agents: Agents = jax.tree.unflatten(jax.tree.structure(template), leaves)
-        agents = agents._replace(keys=jax.random.wrap_key_data(agents.keys))
-        return Training(config, agents, rules, metadata.get("trained_by", ""))
-    except KeyError as missing:
-        raise TrainingFileError(f"{os.fspath(path)} is no training: it has no {missing}") from missing
-    except (ValueError, TypeError, safetensors.SafetensorError, json_format.ParseError) as error:
-        raise TrainingFileError(f"{os.fspath(path)} is no training: {error}") from error
-
-
-def _plain(agents: Agents) -> Agents:
-    """With the keys as plain numbers, which a file can hold."""
-    return agents._replace(keys=jax.random.key_data(agents.keys))
-
-
-def _named(agents: Agents) -> list[tuple[str, jax.Array]]:
-    """The arrays with their names, such as "online.0.1"."""
-    return [
-        (jax.tree_util.keystr(path, simple=True, separator="."), leaf) for path, leaf in jax.tree_util.tree_leaves_with_path(agents)
-    ]
+    with opened(path, FORMAT) as contents:
+        texts = contents.texts
+        plain = json.loads(texts["config"])
+        config = DeepQConfig(**{**plain, "hidden": tuple(plain["hidden"])})
+        number = len(contents.tensor("epsilon"))
+        if number == 0:
+            raise ValueError("it holds no agents")
+        return Training(
+            config,
+            contents.state(lambda: deep_q.start(config, range(number))),
+            contents.rules,
+            texts["trained_by"],
+            texts["opponents"],
+            texts["rewards"],
+            int(texts["seed"]),
+            int(texts["shifts"]),
+        )
 
 
 def _layers_of(config: DeepQConfig, layers: Layers, agent: int) -> list[Layer]:

@@ -6,9 +6,10 @@ The log is written by `ppo_command`; the style of pictures is that of the experi
 import argparse
 import json
 
+from chefshat.errors import failed
 from chefshat.experiments import plots
 from chefshat.experiments.results import Figure, Level, Line, Panel
-from chefshat.files import write_whole
+from chefshat.files import check_readable, write_whole
 
 # Half the width of a 95% interval, in standard errors.
 WIDTH_95 = 1.96
@@ -21,9 +22,12 @@ def figure(log: str) -> Figure:
         log: the log, JSON lines.
 
     Raises:
-        ValueError: it holds no look.
+        ValueError: it is no log, or holds no look.
     """
-    lines = [json.loads(line) for line in log.splitlines()]
+    try:
+        lines = [dict(json.loads(line)) for line in log.splitlines()]
+    except (ValueError, TypeError) as error:
+        raise ValueError("this is no log; `python -m chefshat.learn ppo` writes one beside its network, as .jsonl") from error
     looks = [line for line in lines if line.get("event") == "evaluation"]
     rules = [line["rules"] for line in lines if line.get("event") == "setup"]
     if not looks:
@@ -53,11 +57,14 @@ def figure(log: str) -> Figure:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Draws the picture."""
+    """The command. Returns the exit code."""
     try:
+        check_readable(options.log, "log", "`python -m chefshat.learn ppo` writes beside its network, as .jsonl")
         drawn = figure(options.log.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise SystemExit(f"error: {options.log}: {error}") from None
-    write_whole(options.out, plots.png(drawn))
+        write_whole(options.out, plots.png(drawn))
+    except OSError as error:
+        return failed(error, as_json=options.json)
+    except ValueError as error:
+        return failed(ValueError(f"{options.log}: {error}"), as_json=options.json)
     print(json.dumps({"out": str(options.out)}) if options.json else f"wrote {options.out}")
     return 0

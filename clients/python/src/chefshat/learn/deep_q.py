@@ -17,15 +17,18 @@ Where the paper is silent, this is decided:
 - Actions are compared before the tanh, which changes no order but tells apart what single precision rounds to the same 1.
 """
 
+import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from typing import NamedTuple, TypeAlias
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 import optax
+from jax.typing import ArrayLike
 
 Array: TypeAlias = jax.Array
 # Weights (agents, in, out) and biases (agents, out), from the input on.
@@ -88,6 +91,20 @@ class DeepQConfig:
             raise ValueError(f"without see_mask, inputs must be more than outputs ({self.outputs}), not {self.inputs}")
 
 
+class Numbers(NamedTuple):
+    """Those hyper-parameters that neither shapes nor steps depend on: what is compiled for one set of them serves all others.
+
+    They are numpy numbers under the names of `DeepQConfig`. The discount is not among them: compiled in, it is rounded otherwise,
+    and the networks of the experiments in docs/experiments.md would be others.
+    """
+
+    learning_rate: np.float32
+    epsilon_decay: np.float32
+    epsilon_end: np.float32
+    target_every: np.int32
+    wrong_limit: np.int32
+
+
 class Transitions(NamedTuple):
     """What followed a decision, one row an agent. Rows whose agent has nothing to learn are ignored.
 
@@ -134,16 +151,16 @@ class Agents(NamedTuple):
 
 def start(config: DeepQConfig, seeds: Sequence[int]) -> Agents:
     """New agents, one a seed: weights drawn uniformly as by Glorot and Bengio, biases 0, memories empty."""
-    agents: Agents = _started(config, _keys(seeds))
-    return agents
+    agents: Agents = _started(_shapes(config), _keys(seeds))
+    return _exploring(config, agents)
 
 
 def start_from(config: DeepQConfig, online: Layers, seeds: Sequence[int]) -> Agents:
     """New agents that begin with given networks, stacked, and with memory, optimiser and exploration as at a start."""
     if len(seeds) != len(online[0][0]):
         raise ValueError(f"{len(online[0][0])} networks and {len(seeds)} seeds: every agent needs one of each")
-    agents: Agents = _started_from(config, online, _keys(seeds))
-    return agents
+    agents: Agents = _started_from(_shapes(config), online, _keys(seeds))
+    return _exploring(config, agents)
 
 
 def outputs(config: DeepQConfig, layers: Layers, states: Array) -> Array:
@@ -157,9 +174,8 @@ def outputs(config: DeepQConfig, layers: Layers, states: Array) -> Array:
     return values @ weight + bias
 
 
-@partial(jax.jit, static_argnums=0, static_argnames="explore")
 def act(
-    config: DeepQConfig, agents: Agents, ids: Array, states: Array, masks: Array, attempts: Array, *, explore: bool = True
+    config: DeepQConfig, agents: Agents, ids: ArrayLike, states: Array, masks: Array, attempts: Array, *, explore: bool = True
 ) -> tuple[Array, Array]:
     """One decision for each row.
 
@@ -175,14 +191,13 @@ def act(
     Returns:
         The keys of all agents, to be put into the agents, and the actions (rows,) i32.
     """
-    chosen = jax.tree.map(lambda leaf: leaf.at[ids].get(mode="clip"), (agents.online, agents.epsilon, agents.keys))
-    layers, epsilon, before = chosen
-    actions, keys = jax.vmap(partial(_decided, config, explore))(layers, epsilon, before, states, masks, attempts)
-    return agents.keys.at[ids].set(keys, mode="drop"), actions
+    # Only what a decision needs is handed over: it is called much, and memories are many arrays.
+    decider = agents.online, agents.epsilon, agents.keys
+    keys, actions = _acted(_compiled(config), _numbers(config).wrong_limit, explore, decider, ids, states, masks, attempts)
+    return keys, actions
 
 
-@partial(jax.jit, static_argnums=0, donate_argnums=1)
-def learn(config: DeepQConfig, agents: Agents, ids: Array, transitions: Transitions) -> Agents:
+def learn(config: DeepQConfig, agents: Agents, ids: ArrayLike, transitions: Transitions) -> Agents:
     """Remembers one transition a row and, where the memory holds a batch, updates the row's agent once.
 
     Args:
@@ -192,6 +207,56 @@ def learn(config: DeepQConfig, agents: Agents, ids: Array, transitions: Transiti
             number of agents on) are ignored: so the number of rows can stay the same, and nothing is compiled anew.
         transitions: one a row.
     """
+    learned: Agents = _taught(_compiled(config), agents, _numbers(config), ids, transitions)
+    return learned
+
+
+@cache
+def _compiled(config: DeepQConfig) -> DeepQConfig:
+    """The same with the standard value of all that is not compiled into `act` and `learn`."""
+    standard = DeepQConfig()
+    names = (*Numbers._fields, "epsilon_start")
+    return dataclasses.replace(config, **{name: getattr(standard, name) for name in names})
+
+
+@cache
+def _shapes(config: DeepQConfig) -> DeepQConfig:
+    """Those that the shapes of agents depend on. A batch is as small as can be, so that it fits every memory."""
+    return DeepQConfig(config.inputs, config.outputs, config.hidden, 1, config.memory_size)
+
+
+@cache
+def _numbers(config: DeepQConfig) -> Numbers:
+    return Numbers(
+        learning_rate=np.float32(config.learning_rate),
+        epsilon_decay=np.float32(config.epsilon_decay),
+        epsilon_end=np.float32(config.epsilon_end),
+        target_every=np.int32(config.target_every),
+        wrong_limit=np.int32(config.wrong_limit),
+    )
+
+
+@partial(jax.jit, static_argnums=0)
+def _acted(
+    config: DeepQConfig,
+    wrong_limit: Array,
+    explore: bool | Array,
+    decider: tuple[Layers, Array, Array],
+    ids: Array,
+    states: Array,
+    masks: Array,
+    attempts: Array,
+) -> tuple[Array, Array]:
+    """See `act`; `decider` is what of the agents a decision needs: networks, epsilon and keys."""
+    layers, epsilon, before = jax.tree.map(lambda leaf: leaf.at[ids].get(mode="clip"), decider)
+    epsilon = jnp.where(explore, epsilon, 0.0)
+    actions, keys = jax.vmap(partial(_decided, config, wrong_limit))(layers, epsilon, before, states, masks, attempts)
+    return decider[2].at[ids].set(keys, mode="drop"), actions
+
+
+@partial(jax.jit, static_argnums=0, donate_argnums=1)
+def _taught(config: DeepQConfig, agents: Agents, numbers: Numbers, ids: Array, transitions: Transitions) -> Agents:
+    """See `learn`."""
     slots = agents.remembered.at[ids].get(mode="clip") % config.memory_size
     memory = jax.tree.map(lambda kept, new: kept.at[ids, slots].set(new, mode="drop"), agents.memory, transitions)
     remembered = agents.remembered.at[ids].add(1, mode="drop")
@@ -202,7 +267,7 @@ def learn(config: DeepQConfig, agents: Agents, ids: Array, transitions: Transiti
     keys, draws = _split(learners.keys)
     drawn = jax.vmap(lambda key, top: jax.random.randint(key, (config.batch_size,), 0, top))(draws, jnp.maximum(held, 1))
     batches = jax.tree.map(lambda kept: kept.at[ids[:, None], drawn].get(mode="clip"), memory)
-    updated = jax.vmap(partial(_updated, config))(learners, batches)
+    updated = jax.vmap(partial(_updated, config, numbers))(learners, batches)
     # An agent whose memory does not yet hold a batch stays as it is: its row is dropped.
     ready = jnp.where(held >= config.batch_size, ids, len(agents.keys))
     learned = jax.tree.map(lambda leaf, new: leaf.at[ready].set(new, mode="drop"), _learner(agents), updated._replace(keys=keys))
@@ -225,19 +290,19 @@ def _learner(agents: Agents) -> _Learner:
 
 
 def _decided(
-    config: DeepQConfig, explore: bool, layers: Layers, epsilon: Array, key: Array, state: Array, mask: Array, attempts: Array
+    config: DeepQConfig, wrong_limit: Array, layers: Layers, epsilon: Array, key: Array, state: Array, mask: Array, attempts: Array
 ) -> tuple[Array, Array]:
     """One agent's decision and its next key."""
     allowed = mask if config.mask else jnp.ones_like(mask)
     best = jnp.argmax(jnp.where(allowed, outputs(config, layers, state[None])[0], -jnp.inf))
     key, coin, choice = jax.random.split(key, 3)
-    given_up = jnp.logical_and(config.wrong_limit > 0, attempts >= config.wrong_limit)
+    given_up = jnp.logical_and(wrong_limit > 0, attempts >= wrong_limit)
     by_chance = jnp.argmax(jnp.where(jnp.where(given_up, mask, allowed), jax.random.uniform(choice, mask.shape), -1.0))
-    exploring = jax.random.uniform(coin) < epsilon if explore else False
+    exploring = jax.random.uniform(coin) < epsilon
     return jnp.where(jnp.logical_or(given_up, exploring), by_chance, best).astype(jnp.int32), key
 
 
-def _updated(config: DeepQConfig, learner: _Learner, batch: Transitions) -> _Learner:
+def _updated(config: DeepQConfig, numbers: Numbers, learner: _Learner, batch: Transitions) -> _Learner:
     """One agent after one update."""
     next_values = jnp.tanh(outputs(config, learner.target, batch.next_states))
     judged = outputs(config, learner.online, batch.next_states) if config.double else next_values
@@ -251,26 +316,31 @@ def _updated(config: DeepQConfig, learner: _Learner, batch: Transitions) -> _Lea
         chosen = (taken * jnp.tanh(outputs(config, layers, batch.states))).sum(-1)
         return jnp.mean((chosen - aim) ** 2)
 
-    steps, optimiser = _adam(config).update(jax.grad(loss)(learner.online), learner.optimiser)
+    steps, optimiser = _adam(numbers.learning_rate).update(jax.grad(loss)(learner.online), learner.optimiser)
     online: Layers = optax.apply_updates(learner.online, steps)
     updates = learner.updates + 1
-    copied = updates % config.target_every == 0
+    copied = updates % numbers.target_every == 0
     return learner._replace(
         online=online,
         target=jax.tree.map(lambda new, old: jnp.where(copied, new, old), online, learner.target),
         optimiser=optimiser,
-        epsilon=jnp.minimum(learner.epsilon, jnp.maximum(config.epsilon_end, learner.epsilon * config.epsilon_decay)),
+        epsilon=jnp.minimum(learner.epsilon, jnp.maximum(numbers.epsilon_end, learner.epsilon * numbers.epsilon_decay)),
         updates=updates,
     )
 
 
-def _adam(config: DeepQConfig) -> optax.GradientTransformation:
-    return optax.adam(config.learning_rate)
+def _adam(learning_rate: float | np.float32) -> optax.GradientTransformation:
+    return optax.adam(learning_rate)
 
 
 def _split(keys: Array) -> tuple[Array, Array]:
     pairs = jax.vmap(lambda key: jax.random.split(key, 2))(keys)
     return pairs[:, 0], pairs[:, 1]
+
+
+def _exploring(config: DeepQConfig, agents: Agents) -> Agents:
+    """The agents as much as they explore at the beginning."""
+    return agents._replace(epsilon=jnp.full(len(agents.keys), config.epsilon_start, jnp.float32))
 
 
 def _keys(seeds: Sequence[int]) -> Array:
@@ -306,7 +376,7 @@ def _fresh(config: DeepQConfig, online: Layers, keys: Array) -> Agents:
     return Agents(
         online=online,
         target=online,
-        optimiser=jax.vmap(_adam(config).init)(online),
+        optimiser=jax.vmap(_adam(config.learning_rate).init)(online),
         memory=Transitions(
             states=jnp.zeros((*ring, config.inputs), jnp.float32),
             actions=jnp.zeros(ring, jnp.int32),
@@ -316,7 +386,7 @@ def _fresh(config: DeepQConfig, online: Layers, keys: Array) -> Agents:
             done=jnp.zeros(ring, jnp.bool_),
         ),
         remembered=jnp.zeros(number, jnp.int32),
-        epsilon=jnp.full(number, config.epsilon_start, jnp.float32),
+        epsilon=jnp.zeros(number, jnp.float32),
         updates=jnp.zeros(number, jnp.int32),
         keys=keys,
     )

@@ -1,7 +1,7 @@
 """The command `python -m chefshat.learn deep-q`: trains one Deep Q agent against three built-in ones, and writes what remains.
 
-Two files: the network, which `play` and the server's own agents can play by, and what a training goes on from. The agent is in
-`deep_q`, its games in `deep_q_training`.
+Two files: the network, which `play` and the server's own agents can play by, and what a training goes on from. They are written
+every so many Shifts, at the end, and when Ctrl-C ends it early. The agent is in `deep_q`, its games in `deep_q_training`.
 """
 
 import argparse
@@ -16,14 +16,21 @@ from tqdm import tqdm
 
 from chefshat import pb
 from chefshat.errors import ChefsHatError, failed
-from chefshat.learn import checkpoint, deep_q, deep_q_training, features, network
-from chefshat.learn.checkpoint import Training, TrainingFileError
-from chefshat.learn.deep_q import DeepQConfig
+from chefshat.files import check_readable
+from chefshat.learn import checkpoint, deep_q, deep_q_training, features, network, runs
+from chefshat.learn.checkpoint import Training
+from chefshat.learn.deep_q import Agents, DeepQConfig
 from chefshat.learn.deep_q_training import Played
+from chefshat.learn.training_file import TrainingFileError
 from chefshat.vector import VectorEnv
 
-# A resumed training plays other games than those it has played: its seeds are this far apart.
-SEED_STEP = 2**32
+
+class Stopped(Exception):
+    """The user has stopped the training, which has been saved after so many Shifts."""
+
+    def __init__(self, shifts: int) -> None:
+        super().__init__(f"stopped after {shifts:,} Shifts")
+        self.shifts = shifts
 
 
 def run(options: argparse.Namespace) -> int:
@@ -34,67 +41,151 @@ def run(options: argparse.Namespace) -> int:
         for path in (out, state):
             if not path.parent.is_dir():
                 raise ValueError(f"there is no folder {path.parent} to write {path.name} to")
-        training, played = _trained(options, state)
-        checkpoint.save(state, training)
-        (net,) = training.networks(options.name)
-        network.save(out, net.layers, net.info)
+        played = _train(options, state)
+    except Stopped as stopped:
+        if options.json:
+            print(json.dumps({"event": "interrupted", "file": str(out), "training": str(state), "shifts": stopped.shifts}))
+        else:
+            print(
+                f"interrupted after {stopped.shifts:,} of {options.shifts:,} Shifts; {out} and {state} are saved: "
+                "the same command with --resume goes on",
+                file=sys.stderr,
+            )
+        return runs.INTERRUPTED
     except (ChefsHatError, TrainingFileError, OSError, ValueError) as error:
         return failed(error, as_json=options.json)
     told = _told(played)
     if options.json:
         print(json.dumps({"event": "trained", "file": str(out), "training": str(state), **told}))
     else:
-        print(f"{out}: {options.shifts:,} Shifts against {options.opponents}, of which the last {told['last_shifts']:,}:")
-        print(
-            f"  won {told['won']:.1%}, mean place {told['mean_place']:.2f}, wrong actions per Shift {told['wrong_per_shift']:.2f}"
-        )
+        # Counts, because shares of a few Shifts would say more than is known.
+        won = f"won {told['won'] * told['last_shifts']:,.0f} of the last {told['last_shifts']:,}"
+        print(f"{out}: {options.shifts:,} Shifts")
+        print(f"  {won}, with a mean place of {told['mean_place']:.2f} and {told['wrong_per_shift']:.2f} wrong actions per Shift")
         print(f"{state}: what the training goes on from with --resume")
     return 0
 
 
-def _trained(options: argparse.Namespace, state: Path) -> tuple[Training, Played]:
-    before = checkpoint.load(state) if options.resume else None
+def _train(options: argparse.Namespace, state: Path) -> Played:
+    """Plays the Shifts that are left, and writes the files. Raises `Stopped` when the user stops it."""
+    before = _resumed(options, state) if options.resume else None
     parameters = _parameters(options)
     rules = pb.RuleSet(preset=options.rules)
+    opponents, rewards, seed, shifts, updates = options.opponents, options.rewards, options.seed, 0, 0
     if before is not None:
         rules.CopyFrom(before.rules)
+        opponents, rewards, seed, shifts = before.opponents, before.rewards, before.seed, before.shifts
+        updates = int(before.agents.updates[0])
     rules.ClearField("target_points")
-    rules.target_shifts = options.shifts
-    updates = 0 if before is None else int(before.agents.updates[0])
+    rules.target_shifts = options.shifts - shifts
     env = VectorEnv(
         options.address,
         1,
         client_seats=[0],
-        opponents=options.opponents,
-        rewards=options.rewards,
+        opponents=opponents,
+        rewards=rewards,
         episode="shift",
         decisions="turns",
         invalid="ask_again",
         total_games=1,
-        seed=options.seed + SEED_STEP * updates,
+        # Who goes on plays other games than those that were played.
+        seed=seed + runs.SEED_STEP * updates,
         rules=rules,
         shift_statistics=True,
     )
-    with env, tqdm(total=options.shifts, unit=" Shifts", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar:
+    hidden = not sys.stderr.isatty()
+    with (
+        runs.Interrupts() as interrupts,
+        env,
+        tqdm(total=options.shifts, initial=shifts, unit=" Shifts", file=sys.stderr, disable=hidden, leave=False) as bar,
+    ):
         if before is None:
             inputs, outputs = features.classic_width(env.faces, env.hand_size), env.turn_actions
             config = DeepQConfig(inputs=inputs, outputs=outputs, **parameters)
-            agents = deep_q.start(config, [options.seed])
+            agents, commands = deep_q.start(config, [seed]), ""
         else:
-            config, agents = before.config, before.agents
-        agents, played = deep_q_training.play(env, config, agents, advance=bar.update)
-        return Training(config, agents, env.rules, options.trained_by), played
+            config, agents, commands = before.config, before.agents, before.trained_by
+        whole = pb.RuleSet()
+        whole.CopyFrom(env.rules)
+        whole.target_shifts = options.shifts
+        commands = runs.trained_by(commands, options.trained_by)
+        files = _Files(options, state, Training(config, agents, whole, commands, opponents, rewards, seed, shifts))
+
+        def advance(more: int) -> None:
+            files.shifts += more
+            bar.update(more)
+
+        def look(agents: Agents) -> None:
+            if interrupts.asked:
+                files.write(agents)
+                raise Stopped(files.shifts)
+            files.write_now_and_then(agents)
+
+        agents, played = deep_q_training.play(env, config, agents, advance=advance, look=look)
+        files.write(agents)
+        return played
+
+
+class _Files:
+    """The files of a training, written as it stands.
+
+    Attributes:
+        shifts: Shifts that were played so far.
+    """
+
+    def __init__(self, options: argparse.Namespace, state: Path, begun: Training) -> None:
+        self.shifts = begun.shifts
+        self._options = options
+        self._state = state
+        # Its agents are consumed by what they learn.
+        self._begun = begun
+        self._written = begun.shifts
+
+    def write_now_and_then(self, agents: Agents) -> None:
+        """Writes them if enough Shifts have been played since the last time."""
+        if self.shifts - self._written >= self._options.save_every:
+            self.write(agents)
+
+    def write(self, agents: Agents) -> None:
+        """Writes them."""
+        training = dataclasses.replace(self._begun, agents=agents, shifts=self.shifts)
+        checkpoint.save(self._state, training)
+        (net,) = training.networks(self._options.name)
+        network.save(self._options.out, net.layers, net.info)
+        self._written = self.shifts
+
+
+def _resumed(options: argparse.Namespace, state: Path) -> Training:
+    """The training to go on with, which the options that were given do not contradict."""
+    before = checkpoint.load(runs.existing(state))
+    config = before.config
+    kept = {"opponents": before.opponents, "rewards": before.rewards, "seed": before.seed, "mask": config.mask}
+    runs.refuse_contradictions(options.given, kept)
+    if "parameters" in options.given:
+        asked = DeepQConfig(inputs=config.inputs, outputs=config.outputs, **{**_parameters(options), "mask": config.mask})
+        runs.refuse_contradictions(dataclasses.asdict(asked), dataclasses.asdict(config))
+    if "rules" in options.given:
+        runs.refuse_other_rules(runs.full_rules(options.rules, options.address), before.rules)
+    if before.shifts >= options.shifts:
+        raise ValueError(f"the training has played {before.shifts:,} Shifts already: give more than that with --shifts")
+    return before
 
 
 def _parameters(options: argparse.Namespace) -> dict[str, Any]:
     """The hyper-parameters that are not standard: those of a file, and the mask."""
     if options.parameters is None:
         return {"mask": options.mask}
-    plain = json.loads(options.parameters.read_text(encoding="utf-8"))
+    check_readable(options.parameters, "file of hyper-parameters", "`python -m chefshat.learn tune` writes")
+    try:
+        plain = json.loads(options.parameters.read_text(encoding="utf-8"))
+    except ValueError:  # No text, or none of JSON.
+        plain = None
     found = plain.get("parameters") if isinstance(plain, dict) else None
     known = {field.name for field in dataclasses.fields(DeepQConfig)} - {"inputs", "outputs", "mask"}
     if not isinstance(found, dict) or not found.keys() <= known:
-        raise ValueError(f'{options.parameters} has no object "parameters" with some of {", ".join(sorted(known))}')
+        raise ValueError(
+            f'{options.parameters} has no object "parameters" with some of {", ".join(sorted(known))}: `tune` writes such files'
+        )
     return {**found, **({"hidden": tuple(found["hidden"])} if "hidden" in found else {}), "mask": options.mask}
 
 

@@ -143,6 +143,7 @@ def play(
     learn: bool = True,
     idle_pass_is_wrong: bool = False,
     advance: Callable[[int], object] = lambda shifts: None,
+    look: Callable[[Agents], object] = lambda agents: None,
 ) -> tuple[Agents, Played]:
     """Plays all games of an env to their ends and lets the agents learn.
 
@@ -153,8 +154,10 @@ def play(
         agents: one for each client seat of each game.
         explore: whether they explore.
         learn: whether they learn.
-        idle_pass_is_wrong: whether passing counts as a wrong action where something else is legal. Needs invalid "ask_again".
+        idle_pass_is_wrong: whether passing counts as a wrong action where something else is legal, and is none of those that are
+            taken by chance after too many wrong ones. Needs invalid "ask_again".
         advance: told how many more Shifts have ended.
+        look: shown the agents before each decision. It may raise, which ends it all, but not keep them, for learning consumes them.
 
     Returns:
         The agents, and what was counted.
@@ -176,12 +179,16 @@ def play(
             stack.end(_ids(endings.games, seat_index[endings.seats], seats), endings.rewards)
         if batch.done:
             return stack.agents, log.played()
+        look(stack.agents)
         states = features.classic(batch.observations, batch.mask_bits, faces=env.faces, hand_size=env.hand_size)
         masks = states[:, -config.outputs :] != 0
+        if idle_pass_is_wrong:
+            masks = _without_idle_passes(masks)
         actions = stack.decide(
             _ids(batch.games, seat_index[batch.seats], seats), batch.rewards, states, masks, batch.attempts.astype(np.int32)
         )
-        batch = env.step(_without_idle_passes(actions, masks) if idle_pass_is_wrong else actions)
+        # The server would take an idle pass for valid.
+        batch = env.step(_wrong_as_illegal(actions, masks) if idle_pass_is_wrong else actions)
 
 
 class _Log:
@@ -233,10 +240,17 @@ def _check(env: VectorEnv, config: DeepQConfig, agents: Agents) -> None:
         raise ValueError("the rule set must end the game after a number of Shifts (target_shifts)")
 
 
-def _without_idle_passes(actions: npt.NDArray[np.int32], masks: Mask) -> npt.NDArray[np.int32]:
-    """The actions, with an illegal one in place of a pass where something else is legal: the server knows what to do with it."""
-    idle = (actions == masks.shape[1] - 1) & (masks.sum(axis=1) > 1)
-    return np.where(idle, np.argmin(masks, axis=1), actions).astype(np.int32)
+def _without_idle_passes(masks: Mask) -> Mask:
+    """The legal actions, of which a pass is none where something else is legal."""
+    right = masks.copy()
+    right[:, -1] &= masks.sum(axis=1) == 1
+    return right
+
+
+def _wrong_as_illegal(actions: npt.NDArray[np.int32], right: Mask) -> npt.NDArray[np.int32]:
+    """The actions, with an illegal one in place of each that is not right. No hand is so rich that every play is legal."""
+    chosen = np.take_along_axis(right, actions[:, np.newaxis], axis=1)[:, 0]
+    return np.where(chosen, actions, np.argmin(right, axis=1)).astype(np.int32)
 
 
 def _ids(games: npt.NDArray[np.uint32], seat_index: Ids, seats: int) -> Ids:

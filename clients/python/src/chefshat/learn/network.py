@@ -1,8 +1,9 @@
 """A trained network as a file: safetensors, small enough to be carried about, read by this package and by `chefshat` (the program).
 
 The file's tensors are `layer0.weight` (out, in), `layer0.bias` (out,), `layer1.weight` and so on, in float32 or float16; between
-layers stands max(0, x). Its metadata, all text, say what the numbers mean: `NetworkInfo`. Also here: computing the outputs with
-numpy, and the action that an agent takes by them. Training is not here, nor the state from which a training goes on.
+layers stands max(0, x), which is 0 where x is no number. Its metadata, all text, say what the numbers mean: `NetworkInfo`. Also
+here: computing the outputs with numpy, and the action that an agent takes by them. Training is not here, nor the state from which a
+training goes on.
 """
 
 import json
@@ -17,7 +18,7 @@ import safetensors
 import safetensors.numpy
 
 from chefshat import pb
-from chefshat.files import write_whole
+from chefshat.files import check_readable, write_whole
 from chefshat.learn import features
 
 FORMAT = "chefshat-network-1"
@@ -166,7 +167,7 @@ class Network:
         """The outputs before their activation."""
         values = inputs
         for number, (weight, bias) in enumerate(self.layers):
-            values = (np.maximum(values, 0) if number else values) @ weight.T + bias
+            values = (np.fmax(values, 0) if number else values) @ weight.T + bias
         return values
 
     def actions(
@@ -252,8 +253,7 @@ def save(
 
 def load(path: str | os.PathLike[str]) -> Network:
     """Reads a network from a file. Raises `NetworkFileError` if it is not one, `OSError` if it cannot be read."""
-    with open(path, "rb"):
-        pass  # What cannot be read is an OSError in its own words, not safetensors'.
+    check_readable(path, "network", "`python -m chefshat.learn ppo` or `deep-q` writes")
     try:
         with safetensors.safe_open(path, framework="np") as file:
             info = NetworkInfo.of(file.metadata() or {})

@@ -10,14 +10,10 @@ import json
 import numpy as np
 import numpy.typing as npt
 
-import chefshat
-from chefshat import Agent, Decision, SeatInfo, agent
+from chefshat import Agent, Client, Decision, SeatInfo, agent, pb
 from chefshat.errors import ChefsHatError, failed
 from chefshat.learn import network
 from chefshat.learn.network import Network, NetworkFileError
-
-# Points above this are shown as this in columns.
-MAX_SHOWN = 2**32 - 1
 
 
 class RulesDoNotFit(ValueError):
@@ -32,8 +28,7 @@ class NetworkAgent(Agent):
 
     def on_attached(self, seat: SeatInfo) -> None:
         """Looks whether the network knows such games, if the game has begun; else the first decision does."""
-        if seat.game_started is not None:
-            self._check(seat)
+        self._check(seat)
 
     def decide(self, request: Decision) -> int:
         """The legal action with the highest output."""
@@ -44,9 +39,12 @@ class NetworkAgent(Agent):
         return int(self._network.actions(Row(request), seats, kinds, mask_bits)[0])
 
     def _check(self, seat: SeatInfo) -> None:
-        if seat.game_started is None:
-            return
-        rules, info = seat.game_started.rules, self._network.info
+        if seat.game_started is not None:
+            self.check_rules(seat.game_started.rules)
+
+    def check_rules(self, rules: pb.RuleSet) -> None:
+        """Raises RulesDoNotFit if the network was not trained for games of this rule set's numbers."""
+        info = self._network.info
         if (rules.players, rules.faces, rules.jokers) != (info.players, info.faces, info.jokers):
             raise RulesDoNotFit(
                 f"the network {info.name!r} plays with {info.players} players, {info.faces} faces and {info.jokers} jokers; this "
@@ -67,7 +65,7 @@ class Row:
         self.passed = _row(request.passed)
         self.places = _row(request.places)
         self.roles = _row(request.roles)
-        self.points = np.minimum(request.points, MAX_SHOWN).astype(np.uint32)[np.newaxis]
+        self.points = np.minimum(request.points, np.iinfo(np.uint32).max).astype(np.uint32)[np.newaxis]
         self.played = _row(request.played)
         # Nothing given or received is left out of the message.
         self.gave = _row(request.gave if len(request.gave) else none)
@@ -78,7 +76,14 @@ def run(options: argparse.Namespace) -> int:
     """The command: joins a room, plays one game, prints the standings. Returns the exit code."""
     try:
         player = NetworkAgent(network.load(options.file))
-        result = chefshat.play(player, options.address, join_code=options.join_code, name=options.name, seat=options.seat)
+        with Client(options.address) as client:
+            # Who has not joined cannot see what room a code is of; a seat that is not attached starts no game.
+            joined = client.join_room(options.join_code, options.name, seat=options.seat)
+            try:
+                player.check_rules(joined.room.rules)
+            except RulesDoNotFit as error:
+                raise RulesDoNotFit(f"{error}; its seat {joined.seat} will be free again within two minutes") from error
+            result = client.play(player, joined.ticket)
     except (ChefsHatError, NetworkFileError, RulesDoNotFit, OSError) as error:
         return failed(error, as_json=options.json)
     print(json.dumps(agent.as_json(result)) if options.json else agent.as_table(result), flush=True)

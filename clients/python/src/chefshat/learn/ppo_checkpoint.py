@@ -1,6 +1,6 @@
 """A training by PPO as a value and as a file: its plan, how far it has come, and all that it goes on from.
 
-The network alone, which is what an agent needs, is in a file of its own (see `network`). Training is in `ppo_training`.
+What the file looks like is in `training_file`, training in `ppo_training`.
 """
 
 import dataclasses
@@ -9,25 +9,16 @@ import os
 from dataclasses import dataclass, field
 from typing import Any, Self
 
-import jax
-import jax.numpy as jnp
 import numpy as np
-import safetensors
-import safetensors.numpy
-from google.protobuf import json_format
 
 from chefshat import pb
-from chefshat.files import write_whole
-from chefshat.learn import ppo
+from chefshat.learn import ppo, training_file
 from chefshat.learn.features import num_actions, table_width
-from chefshat.learn.network import Layer, Network, NetworkInfo
+from chefshat.learn.network import Layer, Network
 from chefshat.learn.ppo import Hyper, Learner
+from chefshat.learn.training_file import network_info, opened
 
 FORMAT = "chefshat-ppo-training-1"
-
-
-class TrainingFileError(ValueError):
-    """A file is not a training of this format. The message names the file and what is wrong with it."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +85,7 @@ class Training:
         rules: the rule set, every field set.
         learner: the networks and the optimiser.
         progress: how far it has come.
-        trained_by: the command.
+        trained_by: the command, or the commands.
     """
 
     plan: Plan
@@ -107,22 +98,7 @@ class Training:
     def network(self, name: str) -> Network:
         """The policy network."""
         layers = [Layer(np.array(weight), np.array(bias)) for weight, bias in self.learner.params.policy]
-        rules = self.rules
-        return Network(
-            layers,
-            NetworkInfo(
-                input="table",
-                output="actions",
-                output_activation="none",
-                masked=True,
-                players=rules.players,
-                faces=rules.faces,
-                jokers=rules.jokers,
-                rules=json_format.MessageToJson(rules, indent=None),
-                name=name,
-                trained_by=self.trained_by,
-            ),
-        )
+        return Network(layers, network_info(self.rules, name, self.trained_by, input="table", output="actions", masked=True))
 
 
 def begin(plan: Plan, seed: int, rules: pb.RuleSet, trained_by: str) -> Training:
@@ -133,54 +109,20 @@ def begin(plan: Plan, seed: int, rules: pb.RuleSet, trained_by: str) -> Training
 
 def save(path: str | os.PathLike[str], training: Training) -> None:
     """Writes a training to a file, whole or not at all. Raises OSError if it cannot be written."""
-    metadata = {
-        "format": FORMAT,
+    texts = {
         "plan": json.dumps(dataclasses.asdict(training.plan)),
         "progress": json.dumps(dataclasses.asdict(training.progress)),
         "seed": str(training.seed),
-        "rules": json_format.MessageToJson(training.rules, indent=None),
         "trained_by": training.trained_by,
     }
-    tensors = {name: np.asarray(leaf) for name, leaf in _named(_plain(training.learner))}
-    write_whole(path, safetensors.numpy.save(tensors, metadata=metadata))
+    training_file.save(path, FORMAT, training.learner, training.rules, texts)
 
 
 def load(path: str | os.PathLike[str]) -> Training:
     """Reads a training from a file. Raises `TrainingFileError` if it is none, OSError if it cannot be read."""
-    with open(path, "rb"):
-        pass  # What cannot be read is an OSError in its own words, not safetensors'.
-    try:
-        with safetensors.safe_open(path, framework="np") as file:
-            metadata = file.metadata() or {}
-            if metadata.get("format") != FORMAT:
-                raise ValueError(f"its format is {metadata.get('format')!r}, not {FORMAT!r}")
-            plan = Plan.of(json.loads(metadata["plan"]))
-            progress = Progress(**json.loads(metadata["progress"]))
-            rules = json_format.Parse(metadata["rules"], pb.RuleSet())
-            seed = int(metadata["seed"])
-            # What the arrays must look like, without making them.
-            template = jax.eval_shape(lambda: _plain(begin(plan, seed, rules, "").learner))
-            leaves = []
-            for name, leaf in _named(template):
-                tensor = file.get_tensor(name)
-                if (tensor.shape, tensor.dtype) != (leaf.shape, leaf.dtype):
-                    raise ValueError(f"its {name} is {tensor.dtype}{list(tensor.shape)}, not {leaf.dtype}{list(leaf.shape)}")
-                leaves.append(jnp.asarray(tensor))
-        learner: Learner = jax.tree.unflatten(jax.tree.structure(template), leaves)
-        learner = learner._replace(key=jax.random.wrap_key_data(learner.key))
-        return Training(plan, seed, rules, learner, progress, metadata.get("trained_by", ""))
-    except KeyError as missing:
-        raise TrainingFileError(f"{os.fspath(path)} is no training: it has no {missing}") from missing
-    except (ValueError, TypeError, safetensors.SafetensorError, json_format.ParseError) as error:
-        raise TrainingFileError(f"{os.fspath(path)} is no training: {error}") from error
-
-
-def _plain(learner: Learner) -> Learner:
-    """With the key as plain numbers, which a file can hold."""
-    return learner._replace(key=jax.random.key_data(learner.key))
-
-
-def _named(learner: Learner) -> list[tuple[str, jax.Array]]:
-    """The arrays with their names, such as "params.policy.0.1"."""
-    leaves = jax.tree_util.tree_leaves_with_path(learner)
-    return [(jax.tree_util.keystr(path, simple=True, separator="."), leaf) for path, leaf in leaves]
+    with opened(path, FORMAT) as contents:
+        texts = contents.texts
+        plan, progress = Plan.of(json.loads(texts["plan"])), Progress(**json.loads(texts["progress"]))
+        seed, rules = int(texts["seed"]), contents.rules
+        learner = contents.state(lambda: begin(plan, seed, rules, "").learner)
+        return Training(plan, seed, rules, learner, progress, texts["trained_by"])

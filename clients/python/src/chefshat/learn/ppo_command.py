@@ -18,18 +18,15 @@ import numpy as np
 from google.protobuf import json_format
 from tqdm import tqdm
 
-from chefshat import pb
 from chefshat.errors import ChefsHatError, failed
-from chefshat.learn import network, ppo_checkpoint
+from chefshat.learn import network, ppo_checkpoint, runs
 from chefshat.learn.evaluation import Evaluation, evaluate
 from chefshat.learn.network import Network
 from chefshat.learn.ppo import Hyper
-from chefshat.learn.ppo_checkpoint import Plan, Training, TrainingFileError
+from chefshat.learn.ppo_checkpoint import Plan, Training
 from chefshat.learn.ppo_training import Trainer
-from chefshat.vector import Rules, VectorEnv
+from chefshat.learn.training_file import TrainingFileError
 
-# Deals that policies are looked at with, the same every time; trainings use base seeds from 2^32 on.
-EVALUATION_SEED = 20_200_612
 OPPONENTS = ("greedy", "random")
 
 
@@ -71,12 +68,6 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def full_rules(rules: Rules, address: str | None) -> pb.RuleSet:
-    """A rule set with every field set, as the server understands it."""
-    with VectorEnv(address, 1, rules=rules, seed=0) as env:
-        return env.rules
-
-
 def _begun(options: argparse.Namespace) -> Training:
     plan = Plan(
         games=options.games,
@@ -99,15 +90,18 @@ def _begun(options: argparse.Namespace) -> Training:
         raise ValueError(
             f"{plan.steps} steps of {plan.games + plan.opponent_games} games do not split into {plan.hyper.minibatches} parts"
         )
-    return ppo_checkpoint.begin(plan, options.seed, full_rules(options.rules, options.address), options.trained_by)
+    rules = runs.full_rules(options.rules, options.address)
+    return ppo_checkpoint.begin(plan, options.seed, rules, runs.trained_by("", options.trained_by))
 
 
 def _resumed(state: Path, options: argparse.Namespace) -> Training:
-    if not state.exists():
-        raise TrainingFileError(f"{state} does not exist: there is nothing to go on from; leave out --resume to begin")
-    training = ppo_checkpoint.load(state)
-    # Who wants to train the same again needs both commands.
-    return dataclasses.replace(training, trained_by=f"{training.trained_by}; {options.trained_by}")
+    training = ppo_checkpoint.load(runs.existing(state))
+    plan, hyper = training.plan, training.plan.hyper
+    kept = {"seed": training.seed, "width": hyper.policy_widths[0], "value_width": hyper.value_widths[0]}
+    runs.refuse_contradictions(options.given, {**dataclasses.asdict(plan), **dataclasses.asdict(hyper), **kept})
+    if "rules" in options.given:
+        runs.refuse_other_rules(runs.full_rules(options.rules, options.address), training.rules)
+    return dataclasses.replace(training, trained_by=runs.trained_by(training.trained_by, options.trained_by))
 
 
 def _train(trainer: Trainer, options: argparse.Namespace, lines: TextIO, state: Path) -> list[Evaluation]:
@@ -139,7 +133,7 @@ def _look(trainer: Trainer, options: argparse.Namespace, lines: TextIO, losses: 
     current = training.network(options.name)
     games = training.plan.evaluation_games
     evaluations = [
-        evaluate(current, opponents, games=games, seed=EVALUATION_SEED, rules=training.rules, address=options.address)
+        evaluate(current, opponents, games=games, seed=runs.EVALUATION_SEED, rules=training.rules, address=options.address)
         for opponents in OPPONENTS
     ]
     progress = dataclasses.replace(training.progress, seconds=training.progress.seconds + time.monotonic() - began)

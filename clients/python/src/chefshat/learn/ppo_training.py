@@ -18,11 +18,9 @@ import numpy.typing as npt
 from chefshat.learn import ppo
 from chefshat.learn.ppo import Params, Samples
 from chefshat.learn.ppo_checkpoint import Plan, Progress, Training
+from chefshat.learn.runs import SEED_STEP
 from chefshat.learn.self_play import Collector, Floats, advantages
 from chefshat.vector import VectorEnv
-
-# Base seeds of one training are apart by this much, one for each time it goes on.
-SEED_STEP = 2**32
 
 
 class Trainer:
@@ -33,6 +31,7 @@ class Trainer:
         plan = training.plan
         runs = training.progress.runs + 1
         self.training = dataclasses.replace(training, progress=dataclasses.replace(training.progress, runs=runs))
+        # Every time it goes on it plays other games.
         first_seed = training.seed + SEED_STEP * runs
         kinds: list[tuple[int, dict[str, Any]]] = [(plan.games, {})]
         if plan.opponent_games:

@@ -12,24 +12,26 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from google.protobuf import json_format
 from numpy.typing import NDArray
 
 from chefshat import pb
 from chefshat.client import Client
 from chefshat.columns import Sizes
 from chefshat.errors import ChefsHatError
+from chefshat.files import write_record
+from chefshat.learn import features
 from chefshat.local_server import clean_environment, find_binary
 from chefshat.replay.tables import Decisions, has_pyarrow, read
 from chefshat.transitions import RewardFunction, Transitions
 
+# Players that an error names.
+MOST_NAMES = 20
 SCHEMES = ("validity", "paper", "paper_intended", "winning", "points")
 _KINDS = {
     "turn": pb.DECISION_KIND_TURN,
     "exchange": pb.DECISION_KIND_EXCHANGE,
     "special_action": pb.DECISION_KIND_SPECIAL_ACTION,
 }
-_MAX_POINTS = 2**32 - 1
 
 
 def from_dataset(
@@ -58,7 +60,8 @@ def from_dataset(
     Raises:
         FileNotFoundError: there is no dataset.
         ImportError: it is a Parquet file, and pyarrow is not installed.
-        ValueError: it is no dataset, its games differ in players or decks, or an argument is none of its names.
+        ValueError: it is no dataset, its games differ in players or decks, an argument is none of its names, or one of `agents` did
+            not play.
     """
     if isinstance(rewards, str) and rewards not in SCHEMES:
         raise ValueError(
@@ -68,6 +71,7 @@ def from_dataset(
         if value not in known:
             raise ValueError(f"{argument}={value!r}: choose one of {', '.join(map(repr, known))}")
     table = read(Path(path))
+    _check_agents(table, agents)
     sizes = _sizes(table)
     scheme = rewards if isinstance(rewards, str) else ""
     steps = _steps(table, by_game=episode == "game", turns_only=decisions == "turns", agents=agents)
@@ -90,7 +94,9 @@ def from_records(paths: Path | str | Sequence[Path | str], **options: Any) -> Tr
     with tempfile.TemporaryDirectory() as folder:
         made = Path(folder) / "dataset"
         form = "parquet" if has_pyarrow() else "jsonl"
-        command = [str(find_binary()), "export", *map(str, files), "--out", str(made), "--format", form]
+        # Not instead of it the address of a server, as elsewhere.
+        program = find_binary("replay the records, which is done on this machine, wherever they come from", instead="")
+        command = [str(program), "export", *map(str, files), "--out", str(made), "--format", form]
         done = subprocess.run(command, capture_output=True, text=True, env=clean_environment())
         if done.returncode != 0:
             raise ChefsHatError("RECORDS_REFUSED", done.stderr.strip() or f"`chefshat export` failed with {done.returncode}")
@@ -116,9 +122,8 @@ def from_server(address: str, wanted: pb.RecordFilter | None = None, **options: 
 
 
 def save_record(lines: Iterable[pb.RecordLine], path: Path | str) -> None:
-    """Writes a record as a file, JSON Lines, as the server keeps them: for instance one of `Batch.records`."""
-    text = "".join(f"{json_format.MessageToJson(line, indent=None)}\n" for line in lines)
-    Path(path).write_text(text, encoding="utf-8")
+    """Writes a record as a file, whole or not at all, as the server keeps them: for instance what `Client.record` gives."""
+    write_record(path, lines)
 
 
 class _Steps(NamedTuple):
@@ -131,6 +136,14 @@ class _Steps(NamedTuple):
     games: NDArray[np.intp]
 
 
+def _check_agents(table: Decisions, agents: Sequence[str] | None) -> None:
+    """Refuses names that nobody has who played: a slip would go unnoticed, and there would be nothing to learn from."""
+    playing = np.unique(table.texts("agent")).tolist()
+    for name in agents or ():
+        if name not in playing:
+            raise ValueError(f"agents: no player of these games is called {name!r}: choose of {', '.join(playing[:MOST_NAMES])}")
+
+
 def _sizes(table: Decisions) -> Sizes:
     """The sizes that all games of the table have in common."""
     found = set()
@@ -141,9 +154,8 @@ def _sizes(table: Decisions) -> Sizes:
         kinds = "; ".join(f"{players} players, {faces} faces, {jokers} jokers" for players, faces, jokers in sorted(found))
         raise ValueError(f"the dataset's games differ ({kinds}): make a dataset of each kind")
     ((players, faces, jokers),) = found
-    cards = faces * (faces + 1) // 2
-    turns = 3 * cards + 2
-    return Sizes(players, faces, jokers, (cards + jokers) // players, turns + faces + 3, turns)
+    hand_size = features.dealt(players, faces, jokers)
+    return Sizes(players, faces, jokers, hand_size, features.num_actions(faces), features.turn_actions(faces))
 
 
 def _steps(table: Decisions, *, by_game: bool, turns_only: bool, agents: Sequence[str] | None) -> _Steps:
@@ -181,7 +193,7 @@ def _columns(table: Decisions, sizes: Sizes, steps: _Steps, scheme: str, *, by_g
         "golden": table.numbers("golden", np.uint8),
         "boards": np.stack([table.numbers(f"board_{part}", np.uint8) for part in ("face", "size", "jokers")], axis=1),
         "hands": table.lists("hand", sizes.card_kinds, np.uint8)[0],
-        "points": np.minimum(table.lists("points", sizes.players, np.uint64)[0], _MAX_POINTS).astype(np.uint32),
+        "points": np.minimum(table.lists("points", sizes.players, np.uint64)[0], np.iinfo(np.uint32).max).astype(np.uint32),
     }
     for name in ("cards_left", "passed", "places", "roles"):
         situations[name] = table.lists(name, sizes.players, np.uint8)[0]

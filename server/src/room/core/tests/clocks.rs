@@ -3,7 +3,7 @@
 use chefshat_arena::AgentKind;
 
 use super::*;
-use crate::room::policy::AbortPolicy;
+use crate::room::policy::{AbortPolicy, KindClock};
 use crate::store::journal::AbortReason;
 
 fn quick() -> Policy {
@@ -348,4 +348,40 @@ fn built_in_agents_play_by_themselves_at_their_pace() {
     );
     assert_eq!(by_default(Source::Timeout), 0);
     table.assert_replays();
+}
+
+#[test]
+fn kinds_of_participants_may_have_clocks_of_their_own() {
+    let policy = Policy {
+        clocks: vec![KindClock {
+            kind: ParticipantKind::Human,
+            decision_time: Some(ms(5000)),
+            bank: Some(ms(2000)),
+        }],
+        ..quick()
+    };
+    for (kind, allowed, bank_after) in [
+        (ParticipantKind::Human, 7000, 1000),
+        (ParticipantKind::Robot, 1500, 250),
+    ] {
+        let mut table = Table::empty(policy.clone(), vec![OPEN; 4]);
+        for _ in 0..4 {
+            table.join(kind).expect("a seat is free");
+        }
+        for seat in table.core.all_seats() {
+            table.attach(seat);
+        }
+        let (seat, id) = table.open();
+        table.pass_time(ms(allowed - bank_after));
+        let action = table.legal(0);
+        assert_eq!(table.answer(seat, id, action).verdict, Verdict::Accepted);
+        assert_eq!(u64::from(table.last_decision().bank_left_ms), bank_after);
+        let decisions = table.core.decisions();
+        table.pass_time(ms(allowed - 1));
+        assert_eq!(table.core.decisions(), decisions, "{kind:?} has time left");
+        table.pass_time(ms(1));
+        assert_eq!(table.core.decisions(), decisions + 1);
+        assert_eq!(table.last_decision().source, Source::Timeout);
+        table.assert_replays();
+    }
 }

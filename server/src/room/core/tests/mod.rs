@@ -58,6 +58,7 @@ impl Table {
             created_at_ms: 0,
             join_code: "CODE".into(),
             owner: SecretHash::of(b"owner"),
+            tournament: None,
         });
         Self {
             core: Core::new(header),

@@ -11,7 +11,7 @@ use prost::Message;
 use super::{Unreadable, action, array};
 use crate::convert;
 use crate::ids::{Id, SecretHash};
-use crate::store::journal::GameHeader;
+use crate::store::journal::{GameHeader, TournamentGame};
 
 #[derive(Clone, PartialEq, Message)]
 struct HeaderForm {
@@ -45,6 +45,10 @@ struct HeaderForm {
     start: Option<v1::GameStart>,
     #[prost(uint32, repeated, tag = "15")]
     actions_taken_over: Vec<u32>,
+    #[prost(bytes = "vec", tag = "16")]
+    tournament: Vec<u8>,
+    #[prost(bytes = "vec", tag = "17")]
+    series: Vec<u8>,
 }
 
 /// A header as a blob.
@@ -75,6 +79,8 @@ pub(in crate::store::sqlite) fn header_to_bytes(header: &GameHeader) -> Vec<u8> 
             .flat_map(|part| &part.actions)
             .map(|action| action.index().into())
             .collect(),
+        tournament: (header.tournament).map_or_else(Vec::new, |game| game.tournament.0.to_vec()),
+        series: (header.series()).map_or_else(Vec::new, |series| series.0.to_vec()),
     }
     .encode_to_vec()
 }
@@ -113,5 +119,16 @@ pub(in crate::store::sqlite) fn header_from_bytes(bytes: &[u8]) -> Result<GameHe
         created_at_ms: form.created_at_ms,
         join_code: form.join_code,
         owner: SecretHash::from_bytes(array(&form.owner, "the owner's hash")?),
+        tournament: if form.tournament.is_empty() {
+            None
+        } else {
+            Some(TournamentGame {
+                tournament: Id(array(&form.tournament, "the tournament's id")?),
+                series: match form.series.as_slice() {
+                    [] => None,
+                    series => Some(Id(array(series, "the series' id")?)),
+                },
+            })
+        },
     })
 }

@@ -4,6 +4,7 @@
 
 mod entry;
 mod header;
+mod tournament;
 
 use chefshat_engine::Action;
 use chefshat_proto::v1;
@@ -11,6 +12,10 @@ use prost::Message as _;
 
 pub(super) use entry::{put_entry, read_entries};
 pub(super) use header::{header_from_bytes, header_to_bytes};
+pub(super) use tournament::{
+    tournament_entries_from_bytes, tournament_entries_to_bytes, tournament_from_bytes,
+    tournament_to_bytes,
+};
 
 /// Version of the form.
 pub(super) const FORM: i64 = 1;

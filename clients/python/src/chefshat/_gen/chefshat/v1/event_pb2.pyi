@@ -836,7 +836,7 @@ class GameEnded(_message.Message):
 
     @_builtins.property
     def reveal(self) -> Global___SeedReveal:
-        """What makes the deals checkable."""
+        """What makes the deals checkable. Of a game of a series it stands in the record alone."""
 
     def __init__(
         self,

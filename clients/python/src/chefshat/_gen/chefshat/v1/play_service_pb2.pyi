@@ -63,6 +63,8 @@ class _DetachReasonEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_DetachRe
     """A newer connection has the seat."""
     DETACH_REASON_GAME_OVER: _DetachReason.ValueType  # 3
     """The game is over and everything has been said."""
+    DETACH_REASON_TOURNAMENT_OVER: _DetachReason.ValueType  # 5
+    """The tournament is over: its participant will not be seated again."""
 
 class DetachReason(_DetachReason, metaclass=_DetachReasonEnumTypeWrapper):
     """Why a seat left the stream."""
@@ -75,6 +77,8 @@ DETACH_REASON_SUPERSEDED: DetachReason.ValueType  # 2
 """A newer connection has the seat."""
 DETACH_REASON_GAME_OVER: DetachReason.ValueType  # 3
 """The game is over and everything has been said."""
+DETACH_REASON_TOURNAMENT_OVER: DetachReason.ValueType  # 5
+"""The tournament is over: its participant will not be seated again."""
 Global___DetachReason: _TypeAlias = DetachReason  # noqa: Y015
 
 @_typing.final
@@ -93,9 +97,12 @@ class Attach(_message.Message):
     NO_MASK_FIELD_NUMBER: _builtins.int
     ENTROPY_FIELD_NUMBER: _builtins.int
     ticket: _builtins.str
-    """The seat's ticket."""
+    """The ticket of a seat, or of a participant in a tournament. The latter is answered with Entered; the server then seats the participant
+    in each of its games by itself: each such seat is announced by an Attached with a handle of its own, and all else of this message
+    holds for it too (but not `request_id`, which is 0 there). Games that go on already are attached at once.
+    """
     request_id: _builtins.int
-    """Chosen by the client, echoed in Attached and Refused."""
+    """Chosen by the client, echoed in Attached, Entered and Refused."""
     from_sequence: _builtins.int
     """First event wanted. 0 and 1: all. After a lost connection: the number of the last event seen, plus one."""
     snapshot: _builtins.bool
@@ -105,7 +112,7 @@ class Attach(_message.Message):
     no_mask: _builtins.bool
     """Leave `action_mask` out of decision requests."""
     entropy: _builtins.bytes
-    """The seat's own part of the game seed, 0..=32 bytes. Counts when given before the game starts."""
+    """The seat's own part of the game seed, 0..=32 bytes. Counts when given before the game starts, and in no game of a series."""
     def __init__(
         self,
         *,
@@ -248,6 +255,8 @@ class Attached(_message.Message):
     GAME_ID_FIELD_NUMBER: _builtins.int
     SEAT_FIELD_NUMBER: _builtins.int
     NEXT_SEQUENCE_FIELD_NUMBER: _builtins.int
+    TICKET_FIELD_NUMBER: _builtins.int
+    TOURNAMENT_ID_FIELD_NUMBER: _builtins.int
     request_id: _builtins.int
     """Echo of Attach.request_id."""
     room_id: _builtins.str
@@ -258,6 +267,10 @@ class Attached(_message.Message):
     """The seat."""
     next_sequence: _builtins.int
     """Number of the next event of the game."""
+    ticket: _builtins.str
+    """Where the server seated a participant of a tournament: the ticket of this seat, with which it can be attached by itself and acted for."""
+    tournament_id: _builtins.str
+    """Where the server seated a participant of a tournament: the tournament."""
     def __init__(
         self,
         *,
@@ -266,14 +279,46 @@ class Attached(_message.Message):
         game_id: _builtins.str = ...,
         seat: _builtins.int = ...,
         next_sequence: _builtins.int = ...,
+        ticket: _builtins.str = ...,
+        tournament_id: _builtins.str = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["game_id", b"game_id", "next_sequence", b"next_sequence", "request_id", b"request_id", "room_id", b"room_id", "seat", b"seat"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["game_id", b"game_id", "next_sequence", b"next_sequence", "request_id", b"request_id", "room_id", b"room_id", "seat", b"seat", "ticket", b"ticket", "tournament_id", b"tournament_id"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
 Global___Attached: _TypeAlias = Attached  # noqa: Y015
+
+@_typing.final
+class Entered(_message.Message):
+    """The stream is attached to a participant of a tournament. The newest attachment of a participant wins; the older is told SUPERSEDED."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    REQUEST_ID_FIELD_NUMBER: _builtins.int
+    TOURNAMENT_ID_FIELD_NUMBER: _builtins.int
+    PARTICIPANT_FIELD_NUMBER: _builtins.int
+    request_id: _builtins.int
+    """Echo of Attach.request_id."""
+    tournament_id: _builtins.str
+    """Identifies the tournament."""
+    participant: _builtins.int
+    """The participant's number in it."""
+    def __init__(
+        self,
+        *,
+        request_id: _builtins.int = ...,
+        tournament_id: _builtins.str = ...,
+        participant: _builtins.int = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["participant", b"participant", "request_id", b"request_id", "tournament_id", b"tournament_id"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___Entered: _TypeAlias = Entered  # noqa: Y015
 
 @_typing.final
 class EventBatch(_message.Message):
@@ -431,8 +476,11 @@ class SeatUpdate(_message.Message):
     SNAPSHOT_FIELD_NUMBER: _builtins.int
     DETACHED_FIELD_NUMBER: _builtins.int
     REFUSED_FIELD_NUMBER: _builtins.int
+    ENTERED_FIELD_NUMBER: _builtins.int
     handle: _builtins.int
-    """Handle of the seat on this stream: the number of its Attach on the stream, from 0 (a refused Attach has a number too)."""
+    """Handle of the seat on this stream: the number of its Attach on the stream, from 0 (a refused Attach has a number too, and so has that of
+    a participant). Seats that the server attaches by itself, in the games of a tournament, are numbered from 2147483648 on.
+    """
     @_builtins.property
     def attached(self) -> Global___Attached:
         """The seat is attached."""
@@ -461,6 +509,10 @@ class SeatUpdate(_message.Message):
     def refused(self) -> Global___Refused:
         """A command was refused."""
 
+    @_builtins.property
+    def entered(self) -> Global___Entered:
+        """A participant of a tournament is attached."""
+
     def __init__(
         self,
         *,
@@ -472,12 +524,13 @@ class SeatUpdate(_message.Message):
         snapshot: Global___Snapshot | None = ...,
         detached: Global___Detached | None = ...,
         refused: Global___Refused | None = ...,
+        entered: Global___Entered | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["attached", b"attached", "decision", b"decision", "detached", b"detached", "events", b"events", "refused", b"refused", "result", b"result", "snapshot", b"snapshot", "update", b"update"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["attached", b"attached", "decision", b"decision", "detached", b"detached", "entered", b"entered", "events", b"events", "refused", b"refused", "result", b"result", "snapshot", b"snapshot", "update", b"update"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["attached", b"attached", "decision", b"decision", "detached", b"detached", "events", b"events", "handle", b"handle", "refused", b"refused", "result", b"result", "snapshot", b"snapshot", "update", b"update"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["attached", b"attached", "decision", b"decision", "detached", b"detached", "entered", b"entered", "events", b"events", "handle", b"handle", "refused", b"refused", "result", b"result", "snapshot", b"snapshot", "update", b"update"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
-    _WhichOneofReturnType_update: _TypeAlias = _typing.Literal["attached", "events", "decision", "result", "snapshot", "detached", "refused"]  # noqa: Y015
+    _WhichOneofReturnType_update: _TypeAlias = _typing.Literal["attached", "events", "decision", "result", "snapshot", "detached", "refused", "entered"]  # noqa: Y015
     _WhichOneofArgType_update: _TypeAlias = _typing.Literal["update", b"update"]  # noqa: Y015
     def WhichOneof(self, oneof_group: _WhichOneofArgType_update) -> _WhichOneofReturnType_update | None: ...
 

@@ -94,6 +94,8 @@ class RecordHeader(_message.Message):
     SERVER_VERSION_FIELD_NUMBER: _builtins.int
     ACTION_SPACE_FIELD_NUMBER: _builtins.int
     START_FIELD_NUMBER: _builtins.int
+    TOURNAMENT_ID_FIELD_NUMBER: _builtins.int
+    SERIES_ID_FIELD_NUMBER: _builtins.int
     format_version: _builtins.int
     """Version of this form, 1."""
     game_id: _builtins.str
@@ -112,6 +114,10 @@ class RecordHeader(_message.Message):
     """Milliseconds since the Unix epoch when the room was created."""
     server_version: _builtins.str
     """Version of the server that hosted it."""
+    tournament_id: _builtins.str
+    """The tournament it belonged to; empty if it belonged to none."""
+    series_id: _builtins.str
+    """The series of games that were dealt alike to which it belonged; empty if it belonged to none."""
     @_builtins.property
     def rules(self) -> _rules_pb2.RuleSet:
         """The rule set, every field set."""
@@ -149,10 +155,12 @@ class RecordHeader(_message.Message):
         server_version: _builtins.str = ...,
         action_space: _rules_pb2.ActionSpace | None = ...,
         start: Global___GameStart | None = ...,
+        tournament_id: _builtins.str = ...,
+        series_id: _builtins.str = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["action_space", b"action_space", "policy", b"policy", "rules", b"rules", "start", b"start"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["action_space", b"action_space", "created_at_ms", b"created_at_ms", "format_version", b"format_version", "game_id", b"game_id", "origin", b"origin", "policy", b"policy", "room_id", b"room_id", "room_name", b"room_name", "rules", b"rules", "rules_version", b"rules_version", "seats", b"seats", "seed_commitment", b"seed_commitment", "server_version", b"server_version", "start", b"start"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["action_space", b"action_space", "created_at_ms", b"created_at_ms", "format_version", b"format_version", "game_id", b"game_id", "origin", b"origin", "policy", b"policy", "room_id", b"room_id", "room_name", b"room_name", "rules", b"rules", "rules_version", b"rules_version", "seats", b"seats", "seed_commitment", b"seed_commitment", "series_id", b"series_id", "server_version", b"server_version", "start", b"start", "tournament_id", b"tournament_id"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

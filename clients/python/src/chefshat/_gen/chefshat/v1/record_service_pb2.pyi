@@ -92,6 +92,8 @@ class RecordSummary(_message.Message):
     DECISIONS_FIELD_NUMBER: _builtins.int
     ADDED_FIELD_NUMBER: _builtins.int
     ABORT_REASON_FIELD_NUMBER: _builtins.int
+    TOURNAMENT_ID_FIELD_NUMBER: _builtins.int
+    SUBSTITUTED_FIELD_NUMBER: _builtins.int
     game_id: _builtins.str
     """Identifies the game."""
     room_id: _builtins.str
@@ -114,6 +116,10 @@ class RecordSummary(_message.Message):
     """Added with ImportRecord: the game was played elsewhere, and all that is known of it is that its record fits together."""
     abort_reason: _room_pb2.AbortReason.ValueType
     """For a game without a result: why."""
+    tournament_id: _builtins.str
+    """The tournament it belonged to; empty if it belonged to none."""
+    substituted: _builtins.bool
+    """Whether a substitute took decisions in it."""
     @_builtins.property
     def rules(self) -> _rules_pb2.RuleSet:
         """The rule set, every field set."""
@@ -143,10 +149,12 @@ class RecordSummary(_message.Message):
         decisions: _builtins.int = ...,
         added: _builtins.bool = ...,
         abort_reason: _room_pb2.AbortReason.ValueType = ...,
+        tournament_id: _builtins.str = ...,
+        substituted: _builtins.bool = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["rules", b"rules"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["abort_reason", b"abort_reason", "added", b"added", "created_at_ms", b"created_at_ms", "decisions", b"decisions", "ended_at_ms", b"ended_at_ms", "game_id", b"game_id", "origin", b"origin", "room_id", b"room_id", "room_name", b"room_name", "rules", b"rules", "seats", b"seats", "shifts", b"shifts", "standings", b"standings", "state", b"state"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["abort_reason", b"abort_reason", "added", b"added", "created_at_ms", b"created_at_ms", "decisions", b"decisions", "ended_at_ms", b"ended_at_ms", "game_id", b"game_id", "origin", b"origin", "room_id", b"room_id", "room_name", b"room_name", "rules", b"rules", "seats", b"seats", "shifts", b"shifts", "standings", b"standings", "state", b"state", "substituted", b"substituted", "tournament_id", b"tournament_id"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

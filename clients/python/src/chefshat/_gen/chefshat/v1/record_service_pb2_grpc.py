@@ -70,7 +70,7 @@ class RecordServiceServicer:
 
     def GetRecord(self, request, context):
         """The record of one game, in order, many lines a message. NOT_FOUND (GAME_UNKNOWN) if the server does not hold it;
-        FAILED_PRECONDITION (GAME_RUNNING) while it is being played.
+        FAILED_PRECONDITION (GAME_RUNNING) while it is being played, (SERIES_OPEN) while other games with the same deals are.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

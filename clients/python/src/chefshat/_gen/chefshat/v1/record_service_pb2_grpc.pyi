@@ -37,7 +37,7 @@ class RecordServiceStub:
     """What the server holds, oldest first. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, FILTER_REFUSED)."""
     GetRecord: _grpc.UnaryStreamMultiCallable[_record_service_pb2.GetRecordRequest, _record_service_pb2.GetRecordResponse]
     """The record of one game, in order, many lines a message. NOT_FOUND (GAME_UNKNOWN) if the server does not hold it;
-    FAILED_PRECONDITION (GAME_RUNNING) while it is being played.
+    FAILED_PRECONDITION (GAME_RUNNING) while it is being played, (SERIES_OPEN) while other games with the same deals are.
     """
     StreamRecords: _grpc.UnaryStreamMultiCallable[_record_service_pb2.StreamRecordsRequest, _record_service_pb2.StreamRecordsResponse]
     """All records that a filter lets through, oldest first, one whole record after the other. INVALID_ARGUMENT (FILTER_REFUSED)."""
@@ -57,7 +57,7 @@ class RecordServiceAsyncStub(RecordServiceStub):
     """What the server holds, oldest first. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, FILTER_REFUSED)."""
     GetRecord: _aio.UnaryStreamMultiCallable[_record_service_pb2.GetRecordRequest, _record_service_pb2.GetRecordResponse]  # type: ignore[assignment]
     """The record of one game, in order, many lines a message. NOT_FOUND (GAME_UNKNOWN) if the server does not hold it;
-    FAILED_PRECONDITION (GAME_RUNNING) while it is being played.
+    FAILED_PRECONDITION (GAME_RUNNING) while it is being played, (SERIES_OPEN) while other games with the same deals are.
     """
     StreamRecords: _aio.UnaryStreamMultiCallable[_record_service_pb2.StreamRecordsRequest, _record_service_pb2.StreamRecordsResponse]  # type: ignore[assignment]
     """All records that a filter lets through, oldest first, one whole record after the other. INVALID_ARGUMENT (FILTER_REFUSED)."""
@@ -86,7 +86,7 @@ class RecordServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_abc.Iterator[_record_service_pb2.GetRecordResponse], _abc.AsyncIterator[_record_service_pb2.GetRecordResponse]]:
         """The record of one game, in order, many lines a message. NOT_FOUND (GAME_UNKNOWN) if the server does not hold it;
-        FAILED_PRECONDITION (GAME_RUNNING) while it is being played.
+        FAILED_PRECONDITION (GAME_RUNNING) while it is being played, (SERIES_OPEN) while other games with the same deals are.
         """
 
     @_abc_1.abstractmethod

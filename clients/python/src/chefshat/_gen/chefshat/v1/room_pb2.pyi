@@ -355,6 +355,7 @@ class RoomPolicy(_message.Message):
     SPECTATOR_DELAY_DECISIONS_FIELD_NUMBER: _builtins.int
     SPECTATORS_SEE_HANDS_FIELD_NUMBER: _builtins.int
     DURABILITY_FIELD_NUMBER: _builtins.int
+    CLOCKS_FIELD_NUMBER: _builtins.int
     decision_time_ms: _builtins.int
     """Milliseconds for a decision, 10..=86400000; standard 10000."""
     bank_ms: _builtins.int
@@ -385,6 +386,10 @@ class RoomPolicy(_message.Message):
     """Spectators see all hands (after the delay, which must then be at least 1). Otherwise only after the game has ended."""
     durability: Global___Durability.ValueType
     """What the game outlives; standard DURABLE, or EPHEMERAL on a server that keeps games in memory alone and refuses DURABLE."""
+    @_builtins.property
+    def clocks(self) -> _containers.RepeatedCompositeFieldContainer[Global___KindClock]:
+        """Other times for participants of some kinds; each kind at most once."""
+
     def __init__(
         self,
         *,
@@ -401,10 +406,11 @@ class RoomPolicy(_message.Message):
         spectator_delay_decisions: _builtins.int | None = ...,
         spectators_see_hands: _builtins.bool | None = ...,
         durability: Global___Durability.ValueType = ...,
+        clocks: _abc.Iterable[Global___KindClock] | None = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["_bank_ms", b"_bank_ms", "_decision_time_ms", b"_decision_time_ms", "_max_invalid_attempts", b"_max_invalid_attempts", "_max_timeouts", b"_max_timeouts", "_pace_ms", b"_pace_ms", "_spectator_delay_decisions", b"_spectator_delay_decisions", "_spectators", b"_spectators", "_spectators_see_hands", b"_spectators_see_hands", "_waiting_time_ms", b"_waiting_time_ms", "bank_ms", b"bank_ms", "decision_time_ms", b"decision_time_ms", "max_invalid_attempts", b"max_invalid_attempts", "max_timeouts", b"max_timeouts", "pace_ms", b"pace_ms", "spectator_delay_decisions", b"spectator_delay_decisions", "spectators", b"spectators", "spectators_see_hands", b"spectators_see_hands", "waiting_time_ms", b"waiting_time_ms"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["_bank_ms", b"_bank_ms", "_decision_time_ms", b"_decision_time_ms", "_max_invalid_attempts", b"_max_invalid_attempts", "_max_timeouts", b"_max_timeouts", "_pace_ms", b"_pace_ms", "_spectator_delay_decisions", b"_spectator_delay_decisions", "_spectators", b"_spectators", "_spectators_see_hands", b"_spectators_see_hands", "_waiting_time_ms", b"_waiting_time_ms", "abort", b"abort", "bank_ms", b"bank_ms", "decision_time_ms", b"decision_time_ms", "durability", b"durability", "max_invalid_attempts", b"max_invalid_attempts", "max_timeouts", b"max_timeouts", "pace_ms", b"pace_ms", "reward_scheme", b"reward_scheme", "spectator_delay_decisions", b"spectator_delay_decisions", "spectators", b"spectators", "spectators_see_hands", b"spectators_see_hands", "substitute", b"substitute", "waiting_time_ms", b"waiting_time_ms"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_bank_ms", b"_bank_ms", "_decision_time_ms", b"_decision_time_ms", "_max_invalid_attempts", b"_max_invalid_attempts", "_max_timeouts", b"_max_timeouts", "_pace_ms", b"_pace_ms", "_spectator_delay_decisions", b"_spectator_delay_decisions", "_spectators", b"_spectators", "_spectators_see_hands", b"_spectators_see_hands", "_waiting_time_ms", b"_waiting_time_ms", "abort", b"abort", "bank_ms", b"bank_ms", "clocks", b"clocks", "decision_time_ms", b"decision_time_ms", "durability", b"durability", "max_invalid_attempts", b"max_invalid_attempts", "max_timeouts", b"max_timeouts", "pace_ms", b"pace_ms", "reward_scheme", b"reward_scheme", "spectator_delay_decisions", b"spectator_delay_decisions", "spectators", b"spectators", "spectators_see_hands", b"spectators_see_hands", "substitute", b"substitute", "waiting_time_ms", b"waiting_time_ms"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType__bank_ms: _TypeAlias = _typing.Literal["bank_ms"]  # noqa: Y015
     _WhichOneofArgType__bank_ms: _TypeAlias = _typing.Literal["_bank_ms", b"_bank_ms"]  # noqa: Y015
@@ -444,6 +450,43 @@ class RoomPolicy(_message.Message):
     def WhichOneof(self, oneof_group: _WhichOneofArgType__waiting_time_ms) -> _WhichOneofReturnType__waiting_time_ms | None: ...
 
 Global___RoomPolicy: _TypeAlias = RoomPolicy  # noqa: Y015
+
+@_typing.final
+class KindClock(_message.Message):
+    """Times for participants of one kind, in place of the room's."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    KIND_FIELD_NUMBER: _builtins.int
+    DECISION_TIME_MS_FIELD_NUMBER: _builtins.int
+    BANK_MS_FIELD_NUMBER: _builtins.int
+    kind: Global___ParticipantKind.ValueType
+    """The kind."""
+    decision_time_ms: _builtins.int
+    """Milliseconds for a decision, 10..=86400000; unset: the room's."""
+    bank_ms: _builtins.int
+    """Milliseconds beyond that over the whole game, 0..=86400000; unset: the room's."""
+    def __init__(
+        self,
+        *,
+        kind: Global___ParticipantKind.ValueType = ...,
+        decision_time_ms: _builtins.int | None = ...,
+        bank_ms: _builtins.int | None = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _typing.Literal["_bank_ms", b"_bank_ms", "_decision_time_ms", b"_decision_time_ms", "bank_ms", b"bank_ms", "decision_time_ms", b"decision_time_ms"]  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_bank_ms", b"_bank_ms", "_decision_time_ms", b"_decision_time_ms", "bank_ms", b"bank_ms", "decision_time_ms", b"decision_time_ms", "kind", b"kind"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    _WhichOneofReturnType__bank_ms: _TypeAlias = _typing.Literal["bank_ms"]  # noqa: Y015
+    _WhichOneofArgType__bank_ms: _TypeAlias = _typing.Literal["_bank_ms", b"_bank_ms"]  # noqa: Y015
+    _WhichOneofReturnType__decision_time_ms: _TypeAlias = _typing.Literal["decision_time_ms"]  # noqa: Y015
+    _WhichOneofArgType__decision_time_ms: _TypeAlias = _typing.Literal["_decision_time_ms", b"_decision_time_ms"]  # noqa: Y015
+    @_typing.overload
+    def WhichOneof(self, oneof_group: _WhichOneofArgType__bank_ms) -> _WhichOneofReturnType__bank_ms | None: ...
+    @_typing.overload
+    def WhichOneof(self, oneof_group: _WhichOneofArgType__decision_time_ms) -> _WhichOneofReturnType__decision_time_ms | None: ...
+
+Global___KindClock: _TypeAlias = KindClock  # noqa: Y015
 
 @_typing.final
 class Participant(_message.Message):
@@ -516,6 +559,8 @@ class Room(_message.Message):
     ORIGIN_FIELD_NUMBER: _builtins.int
     BRANCHED_FROM_FIELD_NUMBER: _builtins.int
     ABORT_REASON_FIELD_NUMBER: _builtins.int
+    TOURNAMENT_ID_FIELD_NUMBER: _builtins.int
+    SERIES_ID_FIELD_NUMBER: _builtins.int
     room_id: _builtins.str
     """Identifies the room: 32 hexadecimal digits."""
     game_id: _builtins.str
@@ -536,6 +581,12 @@ class Room(_message.Message):
     """Where its game comes from."""
     abort_reason: Global___AbortReason.ValueType
     """For a game without a result: why."""
+    tournament_id: _builtins.str
+    """The tournament it belongs to; empty if it belongs to none."""
+    series_id: _builtins.str
+    """The series of games it belongs to, which are dealt alike: 32 hexadecimal digits; empty if it belongs to none. Until all games of the series
+    have ended, what could tell its deals is withheld: the reveal of its seed, and its record.
+    """
     @_builtins.property
     def rules(self) -> _rules_pb2.RuleSet:
         """The rule set, every field set."""
@@ -568,10 +619,12 @@ class Room(_message.Message):
         origin: Global___GameOrigin.ValueType = ...,
         branched_from: Global___BranchPoint | None = ...,
         abort_reason: Global___AbortReason.ValueType = ...,
+        tournament_id: _builtins.str = ...,
+        series_id: _builtins.str = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["branched_from", b"branched_from", "policy", b"policy", "rules", b"rules"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["abort_reason", b"abort_reason", "branched_from", b"branched_from", "created_at_ms", b"created_at_ms", "game_id", b"game_id", "name", b"name", "origin", b"origin", "policy", b"policy", "room_id", b"room_id", "rules", b"rules", "seats", b"seats", "seed_commitment", b"seed_commitment", "seed_fixed", b"seed_fixed", "state", b"state"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["abort_reason", b"abort_reason", "branched_from", b"branched_from", "created_at_ms", b"created_at_ms", "game_id", b"game_id", "name", b"name", "origin", b"origin", "policy", b"policy", "room_id", b"room_id", "rules", b"rules", "seats", b"seats", "seed_commitment", b"seed_commitment", "seed_fixed", b"seed_fixed", "series_id", b"series_id", "state", b"state", "tournament_id", b"tournament_id"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

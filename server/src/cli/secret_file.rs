@@ -1,25 +1,31 @@
-//! Leaving a join code in a file, for programs that are started beside the one that makes the room.
+//! Leaving a secret in a file, for programs that are started beside the one that was told it: the join code of a room or a tournament, or
+//! what its owner needs.
 
 use std::fs::File;
 use std::io::{self, Write as _};
 use std::os::unix::fs::OpenOptionsExt as _;
 use std::path::{Path, PathBuf};
 
-use super::super::CommandError;
+use super::CommandError;
 
-/// A file that a join code is going to be left in: whole or not at all, and for its owner alone.
-pub(super) struct CodeFile<'a> {
+/// A file that a secret is going to be left in: whole or not at all, and for its owner alone.
+pub(super) struct SecretFile<'a> {
+    what: &'static str,
     file: &'a Path,
     part: PathBuf,
     whole: File,
 }
 
-impl<'a> CodeFile<'a> {
-    /// Begins it under another name, beside where it is to be.
+impl<'a> SecretFile<'a> {
+    /// Begins it under another name, beside where it is to be. `flag` named the file, `what` is to be left in it: "a join code".
     ///
     /// # Errors
     /// It cannot be written.
-    pub(super) fn prepare(file: &'a Path) -> Result<Self, CommandError> {
+    pub(super) fn prepare(
+        file: &'a Path,
+        flag: &str,
+        what: &'static str,
+    ) -> Result<Self, CommandError> {
         let mut part = file.as_os_str().to_owned();
         part.push(".part");
         let part = PathBuf::from(part);
@@ -36,24 +42,33 @@ impl<'a> CodeFile<'a> {
             options.write(true).create_new(true).mode(0o600).open(&part)
         };
         match open() {
-            Ok(whole) => Ok(Self { file, part, whole }),
+            Ok(whole) => Ok(Self {
+                what,
+                file,
+                part,
+                whole,
+            }),
             Err(error) => {
                 let file = file.display();
-                Err(format!(
-                    "--code-file: a join code cannot be left in {file}: {error}; no room was made"
+                Err(
+                    format!("{flag}: {what} cannot be left in {file}: {error}; nothing was made")
+                        .into(),
                 )
-                .into())
             }
         }
     }
 
-    /// Leaves the code.
-    pub(super) fn leave(mut self, code: &str) -> Result<(), CommandError> {
-        writeln!(self.whole, "{code}")
+    /// Leaves the secret.
+    ///
+    /// # Errors
+    /// It cannot be written after all.
+    pub(super) fn leave(mut self, secret: &str) -> Result<(), CommandError> {
+        writeln!(self.whole, "{secret}")
             .and_then(|()| std::fs::rename(&self.part, self.file))
             .map_err(|error| {
                 format!(
-                    "the room was made, but its join code cannot be left in {}: {error}",
+                    "what was asked for was made, but {} cannot be left in {}: {error}",
+                    self.what,
                     self.file.display()
                 )
                 .into()
@@ -61,9 +76,9 @@ impl<'a> CodeFile<'a> {
     }
 }
 
-impl Drop for CodeFile<'_> {
+impl Drop for SecretFile<'_> {
     fn drop(&mut self) {
-        // Nothing is there any more once the code was left.
+        // Nothing is there any more once the secret was left.
         let _ = std::fs::remove_file(&self.part);
     }
 }
@@ -72,13 +87,17 @@ impl Drop for CodeFile<'_> {
 mod tests {
     use super::*;
 
+    fn prepare(file: &Path) -> Result<SecretFile<'_>, CommandError> {
+        SecretFile::prepare(file, "--code-file", "a join code")
+    }
+
     #[test]
-    fn a_code_is_left_for_its_owner_alone() {
+    fn a_secret_is_left_for_its_owner_alone() {
         use std::os::unix::fs::PermissionsExt as _;
         let folder = tempfile::tempdir().expect("a folder");
         let file = folder.path().join("code");
         for code in ["BCDF2345", "BCDF2346"] {
-            let prepared = CodeFile::prepare(&file).expect("it can be written");
+            let prepared = prepare(&file).expect("it can be written");
             prepared.leave(code).expect("written");
         }
         assert_eq!(std::fs::read_to_string(&file).expect("read"), "BCDF2346\n");
@@ -90,13 +109,19 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_gets_no_code_leaves_nothing_behind() {
+    fn a_file_that_gets_no_secret_leaves_nothing_behind() {
         let folder = tempfile::tempdir().expect("a folder");
-        drop(CodeFile::prepare(&folder.path().join("code")).expect("it can be written"));
+        drop(prepare(&folder.path().join("code")).expect("it can be written"));
         let left = std::fs::read_dir(folder.path())
             .expect("the folder")
             .count();
         assert_eq!(left, 0);
-        assert!(CodeFile::prepare(folder.path()).is_err(), "a folder");
+        let refused = prepare(folder.path()).err().expect("a folder is no file");
+        assert!(
+            refused
+                .to_string()
+                .starts_with("--code-file: a join code cannot"),
+            "{refused}"
+        );
     }
 }

@@ -1,0 +1,311 @@
+//! Participants of tournaments, as courses of events: who is attached when, which agent plays which game, how it ends.
+
+use super::*;
+
+/// First handle of the seats that the server attaches by itself.
+const CALLED: u32 = 1 << 31;
+
+type Logs = Arc<Mutex<Vec<(String, Arc<Mutex<Vec<String>>>)>>>;
+
+/// A session of one participant, and the log of the agent of each game, in the order in which they were made.
+struct Cup {
+    session: Session<'static, Scripted>,
+    logs: Logs,
+}
+
+impl Cup {
+    /// Every agent answers with the number of its game times ten, again and again.
+    fn new() -> Self {
+        let logs = Logs::default();
+        let making = Arc::clone(&logs);
+        let make = move |attached: &v1::Attached| {
+            let log = Arc::default();
+            let mut logs = making.lock().unwrap();
+            logs.push((attached.game_id.clone(), Arc::clone(&log)));
+            let action = 10 * u32::try_from(logs.len()).unwrap();
+            let actions = [action; 9].into();
+            Scripted { log, actions }
+        };
+        let options = PlayOptions {
+            entropy: Entropy::Fixed(vec![7]),
+            ..PlayOptions::default()
+        };
+        let participant = Participant::new("cup".to_owned(), make, &options);
+        let session = Session::of_participant(participant, &options);
+        Self { session, logs }
+    }
+
+    /// One that has entered.
+    fn entered() -> Self {
+        let mut cup = Self::new();
+        assert_eq!(cup.attach(), ["cup from 0"]);
+        assert!(cup.hear(vec![(0, entered())]).is_empty());
+        cup
+    }
+
+    /// A new stream: what is attached on it, in order.
+    fn attach(&mut self) -> Vec<String> {
+        let requests = self.session.attach().into_iter();
+        let commands = requests.flat_map(|request| request.commands);
+        commands
+            .map(|command| match command.command {
+                Some(Command::Attach(attach)) => {
+                    assert_eq!(attach.entropy, [7]);
+                    format!("{} from {}", attach.ticket, attach.from_sequence)
+                }
+                other => panic!("not an attachment: {other:?}"),
+            })
+            .collect()
+    }
+
+    fn hear(&mut self, updates: Vec<(u32, Update)>) -> Vec<String> {
+        let requests = self.session.receive(response(updates));
+        requests.iter().map(said).collect()
+    }
+
+    /// What the agents were told, by game.
+    fn told(&self) -> Vec<(String, Vec<String>)> {
+        let logs = self.logs.lock().unwrap();
+        let told = logs.iter().map(|(game, log)| {
+            let lines = std::mem::take(&mut *log.lock().unwrap());
+            (game.clone(), lines)
+        });
+        told.filter(|(_, lines)| !lines.is_empty()).collect()
+    }
+}
+
+fn entered() -> Update {
+    Update::Entered(v1::Entered {
+        request_id: PARTICIPANT,
+        tournament_id: "tournament".to_owned(),
+        participant: 3,
+    })
+}
+
+/// The seat of a game, attached by the server (request id 0) or because it was asked for.
+fn seated(request_id: u32, game: &str, seat: u32, next_sequence: u64) -> Update {
+    Update::Attached(v1::Attached {
+        request_id,
+        room_id: format!("room of {game}"),
+        game_id: game.to_owned(),
+        seat,
+        next_sequence,
+        ticket: format!("ticket of {game}"),
+        tournament_id: "tournament".to_owned(),
+    })
+}
+
+fn refused(request_id: u32) -> Update {
+    Update::Refused(v1::Refused {
+        request_id,
+        code: 16,
+        reason: "TICKET_UNKNOWN".to_owned(),
+        ..v1::Refused::default()
+    })
+}
+
+fn over() -> Update {
+    detached(v1::DetachReason::TournamentOver)
+}
+
+/// What came of the games, in short.
+fn played(cup: Cup) -> Result<Vec<String>, String> {
+    assert!(cup.session.is_over());
+    match cup.session.into_played() {
+        Ok(outcomes) => Ok(outcomes
+            .into_iter()
+            .map(|outcome| {
+                let place = outcome.standing().map(|line| line.place);
+                format!("{} {place:?}", outcome.game_id)
+            })
+            .collect()),
+        Err(error) => Err(error.reason().unwrap_or("none").to_owned()),
+    }
+}
+
+#[test]
+fn every_game_has_an_agent_of_its_own() {
+    let mut cup = Cup::entered();
+    let said = cup.hear(vec![
+        (CALLED, seated(0, "a", 0, 1)),
+        (CALLED + 1, seated(0, "b", 1, 1)),
+        (CALLED, events(&[(1, None)])),
+        (CALLED + 1, decision(5)),
+        (CALLED, decision(4)),
+    ]);
+    assert_eq!(said, [format!("{}:5=20 {CALLED}:4=10", CALLED + 1)]);
+    let told = cup.told();
+    assert_eq!(told[0].0, "a");
+    assert_eq!(told[0].1, ["attached 0", "event 1", "decide 4 None"]);
+    assert_eq!(told[1].0, "b");
+    assert_eq!(told[1].1, ["attached 1", "decide 5 None"]);
+    let end = |seat| {
+        let end = (seat, events(&[(2, ended())]));
+        vec![end, (seat, detached(v1::DetachReason::GameOver))]
+    };
+    cup.hear(end(CALLED + 1));
+    assert!(!cup.session.is_over());
+    cup.hear(end(CALLED));
+    assert!(!cup.session.is_over(), "there may be more games");
+    cup.hear(vec![(0, over())]);
+    assert_eq!(
+        played(cup),
+        Ok(vec!["a Some(2)".to_owned(), "b Some(1)".to_owned()])
+    );
+}
+
+#[test]
+fn a_new_stream_goes_on_with_the_same_agents() {
+    let mut cup = Cup::entered();
+    cup.hear(vec![
+        (CALLED, seated(0, "a", 0, 1)),
+        (CALLED + 1, seated(0, "b", 1, 1)),
+        (CALLED, events(&[(1, None), (2, None)])),
+        (CALLED, decision(4)),
+    ]);
+    cup.told();
+    cup.session.disconnected();
+    let attached = cup.attach();
+    assert_eq!(
+        attached,
+        ["ticket of a from 3", "ticket of b from 1", "cup from 0"]
+    );
+    let said = cup.hear(vec![
+        (0, seated(1, "a", 0, 4)),
+        (1, seated(2, "b", 1, 1)),
+        (2, entered()),
+        (CALLED, seated(0, "c", 1, 1)),
+        (0, events(&[(3, None)])),
+        (0, decision(4)),
+        (1, decision(1)),
+        (CALLED, decision(2)),
+    ]);
+    assert_eq!(said, [format!("0:4=10 1:1=20 {CALLED}:2=30")]);
+    let told: Vec<_> = cup.told().into_iter().map(|(_, lines)| lines).collect();
+    assert_eq!(
+        told[0],
+        ["attached 0", "event 3"],
+        "asked for nothing, told nothing twice"
+    );
+    assert_eq!(told[1], ["attached 1", "decide 1 None"]);
+    assert_eq!(told[2], ["attached 1", "decide 2 None"]);
+}
+
+/// A server that attaches anew what the client has attached already: the newest attachment of a seat holds.
+#[test]
+fn a_seat_attached_twice_is_one_seat() {
+    let mut cup = Cup::entered();
+    let said = cup.hear(vec![
+        (CALLED, seated(0, "a", 0, 1)),
+        (CALLED, events(&[(1, None)])),
+        (CALLED + 1, seated(0, "a", 0, 2)),
+        (CALLED, detached(v1::DetachReason::Superseded)),
+        (CALLED + 1, events(&[(1, None), (2, None)])),
+        (CALLED + 1, decision(4)),
+    ]);
+    assert_eq!(said, [format!("{}:4=10", CALLED + 1)]);
+    let told = cup.told();
+    assert_eq!(told.len(), 1);
+    let lines = [
+        "attached 0",
+        "event 1",
+        "attached 0",
+        "event 2",
+        "decide 4 None",
+    ];
+    assert_eq!(told[0].1, lines);
+}
+
+#[test]
+fn the_end_of_the_tournament_waits_for_what_is_left_of_its_games() {
+    let mut cup = Cup::entered();
+    let aborted = Kind::GameAborted(Box::new(v1::GameAborted {
+        reason: v1::AbortReason::Closed.into(),
+        reveal: None,
+    }));
+    cup.hear(vec![(CALLED, seated(0, "a", 0, 1)), (0, over())]);
+    assert!(!cup.session.is_over());
+    cup.session.disconnected();
+    assert_eq!(
+        cup.attach(),
+        ["ticket of a from 1"],
+        "nobody enters what is over"
+    );
+    cup.hear(vec![
+        (0, seated(1, "a", 0, 2)),
+        (0, events(&[(1, Some(aborted))])),
+        (0, detached(v1::DetachReason::GameOver)),
+    ]);
+    assert_eq!(played(cup), Ok(vec!["a None".to_owned()]));
+}
+
+#[test]
+fn a_game_whose_room_is_gone_has_no_outcome_and_stops_no_other() {
+    let mut cup = Cup::entered();
+    cup.hear(vec![(CALLED, seated(0, "a", 0, 1))]);
+    cup.session.disconnected();
+    assert_eq!(cup.attach().len(), 2);
+    cup.hear(vec![
+        (0, refused(1)),
+        (1, entered()),
+        (CALLED, seated(0, "b", 0, 1)),
+        (CALLED, events(&[(1, ended())])),
+        (CALLED, detached(v1::DetachReason::GameOver)),
+        (1, over()),
+    ]);
+    assert_eq!(played(cup), Ok(vec!["b Some(2)".to_owned()]));
+}
+
+#[test]
+fn participants_leave_each_for_its_own_reason() {
+    let table = [
+        (refused(PARTICIPANT), "TICKET_UNKNOWN"),
+        (detached(v1::DetachReason::Superseded), "SUPERSEDED"),
+        (detached(v1::DetachReason::Requested), "DETACHED"),
+    ];
+    for (update, reason) in table {
+        let mut cup = Cup::entered();
+        cup.hear(vec![(CALLED, seated(0, "a", 0, 1)), (0, update)]);
+        assert!(!cup.session.is_over(), "its game may go on");
+        cup.hear(vec![(CALLED, detached(v1::DetachReason::Superseded))]);
+        assert_eq!(played(cup), Err(reason.to_owned()));
+    }
+    let mut cup = Cup::entered();
+    cup.hear(vec![(CALLED, seated(0, "a", 0, 1))]);
+    cup.session.give_up(&PlayError::Superseded);
+    assert_eq!(played(cup), Err("SUPERSEDED".to_owned()));
+}
+
+#[test]
+fn of_a_game_that_is_over_no_agent_is_kept() {
+    let mut cup = Cup::entered();
+    cup.hear(vec![(CALLED, seated(0, "a", 0, 1))]);
+    let held = |cup: &Cup| Arc::strong_count(&cup.logs.lock().unwrap()[0].1);
+    assert_eq!(held(&cup), 2);
+    cup.hear(vec![
+        (CALLED, events(&[(1, ended())])),
+        (CALLED, detached(v1::DetachReason::GameOver)),
+    ]);
+    assert_eq!(held(&cup), 1);
+}
+
+#[test]
+fn strange_updates_stop_no_participant() {
+    let mut cup = Cup::entered();
+    let said = cup.hear(vec![
+        (9, entered()),
+        (0, entered()),
+        (CALLED, decision(1)),
+        (CALLED, detached(v1::DetachReason::GameOver)),
+        (CALLED, seated(77, "a", 0, 1)),
+        (CALLED, seated(0, "b", 0, 1)),
+        (CALLED, decision(1)),
+        (0, decision(1)),
+    ]);
+    assert_eq!(said, [format!("{CALLED}:1=10")]);
+    assert!(!cup.session.is_over());
+    // Without a participant nobody is seated by the server.
+    let mut table = Table::seated(&[5]);
+    let said = table.hear(vec![(CALLED, seated(0, "a", 0, 1)), (CALLED, decision(1))]);
+    assert!(said.is_empty());
+}

@@ -1,0 +1,290 @@
+//! Tournaments: the calls of their service, following one, and taking part in one. What a participant makes of what it is told is in
+//! `participant`.
+
+use futures::Stream;
+use tokio::time::{Instant, sleep};
+use tonic::transport::Channel;
+use tonic::{Status, Streaming};
+
+use crate::backoff::{Backoff, Outage};
+use crate::client::MAX_RESPONSE_BYTES;
+use crate::error::{Error, PlayError, may_retry};
+use crate::participant::Participant;
+use crate::session::Session;
+use crate::v1::tournament_service_client::TournamentServiceClient;
+use crate::{Agent, Client, Outcome, PlayOptions, run, v1};
+
+impl Client {
+    /// Makes a tournament. The response holds the join code for its participants and the token that starts and closes it.
+    ///
+    /// # Errors
+    /// `RULE_SET_REFUSED`, `POLICY_REFUSED`, `SETTINGS_REFUSED` or `NAME_REFUSED`, with the field at fault in the metadata;
+    /// `TOO_MANY_TOURNAMENTS`, `DISK_NEARLY_FULL`; `SHUTTING_DOWN`.
+    pub async fn create_tournament(
+        &self,
+        settings: v1::TournamentSettings,
+    ) -> Result<v1::CreateTournamentResponse, Error> {
+        let request = v1::CreateTournamentRequest {
+            settings: Some(settings),
+        };
+        let response = service(self).create_tournament(request).await?;
+        Ok(response.into_inner())
+    }
+
+    /// One tournament.
+    ///
+    /// # Errors
+    /// `TOURNAMENT_UNKNOWN`.
+    pub async fn tournament(
+        &self,
+        tournament_id: impl Into<String>,
+    ) -> Result<v1::Tournament, Error> {
+        let request = v1::GetTournamentRequest {
+            tournament_id: tournament_id.into(),
+        };
+        let response = service(self).get_tournament(request).await?.into_inner();
+        one(response.tournament)
+    }
+
+    /// A page of the server's tournaments, newest last, without their participants.
+    ///
+    /// # Errors
+    /// A failed connection, or a page token that the server does not know.
+    pub async fn list_tournaments(
+        &self,
+        request: v1::ListTournamentsRequest,
+    ) -> Result<v1::ListTournamentsResponse, Error> {
+        let response = service(self).list_tournaments(request).await?;
+        Ok(response.into_inner())
+    }
+
+    /// Joins a tournament; its join code is enough to find it. The response holds the ticket for [`play_tournament`](Self::play_tournament).
+    ///
+    /// # Errors
+    /// `JOIN_CODE_WRONG`, `TOURNAMENT_FULL`, `TOURNAMENT_STARTED`, `NAME_TAKEN`, `NAME_REFUSED`, `KIND_NOT_ADMITTED`, `KIND_REFUSED`,
+    /// `NOT_STATELESS`, `MAX_GAMES_REFUSED`, `TOURNAMENT_UNKNOWN`.
+    pub async fn join_tournament(
+        &self,
+        request: v1::JoinTournamentRequest,
+    ) -> Result<v1::JoinTournamentResponse, Error> {
+        let response = service(self).join_tournament(request).await?;
+        Ok(response.into_inner())
+    }
+
+    /// Begins a tournament.
+    ///
+    /// # Errors
+    /// `OWNER_TOKEN_WRONG`, `TOO_FEW_PARTICIPANTS`, `TOURNAMENT_STARTED`, `TOURNAMENT_UNKNOWN`.
+    pub async fn start_tournament(
+        &self,
+        tournament_id: impl Into<String>,
+        owner_token: impl Into<String>,
+    ) -> Result<v1::Tournament, Error> {
+        let request = v1::StartTournamentRequest {
+            tournament_id: tournament_id.into(),
+            owner_token: owner_token.into(),
+        };
+        let response = service(self).start_tournament(request).await?;
+        one(response.into_inner().tournament)
+    }
+
+    /// Closes a tournament: running games are aborted, what has been counted stays.
+    ///
+    /// # Errors
+    /// `OWNER_TOKEN_WRONG`, `TOURNAMENT_UNKNOWN`.
+    pub async fn close_tournament(
+        &self,
+        tournament_id: impl Into<String>,
+        owner_token: impl Into<String>,
+    ) -> Result<v1::Tournament, Error> {
+        let request = v1::CloseTournamentRequest {
+            tournament_id: tournament_id.into(),
+            owner_token: owner_token.into(),
+        };
+        let response = service(self).close_tournament(request).await?;
+        one(response.into_inner().tournament)
+    }
+
+    /// Standings of a tournament, ratings, and how sure the order is; final once it is over.
+    ///
+    /// # Errors
+    /// `TOURNAMENT_UNKNOWN`.
+    pub async fn tournament_results(
+        &self,
+        tournament_id: impl Into<String>,
+    ) -> Result<v1::GetTournamentResultsResponse, Error> {
+        let request = v1::GetTournamentResultsRequest {
+            tournament_id: tournament_id.into(),
+        };
+        let response = service(self).get_tournament_results(request).await?;
+        Ok(response.into_inner())
+    }
+
+    /// A page of a tournament's games, in order.
+    ///
+    /// # Errors
+    /// `TOURNAMENT_UNKNOWN`, `PAGE_TOKEN_REFUSED`.
+    pub async fn tournament_games(
+        &self,
+        request: v1::ListTournamentGamesRequest,
+    ) -> Result<v1::ListTournamentGamesResponse, Error> {
+        let response = service(self).list_tournament_games(request).await?;
+        Ok(response.into_inner())
+    }
+
+    /// Everybody who has played a rated game on the server, best first.
+    ///
+    /// # Errors
+    /// A failed connection.
+    pub async fn leaderboard(
+        &self,
+        request: v1::GetLeaderboardRequest,
+    ) -> Result<v1::GetLeaderboardResponse, Error> {
+        let response = service(self).get_leaderboard(request).await?;
+        Ok(response.into_inner())
+    }
+
+    /// Follows a tournament. The connection is made when the first report is asked for.
+    pub fn follow_tournament(&self, tournament_id: impl Into<String>) -> TournamentFollower {
+        TournamentFollower {
+            service: service(self),
+            tournament_id: tournament_id.into(),
+            backoff: Backoff::default(),
+            outage: Outage::default(),
+            stream: None,
+            over: false,
+        }
+    }
+
+    /// Takes part in a tournament to its end, with the ticket from [`join_tournament`](Self::join_tournament): over one stream, in as many
+    /// games at a time as the participant said it can play. `make` gives an agent for each game when the participant is seated in it; the
+    /// agent keeps its game across lost connections. Dropping the future leaves: the tournament's games wait for the participant for a
+    /// while, then count as forfeited.
+    ///
+    /// The outcomes come in the order in which games were begun, aborted ones among them. A game that was not played to its end here,
+    /// because its room was gone when the connection was made again, has none; the server counts it, or calls it again.
+    ///
+    /// # Errors
+    /// See [`PlayError`], of the participant: `Superseded` when a newer connection takes part in its place. What had come of games by then
+    /// their agents were told ([`Agent::on_game_over`]).
+    pub async fn play_tournament<A: Agent>(
+        &self,
+        ticket: impl Into<String>,
+        make: impl FnMut(&v1::Attached) -> A + Send,
+    ) -> Result<Vec<Outcome>, PlayError> {
+        let options = PlayOptions::default();
+        self.play_tournament_with(ticket, make, &options).await
+    }
+
+    /// The same with options. The entropy is one for all games of the participant; it counts in those that are dealt independently.
+    ///
+    /// # Errors
+    /// As [`play_tournament`](Self::play_tournament).
+    pub async fn play_tournament_with<A: Agent>(
+        &self,
+        ticket: impl Into<String>,
+        make: impl FnMut(&v1::Attached) -> A + Send,
+        options: &PlayOptions,
+    ) -> Result<Vec<Outcome>, PlayError> {
+        let participant = Participant::new(ticket.into(), make, options);
+        let mut session = Session::of_participant(participant, options);
+        run::run(self.channel(), &mut session, &options.backoff).await;
+        session.into_played()
+    }
+}
+
+/// Follows one tournament, across lost connections. Made by [`Client::follow_tournament`].
+#[derive(Debug)]
+pub struct TournamentFollower {
+    service: TournamentServiceClient<Channel>,
+    tournament_id: String,
+    backoff: Backoff,
+    outage: Outage,
+    stream: Option<Streaming<v1::FollowTournamentResponse>>,
+    over: bool,
+}
+
+impl TournamentFollower {
+    /// With this backoff instead of the standard one.
+    #[must_use]
+    pub fn with_backoff(mut self, backoff: Backoff) -> Self {
+        self.backoff = backoff;
+        self
+    }
+
+    /// How the tournament stands: at once, then whenever that has changed; `None` after the report of its end. May be dropped while it
+    /// waits: nothing is lost.
+    ///
+    /// # Errors
+    /// What the server refuses (`TOURNAMENT_UNKNOWN`, `TOO_MANY_FOLLOWERS`), or the last failure when the connection cannot be made again in
+    /// time. After an error there is nothing more.
+    pub async fn next(&mut self) -> Result<Option<v1::FollowTournamentResponse>, Error> {
+        while !self.over {
+            match self.receive().await {
+                Ok(report) => {
+                    self.outage.over();
+                    // A report without a tournament is a heartbeat.
+                    if let Some(tournament) = &report.tournament {
+                        self.over = is_over(tournament);
+                        return Ok(Some(report));
+                    }
+                }
+                Err(status) => self.lost(status).await?,
+            }
+        }
+        Ok(None)
+    }
+
+    /// The same as a [`Stream`].
+    pub fn into_stream(
+        self,
+    ) -> impl Stream<Item = Result<v1::FollowTournamentResponse, Error>> + Send {
+        futures::stream::try_unfold(self, |mut follower| async {
+            let report = follower.next().await?;
+            Ok(report.map(|report| (report, follower)))
+        })
+    }
+
+    async fn receive(&mut self) -> Result<v1::FollowTournamentResponse, Status> {
+        let stream = match &mut self.stream {
+            Some(stream) => stream,
+            none => {
+                let request = v1::FollowTournamentRequest {
+                    tournament_id: self.tournament_id.clone(),
+                };
+                none.insert((self.service.follow_tournament(request).await?).into_inner())
+            }
+        };
+        let report = stream.message().await?;
+        report.ok_or_else(|| Status::unavailable("the server ended the stream"))
+    }
+
+    async fn lost(&mut self, status: Status) -> Result<(), Error> {
+        self.stream = None;
+        let retry = may_retry(status.code())
+            .then(|| self.outage.failed(&self.backoff, Instant::now()).ok())
+            .flatten();
+        let Some(delay) = retry else {
+            self.over = true;
+            return Err(status.into());
+        };
+        tracing::info!(?delay, "connection lost: {status}");
+        sleep(delay).await;
+        Ok(())
+    }
+}
+
+fn service(client: &Client) -> TournamentServiceClient<Channel> {
+    TournamentServiceClient::new(client.channel()).max_decoding_message_size(MAX_RESPONSE_BYTES)
+}
+
+fn one(tournament: Option<v1::Tournament>) -> Result<v1::Tournament, Error> {
+    tournament.ok_or_else(|| Error::incomplete("tournament"))
+}
+
+fn is_over(tournament: &v1::Tournament) -> bool {
+    matches!(
+        tournament.state(),
+        v1::TournamentState::Finished | v1::TournamentState::Closed
+    )
+}

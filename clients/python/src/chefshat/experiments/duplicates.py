@@ -1,0 +1,91 @@
+"""What duplicate deals are worth, as a picture: `python -m chefshat.experiments.duplicates FILE --out PNG`.
+
+The file is what `chefshat experiment duplicates --json` prints; nothing is played or computed here.
+"""
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from chefshat.errors import failed
+from chefshat.experiments import plots
+from chefshat.experiments.results import Figure, Line, Panel
+from chefshat.files import check_readable, write_whole
+
+EXAMPLE = """\
+example:
+  chefshat experiment duplicates --json > duplicates.json
+  python -m chefshat.experiments.duplicates duplicates.json --out duplicates.png
+"""
+PRINTED = "`chefshat experiment duplicates --json` prints"
+# Room above the highest line, as a share of it.
+HEADROOM = 1.08
+
+
+def figure(report: str) -> Figure:
+    """The standard error of the difference between two agents over the games of each, a panel for each pair and length of games.
+
+    Args:
+        report: the report, JSON.
+
+    Raises:
+        ValueError: it is no such report.
+    """
+    try:
+        rows = json.loads(report)["rows"]
+        cases: dict[tuple[str, str, str], list[dict[str, Any]]] = {}
+        for row in rows:
+            cases.setdefault((row["game"], row["first"], row["second"]), []).append(row)
+        highest = max(max(row["independent_error"], row["duplicate_error"]) for row in rows)
+        panels = [_panel(case, rows, highest * HEADROOM) for case, rows in cases.items()]
+    except (ValueError, TypeError, KeyError) as error:
+        raise ValueError(f"this is not what {PRINTED}") from error
+    return Figure(
+        name="duplicates",
+        title="Two agents among three greedy ones: how sure is it which of them is better?",
+        panels=panels,
+        columns=3,
+    )
+
+
+def _panel(case: tuple[str, str, str], rows: list[dict[str, Any]], highest: float) -> Panel:
+    game, first, second = case
+    names = {"independent_error": "each game has its own deals", "duplicate_error": "both play the same deals"}
+    games = [row["games"] for row in rows]
+    return Panel(
+        title=f"{first} / {second}, games of {game}" if "Shift" in game else f"{first} / {second}, games to {game}",
+        x_label="games of each",
+        y_label="standard error, points by place",
+        lines=[Line(label=label, x=games, y=[row[error] for row in rows]) for error, label in names.items()],
+        y_range=(0.0, highest),
+    )
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command. Returns the exit code."""
+    parser = argparse.ArgumentParser(
+        prog="python -m chefshat.experiments.duplicates",
+        description="Draw what duplicate deals are worth.",
+        epilog=EXAMPLE,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("report", type=Path, metavar="FILE", help=f"what {PRINTED}")
+    parser.add_argument("--out", type=Path, required=True, metavar="PNG", help="the picture to write")
+    parser.add_argument("--json", action="store_true", help="print one object of JSON")
+    options = parser.parse_args(arguments)
+    try:
+        check_readable(options.report, "report", f"{PRINTED}")
+        write_whole(options.out, plots.png(figure(options.report.read_text(encoding="utf-8"))))
+    except OSError as error:
+        return failed(error, as_json=options.json)
+    except ValueError as error:
+        return failed(ValueError(f"{options.report}: {error}"), as_json=options.json)
+    print(json.dumps({"out": str(options.out)}) if options.json else f"wrote {options.out}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

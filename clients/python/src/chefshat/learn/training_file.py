@@ -1,0 +1,146 @@
+"""A training in a file: safetensors with every array that learning goes on from, to the last bit, and texts that say what it is.
+
+What the arrays and the texts mean is said where the training is: `checkpoint` (Deep Q), `ppo_checkpoint`. The network alone, which
+is what an agent needs, is in a file of its own (see `network`).
+"""
+
+import os
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any, Literal, TypeVar
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import safetensors
+import safetensors.numpy
+from google.protobuf import json_format
+
+from chefshat import pb
+from chefshat.files import check_readable, write_whole
+from chefshat.learn.network import NetworkInfo
+
+State = TypeVar("State")
+
+
+class TrainingFileError(ValueError):
+    """A file is not a training of the format. The message names the file and what is wrong with it."""
+
+
+class Contents:
+    """What an open file holds.
+
+    Attributes:
+        texts: the texts by name.
+    """
+
+    def __init__(self, file: Any, texts: Mapping[str, str]) -> None:  # noqa: ANN401 - safetensors has no types.
+        self._file = file
+        self.texts = texts
+
+    @property
+    def rules(self) -> pb.RuleSet:
+        """The rule set."""
+        return json_format.Parse(self.texts["rules"], pb.RuleSet())
+
+    def tensor(self, name: str) -> np.ndarray[Any, Any]:
+        """One array."""
+        return np.asarray(self._file.get_tensor(name))
+
+    def state(self, make: Callable[[], State]) -> State:
+        """The arrays, put into the shape of what `make` would make. Nothing is made: it is only looked at what would be."""
+        template = jax.eval_shape(make)
+        # Keys have a type of their own, which the plain numbers of the file do not say.
+        are_keys = [_is_key(leaf) for leaf in jax.tree.leaves(template)]
+        leaves = []
+        for (name, leaf), is_key in zip(_named(jax.eval_shape(lambda: _plain(make()))), are_keys, strict=True):
+            tensor = self.tensor(name)
+            if (tensor.shape, tensor.dtype) != (leaf.shape, leaf.dtype):
+                raise ValueError(f"its {name} is {tensor.dtype}{list(tensor.shape)}, not {leaf.dtype}{list(leaf.shape)}")
+            leaves.append(jax.random.wrap_key_data(jnp.asarray(tensor)) if is_key else jnp.asarray(tensor))
+        state: State = jax.tree.unflatten(jax.tree.structure(template), leaves)
+        return state
+
+
+def save(path: str | os.PathLike[str], form: str, state: object, rules: pb.RuleSet, texts: Mapping[str, str]) -> None:
+    """Writes a training to a file, whole or not at all.
+
+    Args:
+        path: where to; what stands there is replaced.
+        form: the name of the format.
+        state: arrays of jax in tuples.
+        rules: the rule set.
+        texts: what else is to be said, by name.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    metadata = {"format": form, "rules": rules_text(rules), **texts}
+    tensors = {name: np.asarray(leaf) for name, leaf in _named(_plain(state))}
+    write_whole(path, safetensors.numpy.save(tensors, metadata=metadata))
+
+
+@contextmanager
+def opened(path: str | os.PathLike[str], form: str) -> Iterator[Contents]:
+    """A file of the format, to be read within the `with`.
+
+    Raises:
+        TrainingFileError: it is none, or what it holds is not what it should.
+        OSError: it cannot be read.
+    """
+    check_readable(path, "training", "`python -m chefshat.learn ppo` or `deep-q` writes beside its network")
+    try:
+        with safetensors.safe_open(path, framework="np") as file:
+            metadata = file.metadata() or {}
+            if metadata.get("format") != form:
+                raise ValueError(f"its format is {metadata.get('format')!r}, not {form!r}")
+            yield Contents(file, metadata)
+    except KeyError as missing:
+        raise TrainingFileError(f"{os.fspath(path)} is no training: it has no {missing}") from missing
+    except (ValueError, TypeError, safetensors.SafetensorError, json_format.ParseError) as error:
+        raise TrainingFileError(f"{os.fspath(path)} is no training: {error}") from error
+
+
+def network_info(
+    rules: pb.RuleSet,
+    name: str,
+    trained_by: str,
+    *,
+    input: Literal["classic", "table"],
+    output: Literal["turns", "actions"],
+    masked: bool,
+) -> NetworkInfo:
+    """What the numbers of a network mean that was trained by a rule set, its outputs as they come out of the last layer."""
+    return NetworkInfo(
+        input=input,
+        output=output,
+        output_activation="none",
+        masked=masked,
+        players=rules.players,
+        faces=rules.faces,
+        jokers=rules.jokers,
+        rules=rules_text(rules),
+        name=name,
+        trained_by=trained_by,
+    )
+
+
+def rules_text(rules: pb.RuleSet) -> str:
+    """A rule set as files have it: canonical protobuf JSON on one line."""
+    return json_format.MessageToJson(rules, indent=None)
+
+
+def _is_key(leaf: Any) -> bool:  # noqa: ANN401 - An array, or what one would be.
+    return bool(jnp.issubdtype(leaf.dtype, jax.dtypes.prng_key))
+
+
+def _plain(state: State) -> State:
+    """With keys as plain numbers, which a file can hold."""
+    plain: State = jax.tree.map(lambda leaf: jax.random.key_data(leaf) if _is_key(leaf) else leaf, state)
+    return plain
+
+
+def _named(state: object) -> list[tuple[str, Any]]:
+    """The arrays with their names, such as "online.0.1"."""
+    leaves = jax.tree_util.tree_leaves_with_path(state)
+    return [(jax.tree_util.keystr(path, simple=True, separator="."), leaf) for path, leaf in leaves]

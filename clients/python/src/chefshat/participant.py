@@ -1,0 +1,48 @@
+"""What a session remembers of a participant of a tournament, who is given a seat in each of its games.
+
+What it remembers of a seat is in `place`; what changes either, and why, in `session`.
+"""
+
+from collections.abc import Callable
+from typing import TypeAlias
+
+from chefshat import pb
+from chefshat.agents import Agent
+from chefshat.decision import SeatInfo
+from chefshat.errors import ChefsHatError
+
+# Request id of a participant's attachment, far from those of seats.
+REQUEST_ID = 2**32 - 1
+
+MakeAgent: TypeAlias = Callable[[SeatInfo], Agent]
+"""Gives the agent of a game that the participant is seated in. A subclass of `Agent` whose constructor takes the seat is one."""
+
+
+class Participant:
+    """One participant's part of a session; it outlives connections."""
+
+    def __init__(self, ticket: str, make_agent: MakeAgent, entropy: bytes) -> None:
+        self.ticket = ticket
+        self.make_agent = make_agent
+        # One for all games of the participant, as the protocol has it.
+        self.entropy = entropy
+        # Handle on the present connection; None while not attached.
+        self.handle: int | None = None
+        # Whether it will be seated no more, and why if not because the tournament is over.
+        self.over = False
+        self.error: ChefsHatError | None = None
+
+    def end(self, error: ChefsHatError | None = None) -> None:
+        """It will be seated no more."""
+        self.handle = None
+        if not self.over:
+            self.over, self.error = True, error
+
+    def detached(self, reason: pb.DetachReason.ValueType) -> None:
+        """The server has dismissed it."""
+        if reason == pb.DETACH_REASON_TOURNAMENT_OVER:
+            self.end()
+        elif reason == pb.DETACH_REASON_SUPERSEDED:
+            self.end(ChefsHatError("SUPERSEDED", "a newer connection takes part in the tournament in its place"))
+        else:
+            self.end(ChefsHatError("DETACHED", "the participant has left the stream"))

@@ -1,0 +1,207 @@
+"""Players in the manner of the reference implementation's second version, good and bad ones. No tests of their own.
+
+They run in processes of their own and import nothing but what such players would. So they are made by name, and tell of themselves
+in files.
+"""
+
+import json
+import os
+import time
+from typing import Any
+
+import numpy as np
+
+Info = dict[str, Any]
+
+
+class Player:
+    """What all have in common, and the callbacks that some players leave out."""
+
+    def __init__(self, name: str, **_: object) -> None:
+        self.name = f"PLAYER_{name}"
+
+    def get_name(self) -> str:
+        return self.name
+
+    def get_action(self, observations: Any) -> Any:
+        raise NotImplementedError
+
+    def get_exhanged_cards(self, cards: list[int], amount: int) -> list[int]:
+        return sorted(cards)[-amount:]
+
+    def do_special_action(self, info: Info, special_action: str) -> bool:
+        return True
+
+
+class Largest(Player):
+    """Plays the last of the legal actions that is not passing. Answers with an array of its own."""
+
+    def get_action(self, observations: Any) -> Any:
+        legal = np.flatnonzero(observations[28:] == 1)
+        answer = np.zeros(200)
+        answer[legal[-2] if len(legal) > 1 else legal[0]] = 1
+        return answer
+
+
+class Rarest(Player):
+    """Prefers low actions to high ones, in 200 numbers of which none is 0 or 1, and gives as little as it can."""
+
+    def get_action(self, observations: Any) -> list[float]:
+        return [0.5 - index / 1000 - (0.0 if legal else 10.0) for index, legal in enumerate(observations[28:])]
+
+    def get_exhanged_cards(self, cards: list[int], amount: int) -> Any:
+        return np.array(cards)[-amount:]
+
+    def do_special_action(self, info: Info, special_action: str) -> Any:
+        return np.bool_(False)
+
+
+class Scribe(Largest):
+    """The same as `Largest`, and writes every call with what came with it to a file, one JSON array each."""
+
+    def __init__(self, name: str, log_file: str) -> None:
+        super().__init__(name)
+        self.log_file = log_file
+
+    def write(self, method: str, *arguments: object) -> None:
+        with open(self.log_file, "a", encoding="utf-8") as file:
+            file.write(json.dumps([method, *arguments], default=lambda array: array.tolist()) + "\n")
+
+    def get_action(self, observations: Any) -> Any:
+        answer = super().get_action(observations)
+        self.write("get_action", observations, int(np.argmax(answer)))
+        return answer
+
+    def get_exhanged_cards(self, cards: list[int], amount: int) -> list[int]:
+        answer = super().get_exhanged_cards(cards, amount)
+        self.write("get_exhanged_cards", cards, amount, answer)
+        return answer
+
+    def do_special_action(self, info: Info, special_action: str) -> bool:
+        self.write("do_special_action", info, special_action)
+        return True
+
+    def update_start_match(self, cards: list[int], players: list[str], starting_player: str) -> None:
+        self.write("update_start_match", cards, players, starting_player)
+
+    def update_exchange_cards(self, cards_sent: list[int], cards_received: list[int]) -> None:
+        self.write("update_exchange_cards", cards_sent, cards_received)
+
+    def observe_special_action(self, action_type: str, player: int) -> None:
+        self.write("observe_special_action", action_type, player)
+
+    def update_my_action(self, info: Info) -> object:
+        self.write("update_my_action", info)
+        return object()  # Nothing anybody could write down.
+
+    def update_action_others(self, info: Info) -> None:
+        self.write("update_action_others", info)
+
+    def update_end_match(self, info: Info) -> None:
+        self.write("update_end_match", info)
+
+    def update_game_over(self) -> None:
+        self.write("update_game_over")
+
+
+class Present(Largest):
+    """Writes the number of its process to a file when it is made."""
+
+    def __init__(self, name: str, file: str) -> None:
+        super().__init__(name)
+        with open(file, "w", encoding="utf-8") as opened:
+            opened.write(str(os.getpid()))
+
+
+class Babbling(Largest):
+    """Prints what looks like answers, with Python and without, and asks for input that never comes."""
+
+    def get_action(self, observations: Any) -> Any:
+        print('{"id": 1, "value": null}')
+        os.write(1, b'{"id": 2, "value": [0]}\n')
+        try:
+            input()
+        except EOFError:
+            return super().get_action(observations)
+        raise AssertionError("there was something to read")
+
+
+class Stubborn(Player):
+    """Wants most what is never legal, an ace with two jokers that it does not hold; then passing."""
+
+    def get_action(self, observations: Any) -> list[float]:
+        return [0.0, 0.0, 2.0] + [0.0] * 196 + [1.0]
+
+    def get_exhanged_cards(self, cards: list[int], amount: int) -> list[int]:
+        lacking = next(card for card in range(1, 13) if card not in cards)
+        return [lacking] * amount
+
+
+class Raising(Largest):
+    """Fails whenever it is asked for something."""
+
+    def get_action(self, observations: Any) -> Any:
+        raise RuntimeError("no idea")
+
+    def get_exhanged_cards(self, cards: list[int], amount: int) -> list[int]:
+        raise SystemExit(1)
+
+    def update_action_others(self, info: Info) -> None:
+        raise KeyError("what is not there")
+
+
+class Mortal(Largest):
+    """Says its last words and dies at its fifth action."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(name)
+        self.actions = 0
+
+    def get_action(self, observations: Any) -> Any:
+        self.actions += 1
+        if self.actions == 5:
+            os.write(2, b"farewell\n")
+            os._exit(7)
+        return super().get_action(observations)
+
+
+class Hanging(Largest):
+    """Never comes back from an action."""
+
+    def get_action(self, observations: Any) -> Any:
+        time.sleep(3600)
+
+
+class Answering(Largest):
+    """Answers an action with whatever it was made with."""
+
+    def __init__(self, name: str, answer: object) -> None:
+        super().__init__(name)
+        self.answer = answer
+
+    def get_action(self, observations: Any) -> Any:
+        return self.answer
+
+    def get_exhanged_cards(self, cards: list[int], amount: int) -> Any:
+        return self.answer
+
+
+class Unspeakable(Largest):
+    """Answers an action with an object that is no number."""
+
+    def get_action(self, observations: Any) -> Any:
+        return object()
+
+
+class Unmade(Largest):
+    """Cannot be made."""
+
+    def __init__(self, name: str) -> None:
+        raise FileNotFoundError("no model there")
+
+
+class Nothing:
+    """No player."""
+
+    def get_action(self, observations: Any) -> None:
+        return None

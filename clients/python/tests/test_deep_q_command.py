@@ -1,0 +1,167 @@
+"""The command `deep-q` and its files: Ctrl-C keeps what was learned, and a training goes on as it was begun or not at all."""
+
+import dataclasses
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from chefshat import pb
+from chefshat.learn import checkpoint, deep_q, network, runs
+from chefshat.learn.__main__ import main, parse
+from chefshat.learn.deep_q import DeepQConfig
+
+SMALL = {"hidden": [8], "batch_size": 4, "memory_size": 32}
+# Seconds to wait for what must happen: generous, because nothing is measured by it.
+WAIT_S = 300
+
+
+class Place:
+    """A folder with hyper-parameters of a small agent, and the command that trains it there."""
+
+    def __init__(self, folder: Path, address: str) -> None:
+        self.out = folder / "agent.safetensors"
+        self.state = folder / "agent.training"
+        self.address = address
+        self.parameters = folder / "small.json"
+        self.parameters.write_text(json.dumps({"parameters": SMALL}))
+
+    def arguments(self, shifts: int, *more: str) -> list[str]:
+        files = ["--out", str(self.out), "--parameters", str(self.parameters)]
+        return ["deep-q", *files, "--shifts", str(shifts), "--address", self.address, *more]
+
+
+@pytest.fixture
+def place(tmp_path: Path, real_address: str) -> Place:
+    return Place(tmp_path, real_address)
+
+
+@pytest.mark.server
+def test_what_ctrl_c_ends_goes_on(
+    place: Place, processes: list["subprocess.Popen[str]"], capsys: pytest.CaptureFixture[str]
+) -> None:
+    # More Shifts than anybody would wait for: it ends because it is told to.
+    command = [sys.executable, "-m", "chefshat.learn", *place.arguments(1_000_000, "--save-every", "1", "--seed", "5")]
+    running = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    processes.append(running)
+    deadline = time.monotonic() + WAIT_S
+    # The network is written last: both files are there while the training goes on.
+    while not place.out.exists():
+        assert running.poll() is None, running.communicate()
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    during = checkpoint.load(place.state)
+    running.send_signal(signal.SIGINT)
+    _, said = running.communicate(timeout=WAIT_S)
+    assert running.returncode == 130, said
+    assert "of 1,000,000 Shifts" in said
+    assert "--resume goes on" in said
+    assert "Traceback" not in said
+
+    stopped = checkpoint.load(place.state)
+    assert stopped.shifts >= during.shifts >= 1
+    assert int(stopped.agents.updates[0]) > 0
+    (expected,) = stopped.networks("deep-q")
+    for kept, layer in zip(network.load(place.out).layers, expected.layers, strict=True):
+        np.testing.assert_array_equal(kept.weight, layer.weight)
+
+    assert main(place.arguments(stopped.shifts + 2, "--resume", "--json")) == 0
+    assert json.loads(capsys.readouterr().out)["event"] == "trained"
+    after = checkpoint.load(place.state)
+    assert (after.shifts, after.seed) == (stopped.shifts + 2, 5)
+    assert int(after.agents.updates[0]) > int(stopped.agents.updates[0])
+    assert int(after.agents.remembered[0]) > int(stopped.agents.remembered[0])
+    assert after.rules.target_shifts == after.shifts
+    first, second = after.trained_by.split("; ")
+    assert ("--seed 5" in first, "--resume" in second) == (True, True)
+    assert network.load(place.out).info.trained_by == after.trained_by
+
+
+@pytest.fixture(scope="module")
+def full_rules(real_address: str) -> pb.RuleSet:
+    rules = runs.full_rules("paper", real_address)
+    rules.ClearField("target_points")
+    rules.target_shifts = 3
+    return rules
+
+
+@pytest.mark.server
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (["--mask"], "mask False, not True"),
+        (["--opponents", "greedy"], "opponents random, not greedy"),
+        (["--rewards", "validity"], "rewards paper, not validity"),
+        (["--seed", "2"], "seed 7, not 2"),
+        (["--rules", "rulebook"], "rules points [5, 3, 1, 0], not [3, 2, 1, 0]"),
+        (["--shifts", "3"], "has played 3 Shifts already: give more than that with --shifts"),
+    ],
+)
+def test_a_training_is_not_contradicted(
+    place: Place, full_rules: pb.RuleSet, given: Sequence[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    begin(place, full_rules)
+    before = place.state.read_bytes()
+    assert main(place.arguments(5, "--resume", *given)) == 1
+    found = capsys.readouterr().err
+    assert said in found
+    assert place.state.read_bytes() == before
+    assert not place.out.exists()
+
+
+@pytest.mark.server
+def test_parameters_are_not_contradicted(place: Place, full_rules: pb.RuleSet, capsys: pytest.CaptureFixture[str]) -> None:
+    begin(place, full_rules)
+    place.parameters.write_text(json.dumps({"parameters": {**SMALL, "batch_size": 8}}))
+    assert main(place.arguments(5, "--resume")) == 1
+    assert "batch size 4, not 8" in capsys.readouterr().err
+
+
+def test_without_a_training_there_is_nothing_to_go_on_from(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(Place(tmp_path, "127.0.0.1:1").arguments(5, "--resume")) == 1
+    assert "leave out --resume" in capsys.readouterr().err
+
+
+def begin(place: Place, rules: pb.RuleSet) -> None:
+    """Writes a training that has played 3 Shifts."""
+    config = dataclasses.replace(DeepQConfig(), hidden=(8,), batch_size=4, memory_size=32)
+    agents = deep_q.start(config, [7])
+    checkpoint.save(place.state, checkpoint.Training(config, agents, rules, "a command", "random", "paper", 7, 3))
+
+
+def test_the_options_that_were_given_are_known() -> None:
+    options = parse(["deep-q", "--out", "o", "--shifts", "250", "--mask"])
+    assert options.given == {"out": Path("o"), "shifts": 250, "mask": True}
+    assert (options.mask, options.opponents, parse(["deep-q", "--out", "o"]).mask) == (True, "random", False)
+    assert parse(["ppo", "--out", "o", "--minutes", "1", "--games", "256"]).given["games"] == 256
+
+
+def test_commands_are_remembered_but_not_without_end() -> None:
+    assert runs.trained_by("", "first") == "first"
+    assert runs.trained_by("first", "second") == "first; second"
+    commands = ""
+    for number in range(1_000):
+        commands = runs.trained_by(commands, f"command {number:04}")
+    assert len(commands) <= runs.MAX_TRAINED_BY
+    assert commands.startswith("command 0000; command 0001; ")
+    assert commands.endswith("; command 0998; command 0999")
+    assert commands.count("[...]") == 1
+    assert len(runs.trained_by("", "x" * 100_000)) <= runs.MAX_TRAINED_BY
+
+
+def test_the_first_ctrl_c_asks_and_the_second_interrupts() -> None:
+    before = signal.getsignal(signal.SIGINT)
+    with runs.Interrupts() as interrupts:
+        assert not interrupts.asked
+        os.kill(os.getpid(), signal.SIGINT)
+        assert interrupts.asked
+        with pytest.raises(KeyboardInterrupt):
+            os.kill(os.getpid(), signal.SIGINT)
+    assert signal.getsignal(signal.SIGINT) is before

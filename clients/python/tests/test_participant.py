@@ -1,0 +1,185 @@
+"""Participants of tournaments without a connection: who is attached when, which agent plays which game, how it ends."""
+
+import pytest
+from stage import Scribe, decision, detached, ended, events
+
+from chefshat import Agent, ChefsHatError, PlayOptions, SeatInfo, pb
+from chefshat.participant import REQUEST_ID
+from chefshat.place import Ask
+from chefshat.session import PlaySession
+
+# First handle of the seats that a server attaches by itself.
+CALLED = 2**31
+
+
+class Cup:
+    """A session of one participant, its driver's part, and the agents it has made, by game."""
+
+    def __init__(self) -> None:
+        self.scribes: dict[str, Scribe] = {}
+        self.session = PlaySession.of_participant("cup", self._make, PlayOptions(entropy=b"mine"))
+        self.connect()
+        self.say(entered())
+
+    def _make(self, seat: SeatInfo) -> Agent:
+        assert seat.game_id not in self.scribes, "one agent a game"
+        return self.scribes.setdefault(seat.game_id, Scribe())
+
+    def connect(self) -> list[tuple[str, int]]:
+        """A new connection: what is attached on it, in order, and from which event on."""
+        self.session.connected()
+        attaches = [command.attach for request in self.session.take_requests() for command in request.commands]
+        assert all(attach.entropy == b"mine" for attach in attaches)
+        return [(attach.ticket, attach.from_sequence) for attach in attaches]
+
+    def say(self, *updates: pb.SeatUpdate) -> list[Ask]:
+        return self.session.receive(pb.PlayResponse(updates=updates))
+
+    def answers(self) -> list[tuple[int, int]]:
+        commands = [command for request in self.session.take_requests() for command in request.commands]
+        return [(command.handle, command.answer.decision_id) for command in commands if command.HasField("answer")]
+
+
+def entered(handle: int = 0) -> pb.SeatUpdate:
+    return pb.SeatUpdate(handle=handle, entered=pb.Entered(request_id=REQUEST_ID, tournament_id="tournament", participant=3))
+
+
+def seated(handle: int, game: str, *, request_id: int = 0, seat: int = 0, next_sequence: int = 1) -> pb.SeatUpdate:
+    said = pb.Attached(
+        request_id=request_id,
+        room_id=f"room of {game}",
+        game_id=game,
+        seat=seat,
+        next_sequence=next_sequence,
+        ticket=f"ticket of {game}",
+        tournament_id="tournament",
+    )
+    return pb.SeatUpdate(handle=handle, attached=said)
+
+
+def refused(request_id: int) -> pb.SeatUpdate:
+    return pb.SeatUpdate(refused=pb.Refused(request_id=request_id, reason="TICKET_UNKNOWN", message="no", code=16))
+
+
+def test_every_game_has_an_agent_of_its_own() -> None:
+    cup = Cup()
+    asks = cup.say(
+        seated(CALLED, "a"), seated(CALLED + 1, "b", seat=1), events(1, handle=CALLED), decision(5, CALLED + 1), decision(4, CALLED)
+    )
+    assert [ask.agent for ask in asks] == [cup.scribes["b"], cup.scribes["a"]]
+    for ask in asks:
+        cup.session.answer(ask, 1)
+    assert cup.answers() == [(CALLED + 1, 5), (CALLED, 4)]
+    assert cup.scribes["a"].log == [("attached", 0), ("event", 1)]
+    cup.say(ended(2, handle=CALLED + 1), detached("GAME_OVER", handle=CALLED + 1))
+    cup.say(ended(2, handle=CALLED), detached("GAME_OVER", handle=CALLED))
+    assert not cup.session.done, "there may be more games"
+    cup.say(detached("TOURNAMENT_OVER"))
+    assert cup.session.done
+    played = cup.session.played()
+    assert [(result.game_id, result.place, result.entropy) for result in played] == [("a", 2, b"mine"), ("b", 1, b"mine")]
+
+
+def test_a_new_connection_goes_on_with_the_same_agents() -> None:
+    cup = Cup()
+    (ask,) = cup.say(seated(CALLED, "a"), seated(CALLED + 1, "b"), events(1, 2, handle=CALLED), decision(4, CALLED))
+    cup.session.answer(ask, 1)
+    assert cup.answers() == [(CALLED, 4)]
+    cup.session.lost()
+    assert cup.connect() == [("ticket of a", 3), ("ticket of b", 0), ("cup", 0)]
+    asks = cup.say(
+        seated(0, "a", request_id=1, next_sequence=4),
+        seated(1, "b", request_id=2),
+        entered(2),
+        seated(CALLED, "c"),
+        events(3, handle=0),
+        decision(4, 0),
+        decision(1, 1),
+        decision(2, CALLED),
+    )
+    assert [ask.agent for ask in asks] == [cup.scribes["b"], cup.scribes["c"]], "the answer of a is repeated, and not thought over"
+    assert cup.answers() == [(0, 4)]
+    assert cup.scribes["a"].log == [("attached", 0), ("event", 1), ("event", 2), ("attached", 0), ("event", 3)]
+
+
+def test_a_seat_attached_twice_is_one_seat() -> None:
+    cup = Cup()
+    cup.say(seated(CALLED, "a"), events(1, handle=CALLED))
+    (ask,) = cup.say(
+        seated(CALLED + 1, "a", next_sequence=2),
+        detached("SUPERSEDED", handle=CALLED),
+        events(1, 2, handle=CALLED + 1),
+        decision(4, CALLED + 1),
+    )
+    assert ask.agent is cup.scribes["a"]
+    assert cup.scribes["a"].log == [("attached", 0), ("event", 1), ("attached", 0), ("event", 2)]
+
+
+def test_the_end_of_the_tournament_waits_for_what_is_left_of_its_games() -> None:
+    cup = Cup()
+    cup.say(seated(CALLED, "a"), detached("TOURNAMENT_OVER"))
+    assert not cup.session.done
+    cup.session.lost()
+    assert cup.connect() == [("ticket of a", 0)], "nobody enters what is over"
+    aborted = events(1, handle=0, game_aborted=pb.GameAborted(reason=pb.ABORT_REASON_CLOSED))
+    cup.say(seated(0, "a", request_id=1), aborted, detached("GAME_OVER"))
+    assert cup.session.done
+    (result,) = cup.session.played()
+    assert (result.abort_reason, result.finished) == ("CLOSED", False)
+
+
+def test_a_game_whose_room_is_gone_stops_no_other() -> None:
+    cup = Cup()
+    cup.say(seated(CALLED, "a"))
+    cup.session.lost()
+    assert len(cup.connect()) == 2
+    cup.say(refused(1), entered(1), seated(CALLED, "b"), ended(1, handle=CALLED), detached("GAME_OVER", handle=CALLED))
+    cup.say(detached("TOURNAMENT_OVER", handle=1))
+    lost, played = cup.session.played()
+    assert lost.error is not None
+    assert (lost.game_id, lost.error.reason) == ("a", "TICKET_UNKNOWN")
+    assert (played.game_id, played.place) == ("b", 2)
+
+
+@pytest.mark.parametrize(
+    ("update", "reason"),
+    [(refused(REQUEST_ID), "TICKET_UNKNOWN"), (detached("SUPERSEDED"), "SUPERSEDED"), (detached("REQUESTED"), "DETACHED")],
+)
+def test_a_participant_that_must_leave_says_why(update: pb.SeatUpdate, reason: str) -> None:
+    cup = Cup()
+    cup.say(seated(CALLED, "a"), update)
+    assert not cup.session.done, "its game may go on"
+    cup.say(detached("SUPERSEDED", handle=CALLED))
+    assert cup.session.done
+    with pytest.raises(ChefsHatError, match=reason):
+        cup.session.played()
+
+
+def test_giving_up_ends_the_participant_too() -> None:
+    cup = Cup()
+    cup.say(seated(CALLED, "a"))
+    cup.session.give_up(ChefsHatError("UNAVAILABLE"))
+    assert cup.session.done
+    with pytest.raises(ChefsHatError, match="UNAVAILABLE"):
+        cup.session.played()
+
+
+def test_strange_updates_stop_no_participant() -> None:
+    cup = Cup()
+    (ask,) = cup.say(
+        decision(1, CALLED),
+        detached("GAME_OVER", handle=CALLED),
+        seated(CALLED, "a", request_id=77),
+        seated(CALLED, "b"),
+        decision(1, CALLED),
+        decision(1, 0),
+    )
+    assert ask.agent is cup.scribes["b"]
+    assert list(cup.scribes) == ["b"]
+    assert not cup.session.done
+
+
+def test_nobody_is_seated_by_the_server_without_taking_part() -> None:
+    session = PlaySession({"t": Scribe()})
+    session.connected()
+    assert session.receive(pb.PlayResponse(updates=[seated(CALLED, "a"), decision(1, CALLED)])) == []

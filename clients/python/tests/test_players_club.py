@@ -1,0 +1,255 @@
+"""Whole games of the real server with players in the manner of the reference implementation, by the command and by the package."""
+
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import pytest
+from test_club_process import TESTS
+
+import chefshat
+from chefshat import RandomAgent, pb
+from chefshat.players_club import AgentProcess, AgentSpec, PlayersClubAgent
+from chefshat.players_club.__main__ import main
+from chefshat.players_club.table import ACTIONS
+
+pytestmark = pytest.mark.server
+
+# Seconds a command may take before it counts as hanging.
+LIMIT_S = 120
+Info = dict[str, Any]
+
+
+def room(address: str, seats: list[str | None], **options: Any) -> str:
+    with chefshat.Client(address) as client:
+        return client.create_room("club", seats=seats, **options).join_code
+
+
+def command(address: str, code: str, player: str, *options: str) -> list[str]:
+    named = ["--server", address, "--code", code, "--agent", f"club_players:{player}"]
+    return [*named, "--path", TESTS, *options]
+
+
+def one_line(capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:
+    printed = capsys.readouterr().out
+    assert printed.count("\n") == 1
+    said: dict[str, Any] = json.loads(printed)
+    return said
+
+
+def play_four(address: str, players: list[AgentSpec]) -> dict[str, chefshat.SeatResult]:
+    """Seats these players, and at the rest of the table the random agent, and plays a game. Returns the results by name."""
+    with chefshat.Client(address) as client, contextlib.ExitStack() as stack:
+        code = client.create_room("club").join_code
+        agents: dict[str, chefshat.Agent] = {}
+        names = {}
+        for number in range(4):
+            spec = players[number] if number < len(players) else None
+            name = spec.name if spec else f"random {number}"
+            ticket = client.join_room(code, name).ticket
+            names[ticket] = name
+            agents[ticket] = PlayersClubAgent(stack.enter_context(AgentProcess(spec))) if spec else RandomAgent(seed=number)
+        results = client.play_many(agents)
+    return {names[ticket]: result for ticket, result in results.items()}
+
+
+def test_four_commands_play_a_game_with_each_other(real_address: str) -> None:
+    code = room(real_address, [None] * 4)
+    running = [
+        subprocess.Popen(
+            [sys.executable, "-m", "chefshat.players_club", *command(real_address, code, player, "--name", f"{number}", "--json")],
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        for number, player in enumerate(["Largest", "Rarest", "Largest", "Babbling"])
+    ]
+    said = [json.loads(process.communicate(timeout=LIMIT_S)[0]) for process in running]
+    assert [process.returncode for process in running] == [0] * 4
+    assert sorted(one["place"] for one in said) == [1, 2, 3, 4]
+    assert len({one["game_id"] for one in said}) == 1
+    for one in said:
+        assert one["event"] == "finished"
+        assert one["decisions"] > 0
+        assert (one["invalid"], one["failures"], one["replaced"], one["restarts"]) == (0, 0, 0, 0)
+
+
+def test_a_player_goes_from_room_to_room_and_is_told_when_one_is_over(
+    real_address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    codes = [room(real_address, [None, "random", "random", "random"]) for _ in range(2)]
+    log = tmp_path / "log"
+    arguments = command(real_address, codes[0], "Scribe", "--code", codes[1], "--arguments", json.dumps({"log_file": str(log)}))
+    assert main(arguments) == 0
+    printed = capsys.readouterr().out
+    assert printed.count("<- this agent") == 2
+    assert printed.count("0 failures of the player, 0 decisions taken for it, 0 restarts") == 2
+    assert log.read_text().count('["update_game_over"]') == 2
+
+
+def test_a_player_is_told_the_game_as_the_reference_tells_it(real_address: str, tmp_path: Path) -> None:
+    log = tmp_path / "log"
+    specs = [AgentSpec("club_players:Scribe", "Ada", {"log_file": str(log)}, paths=(TESTS,))]
+    specs += [AgentSpec("club_players:Rarest", name, paths=(TESTS,)) for name in ("Bob", "Cleo")]
+    result = play_four(real_address, specs)["Ada"]
+    calls = [json.loads(line) for line in log.read_text().splitlines()]
+    told = [call for call in calls if not call[0].startswith(("get", "do"))]
+    check_order([method for method, *_ in told])
+    check_asking(calls)
+    infos = [call[1] for call in calls if call[0].startswith("update_") and "action" in call[0]]
+    check_actions(infos, result.seat)
+    ends = [call[1] for call in calls if call[0] == "update_end_match"]
+    # As the reference counts its points; they name the order of the players as ours do.
+    game = [sum(end["Match_Score"][seat] for end in ends) for seat in range(4)]
+    assert ends[-1]["Game_Score"] == game
+    assert all(sorted(end["Match_Score"]) == [0, 1, 2, 3] for end in ends)
+    ours = [sum((0, 1, 3, 5)[end["Match_Score"][seat]] for end in ends) for seat in range(4)]
+    assert {line.seat: line.points for line in result.standings} == dict(enumerate(ours))
+
+
+def check_order(methods: list[str]) -> None:
+    """Matches begin, have actions, and end; between two of them there may be an exchange and a special action."""
+    beginning = [index for index, method in enumerate(methods) if method == "update_start_match"]
+    ending = [index for index, method in enumerate(methods) if method == "update_end_match"]
+    assert len(beginning) == len(ending) >= 3
+    assert beginning[0] == 0
+    assert methods[-1] == "update_game_over"
+    for start, end in zip(beginning, ending, strict=True):
+        assert set(methods[start + 1 : end]) <= {"update_my_action", "update_action_others"}
+        assert end - start > 4
+    special, exchange = "observe_special_action", "update_exchange_cards"
+    for end, start in zip(ending, beginning[1:], strict=False):
+        assert methods[end + 1 : start] in ([exchange], [special], [special, exchange])
+
+
+def check_asking(calls: list[list[Any]]) -> None:
+    """What is chosen is what is told afterwards, with what was seen before; what is given is what is told to be given."""
+    chosen = [(call[1], call[2]) for call in calls if call[0] == "get_action"]
+    done = [call[1] for call in calls if call[0] == "update_my_action"]
+    assert len(chosen) == len(done) > 10
+    for (vector, action), info in zip(chosen, done, strict=True):
+        assert len(vector) == len(info["Observation_After"]) == 228
+        assert info["Observation_Before"] == pytest.approx(vector)
+        assert info["Action_Index"] == action
+        assert info["Action_Decoded"] == ACTIONS[action]
+        assert info["Action_Decoded"] in info["Author_Possible_Actions"]
+        assert len(info["Author_Possible_Actions"]) == sum(vector[28:])
+        assert info["Action_Random"] is False
+        before, after = (sum(1 for card in observed[11:28] if card) for observed in (vector, info["Observation_After"]))
+        assert after == info["Cards_Per_Player"][info["Author_Index"]]
+        assert before - after == sum(int(number[1:]) for number in info["Action_Decoded"].split(";")[1:])
+    gave = [call[3] for call in calls if call[0] == "get_exhanged_cards"]
+    sent = [call[1] for call in calls if call[0] == "update_exchange_cards"]
+    hands = [call[1] for call in calls if call[0] == "update_start_match"]
+    assert all(len(hand) == 17 for hand in hands)
+    assert [cards for cards in sent if cards in gave] == gave
+
+
+def check_actions(infos: list[Info], seat: int) -> None:
+    """Each action follows on the one before: board, pizza, whose turn it is."""
+    assert all(set(info) == set(infos[0]) for info in infos)
+    assert {info["Author_Index"] for info in infos} == {0, 1, 2, 3}
+    assert all((info["Observation_Before"] != "") == (info["Author_Index"] == seat) for info in infos)
+    assert any(info["Is_Pizza"] for info in infos)
+    for one, other in pairwise(infos):
+        if one["Matches"] != other["Matches"]:
+            assert other["Matches"] == one["Matches"] + 1
+            assert one["Match_Score"] != other["Match_Score"] == [-1] * 4
+            assert other["Rounds"] == 1
+            continue
+        assert other["Author_Index"] == one["Next_Player"]
+        assert other["Board_Before"] == ([13] + [0] * 10 if one["Is_Pizza"] else one["Board_After"])
+        assert other["Rounds"] == one["Rounds"] + other["Is_Pizza"]
+        assert sum(other["Cards_Per_Player"]) <= sum(one["Cards_Per_Player"])
+
+
+def test_illegal_choices_are_counted_as_often_as_the_reference_would_ask(
+    real_address: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code = room(real_address, [None, "random", "random", "random"], rules=pb.RuleSet(target_shifts=3))
+    assert main(command(real_address, code, "Stubborn", "--json", "--attempts", "2")) == 0
+    said = one_line(capsys)
+    # Never what it wants most: two attempts in vain at every turn, and at every card it has to give.
+    assert said["invalid"] == 2 * said["replaced"] > 0
+    assert said["replaced"] <= said["decisions"]
+
+
+def test_the_game_goes_on_with_a_player_that_only_fails(real_address: str, capsys: pytest.CaptureFixture[str]) -> None:
+    code = room(real_address, [None, "random", "random", "random"], rules=pb.RuleSet(target_shifts=2))
+    assert main(command(real_address, code, "Raising", "--json")) == 0
+    said = one_line(capsys)
+    assert said["invalid"] == 0
+    assert said["failures"] > said["replaced"] > 0
+    assert said["restarts"] == 0
+
+
+def test_the_game_goes_on_when_the_player_has_been_given_up(real_address: str, capsys: pytest.CaptureFixture[str]) -> None:
+    code = room(real_address, [None, "random", "random", "random"], rules=pb.RuleSet(target_shifts=6))
+    assert main(command(real_address, code, "Mortal", "--json", "--restarts", "1")) == 1
+    said = one_line(capsys)
+    assert said["event"] == "finished"
+    assert said["restarts"] == 1
+    # Four actions of each life are its own, and what it chose otherwise.
+    assert 0 < said["replaced"] < said["decisions"]
+
+
+def test_a_command_that_is_interrupted_leaves_nobody_behind(
+    real_address: str, tmp_path: Path, processes: list["subprocess.Popen[str]"]
+) -> None:
+    with chefshat.Client(real_address) as client:
+        made = client.create_room("club", seats=[None, None, "random", "random"])
+        given = json.dumps({"file": str(tmp_path / "pid")})
+        options = command(real_address, made.join_code, "Present", "--arguments", given)
+        process = subprocess.Popen(
+            [sys.executable, "-m", "chefshat.players_club", *options], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+        processes.append(process)
+        while process.poll() is None and not client.get_room(made.room.room_id).seats[0].connected:
+            time.sleep(0.01)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=LIMIT_S)
+    assert said == "interrupted; the seat is the server's to fill\n"
+    assert process.returncode == 130
+    with pytest.raises(ProcessLookupError):
+        os.kill(int((tmp_path / "pid").read_text()), 0)
+
+
+def test_a_player_that_cannot_be_made_takes_no_seat(real_address: str, capsys: pytest.CaptureFixture[str]) -> None:
+    code = room(real_address, [None, "random", "random", "random"])
+    assert main(command(real_address, code, "Unmade", "--json")) == 1
+    assert "making it raised FileNotFoundError: no model there" in one_line(capsys)["message"]
+    assert main(command(real_address, code, "Largest", "--json")) == 0
+
+
+def test_rooms_that_such_players_do_not_know_are_refused(real_address: str, capsys: pytest.CaptureFixture[str]) -> None:
+    code = room(real_address, [None, "random", "random"], rules=pb.RuleSet(players=3))
+    assert main(command(real_address, code, "Largest")) == 1
+    assert "games of 4 players, 11 faces and 2 jokers alone; this one has 3, 11 and 2" in capsys.readouterr().err
+
+
+def test_the_actions_are_those_of_the_server(real_address: str) -> None:
+    with chefshat.Client(real_address) as client:
+        assert tuple(client.action_table().texts[:200]) == ACTIONS
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--agent", "no colon"], "not of the form module.path:Class"),
+        (["--arguments", "[1]"], "an object was expected"),
+        (["--arguments", "{"], "no JSON"),
+        (["--limit", "0"], "must be above 0"),
+        (["--attempts", "-1"], "must be 0 or more"),
+    ],
+)
+def test_arguments_are_checked(options: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["--server", "127.0.0.1:1", "--code", "CODE", "--agent", "a:B", *options])
+    assert ended.value.code == 2
+    assert said in capsys.readouterr().err

@@ -1,0 +1,254 @@
+//! What follows when: which game is called, who is waited for and how long, what comes of a game that ended, when the next round is drawn.
+//! What a change does is in `course`; how a round is drawn in `draw`.
+//!
+//! A game is called when all its participants are present and have a free place, in the order of the schedule. If nothing but absent ones
+//! hold it up, it waits for them for the no-show time; that counts as a call, and the game waits again, after the others. On the last
+//! call it is played without them. A game that nobody would come to, or that was aborted on its last call, is given up.
+
+use std::collections::BTreeMap;
+
+use super::Tournament;
+use super::change::{Change, Ended, Game, GameResult, GameState, SeatPlayed, SeatResult};
+use super::course::{Course, State};
+
+/// What a tournament knows of this moment alone; after a restart nobody is present until they come back.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Floor {
+    /// Who is present, by participant.
+    present: Vec<bool>,
+    /// Games that nothing but absent ones hold up, and since when, in milliseconds.
+    waits: BTreeMap<usize, u64>,
+}
+
+impl Floor {
+    fn is_present(&self, course: &Course, participant: usize) -> bool {
+        course.participants[participant].built_in.is_some()
+            || self.present.get(participant) == Some(&true)
+    }
+
+    /// Nobody waits for a game that was called or is over.
+    pub(super) fn fold(&mut self, change: &Change) {
+        match change {
+            Change::Called { game, .. }
+            | Change::Rescheduled { game, .. }
+            | Change::Counted { game, .. }
+            | Change::Voided { game } => {
+                self.waits.remove(game);
+            }
+            Change::Finished | Change::Closed => self.waits.clear(),
+            Change::Joined(_) | Change::Begun { .. } | Change::Drawn { .. } => {}
+        }
+    }
+}
+
+/// What is to be done about a game that is due.
+enum Readiness {
+    /// A participant plays elsewhere.
+    Busy,
+    /// These have not come, and nothing else holds it up.
+    Missing(Vec<usize>),
+    /// It can be played; these forfeit it.
+    Ready(Vec<usize>),
+}
+
+impl Tournament {
+    /// Says whether a participant is present: can be seated in games at once. Built-in ones always are.
+    pub fn set_present(&mut self, participant: usize, present: bool) {
+        if participant >= self.course.participants.len() {
+            return;
+        }
+        let floor = &mut self.floor;
+        if floor.present.len() <= participant {
+            floor.present.resize(participant + 1, false);
+        }
+        floor.present[participant] = present;
+        if present {
+            // Whoever leaves again is waited for anew.
+            let games = &self.course.games;
+            floor
+                .waits
+                .retain(|&game, _| !games[game].seats.contains(&participant));
+        }
+    }
+
+    /// Whether a participant is present.
+    pub fn is_present(&self, participant: usize) -> bool {
+        participant < self.course.participants.len()
+            && self.floor.is_present(&self.course, participant)
+    }
+
+    /// The next change that follows at this time, in milliseconds of any steady clock. Whoever asks folds it and asks again, until there is
+    /// none; then again after every other change, and at [`Tournament::wake_at`].
+    pub fn next(&mut self, now_ms: u64) -> Option<Change> {
+        match self.course.state {
+            State::Open => {
+                let enough = self.course.settings.start_when_joined?;
+                (self.joined() >= enough).then(|| self.beginning())?
+            }
+            State::Playing => {
+                if let Some(change) = self.drawing() {
+                    return Some(change);
+                }
+                if self.course.is_round_over() && self.course.drawn >= self.course.rounds {
+                    return Some(Change::Finished);
+                }
+                self.next_game(now_ms)
+            }
+            State::Finished | State::Closed => None,
+        }
+    }
+
+    /// When [`Tournament::next`] is to be asked again although nothing has happened, on the same clock.
+    pub fn wake_at(&self) -> Option<u64> {
+        let since = self.floor.waits.values().min()?;
+        Some(since.saturating_add(self.course.settings.no_show_ms))
+    }
+
+    /// What follows from the end of a game that was called; `None` if it is not being played.
+    pub fn ended(&self, game: usize, ended: Ended) -> Option<Change> {
+        let course = &self.course;
+        let played = course.games.get(game)?;
+        if played.state != GameState::Playing {
+            return None;
+        }
+        let is_last_call = played.calls >= course.settings.max_calls;
+        let missing = match ended {
+            Ended::Played { shifts, seats } if seats.len() == played.seats.len() => {
+                let result = result(course, played, shifts, &seats);
+                return Some(Change::Counted { game, result });
+            }
+            Ended::NeverStarted { missing } => missing
+                .into_iter()
+                .filter(|who| played.seats.contains(who) && !played.forfeited.contains(who))
+                .collect(),
+            // A result of other seats is none.
+            Ended::Played { .. } | Ended::Aborted => Vec::new(),
+        };
+        // If somebody did not come to the last call, the game is called once more without them.
+        Some(if is_last_call && missing.is_empty() {
+            Change::Voided { game }
+        } else {
+            Change::Rescheduled { game, missing }
+        })
+    }
+
+    /// The change that closes it; `None` if it is over.
+    pub fn close(&self) -> Option<Change> {
+        match self.course.state {
+            State::Open | State::Playing => Some(Change::Closed),
+            State::Finished | State::Closed => None,
+        }
+    }
+
+    /// Goes through the games that are due, in order, until one of them has to change.
+    fn next_game(&mut self, now_ms: u64) -> Option<Change> {
+        let Tournament { course, floor, .. } = self;
+        let settings = &course.settings;
+        if course.playing.len() >= settings.max_parallel {
+            // Not only absent ones hold the games up.
+            floor.waits.clear();
+            return None;
+        }
+        for &(_, index) in &course.due {
+            let game = &course.games[index];
+            match readiness(course, floor, game) {
+                Readiness::Busy => {
+                    floor.waits.remove(&index);
+                }
+                Readiness::Ready(forfeited) => return Some(called(index, game, forfeited)),
+                Readiness::Missing(missing) => {
+                    let since = *floor.waits.entry(index).or_insert(now_ms);
+                    if now_ms.saturating_sub(since) < settings.no_show_ms {
+                        continue;
+                    }
+                    return Some(if game.calls + 1 < settings.max_calls {
+                        Change::Rescheduled {
+                            game: index,
+                            missing,
+                        }
+                    } else {
+                        called(index, game, missing)
+                    });
+                }
+            }
+        }
+        None
+    }
+}
+
+fn readiness(course: &Course, floor: &Floor, game: &Game) -> Readiness {
+    // Those who did not come to the last call forfeit it, and so do those who are away now; others play at once.
+    let is_decided = game.calls >= course.settings.max_calls;
+    let mut out = Vec::new();
+    for &participant in &game.seats {
+        let is_forfeited = game.forfeited.contains(&participant)
+            || is_decided && game.missing.contains(&participant);
+        if is_forfeited {
+            out.push(participant);
+        } else if !course.has_place(participant) {
+            return Readiness::Busy;
+        } else if !floor.is_present(course, participant) {
+            out.push(participant);
+        }
+    }
+    if is_decided || out.is_empty() {
+        Readiness::Ready(out)
+    } else {
+        Readiness::Missing(out)
+    }
+}
+
+/// A game is played without those who forfeit it, if anybody is left.
+fn called(index: usize, game: &Game, forfeited: Vec<usize>) -> Change {
+    if game.seats.iter().all(|who| forfeited.contains(who)) {
+        return Change::Voided { game: index };
+    }
+    Change::Called {
+        game: index,
+        forfeited,
+    }
+}
+
+/// Places those who forfeited behind the others, in the order of their seats, and says what each place is worth.
+fn result(course: &Course, game: &Game, shifts: u32, played: &[SeatPlayed]) -> GameResult {
+    let has_forfeited = |seat: usize| game.forfeited.contains(&game.seats[seat]);
+    let mut order: Vec<usize> = (0..played.len()).collect();
+    order.sort_by_key(|&seat| match has_forfeited(seat) {
+        false => (false, played[seat].place, seat),
+        true => (true, 0, seat),
+    });
+    let seats = game.seats.iter().enumerate().map(|(seat, &participant)| {
+        let behind = order.iter().position(|&other| other == seat);
+        let behind = behind.expect("every seat is in the order");
+        let forfeited = has_forfeited(seat);
+        // What the filler did in its place is nothing of its own.
+        let did = if forfeited {
+            SeatPlayed::default()
+        } else {
+            played[seat]
+        };
+        SeatResult {
+            participant,
+            forfeited,
+            substituted: did.substituted,
+            place: behind + 1,
+            score: if forfeited {
+                0
+            } else {
+                let points = course.settings.points.get(behind);
+                points.copied().unwrap_or_default()
+            },
+            points: did.points,
+            decisions: did.decisions,
+            wrong_actions: did.wrong_actions,
+            timeouts: did.timeouts,
+            decision_time_us: did.decision_time_us,
+            timed_decisions: did.timed_decisions,
+            performance_score: did.performance_score,
+        }
+    });
+    GameResult {
+        shifts,
+        seats: seats.collect(),
+    }
+}

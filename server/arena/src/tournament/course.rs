@@ -1,0 +1,310 @@
+//! A tournament as its changes left it, and what each change does to it. Nothing here decides what is to happen, and a change that does
+//! not fit (of a game that is over, say) does nothing, so that the same changes always lead to the same course.
+
+use std::collections::BTreeSet;
+use std::ops::Range;
+
+use super::change::{Change, Entrant, Game, GameResult, GameState};
+use super::settings::{Deals, Settings};
+
+/// Where a tournament stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum State {
+    /// Participants may join.
+    Open,
+    /// It is being played.
+    Playing,
+    /// All games have been played or given up; the standings are final.
+    Finished,
+    /// Closed before its end.
+    Closed,
+}
+
+/// A table of participants of one round and the games they play.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Pairing {
+    pub(super) round: u32,
+    /// Participants in the order of the seats of its first game.
+    pub(super) table: Vec<usize>,
+    pub(super) games: Range<usize>,
+}
+
+/// What a participant did in the games that counted, in all.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct Sums {
+    pub(super) games: u32,
+    pub(super) byes: u32,
+    pub(super) last_round: u32,
+    pub(super) score: u64,
+    pub(super) points: u64,
+    pub(super) places: Vec<u32>,
+    pub(super) forfeited: u32,
+    pub(super) substituted: u32,
+    pub(super) wrong_actions: u64,
+    pub(super) timeouts: u64,
+    pub(super) decision_time_us: u64,
+    pub(super) timed_decisions: u64,
+    pub(super) performance: f64,
+}
+
+/// A tournament as its changes left it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Course {
+    pub(super) settings: Settings,
+    pub(super) state: State,
+    pub(super) participants: Vec<Entrant>,
+    pub(super) sums: Vec<Sums>,
+    /// Rounds in all; 0 before the beginning.
+    pub(super) rounds: u32,
+    /// Rounds that have been drawn.
+    pub(super) drawn: u32,
+    pub(super) pairings: Vec<Pairing>,
+    pub(super) games: Vec<Game>,
+    /// Games that wait to be called, by their turns.
+    pub(super) due: BTreeSet<(u64, usize)>,
+    pub(super) playing: BTreeSet<usize>,
+    /// Games that each participant is playing.
+    pub(super) busy: Vec<usize>,
+    /// Games that have been counted or given up.
+    pub(super) over: usize,
+    /// Games of each deal that are not over.
+    pub(super) deals: Vec<usize>,
+    next_turn: u64,
+}
+
+impl Course {
+    pub(super) fn new(settings: Settings) -> Course {
+        Course {
+            settings,
+            state: State::Open,
+            participants: Vec::new(),
+            sums: Vec::new(),
+            rounds: 0,
+            drawn: 0,
+            pairings: Vec::new(),
+            games: Vec::new(),
+            due: BTreeSet::new(),
+            playing: BTreeSet::new(),
+            busy: Vec::new(),
+            over: 0,
+            deals: Vec::new(),
+            next_turn: 0,
+        }
+    }
+
+    /// Whether every game that was drawn is over.
+    pub(super) fn is_round_over(&self) -> bool {
+        self.over == self.games.len()
+    }
+
+    /// Whether a participant can play one more game now.
+    pub(super) fn has_place(&self, participant: usize) -> bool {
+        let entrant = &self.participants[participant];
+        entrant.built_in.is_some() || self.busy[participant] < entrant.max_games
+    }
+
+    pub(super) fn fold(&mut self, change: &Change) {
+        match change {
+            Change::Joined(entrant) => {
+                self.participants.push(entrant.clone());
+                self.busy.push(0);
+                self.sums.push(Sums {
+                    places: vec![0; self.settings.players],
+                    ..Sums::default()
+                });
+            }
+            Change::Begun { rounds } => {
+                self.state = State::Playing;
+                self.rounds = *rounds;
+            }
+            Change::Drawn {
+                round,
+                tables,
+                byes,
+            } => self.draw(*round, tables, byes),
+            Change::Called { game, forfeited } => self.call(*game, forfeited),
+            Change::Rescheduled { game, missing } => self.reschedule(*game, missing),
+            Change::Counted { game, result } => self.count(*game, result),
+            Change::Voided { game } => self.void(*game),
+            Change::Finished => self.state = State::Finished,
+            Change::Closed => {
+                (0..self.games.len()).for_each(|game| self.void(game));
+                self.state = State::Closed;
+            }
+        }
+    }
+
+    fn draw(&mut self, round: u32, tables: &[Vec<usize>], byes: &[usize]) {
+        let known = |participant: &usize| *participant < self.participants.len();
+        if !tables.iter().flatten().chain(byes).all(known) {
+            return;
+        }
+        self.drawn = round;
+        byes.iter().for_each(|&who| self.sums[who].byes += 1);
+        let games = self.settings.games_of_pairing();
+        let round_deals = self.deals.len();
+        for (table, number) in tables.iter().zip(1..) {
+            for &participant in table {
+                self.sums[participant].last_round = round;
+            }
+            let first = self.games.len();
+            let pairing_deals = self.deals.len();
+            for game in 0..games {
+                let deal = match self.settings.deals {
+                    Deals::Independent => None,
+                    Deals::SameAtAllTables => Some(round_deals + game as usize),
+                    Deals::Rotated => Some(pairing_deals + game as usize / table.len().max(1)),
+                };
+                self.add_game(round, number, game, table, deal);
+            }
+            self.pairings.push(Pairing {
+                round,
+                table: table.clone(),
+                games: first..self.games.len(),
+            });
+        }
+    }
+
+    /// Adds a game, by its number in the pairing from 0.
+    fn add_game(
+        &mut self,
+        round: u32,
+        table: u32,
+        game: u32,
+        participants: &[usize],
+        deal: Option<usize>,
+    ) {
+        let mut seats = participants.to_vec();
+        let by = game as usize % seats.len().max(1);
+        seats.rotate_left(by);
+        if let Some(deal) = deal {
+            self.deals.resize(self.deals.len().max(deal + 1), 0);
+            self.deals[deal] += 1;
+        }
+        let index = self.games.len();
+        self.games.push(Game {
+            round,
+            table,
+            number: game + 1,
+            seats,
+            deal: deal.map(|deal| deal as u32),
+            state: GameState::Due,
+            calls: 0,
+            forfeited: Vec::new(),
+            missing: Vec::new(),
+            turn: 0,
+        });
+        self.queue(index);
+    }
+
+    /// Lets a game wait behind those that are due.
+    fn queue(&mut self, index: usize) {
+        let game = &mut self.games[index];
+        game.state = GameState::Due;
+        game.turn = self.next_turn;
+        self.due.insert((self.next_turn, index));
+        self.next_turn += 1;
+    }
+
+    fn call(&mut self, index: usize, forfeited: &[usize]) {
+        let Some(game) = self.games.get_mut(index) else {
+            return;
+        };
+        if game.state != GameState::Due {
+            return;
+        }
+        self.due.remove(&(game.turn, index));
+        game.state = GameState::Playing;
+        game.calls += 1;
+        game.forfeited = forfeited.to_vec();
+        game.missing.clear();
+        self.playing.insert(index);
+        for participant in &game.seats {
+            if !game.forfeited.contains(participant) {
+                self.busy[*participant] += 1;
+            }
+        }
+    }
+
+    fn reschedule(&mut self, index: usize, missing: &[usize]) {
+        let Some(game) = self.games.get_mut(index) else {
+            return;
+        };
+        match game.state {
+            // Those whom it waited for did not come: that is a call in vain.
+            GameState::Due => game.calls += 1,
+            GameState::Playing => {}
+            GameState::Counted(_) | GameState::Void => return,
+        }
+        game.missing = missing.to_vec();
+        if missing.is_empty() && self.settings.deals == Deals::SameAtAllTables {
+            let deal = game.deal.take();
+            self.end_of_deal(deal);
+        }
+        self.leave(index);
+        self.queue(index);
+    }
+
+    fn count(&mut self, index: usize, result: &GameResult) {
+        let Some(game) = self.games.get(index) else {
+            return;
+        };
+        let known = |participant| participant < self.sums.len();
+        if game.is_over() || !result.seats.iter().all(|seat| known(seat.participant)) {
+            return;
+        }
+        self.leave(index);
+        for seat in &result.seats {
+            let sums = &mut self.sums[seat.participant];
+            sums.games += 1;
+            sums.score += u64::from(seat.score);
+            sums.points += seat.points;
+            if let Some(times) = sums.places.get_mut(seat.place.wrapping_sub(1)) {
+                *times += 1;
+            }
+            sums.forfeited += u32::from(seat.forfeited);
+            sums.substituted += u32::from(seat.substituted);
+            sums.wrong_actions += seat.wrong_actions;
+            sums.timeouts += seat.timeouts;
+            sums.decision_time_us += seat.decision_time_us;
+            sums.timed_decisions += seat.timed_decisions;
+            sums.performance += seat.performance_score;
+        }
+        self.end(index, GameState::Counted(result.clone()));
+    }
+
+    fn void(&mut self, index: usize) {
+        if self.games.get(index).is_some_and(|game| !game.is_over()) {
+            self.leave(index);
+            self.end(index, GameState::Void);
+        }
+    }
+
+    /// A game is neither due nor being played any more.
+    fn leave(&mut self, index: usize) {
+        let game = &self.games[index];
+        self.due.remove(&(game.turn, index));
+        if self.playing.remove(&index) {
+            for participant in &game.seats {
+                if !game.forfeited.contains(participant) {
+                    self.busy[*participant] -= 1;
+                }
+            }
+        }
+    }
+
+    fn end(&mut self, index: usize, state: GameState) {
+        let game = &mut self.games[index];
+        game.state = state;
+        let deal = game.deal;
+        self.over += 1;
+        self.end_of_deal(deal);
+    }
+
+    /// One game less is to be played with this deal.
+    fn end_of_deal(&mut self, deal: Option<u32>) {
+        if let Some(left) = deal.and_then(|deal| self.deals.get_mut(deal as usize)) {
+            *left -= 1;
+        }
+    }
+}

@@ -1,0 +1,98 @@
+//! What only the owner of a tournament may do: `chefshat tournament start` and `close`.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use chefshat_client::v1;
+use clap::Args;
+
+use super::super::connect::ServerArg;
+use super::super::{CommandError, say};
+use super::words::state;
+
+/// Begin a tournament with those who have joined.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  chefshat tournament start 5f0c6a4de2b14b7f8a3d9c1e7b60425d --owner-file ./owner"
+)]
+pub(super) struct Start {
+    #[command(flatten)]
+    owned: Owned,
+}
+
+/// Close a tournament before its end: games that are being played are aborted, what has been counted stays.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  chefshat tournament close 5f0c6a4de2b14b7f8a3d9c1e7b60425d --owner-file ./owner"
+)]
+pub(super) struct Close {
+    #[command(flatten)]
+    owned: Owned,
+}
+
+/// Which tournament, and what shows that one is its owner.
+#[derive(Debug, Args)]
+struct Owned {
+    /// Which tournament.
+    #[arg(value_name = "TOURNAMENT-ID")]
+    tournament_id: String,
+    /// The secret that `tournament create` gave.
+    #[arg(
+        long,
+        env = "CHEFSHAT_OWNER_TOKEN",
+        hide_env_values = true,
+        required_unless_present = "owner_file"
+    )]
+    owner_token: Option<String>,
+    /// The file in which `tournament create` left it.
+    #[arg(long, value_name = "FILE")]
+    owner_file: Option<PathBuf>,
+    #[command(flatten)]
+    server: ServerArg,
+    /// Print the tournament as a JSON line.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Start {
+    pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
+        let Owned { tournament_id, .. } = &self.owned;
+        let token = self.owned.token()?;
+        let client = self.owned.server.connect().await?;
+        let tournament = client.start_tournament(tournament_id, token).await?;
+        self.owned.tell("started", &tournament)
+    }
+}
+
+impl Close {
+    pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
+        let Owned { tournament_id, .. } = &self.owned;
+        let token = self.owned.token()?;
+        let client = self.owned.server.connect().await?;
+        let tournament = client.close_tournament(tournament_id, token).await?;
+        self.owned.tell("closed", &tournament)
+    }
+}
+
+impl Owned {
+    /// The owner's token; one in a file that is named goes before one of the environment.
+    fn token(&self) -> Result<String, CommandError> {
+        match (&self.owner_file, &self.owner_token) {
+            (Some(file), _) => std::fs::read_to_string(file)
+                .map(|text| text.trim().to_owned())
+                .map_err(|error| format!("--owner-file: {}: {error}", file.display()).into()),
+            (None, Some(token)) => Ok(token.clone()),
+            (None, None) => Err("give --owner-token or --owner-file".into()),
+        }
+    }
+
+    fn tell(&self, event: &str, tournament: &v1::Tournament) -> Result<ExitCode, CommandError> {
+        if self.json {
+            say(serde_json::json!({"event": event, "tournament": tournament}))?;
+        } else {
+            let (id, state) = (&tournament.tournament_id, state(tournament.state()));
+            say(format_args!("tournament {id} is {state}"))?;
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+}

@@ -1,0 +1,117 @@
+//! `chefshat tournament results`: the standings, how sure their order is, how all played; for people, for programs, as files.
+
+use std::io::Write as _;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use chefshat_client::v1;
+use clap::Args;
+
+use super::super::connect::ServerArg;
+use super::super::narrator::clean;
+use super::super::numbers::counted;
+use super::super::sheet::{heading, line};
+use super::super::{CommandError, say};
+use super::tables::{self, Field};
+use super::words::{format_name, is_over, state};
+use super::{all_games, files};
+
+/// Show the standings of a tournament, how sure their order is, and how all played; final once it is over.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  chefshat tournament results 5f0c6a4de2b14b7f8a3d9c1e7b60425d\n  \
+                  chefshat tournament results 5f0c6a4de2b14b7f8a3d9c1e7b60425d --csv standings.csv --final-results FinalResultsComp.csv\n\n\
+                  docs/tournaments.md and docs/ratings.md say what the numbers mean."
+)]
+pub(super) struct Results {
+    /// Which tournament.
+    #[arg(value_name = "TOURNAMENT-ID")]
+    tournament_id: String,
+    #[command(flatten)]
+    server: ServerArg,
+    /// Print the results as a JSON line.
+    #[arg(long)]
+    json: bool,
+    /// Write a line for each participant into this file, with all there is to know.
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Write the columns of the reference implementation's FinalResultsComp.csv into this file. The score is that of the last game played.
+    #[arg(long, value_name = "FILE")]
+    final_results: Option<PathBuf>,
+}
+
+impl Results {
+    pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
+        let client = self.server.connect().await?;
+        let results = client
+            .tournament_results(self.tournament_id.as_str())
+            .await?;
+        if let Some(file) = &self.csv {
+            files::write_standings(file, &results)?;
+        }
+        if let Some(file) = &self.final_results {
+            let games = all_games(&client, &self.tournament_id).await?;
+            files::write_final_results(file, &results, &games)?;
+        }
+        if self.json {
+            let (tournament, standings) = (results.tournament, results.standings);
+            say(serde_json::json!({
+                "event": "results", "tournament": tournament, "standings": standings, "confidence": results.confidence,
+            }))?;
+        } else {
+            let mut out = anstream::stdout().lock();
+            write!(out, "{}", text(&results))?;
+            out.flush()?;
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+/// The results for people.
+fn text(results: &v1::GetTournamentResultsResponse) -> String {
+    let tournament = results.tournament.clone().unwrap_or_default();
+    let settings = tournament.settings.clone().unwrap_or_default();
+    let mut text = String::new();
+    let name = clean(&settings.name, 64);
+    heading(&mut text, &format!("{name}: {}", state(tournament.state())));
+    let format = format_name(settings.format());
+    let participants = counted(tournament.participants.len() as u64, "participant");
+    let (over, games) = (tournament.games_over, tournament.games);
+    let course = match tournament.state() {
+        v1::TournamentState::Open => "not begun".to_owned(),
+        _ => format!(
+            "{}, {over} of {games} games over",
+            counted(tournament.rounds.into(), "round")
+        ),
+    };
+    line(&mut text, &format!("{format}, {participants}, {course}"));
+    if let Some(words) = of_deals(settings.deals()) {
+        line(&mut text, words);
+    }
+    if !is_over(&tournament) {
+        line(&mut text, "these standings are not final");
+    }
+    let field = Field::new(&tournament);
+    text.push('\n');
+    tables::standings(&mut text, &field, &results.standings);
+    if over > 0 {
+        text.push('\n');
+        tables::order(&mut text, &field, &results.confidence);
+        text.push('\n');
+        tables::play(&mut text, &field, &results.standings);
+    }
+    text
+}
+
+/// What has to be known about the deals.
+fn of_deals(deals: v1::TournamentDeals) -> Option<&'static str> {
+    match deals {
+        v1::TournamentDeals::Unspecified | v1::TournamentDeals::Independent => None,
+        v1::TournamentDeals::SameAtAllTables => {
+            Some("all tables of a round were dealt alike; nobody met a deal twice")
+        }
+        v1::TournamentDeals::Rotated => Some(
+            "participants met each deal in all seats: built-in agents, and others that declared to remember nothing",
+        ),
+    }
+}

@@ -1,0 +1,312 @@
+//! What a tournament is to be, checked, and tournaments as everybody sees them.
+
+use chefshat_arena::AgentKind;
+use chefshat_arena::tournament::{
+    Deals, EntrantKind, Format, Game, GameState, MAX_PARTICIPANTS, Settings, State, Tournament,
+};
+use chefshat_engine::RuleSet;
+use chefshat_proto::v1;
+use chefshat_records::convert::{FieldProblem, rules_from_proto, rules_to_proto};
+
+use super::policy::{agent, policy_from_proto, policy_to_proto, unknown};
+use super::room::{kind_from_proto, kind_to_proto};
+use crate::ids::Id;
+use crate::room::policy::{AbortPolicy, Policy};
+use crate::store::journal::ParticipantKind;
+
+/// What is taken where a request does not say.
+const STANDARD_PARTICIPANTS: u32 = 64;
+const STANDARD_NO_SHOW_MS: u32 = 60_000;
+const STANDARD_CALLS: u32 = 2;
+const STANDARD_PARALLEL: u32 = 64;
+
+/// What a tournament is to be, checked.
+#[derive(Debug)]
+pub struct TournamentPlan {
+    /// As its core knows it.
+    pub core: Settings,
+    /// The rules of all games.
+    pub rules: RuleSet,
+    /// The policy of all games.
+    pub policy: Policy,
+    /// Kinds that may join; empty: all.
+    pub kinds: Vec<ParticipantKind>,
+    /// Built-in agents that take part.
+    pub built_in: Vec<AgentKind>,
+    /// What all deals follow from, if its owner fixes that.
+    pub deal_seed: Option<[u8; 32]>,
+}
+
+/// What a tournament is asked to be, with the standard in place of what is left out. `draw_seed` is taken where none is asked for.
+///
+/// # Errors
+/// The first field that cannot be.
+pub fn tournament_plan(
+    message: &v1::TournamentSettings,
+    draw_seed: [u8; 32],
+) -> Result<TournamentPlan, FieldProblem> {
+    let rules = rules_from_proto(&message.rules.clone().unwrap_or_default())
+        .map_err(|problem| FieldProblem::new("rules", problem.to_string()))?;
+    let deals = deals_from_proto(message.deals)?;
+    let standard = |value: u32, standard: u32| if value == 0 { standard } else { value };
+    let count = |value: u32| usize::try_from(value).unwrap_or(usize::MAX);
+    let no_show_ms = standard(message.no_show_time_ms, STANDARD_NO_SHOW_MS);
+    let built_in: Vec<AgentKind> = (message.built_in_agents.iter())
+        .map(|name| {
+            agent("built_in_agents", name)?
+                .ok_or_else(|| FieldProblem::new("built_in_agents", "a built-in agent has no name"))
+        })
+        .collect::<Result<_, _>>()?;
+    let max_participants = standard(message.max_participants, STANDARD_PARTICIPANTS);
+    if built_in.len() > count(max_participants).min(MAX_PARTICIPANTS) {
+        let problem = format!(
+            "{} of at most {max_participants} participants",
+            built_in.len()
+        );
+        return Err(FieldProblem::new("built_in_agents", problem));
+    }
+    Ok(TournamentPlan {
+        core: Settings {
+            format: format_from_proto(message.format)?,
+            players: rules.players(),
+            points: rules.points_slice().to_vec(),
+            rounds: (message.rounds != 0).then_some(message.rounds),
+            games_per_pairing: standard(message.games_per_pairing, 1),
+            deals,
+            max_participants: count(max_participants),
+            start_when_joined: (message.start_when_joined != 0)
+                .then(|| count(message.start_when_joined)),
+            no_show_ms: no_show_ms.into(),
+            max_calls: standard(message.max_calls, STANDARD_CALLS),
+            max_parallel: count(standard(message.max_parallel_games, STANDARD_PARALLEL)),
+            draw_seed: seed("draw_seed", &message.draw_seed)?.unwrap_or(draw_seed),
+            filler: agent("filler", &message.filler)?.unwrap_or(AgentKind::Random),
+        },
+        policy: policy(message, deals, no_show_ms)?,
+        kinds: (message.kinds.iter())
+            .map(|kind| {
+                kind_from_proto("kinds", *kind)?
+                    .ok_or_else(|| FieldProblem::new("kinds", "a kind is not said"))
+            })
+            .collect::<Result<_, _>>()?,
+        rules,
+        built_in,
+        deal_seed: seed("deal_seed", &message.deal_seed)?,
+    })
+}
+
+fn seed(name: &'static str, bytes: &[u8]) -> Result<Option<[u8; 32]>, FieldProblem> {
+    if bytes.is_empty() {
+        return Ok(None);
+    }
+    bytes.try_into().map(Some).map_err(|_| {
+        let problem = format!("{} bytes; give 32, or none", bytes.len());
+        FieldProblem::new(name, problem)
+    })
+}
+
+/// The policy of all games. What a tournament decides itself may be left out, but not be asked for otherwise.
+fn policy(
+    message: &v1::TournamentSettings,
+    deals: Deals,
+    no_show_ms: u32,
+) -> Result<Policy, FieldProblem> {
+    let refuse = |problem: String| Err(FieldProblem::new("policy", problem));
+    let mut asked = message.policy.clone().unwrap_or_default();
+    if ![v1::AbortPolicy::Unspecified, v1::AbortPolicy::Never].contains(&asked.abort()) {
+        return refuse(
+            "abort: games of a tournament go on with substitutes; leave it unset".into(),
+        );
+    }
+    if asked.waiting_time_ms.is_some_and(|time| time != no_show_ms) {
+        return refuse("waiting_time_ms: set no_show_time_ms of the tournament instead".into());
+    }
+    if deals == Deals::SameAtAllTables {
+        if asked.spectators == Some(true) {
+            return refuse(
+                "spectators: who watches one table would know the cards of the others".into(),
+            );
+        }
+        asked.spectators = Some(false);
+    }
+    asked.abort = v1::AbortPolicy::Never.into();
+    asked.waiting_time_ms = Some(no_show_ms);
+    let policy = policy_from_proto(&asked);
+    let policy = policy.map_err(|problem| FieldProblem::new("policy", problem.to_string()))?;
+    debug_assert_eq!(policy.abort, AbortPolicy::Never);
+    Ok(policy)
+}
+
+fn format_from_proto(format: i32) -> Result<Format, FieldProblem> {
+    match v1::TournamentFormat::try_from(format) {
+        Ok(v1::TournamentFormat::Knockout) => Ok(Format::Knockout),
+        Ok(v1::TournamentFormat::RoundRobin) => Ok(Format::RoundRobin),
+        Ok(v1::TournamentFormat::Swiss) => Ok(Format::Swiss),
+        Ok(v1::TournamentFormat::Unspecified) => Err(FieldProblem::new(
+            "format",
+            "say knockout, round robin or swiss",
+        )),
+        Err(_) => Err(unknown("format", format)),
+    }
+}
+
+fn deals_from_proto(deals: i32) -> Result<Deals, FieldProblem> {
+    match v1::TournamentDeals::try_from(deals) {
+        Ok(v1::TournamentDeals::Unspecified | v1::TournamentDeals::Independent) => {
+            Ok(Deals::Independent)
+        }
+        Ok(v1::TournamentDeals::SameAtAllTables) => Ok(Deals::SameAtAllTables),
+        Ok(v1::TournamentDeals::Rotated) => Ok(Deals::Rotated),
+        Err(_) => Err(unknown("deals", deals)),
+    }
+}
+
+/// What a tournament is, every field set.
+pub fn settings_to_proto(name: &str, plan: &TournamentPlan) -> v1::TournamentSettings {
+    let core = &plan.core;
+    let number = |value: usize| u32::try_from(value).unwrap_or(u32::MAX);
+    v1::TournamentSettings {
+        name: name.to_owned(),
+        format: match core.format {
+            Format::Knockout => v1::TournamentFormat::Knockout,
+            Format::RoundRobin => v1::TournamentFormat::RoundRobin,
+            Format::Swiss => v1::TournamentFormat::Swiss,
+        }
+        .into(),
+        rules: Some(rules_to_proto(&plan.rules)),
+        policy: Some(policy_to_proto(&plan.policy)),
+        rounds: core.rounds.unwrap_or(0),
+        games_per_pairing: core.games_per_pairing,
+        deals: match core.deals {
+            Deals::Independent => v1::TournamentDeals::Independent,
+            Deals::SameAtAllTables => v1::TournamentDeals::SameAtAllTables,
+            Deals::Rotated => v1::TournamentDeals::Rotated,
+        }
+        .into(),
+        kinds: (plan.kinds.iter())
+            .map(|kind| kind_to_proto(Some(*kind)))
+            .collect(),
+        max_participants: number(core.max_participants),
+        built_in_agents: (plan.built_in.iter())
+            .map(|kind| kind.name().to_owned())
+            .collect(),
+        start_when_joined: core.start_when_joined.map_or(0, number),
+        no_show_time_ms: u32::try_from(core.no_show_ms).unwrap_or(u32::MAX),
+        max_calls: core.max_calls,
+        max_parallel_games: number(core.max_parallel),
+        draw_seed: core.draw_seed.to_vec(),
+        filler: core.filler.name().to_owned(),
+        deal_seed: (plan.deal_seed).map_or_else(Vec::new, |seed| seed.to_vec()),
+    }
+}
+
+/// A kind of participant as the core of a tournament knows it.
+pub fn entrant_kind(kind: ParticipantKind) -> EntrantKind {
+    match kind {
+        ParticipantKind::Agent => EntrantKind::Agent,
+        ParticipantKind::Human => EntrantKind::Human,
+        ParticipantKind::Robot => EntrantKind::Robot,
+    }
+}
+
+/// The kind of a participant, as rooms know it.
+pub fn participant_kind(kind: EntrantKind) -> ParticipantKind {
+    match kind {
+        EntrantKind::Agent => ParticipantKind::Agent,
+        EntrantKind::Human => ParticipantKind::Human,
+        EntrantKind::Robot => ParticipantKind::Robot,
+    }
+}
+
+/// Where a tournament stands, as a message.
+pub fn tournament_state(state: State) -> v1::TournamentState {
+    match state {
+        State::Open => v1::TournamentState::Open,
+        State::Playing => v1::TournamentState::Playing,
+        State::Finished => v1::TournamentState::Finished,
+        State::Closed => v1::TournamentState::Closed,
+    }
+}
+
+/// The participants of a tournament.
+pub fn tournament_participants(tournament: &Tournament) -> Vec<v1::TournamentParticipant> {
+    let entrants = tournament.participants().iter().enumerate();
+    entrants
+        .map(|(number, entrant)| v1::TournamentParticipant {
+            participant: u32::try_from(number).unwrap_or(u32::MAX),
+            name: entrant.name.clone(),
+            kind: kind_to_proto(Some(participant_kind(entrant.kind))),
+            built_in_agent: (entrant.built_in)
+                .map_or_else(String::new, |kind| kind.name().to_owned()),
+            filler: entrant.filler,
+            stateless: entrant.stateless,
+            max_games: u32::try_from(entrant.max_games).unwrap_or(u32::MAX),
+            connected: tournament.is_present(number),
+        })
+        .collect()
+}
+
+/// A game of a tournament. `placed` is the room and the game it is or was played in.
+pub fn tournament_game(
+    number: usize,
+    game: &Game,
+    placed: Option<(Id, Id)>,
+    series: Option<Id>,
+    plan: &TournamentPlan,
+) -> v1::TournamentGame {
+    let participant = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
+    let seats = match &game.state {
+        GameState::Counted(result) => (result.seats.iter())
+            .map(|seat| v1::TournamentGameSeat {
+                participant: participant(seat.participant),
+                forfeited: seat.forfeited,
+                substituted: seat.substituted,
+                place: u32::try_from(seat.place).unwrap_or(u32::MAX),
+                score: seat.score,
+                points: seat.points,
+                decisions: seat.decisions,
+                wrong_actions: seat.wrong_actions,
+                timeouts: seat.timeouts,
+                decision_time_us: seat.decision_time_us,
+                timed_decisions: seat.timed_decisions,
+                performance_score: seat.performance_score,
+            })
+            .collect(),
+        _ => (game.seats.iter())
+            .map(|number| v1::TournamentGameSeat {
+                participant: participant(*number),
+                forfeited: game.forfeited.contains(number),
+                ..v1::TournamentGameSeat::default()
+            })
+            .collect(),
+    };
+    let result = game.result();
+    v1::TournamentGame {
+        game: participant(number),
+        round: game.round,
+        table: game.table,
+        number: game.number,
+        state: match game.state {
+            GameState::Due => v1::TournamentGameState::Due,
+            GameState::Playing => v1::TournamentGameState::Playing,
+            GameState::Counted(_) => v1::TournamentGameState::Counted,
+            GameState::Void => v1::TournamentGameState::Void,
+        }
+        .into(),
+        seats,
+        room_id: placed.map_or_else(String::new, |(room, _)| room.to_string()),
+        game_id: placed.map_or_else(String::new, |(_, game)| game.to_string()),
+        calls: game.calls,
+        series_id: series.map_or_else(String::new, |series| series.to_string()),
+        rated: is_rated(game, plan),
+        shifts: result.map_or(0, |result| result.shifts),
+    }
+}
+
+/// Whether a game counts for ratings: it has a result, the server chose its deals, and all its participants played it themselves.
+pub fn is_rated(game: &Game, plan: &TournamentPlan) -> bool {
+    let result = game.result().filter(|_| plan.deal_seed.is_none());
+    result.is_some_and(|result| {
+        (result.seats.iter()).all(|seat| !seat.forfeited && !seat.substituted)
+    })
+}

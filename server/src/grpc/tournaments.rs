@@ -1,0 +1,504 @@
+//! `TournamentService`: what is asked is checked and handed to the tournament; what it shows of itself is put into messages.
+
+use std::collections::BTreeMap;
+use std::pin::Pin;
+use std::sync::Arc;
+
+use chefshat_arena::ratings::Ratings;
+use chefshat_arena::tournament::{
+    BeginProblem, Format, Game, GameState, JoinProblem, Standing, Tournament,
+};
+use chefshat_proto::v1::{self, tournament_service_server::TournamentService};
+use chefshat_records::convert::FieldProblem;
+use futures::Stream;
+use tokio::sync::{Semaphore, mpsc};
+use tokio::time::{Instant, timeout};
+use tokio_stream::wrappers::ReceiverStream;
+use tokio_util::sync::CancellationToken;
+use tonic::{Code, Request, Response, Status};
+
+use super::new_room::{check_length, check_name, kept_policy};
+use super::pages;
+use super::recorded::{Recorded, not_read};
+use super::status::{disk_nearly_full, field, shutting_down, status, store_failed};
+use crate::config::{
+    FOLLOW_INTERVAL, HEARTBEAT, MAX_FOLLOWERS, MAX_GAMES_PAGE, MAX_LEADERBOARD_LINES,
+};
+use crate::convert;
+use crate::ids::{Id, random_bytes};
+use crate::store::journal::ParticipantKind;
+use crate::tournaments::{CreateProblem, Entry, Hosted, Leaderboard, Stopped, Tournaments};
+
+/// Games of a page, and lines of a leaderboard, where a request does not say.
+const STANDARD_LINES: u32 = 100;
+
+/// The service.
+#[derive(Debug, Clone)]
+pub struct TournamentCalls {
+    tournaments: Arc<Tournaments>,
+    recorded: Recorded,
+    leaderboard: Arc<Leaderboard>,
+    followers: Arc<Semaphore>,
+    /// Cancelled when all streams are to end.
+    closing: CancellationToken,
+}
+
+impl TournamentCalls {
+    /// The service for these tournaments; `closing` ends its streams.
+    pub fn new(
+        tournaments: Arc<Tournaments>,
+        recorded: Recorded,
+        closing: CancellationToken,
+    ) -> Self {
+        let store = Arc::clone(recorded.rooms().store());
+        Self {
+            tournaments,
+            leaderboard: Arc::new(Leaderboard::new(store)),
+            recorded,
+            followers: Arc::new(Semaphore::new(MAX_FOLLOWERS)),
+            closing,
+        }
+    }
+
+    fn find(&self, id: &str) -> Result<Arc<Hosted>, Status> {
+        (Id::parse(id).and_then(|id| self.tournaments.get(id))).ok_or_else(unknown)
+    }
+
+    fn find_own(&self, id: &str, owner_token: &str) -> Result<Arc<Hosted>, Status> {
+        let hosted = self.find(id)?;
+        if hosted.is_owner(owner_token) {
+            return Ok(hosted);
+        }
+        Err(status(
+            Code::PermissionDenied,
+            "OWNER_TOKEN_WRONG",
+            "this is not the owner token that CreateTournament gave for this tournament",
+            [("field", "owner_token")],
+        ))
+    }
+}
+
+#[tonic::async_trait]
+impl TournamentService for TournamentCalls {
+    type FollowTournamentStream =
+        Pin<Box<dyn Stream<Item = Result<v1::FollowTournamentResponse, Status>> + Send>>;
+
+    async fn create_tournament(
+        &self,
+        request: Request<v1::CreateTournamentRequest>,
+    ) -> Result<Response<v1::CreateTournamentResponse>, Status> {
+        let settings = request.into_inner().settings.unwrap_or_default();
+        let name = settings.name.trim().to_owned();
+        check_name(&name, 1).map_err(|problem| field("NAME_REFUSED", &problem))?;
+        let mut plan = convert::tournament_plan(&settings, random_bytes())
+            .map_err(|problem| refused(&problem))?;
+        check_length(&plan.rules)?;
+        let asked = settings.policy.unwrap_or_default();
+        plan.policy.durability = kept_policy(&self.recorded, &asked)
+            .map_err(|problem| field("POLICY_REFUSED", &problem))?
+            .durability;
+        let (hosted, owner) = self
+            .tournaments
+            .create(&name, plan)
+            .await
+            .map_err(not_made)?;
+        Ok(Response::new(v1::CreateTournamentResponse {
+            tournament: Some(hosted.describe()),
+            join_code: hosted.join_code().to_owned(),
+            owner_token: owner.word(),
+        }))
+    }
+
+    async fn get_tournament(
+        &self,
+        request: Request<v1::GetTournamentRequest>,
+    ) -> Result<Response<v1::GetTournamentResponse>, Status> {
+        let hosted = self.find(&request.into_inner().tournament_id)?;
+        let tournament = Some(hosted.describe());
+        Ok(Response::new(v1::GetTournamentResponse { tournament }))
+    }
+
+    async fn list_tournaments(
+        &self,
+        request: Request<v1::ListTournamentsRequest>,
+    ) -> Result<Response<v1::ListTournamentsResponse>, Status> {
+        let request = request.into_inner();
+        let after = pages::after(&request.page_token)?;
+        let size = pages::page_size(request.page_size);
+        let mut found = self.tournaments.list(after, size + 1);
+        let more = found.len() > size;
+        found.truncate(size);
+        let next_page_token = match found.last() {
+            Some((last, _)) if more => last.to_string(),
+            _ => String::new(),
+        };
+        let tournaments = (found.iter())
+            .map(|(_, hosted)| v1::Tournament {
+                participants: Vec::new(),
+                ..hosted.describe()
+            })
+            .collect();
+        Ok(Response::new(v1::ListTournamentsResponse {
+            tournaments,
+            next_page_token,
+        }))
+    }
+
+    async fn join_tournament(
+        &self,
+        request: Request<v1::JoinTournamentRequest>,
+    ) -> Result<Response<v1::JoinTournamentResponse>, Status> {
+        let request = request.into_inner();
+        let name = request.name.trim().to_owned();
+        check_name(&name, 1).map_err(|problem| field("NAME_REFUSED", &problem))?;
+        let kind = convert::kind_from_proto("kind", request.kind)
+            .map_err(|problem| field("KIND_REFUSED", &problem))?
+            .unwrap_or(ParticipantKind::Agent);
+        let hosted = match request.tournament_id.as_str() {
+            "" => self.tournaments.by_code(&request.join_code),
+            id => Some(self.find(id)?)
+                .filter(|hosted| crate::ids::normal_code(&request.join_code) == hosted.join_code()),
+        };
+        let hosted = hosted.ok_or_else(|| {
+            status(
+                Code::PermissionDenied,
+                "JOIN_CODE_WRONG",
+                "no tournament here has this join code; ask its owner for it",
+                [("field", "join_code")],
+            )
+        })?;
+        if !hosted.admits(kind) {
+            return Err(status(
+                Code::FailedPrecondition,
+                "KIND_NOT_ADMITTED",
+                "this tournament admits other kinds of participants",
+                [("field", "kind")],
+            ));
+        }
+        let entry = Entry {
+            name,
+            kind,
+            max_games: usize::try_from(request.max_games.max(1)).unwrap_or(usize::MAX),
+            stateless: request.stateless,
+        };
+        let (participant, ticket) = hosted
+            .join(entry)
+            .await
+            .map_err(stopped)?
+            .map_err(not_joined)?;
+        Ok(Response::new(v1::JoinTournamentResponse {
+            tournament: Some(hosted.describe()),
+            participant: u32::try_from(participant).unwrap_or(u32::MAX),
+            ticket: ticket.word(),
+        }))
+    }
+
+    async fn start_tournament(
+        &self,
+        request: Request<v1::StartTournamentRequest>,
+    ) -> Result<Response<v1::StartTournamentResponse>, Status> {
+        let request = request.into_inner();
+        let hosted = self.find_own(&request.tournament_id, &request.owner_token)?;
+        let begun = hosted.begin().await.map_err(stopped)?;
+        begun.map_err(|problem| {
+            let reason = match problem {
+                BeginProblem::TooFew { .. } => "TOO_FEW_PARTICIPANTS",
+                BeginProblem::Started => "TOURNAMENT_STARTED",
+            };
+            status(Code::FailedPrecondition, reason, problem.to_string(), [])
+        })?;
+        let tournament = Some(hosted.describe());
+        Ok(Response::new(v1::StartTournamentResponse { tournament }))
+    }
+
+    async fn close_tournament(
+        &self,
+        request: Request<v1::CloseTournamentRequest>,
+    ) -> Result<Response<v1::CloseTournamentResponse>, Status> {
+        let request = request.into_inner();
+        let hosted = self.find_own(&request.tournament_id, &request.owner_token)?;
+        hosted.close().await.map_err(stopped)?;
+        let tournament = Some(hosted.describe());
+        Ok(Response::new(v1::CloseTournamentResponse { tournament }))
+    }
+
+    async fn follow_tournament(
+        &self,
+        request: Request<v1::FollowTournamentRequest>,
+    ) -> Result<Response<Self::FollowTournamentStream>, Status> {
+        let hosted = self.find(&request.into_inner().tournament_id)?;
+        let place = Arc::clone(&self.followers).try_acquire_owned();
+        let place = place.map_err(|_| {
+            status(
+                Code::ResourceExhausted,
+                "TOO_MANY_FOLLOWERS",
+                "the server's tournaments are followed by as many as it can take",
+                [("max_followers", &MAX_FOLLOWERS.to_string())],
+            )
+        })?;
+        let (sender, responses) = mpsc::channel(1);
+        let closing = self.closing.clone();
+        tokio::spawn(async move {
+            let _place = place;
+            tokio::select! {
+                () = follow(&hosted, &sender) => {}
+                () = closing.cancelled() => {}
+            }
+        });
+        Ok(Response::new(Box::pin(ReceiverStream::new(responses))))
+    }
+
+    async fn get_tournament_results(
+        &self,
+        request: Request<v1::GetTournamentResultsRequest>,
+    ) -> Result<Response<v1::GetTournamentResultsResponse>, Status> {
+        let hosted = self.find(&request.into_inner().tournament_id)?;
+        let looked = tokio::task::spawn_blocking(move || {
+            let (standings, confidence) = hosted.look(|tournament| {
+                let standings = tournament.standings();
+                (
+                    with_ratings(&hosted, tournament, &standings),
+                    order(tournament),
+                )
+            });
+            v1::GetTournamentResultsResponse {
+                tournament: Some(hosted.describe()),
+                standings,
+                confidence,
+            }
+        });
+        let results = looked.await.map_err(|error| {
+            tracing::error!(%error, "results were not worked out");
+            super::status::internal()
+        })?;
+        Ok(Response::new(results))
+    }
+
+    async fn list_tournament_games(
+        &self,
+        request: Request<v1::ListTournamentGamesRequest>,
+    ) -> Result<Response<v1::ListTournamentGamesResponse>, Status> {
+        let request = request.into_inner();
+        let hosted = self.find(&request.tournament_id)?;
+        let after = pages::after(&request.page_token)?;
+        let from = after.map_or(0, |after| usize::try_from(after).unwrap_or(usize::MAX));
+        let size = match request.page_size {
+            0 => STANDARD_LINES,
+            size => size.min(MAX_GAMES_PAGE),
+        };
+        let size = usize::try_from(size).unwrap_or(usize::MAX);
+        let mut games = hosted.games(from, size + 1, |_| true);
+        let more = games.len() > size;
+        games.truncate(size);
+        let next_page_token = match more {
+            true => (from + size).to_string(),
+            false => String::new(),
+        };
+        Ok(Response::new(v1::ListTournamentGamesResponse {
+            games,
+            next_page_token,
+        }))
+    }
+
+    async fn get_leaderboard(
+        &self,
+        request: Request<v1::GetLeaderboardRequest>,
+    ) -> Result<Response<v1::GetLeaderboardResponse>, Status> {
+        let request = request.into_inner();
+        let kind = convert::kind_from_proto("kind", request.kind)
+            .map_err(|problem| field("KIND_REFUSED", &problem))?;
+        let kind = kind.map(|kind| convert::kind_to_proto(Some(kind)));
+        let limit = match request.limit {
+            0 => STANDARD_LINES,
+            limit => limit.min(MAX_LEADERBOARD_LINES),
+        };
+        let ratings = self.leaderboard.ratings().await.map_err(not_read)?;
+        let wanted = |who: &crate::tournaments::Who| kind.is_none_or(|kind| who.1 == kind);
+        let lines = ratings.leaderboard(wanted, request.min_games);
+        let rated = (1..)
+            .zip(lines)
+            .take(usize::try_from(limit).unwrap_or(usize::MAX))
+            .map(|(place, ((name, kind, built_in), rated))| v1::Rated {
+                name: name.clone(),
+                kind: *kind,
+                built_in: *built_in,
+                rating: Some(rating(rated)),
+                place,
+                places: rated.places.clone(),
+            })
+            .collect();
+        Ok(Response::new(v1::GetLeaderboardResponse {
+            rated,
+            games: ratings.games(),
+        }))
+    }
+}
+
+/// Sends the tournament whenever it has changed, until it is over or nobody listens.
+async fn follow(
+    hosted: &Hosted,
+    sender: &mpsc::Sender<Result<v1::FollowTournamentResponse, Status>>,
+) {
+    let mut changes = hosted.changes();
+    loop {
+        changes.mark_unchanged();
+        let over = hosted.is_over();
+        let sent = Instant::now();
+        if sender.send(Ok(now(hosted))).await.is_err() || over {
+            return;
+        }
+        tokio::time::sleep_until(sent + FOLLOW_INTERVAL).await;
+        while timeout(HEARTBEAT, changes.changed()).await.is_err() {
+            let heartbeat = v1::FollowTournamentResponse::default();
+            if sender.send(Ok(heartbeat)).await.is_err() {
+                return;
+            }
+        }
+    }
+}
+
+/// Where a tournament stands.
+fn now(hosted: &Hosted) -> v1::FollowTournamentResponse {
+    let (standings, round, by_rounds) = hosted.look(|tournament| {
+        let standings = tournament.standings();
+        (
+            with_ratings(hosted, tournament, &standings),
+            tournament.round(),
+            tournament.settings().format != Format::RoundRobin,
+        )
+    });
+    let wanted = |game: &Game| match by_rounds {
+        true => game.round == round,
+        false => game.state == GameState::Playing,
+    };
+    v1::FollowTournamentResponse {
+        tournament: Some(hosted.describe()),
+        standings,
+        games: hosted.games(0, usize::MAX, wanted),
+    }
+}
+
+/// The standings as messages, with ratings from the tournament's rated games alone.
+fn with_ratings(
+    hosted: &Hosted,
+    tournament: &Tournament,
+    standings: &[Standing],
+) -> Vec<v1::TournamentStanding> {
+    let mut ratings: Ratings<usize> = Ratings::default();
+    for game in tournament
+        .games()
+        .iter()
+        .filter(|game| hosted.is_rated(game))
+    {
+        let placed: Vec<(usize, u32)> = (game.result().into_iter())
+            .flat_map(|result| &result.seats)
+            .map(|seat| {
+                (
+                    seat.participant,
+                    u32::try_from(seat.place).unwrap_or(u32::MAX),
+                )
+            })
+            .collect();
+        // What tells nothing is no game of a tournament.
+        let _ = ratings.fold(&placed);
+    }
+    let rated: BTreeMap<usize, v1::Rating> = (ratings.leaderboard(|_| true, 0).into_iter())
+        .map(|(who, rated)| (*who, rating(rated)))
+        .collect();
+    (standings.iter())
+        .map(|standing| v1::TournamentStanding {
+            place: standing.place,
+            participant: u32::try_from(standing.participant).unwrap_or(u32::MAX),
+            last_round: standing.last_round,
+            games: standing.games,
+            byes: standing.byes,
+            score: standing.score,
+            points: standing.points,
+            places: standing.places.clone(),
+            forfeited: standing.forfeited,
+            substituted: standing.substituted,
+            wrong_actions: standing.wrong_actions,
+            timeouts: standing.timeouts,
+            mean_decision_time_us: standing.mean_decision_time_us,
+            performance_score: standing.performance_score,
+            rating: rated.get(&standing.participant).copied(),
+        })
+        .collect()
+}
+
+/// How sure the order of neighbours is.
+fn order(tournament: &Tournament) -> Vec<v1::OrderConfidence> {
+    let number = |value: usize| u32::try_from(value).unwrap_or(u32::MAX);
+    (tournament.order_confidence().into_iter())
+        .map(|pair| v1::OrderConfidence {
+            upper: number(pair.upper),
+            lower: number(pair.lower),
+            difference: pair.order.difference,
+            standard_error: pair.order.standard_error,
+            confidence: pair.order.confidence,
+            more_games: pair.order.more_games,
+        })
+        .collect()
+}
+
+fn rating(rated: &chefshat_arena::ratings::Rated) -> v1::Rating {
+    v1::Rating {
+        mean: rated.rating.mean,
+        deviation: rated.rating.deviation,
+        games: rated.games,
+    }
+}
+
+fn unknown() -> Status {
+    status(
+        Code::NotFound,
+        "TOURNAMENT_UNKNOWN",
+        "there is no such tournament here",
+        [("field", "tournament_id")],
+    )
+}
+
+fn stopped(_: Stopped) -> Status {
+    shutting_down()
+}
+
+/// A field of the settings that cannot be accepted.
+fn refused(problem: &FieldProblem) -> Status {
+    let reason = match problem.field {
+        "rules" => "RULE_SET_REFUSED",
+        "policy" => "POLICY_REFUSED",
+        _ => "SETTINGS_REFUSED",
+    };
+    field(reason, problem)
+}
+
+fn not_made(problem: CreateProblem) -> Status {
+    match problem {
+        CreateProblem::Settings(problem) => {
+            refused(&FieldProblem::new(problem.field, problem.problem))
+        }
+        CreateProblem::TooMany(limit) => status(
+            Code::ResourceExhausted,
+            "TOO_MANY_TOURNAMENTS",
+            problem.to_string(),
+            [("max_tournaments", &limit.to_string())],
+        ),
+        CreateProblem::ShuttingDown => shutting_down(),
+        CreateProblem::DiskNearlyFull => disk_nearly_full(&problem.to_string()),
+        CreateProblem::Store(error) => {
+            tracing::error!(%error, "a tournament was not made");
+            store_failed()
+        }
+    }
+}
+
+fn not_joined(problem: JoinProblem) -> Status {
+    let (code, reason) = match problem {
+        JoinProblem::Full => (Code::ResourceExhausted, "TOURNAMENT_FULL"),
+        JoinProblem::Started => (Code::FailedPrecondition, "TOURNAMENT_STARTED"),
+        JoinProblem::NameTaken => (Code::FailedPrecondition, "NAME_TAKEN"),
+        JoinProblem::NotStateless => (Code::FailedPrecondition, "NOT_STATELESS"),
+        JoinProblem::MaxGames => (Code::InvalidArgument, "MAX_GAMES_REFUSED"),
+    };
+    status(code, reason, problem.to_string(), [])
+}

@@ -1,0 +1,170 @@
+//! Tournaments: what is kept of them is found again, in a form that stays readable.
+
+use chefshat_arena::tournament::{Change, Entrant, EntrantKind, GameResult, SeatResult};
+
+use super::*;
+use crate::store::journal::TournamentGame;
+use crate::store::tournaments::{TournamentEntry, TournamentHeader};
+
+fn cup(number: u8) -> TournamentHeader {
+    TournamentHeader {
+        id: Id([number; 16]),
+        settings: v1::TournamentSettings {
+            name: "Coppa dello chef".into(),
+            format: v1::TournamentFormat::Swiss.into(),
+            max_calls: 2,
+            ..v1::TournamentSettings::default()
+        },
+        created_at_ms: 1_700_000_000_000,
+        join_code: "ABCDEFGH".into(),
+        owner: SecretHash::of(b"owner"),
+        deal_secret: [6; 32],
+    }
+}
+
+/// One entry of every kind.
+fn moved() -> Vec<TournamentEntry> {
+    let entrant = Entrant {
+        name: "Bruna".into(),
+        kind: EntrantKind::Robot,
+        built_in: None,
+        filler: false,
+        stateless: true,
+        max_games: 3,
+    };
+    let filler = Entrant {
+        name: "random 1".into(),
+        kind: EntrantKind::Agent,
+        built_in: Some(AgentKind::Random),
+        filler: true,
+        stateless: false,
+        max_games: 64,
+    };
+    let seat = SeatResult {
+        participant: 4,
+        forfeited: false,
+        substituted: true,
+        place: 2,
+        score: 3,
+        points: u64::MAX,
+        decisions: 71,
+        wrong_actions: 5,
+        timeouts: 6,
+        decision_time_us: 7_000_000,
+        timed_decisions: 8,
+        performance_score: 1.25,
+    };
+    let forfeited = SeatResult {
+        participant: 0,
+        forfeited: true,
+        substituted: false,
+        ..seat
+    };
+    let change = TournamentEntry::Change;
+    vec![
+        change(Change::Joined(entrant)),
+        TournamentEntry::Ticket {
+            participant: 0,
+            ticket: SecretHash::of(b"ticket"),
+        },
+        change(Change::Joined(filler)),
+        change(Change::Begun { rounds: 3 }),
+        change(Change::Drawn {
+            round: 2,
+            tables: vec![vec![3, 1, 0, 2], vec![4, 5, 6, 7]],
+            byes: vec![8, 9],
+        }),
+        change(Change::Called {
+            game: 1,
+            forfeited: vec![0],
+        }),
+        TournamentEntry::Placed {
+            game: 1,
+            room_id: Id([3; 16]),
+            game_id: Id([4; 16]),
+        },
+        change(Change::Rescheduled {
+            game: 1,
+            missing: vec![1, 2],
+        }),
+        change(Change::Counted {
+            game: 1,
+            result: GameResult {
+                shifts: 5,
+                seats: vec![seat, forfeited],
+            },
+        }),
+        change(Change::Voided { game: 2 }),
+        change(Change::Finished),
+        change(Change::Closed),
+    ]
+}
+
+fn shown(value: &impl std::fmt::Debug) -> String {
+    format!("{value:?}")
+}
+
+#[tokio::test]
+async fn what_was_kept_of_tournaments_is_found_again_in_order() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let store = SqliteStore::open(folder.path()).await.expect("it opens");
+    for number in [7, 3] {
+        let made = store.create_tournament(Arc::new(cup(number))).await;
+        made.expect("it is kept");
+    }
+    let entries = moved();
+    let (first, rest) = entries.split_at(5);
+    for (row, part) in [(0, first), (1, rest)] {
+        let kept = store.append_tournament(Id([3; 16]), row, part.to_vec());
+        kept.await.expect("it is kept");
+    }
+    store.close().await;
+    drop(store);
+    let store = SqliteStore::open(folder.path()).await.expect("it opens");
+    let found = store.tournaments().await.expect("it reads");
+    assert_eq!(found.len(), 2);
+    assert_eq!(shown(&found[0].header), shown(&cup(7)));
+    assert_eq!((found[0].rows, found[0].entries.len()), (0, 0));
+    assert_eq!(shown(&found[1].header), shown(&cup(3)));
+    assert_eq!(found[1].rows, 2);
+    assert_eq!(shown(&found[1].entries), shown(&moved()));
+}
+
+#[test]
+fn the_form_of_tournaments_stays_readable() {
+    let written = format!(
+        "{}\n{}\n",
+        hex::encode(form::tournament_to_bytes(&cup(3))),
+        hex::encode(form::tournament_entries_to_bytes(&moved()))
+    );
+    assert_eq!(written, include_str!("../fixtures/tournament1.hex"));
+    let (first, second) = written.split_once('\n').expect("two lines");
+    let bytes = hex::decode(first).expect("hexadecimal digits");
+    let read = form::tournament_from_bytes(&bytes).expect("readable");
+    assert_eq!(shown(&read), shown(&cup(3)));
+    let bytes = hex::decode(second.trim()).expect("hexadecimal digits");
+    let read = form::tournament_entries_from_bytes(&bytes).expect("readable");
+    assert_eq!(shown(&read), shown(&moved()));
+    for end in 1..bytes.len() {
+        // Half of an entry is no entry; what was cut between two reads as fewer.
+        if let Ok(read) = form::tournament_entries_from_bytes(&bytes[..end]) {
+            assert!(read.len() < moved().len());
+        }
+    }
+}
+
+#[test]
+fn a_game_remembers_its_tournament() {
+    for series in [None, Some(Id([5; 16]))] {
+        let game = TournamentGame {
+            tournament: Id([6; 16]),
+            series,
+        };
+        let header = GameHeader {
+            tournament: Some(game),
+            ..header(1, Durability::Durable)
+        };
+        let read = form::header_from_bytes(&form::header_to_bytes(&header)).expect("readable");
+        assert_eq!(read.tournament, Some(game));
+    }
+}

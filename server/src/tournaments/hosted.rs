@@ -1,0 +1,269 @@
+//! One tournament as services reach it: what it shows of itself, and a handle to the task that moves it. What happens when is the task's.
+
+use std::collections::BTreeMap;
+use std::sync::{Mutex, MutexGuard};
+
+use chefshat_arena::tournament::{BeginProblem, Game, JoinProblem, State, Tournament};
+use chefshat_proto::v1;
+use sha2::{Digest as _, Sha256};
+use tokio::sync::{mpsc, oneshot, watch};
+
+use crate::convert::{self, TournamentPlan};
+use crate::ids::{Id, SecretHash, Token};
+use crate::store::journal::ParticipantKind;
+use crate::store::tournaments::TournamentHeader;
+
+/// What a stream is told that is attached to a participant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Call {
+    /// Its game is to be played in this room.
+    Seat(Id),
+    /// A newer connection has the participant.
+    Superseded,
+    /// The tournament is over.
+    Over,
+}
+
+/// The way to a stream that is attached to a participant.
+#[derive(Debug, Clone)]
+pub struct Connection {
+    /// Number of the participant's attachment on the stream.
+    pub handle: u32,
+    /// Takes what the participant is told.
+    pub calls: mpsc::Sender<(u32, Call)>,
+}
+
+impl Connection {
+    /// Tells the stream; `false` if it is gone, or has not taken what it was told before.
+    pub(super) fn call(&self, call: Call) -> bool {
+        self.calls.try_send((self.handle, call)).is_ok()
+    }
+}
+
+/// Asks to take part.
+#[derive(Debug)]
+pub struct Entry {
+    /// Name to show.
+    pub name: String,
+    /// What joins.
+    pub kind: ParticipantKind,
+    /// Games it can play at a time.
+    pub max_games: usize,
+    /// Declares that it remembers nothing.
+    pub stateless: bool,
+}
+
+/// The tournament moves no more: the server ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Stopped;
+
+pub(super) enum Message {
+    Join(Entry, oneshot::Sender<Result<(usize, Token), JoinProblem>>),
+    Begin(oneshot::Sender<Result<(), BeginProblem>>),
+    Close(oneshot::Sender<()>),
+    Enter(usize, u64, Connection),
+    Left(usize, u64),
+}
+
+/// What moves, and what everybody may look at. A look may be ahead of the store by one commit; what it shows is promised when it is kept.
+#[derive(Debug)]
+pub(super) struct Moving {
+    pub(super) core: Tournament,
+    /// Tickets of participants, hashed; built-in ones have none.
+    pub(super) tickets: BTreeMap<usize, SecretHash>,
+    /// Rooms and games that games of the tournament are or were played in.
+    pub(super) placed: BTreeMap<usize, (Id, Id)>,
+}
+
+/// A tournament of this server.
+#[derive(Debug)]
+pub struct Hosted {
+    pub(super) header: TournamentHeader,
+    pub(super) plan: TournamentPlan,
+    pub(super) moving: Mutex<Moving>,
+    pub(super) mailbox: mpsc::Sender<Message>,
+    /// Counts what has happened.
+    pub(super) changes: watch::Sender<u64>,
+}
+
+impl Hosted {
+    /// Which tournament.
+    pub fn id(&self) -> Id {
+        self.header.id
+    }
+
+    /// Its join code.
+    pub fn join_code(&self) -> &str {
+        &self.header.join_code
+    }
+
+    /// Whether this is its owner's token.
+    pub fn is_owner(&self, token: &str) -> bool {
+        Token::parse(token).is_some_and(|token| {
+            token.room == self.header.id && self.header.owner.matches(&token.secret)
+        })
+    }
+
+    /// The participant with this ticket, in constant time for each.
+    pub fn participant_of(&self, secret: &[u8]) -> Option<usize> {
+        let hash = SecretHash::of(secret);
+        let moving = self.moving();
+        let mut tickets = moving.tickets.iter();
+        tickets
+            .find(|(_, ticket)| ticket.is(&hash))
+            .map(|(participant, _)| *participant)
+    }
+
+    /// Takes part; gives the participant's number and its ticket.
+    ///
+    /// # Errors
+    /// The server ends, or (inside) why it cannot.
+    pub async fn join(&self, entry: Entry) -> Result<Result<(usize, Token), JoinProblem>, Stopped> {
+        self.ask(|reply| Message::Join(entry, reply)).await
+    }
+
+    /// Begins.
+    ///
+    /// # Errors
+    /// The server ends, or (inside) why it cannot.
+    pub async fn begin(&self) -> Result<Result<(), BeginProblem>, Stopped> {
+        self.ask(Message::Begin).await
+    }
+
+    /// Closes it, unless it is over.
+    ///
+    /// # Errors
+    /// The server ends.
+    pub async fn close(&self) -> Result<(), Stopped> {
+        self.ask(Message::Close).await
+    }
+
+    /// Attaches a stream to a participant; `number` is the connection's own.
+    pub async fn enter(&self, participant: usize, number: u64, connection: Connection) {
+        let message = Message::Enter(participant, number, connection);
+        // When the server ends, the stream is ended too.
+        let _ = self.mailbox.send(message).await;
+    }
+
+    /// The stream with this number has left a participant.
+    pub async fn left(&self, participant: usize, number: u64) {
+        let _ = self.mailbox.send(Message::Left(participant, number)).await;
+    }
+
+    /// Kinds that may join; empty: all.
+    pub fn admits(&self, kind: ParticipantKind) -> bool {
+        self.plan.kinds.is_empty() || self.plan.kinds.contains(&kind)
+    }
+
+    /// Counts what has happened.
+    pub fn changes(&self) -> watch::Receiver<u64> {
+        self.changes.subscribe()
+    }
+
+    /// Whether it has ended, one way or the other.
+    pub fn is_over(&self) -> bool {
+        matches!(self.moving().core.state(), State::Finished | State::Closed)
+    }
+
+    /// The tournament as everybody sees it.
+    pub fn describe(&self) -> v1::Tournament {
+        let moving = self.moving();
+        let core = &moving.core;
+        let number = |value: usize| u32::try_from(value).unwrap_or(u32::MAX);
+        let state = core.state();
+        let mut settings = self.header.settings.clone();
+        if matches!(state, State::Open | State::Playing) {
+            // Who knows it could work out the draws to come.
+            settings.draw_seed.clear();
+            settings.deal_seed.clear();
+        }
+        v1::Tournament {
+            tournament_id: self.header.id.to_string(),
+            settings: Some(settings),
+            state: convert::tournament_state(state).into(),
+            participants: convert::tournament_participants(core),
+            round: core.round(),
+            rounds: core.rounds(),
+            games_over: number(core.games_over()),
+            games_playing: number(core.playing().count()),
+            games: number(core.games_expected()),
+            created_at_ms: self.header.created_at_ms,
+        }
+    }
+
+    /// Its games that are asked for, with what has come of them; at most `most`.
+    pub fn games(
+        &self,
+        from: usize,
+        most: usize,
+        wanted: impl Fn(&Game) -> bool,
+    ) -> Vec<v1::TournamentGame> {
+        let moving = self.moving();
+        let games = moving.core.games().iter().enumerate().skip(from);
+        games
+            .filter(|(_, game)| wanted(game))
+            .take(most)
+            .map(|(number, game)| {
+                let placed = moving.placed.get(&number).copied();
+                let series = game.deal.map(|deal| self.series(deal));
+                convert::tournament_game(number, game, placed, series, &self.plan)
+            })
+            .collect()
+    }
+
+    /// Whether a game of it counts for ratings.
+    pub fn is_rated(&self, game: &Game) -> bool {
+        convert::is_rated(game, &self.plan)
+    }
+
+    /// What `look` makes of the tournament.
+    pub fn look<T>(&self, look: impl FnOnce(&Tournament) -> T) -> T {
+        look(&self.moving().core)
+    }
+
+    /// The id of the games that are dealt alike.
+    pub(super) fn series(&self, deal: u32) -> Id {
+        let hash = self.of_deal(b"chefshat.v1 series", deal);
+        Id(std::array::from_fn(|index| hash[index]))
+    }
+
+    /// The server's part of the seed of the games that are dealt alike.
+    pub(super) fn server_seed(&self, deal: u32) -> [u8; 32] {
+        self.of_deal(b"chefshat.v1 deal", deal)
+    }
+
+    /// The seed of a game whose deals the owner fixed.
+    pub(super) fn game_seed(&self, number: usize, deal: Option<u32>) -> Option<[u8; 32]> {
+        let seed = self.plan.deal_seed?;
+        let number = u64::try_from(number).unwrap_or(u64::MAX);
+        Some(match deal {
+            Some(deal) => hash(b"chefshat.v1 fixed deal", &seed, &deal.to_le_bytes()),
+            None => hash(b"chefshat.v1 fixed game", &seed, &number.to_le_bytes()),
+        })
+    }
+
+    fn of_deal(&self, what: &[u8], deal: u32) -> [u8; 32] {
+        hash(what, &self.header.deal_secret, &deal.to_le_bytes())
+    }
+
+    pub(super) fn moving(&self) -> MutexGuard<'_, Moving> {
+        (self.moving.lock()).expect("nothing that holds this lock can panic")
+    }
+
+    async fn ask<T>(
+        &self,
+        message: impl FnOnce(oneshot::Sender<T>) -> Message,
+    ) -> Result<T, Stopped> {
+        let (reply, answer) = oneshot::channel();
+        (self.mailbox.send(message(reply)).await).map_err(|_| Stopped)?;
+        answer.await.map_err(|_| Stopped)
+    }
+}
+
+fn hash(what: &[u8], secret: &[u8; 32], number: &[u8]) -> [u8; 32] {
+    let mut hash = Sha256::new();
+    for part in [what, secret, number] {
+        hash.update(part);
+    }
+    hash.finalize().into()
+}

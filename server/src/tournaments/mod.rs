@@ -1,0 +1,289 @@
+//! The tournaments of a server: making them, finding them, going on with them after the server ended. Who plays whom and what counts is
+//! decided in `chefshat_arena::tournament`; a tournament is moved by its `task`.
+
+mod hosted;
+mod leaderboard;
+mod task;
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, MutexGuard};
+
+use chefshat_arena::tournament::{
+    Change, Entrant, EntrantKind, SettingsProblem, State, Tournament,
+};
+use chefshat_records::convert::FieldProblem;
+use tokio::sync::{mpsc, watch};
+use tokio_util::sync::CancellationToken;
+use tokio_util::task::TaskTracker;
+use tracing::{error, info};
+
+pub use hosted::{Call, Connection, Entry, Hosted, Stopped};
+pub use leaderboard::{BoardError, Leaderboard, Who};
+
+use crate::config::{MAX_TOURNAMENTS, TOURNAMENT_MAILBOX};
+use crate::convert::{self, TournamentPlan};
+use crate::ids::{Id, Token, join_code, normal_code, random_bytes};
+use crate::room::since_epoch_ms;
+use crate::rooms::Rooms;
+use crate::store::StoreError;
+use crate::store::tournaments::{KeptTournament, TournamentEntry, TournamentHeader};
+use hosted::Moving;
+use task::Task;
+
+/// Why no tournament was made.
+#[derive(Debug, thiserror::Error)]
+pub enum CreateProblem {
+    /// It cannot be held so.
+    #[error(transparent)]
+    Settings(#[from] SettingsProblem),
+    /// The limit of tournaments is reached.
+    #[error("the server holds {0} tournaments that are not over; close one or try later")]
+    TooMany(usize),
+    /// The server takes no new tournaments.
+    #[error("the server is shutting down and takes no new tournaments")]
+    ShuttingDown,
+    /// There is no space for more games.
+    #[error("the server's disk is nearly full; what is left is kept for games that go on")]
+    DiskNearlyFull,
+    /// The store refused.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+}
+
+/// The tournaments of a server.
+#[derive(Debug)]
+pub struct Tournaments {
+    rooms: Arc<Rooms>,
+    tracker: TaskTracker,
+    /// Cancelled when no tournament is to move any more.
+    stop: CancellationToken,
+    table: Mutex<Table>,
+}
+
+#[derive(Debug, Default)]
+struct Table {
+    next_number: u64,
+    /// In the order in which they were made.
+    by_number: BTreeMap<u64, Arc<Hosted>>,
+    /// Places taken for tournaments that are being made.
+    being_made: usize,
+}
+
+impl Tournaments {
+    /// No tournaments yet. A shutdown waits for what `tracker` tracks.
+    pub fn new(rooms: Arc<Rooms>, tracker: TaskTracker) -> Arc<Self> {
+        Arc::new(Self {
+            rooms,
+            tracker,
+            stop: CancellationToken::new(),
+            table: Mutex::default(),
+        })
+    }
+
+    /// Makes a tournament; gives its owner's token with it.
+    ///
+    /// # Errors
+    /// See [`CreateProblem`].
+    pub async fn create(
+        &self,
+        name: &str,
+        plan: TournamentPlan,
+    ) -> Result<(Arc<Hosted>, Token), CreateProblem> {
+        let mut core = Tournament::new(plan.core.clone())?;
+        if self.stop.is_cancelled() || self.rooms.is_shutting_down() {
+            return Err(CreateProblem::ShuttingDown);
+        }
+        if !self.rooms.store().has_space() {
+            return Err(CreateProblem::DiskNearlyFull);
+        }
+        let _place = Place::reserve(self)?;
+        let id = Id::random();
+        let owner = Token::random(id);
+        let header = TournamentHeader {
+            id,
+            settings: convert::settings_to_proto(name, &plan),
+            created_at_ms: since_epoch_ms(),
+            join_code: join_code(),
+            owner: owner.hash(),
+            deal_secret: random_bytes(),
+        };
+        let mut entries = Vec::new();
+        for entrant in built_in(&plan) {
+            let change = Change::Joined(entrant);
+            core.fold(&change);
+            entries.push(TournamentEntry::Change(change));
+        }
+        let store = self.rooms.store();
+        store.create_tournament(Arc::new(header.clone())).await?;
+        if !entries.is_empty() {
+            store.append_tournament(id, 0, entries.clone()).await?;
+        }
+        let kept = KeptTournament {
+            header,
+            rows: u64::from(!entries.is_empty()),
+            entries,
+        };
+        Ok((self.take_up(kept, plan, core), owner))
+    }
+
+    /// Goes on with the tournaments of the store, and says how many were not over. The rooms must be there already.
+    ///
+    /// # Errors
+    /// The store's.
+    pub async fn restore(&self) -> Result<usize, StoreError> {
+        let mut going_on = 0;
+        for kept in self.rooms.store().tournaments().await? {
+            let id = kept.header.id;
+            match folded(&kept) {
+                Ok((plan, core)) => {
+                    going_on += usize::from(core.state() == State::Playing);
+                    self.take_up(kept, plan, core);
+                }
+                Err(problem) => {
+                    error!(tournament = %id, %problem, "a tournament cannot be gone on with; it is left as it is");
+                }
+            }
+        }
+        if going_on > 0 {
+            info!(tournaments = going_on, "tournaments go on where they stood");
+        }
+        Ok(going_on)
+    }
+
+    /// No tournament moves any more; their games may end, and count when the server is back.
+    pub fn stop(&self) {
+        self.stop.cancel();
+    }
+
+    /// A tournament by its id.
+    pub fn get(&self, id: Id) -> Option<Arc<Hosted>> {
+        self.find(|hosted| hosted.id() == id)
+    }
+
+    /// A tournament by its join code.
+    pub fn by_code(&self, code: &str) -> Option<Arc<Hosted>> {
+        let code = normal_code(code);
+        self.find(|hosted| hosted.join_code() == code)
+    }
+
+    /// At most `count` tournaments made after the one numbered `after`, with their numbers.
+    pub fn list(&self, after: Option<u64>, count: usize) -> Vec<(u64, Arc<Hosted>)> {
+        let first = after.map_or(0, |number| number.saturating_add(1));
+        let table = self.lock();
+        let from = table.by_number.range(first..).take(count);
+        from.map(|(number, hosted)| (*number, Arc::clone(hosted)))
+            .collect()
+    }
+
+    fn find(&self, wanted: impl Fn(&Hosted) -> bool) -> Option<Arc<Hosted>> {
+        let table = self.lock();
+        let found = table.by_number.values().find(|hosted| wanted(hosted));
+        found.cloned()
+    }
+
+    /// Enters a tournament into the table and lets it move.
+    fn take_up(&self, kept: KeptTournament, plan: TournamentPlan, core: Tournament) -> Arc<Hosted> {
+        let (mailbox, inbox) = mpsc::channel(TOURNAMENT_MAILBOX);
+        let mut moving = Moving {
+            core,
+            tickets: BTreeMap::new(),
+            placed: BTreeMap::new(),
+        };
+        for entry in kept.entries {
+            match entry {
+                TournamentEntry::Change(_) => {}
+                TournamentEntry::Ticket {
+                    participant,
+                    ticket,
+                } => drop(moving.tickets.insert(participant, ticket)),
+                TournamentEntry::Placed {
+                    game,
+                    room_id,
+                    game_id,
+                } => drop(moving.placed.insert(game, (room_id, game_id))),
+            }
+        }
+        let hosted = Arc::new(Hosted {
+            header: kept.header,
+            plan,
+            moving: Mutex::new(moving),
+            mailbox,
+            changes: watch::Sender::new(0),
+        });
+        let mut table = self.lock();
+        while table.by_number.len() >= MAX_TOURNAMENTS
+            && let Some(number) = (table.by_number.iter())
+                .find(|(_, hosted)| hosted.is_over())
+                .map(|(number, _)| *number)
+        {
+            table.by_number.remove(&number);
+        }
+        let number = table.next_number;
+        table.next_number += 1;
+        table.by_number.insert(number, Arc::clone(&hosted));
+        drop(table);
+        let task = Task::new(Arc::clone(&hosted), Arc::clone(&self.rooms), kept.rows);
+        self.tracker.spawn(task.run(inbox, self.stop.clone()));
+        hosted
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Table> {
+        (self.table.lock()).expect("nothing that holds this lock can panic")
+    }
+}
+
+/// A place for a tournament that is being made.
+struct Place<'a>(&'a Tournaments);
+
+impl<'a> Place<'a> {
+    fn reserve(tournaments: &'a Tournaments) -> Result<Self, CreateProblem> {
+        let mut table = tournaments.lock();
+        let open = table.by_number.values().filter(|hosted| !hosted.is_over());
+        if open.count() + table.being_made >= MAX_TOURNAMENTS {
+            return Err(CreateProblem::TooMany(MAX_TOURNAMENTS));
+        }
+        table.being_made += 1;
+        Ok(Self(tournaments))
+    }
+}
+
+impl Drop for Place<'_> {
+    fn drop(&mut self) {
+        self.0.lock().being_made -= 1;
+    }
+}
+
+/// The built-in participants of a tournament, each named after its agent, numbered where there are several.
+fn built_in(plan: &TournamentPlan) -> Vec<Entrant> {
+    let mut entrants: Vec<Entrant> = Vec::new();
+    for kind in &plan.built_in {
+        let same = |other: &&Entrant| other.built_in == Some(*kind);
+        let before = entrants.iter().filter(same).count();
+        let several = plan.built_in.iter().filter(|other| *other == kind).count() > 1;
+        entrants.push(Entrant {
+            name: match several {
+                true => format!("{} {}", kind.name(), before + 1),
+                false => kind.name().to_owned(),
+            },
+            kind: EntrantKind::Agent,
+            built_in: Some(*kind),
+            filler: false,
+            stateless: true,
+            max_games: chefshat_arena::tournament::MAX_GAMES_AT_A_TIME,
+        });
+    }
+    entrants
+}
+
+/// A tournament as it stood, from what was kept of it.
+fn folded(kept: &KeptTournament) -> Result<(TournamentPlan, Tournament), String> {
+    let plan = convert::tournament_plan(&kept.header.settings, [0; 32])
+        .map_err(|problem: FieldProblem| problem.to_string())?;
+    let mut core = Tournament::new(plan.core.clone()).map_err(|problem| problem.to_string())?;
+    for entry in &kept.entries {
+        if let TournamentEntry::Change(change) = entry {
+            core.fold(change);
+        }
+    }
+    Ok((plan, core))
+}

@@ -1,0 +1,527 @@
+//! The task that moves one tournament: it lets the core say what follows, keeps it, and only then makes rooms for games that are called
+//! and tells participants where they play. It sees that a game has ended by the room and reads what came of it from the store, so that
+//! a game counts once, whenever the server ended in between.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+use std::time::Duration;
+
+use chefshat_arena::tournament::{Change, Deals, Ended, Entrant, Game, SeatPlayed, State};
+use chefshat_proto::v1;
+use chefshat_records::outcome;
+use futures::future::join_all;
+use tokio::sync::mpsc;
+use tokio::time::{Instant, sleep_until};
+use tokio_util::sync::CancellationToken;
+use tracing::{error, info, warn};
+
+use super::hosted::{Call, Connection, Entry, Hosted, Message};
+use crate::config::{MAX_NAME_CHARS, TOURNAMENT_RETRY};
+use crate::convert;
+use crate::ids::{Id, Token};
+use crate::rooms::{CreateError, NewRoom, Rooms, Seating};
+use crate::store::StoreError;
+use crate::store::journal::{Fill, GameStart, SeatedParticipant, TournamentGame};
+use crate::store::tournaments::TournamentEntry;
+
+/// Messages that are taken before what follows from them is worked out.
+const MESSAGES_AT_A_TIME: usize = 64;
+
+/// Moves a tournament until the server ends.
+pub(super) struct Task {
+    hosted: Arc<Hosted>,
+    rooms: Arc<Rooms>,
+    /// Rows that have been kept.
+    rows: u64,
+    /// What is to be kept next.
+    unkept: Vec<TournamentEntry>,
+    /// Streams of participants, with the numbers of the connections.
+    connections: BTreeMap<usize, (u64, Connection)>,
+    /// Games that were called and have no room yet.
+    unmade: BTreeSet<usize>,
+    /// When rooms that could not be made are tried again.
+    retry: Option<Instant>,
+    /// Answers that wait for what they promise to be kept.
+    replies: Vec<Box<dyn FnOnce() + Send + Sync>>,
+    began: Instant,
+}
+
+impl Task {
+    /// The task of a tournament of which so many rows have been kept.
+    pub(super) fn new(hosted: Arc<Hosted>, rooms: Arc<Rooms>, rows: u64) -> Self {
+        Self {
+            hosted,
+            rooms,
+            rows,
+            unkept: Vec::new(),
+            connections: BTreeMap::new(),
+            unmade: BTreeSet::new(),
+            retry: None,
+            replies: Vec::new(),
+            began: Instant::now(),
+        }
+    }
+
+    /// Moves the tournament until the server ends, or its store fails.
+    pub(super) async fn run(mut self, mut inbox: mpsc::Receiver<Message>, stop: CancellationToken) {
+        let rooms = Arc::clone(&self.rooms);
+        let mut messages = Vec::new();
+        loop {
+            let changed = rooms.changed();
+            tokio::pin!(changed);
+            // From here on no end of a game is missed.
+            changed.as_mut().enable();
+            if let Err(error) = self.settle().await {
+                error!(tournament = %self.hosted.id(), %error, "the tournament stops");
+                return;
+            }
+            let wake = self.wake_at();
+            let alarm = sleep_until(wake.unwrap_or(self.began));
+            tokio::select! {
+                () = stop.cancelled() => return,
+                received = inbox.recv_many(&mut messages, MESSAGES_AT_A_TIME) => {
+                    if received == 0 {
+                        return;
+                    }
+                    for message in messages.drain(..) {
+                        self.receive(message);
+                    }
+                }
+                () = changed => {}
+                () = alarm, if wake.is_some() => {}
+            }
+        }
+    }
+
+    fn wake_at(&self) -> Option<Instant> {
+        let core = self.hosted.look(|core| core.wake_at());
+        let core = core.map(|ms| self.began + Duration::from_millis(ms));
+        core.into_iter().chain(self.retry).min()
+    }
+
+    fn now_ms(&self) -> u64 {
+        u64::try_from(self.began.elapsed().as_millis()).unwrap_or(u64::MAX)
+    }
+
+    fn receive(&mut self, message: Message) {
+        match message {
+            Message::Join(entry, reply) => {
+                let joined = self.join(entry);
+                self.replies.push(Box::new(move || {
+                    let _ = reply.send(joined);
+                }));
+            }
+            Message::Begin(reply) => {
+                let begun = self.hosted.look(|core| core.begin());
+                let begun = begun.map(|changes| self.fold_all(changes));
+                self.replies.push(Box::new(move || {
+                    // Who asked may be gone.
+                    let _ = reply.send(begun);
+                }));
+            }
+            Message::Close(reply) => {
+                self.close();
+                self.replies.push(Box::new(move || {
+                    let _ = reply.send(());
+                }));
+            }
+            Message::Enter(participant, number, connection) => {
+                self.enter(participant, number, connection);
+            }
+            Message::Left(participant, number) => self.left(participant, number),
+        }
+    }
+
+    fn join(
+        &mut self,
+        entry: Entry,
+    ) -> Result<(usize, Token), chefshat_arena::tournament::JoinProblem> {
+        let entrant = Entrant {
+            name: entry.name,
+            kind: convert::entrant_kind(entry.kind),
+            built_in: None,
+            filler: false,
+            stateless: entry.stateless,
+            max_games: entry.max_games,
+        };
+        let (change, participant) = self
+            .hosted
+            .look(|core| Ok((core.join(entrant)?, core.participants().len())))?;
+        let token = Token::random(self.hosted.id());
+        let ticket = token.hash();
+        self.fold(change);
+        self.hosted.moving().tickets.insert(participant, ticket);
+        self.unkept.push(TournamentEntry::Ticket {
+            participant,
+            ticket,
+        });
+        Ok((participant, token))
+    }
+
+    /// Closes the tournament and the rooms of its games.
+    fn close(&mut self) {
+        let Some(change) = self.hosted.look(|core| core.close()) else {
+            return;
+        };
+        let playing: Vec<usize> = self.hosted.look(|core| core.playing().collect());
+        self.fold(change);
+        for game in playing {
+            let placed = self.hosted.moving().placed.get(&game).copied();
+            if let Some(room) = placed.and_then(|(room, _)| self.rooms.get(room)) {
+                tokio::spawn(async move { room.give_up().await });
+            }
+        }
+        self.unmade.clear();
+    }
+
+    fn enter(&mut self, participant: usize, number: u64, connection: Connection) {
+        if let Some((_, older)) = self.connections.remove(&participant) {
+            older.call(Call::Superseded);
+        }
+        if self.hosted.is_over() {
+            connection.call(Call::Over);
+            return;
+        }
+        let mut reached = true;
+        for room in self.rooms_of(participant) {
+            reached &= connection.call(Call::Seat(room));
+        }
+        if reached {
+            self.connections.insert(participant, (number, connection));
+        }
+        (self.hosted.moving().core).set_present(participant, reached);
+    }
+
+    fn left(&mut self, participant: usize, number: u64) {
+        if (self.connections.get(&participant)).is_some_and(|(newest, _)| *newest == number) {
+            self.connections.remove(&participant);
+            self.hosted.moving().core.set_present(participant, false);
+        }
+    }
+
+    /// Rooms in which a participant has a seat now.
+    fn rooms_of(&self, participant: usize) -> Vec<Id> {
+        let moving = self.hosted.moving();
+        let games = moving.core.playing().filter(|number| {
+            let game = &moving.core.games()[*number];
+            !self.unmade.contains(number) && plays_itself(game, participant)
+        });
+        games
+            .filter_map(|number| moving.placed.get(&number).map(|(room, _)| *room))
+            .collect()
+    }
+
+    /// Folds a change and puts it where it will be kept.
+    fn fold(&mut self, change: Change) {
+        let mut moving = self.hosted.moving();
+        moving.core.fold(&change);
+        let placed = match &change {
+            Change::Called { game, .. } => Some(*game),
+            _ => None,
+        };
+        self.unkept.push(TournamentEntry::Change(change));
+        drop(moving);
+        if let Some(game) = placed {
+            self.place(game);
+        }
+    }
+
+    fn fold_all(&mut self, changes: Vec<Change>) {
+        for change in changes {
+            self.fold(change);
+        }
+    }
+
+    /// Gives a game a room, which is made when that is kept.
+    fn place(&mut self, game: usize) {
+        let (room_id, game_id) = (Id::random(), Id::random());
+        let mut moving = self.hosted.moving();
+        moving.placed.insert(game, (room_id, game_id));
+        if let Some(deal) = moving.core.games()[game].deal {
+            self.rooms.close_series(self.hosted.series(deal), true);
+        }
+        self.unmade.insert(game);
+        self.unkept.push(TournamentEntry::Placed {
+            game,
+            room_id,
+            game_id,
+        });
+    }
+
+    /// Does everything that follows now, and keeps it.
+    async fn settle(&mut self) -> Result<(), StoreError> {
+        loop {
+            self.look_at_games().await?;
+            let now_ms = self.now_ms();
+            loop {
+                let next = self.hosted.moving().core.next(now_ms);
+                let Some(change) = next else { break };
+                self.fold(change);
+            }
+            let moved = !self.unkept.is_empty();
+            if moved {
+                let entries = std::mem::take(&mut self.unkept);
+                let store = self.rooms.store();
+                (store.append_tournament(self.hosted.id(), self.rows, entries)).await?;
+                self.rows += 1;
+            }
+            for reply in self.replies.drain(..) {
+                reply();
+            }
+            self.hosted.changes.send_modify(|count| *count += 1);
+            self.open_series();
+            self.make_rooms().await?;
+            if self.hosted.is_over() {
+                for (_, connection) in std::mem::take(&mut self.connections).into_values() {
+                    connection.call(Call::Over);
+                }
+            }
+            if !moved {
+                return Ok(());
+            }
+        }
+    }
+
+    /// Takes in what came of games that have ended.
+    async fn look_at_games(&mut self) -> Result<(), StoreError> {
+        let playing: Vec<usize> = self.hosted.look(|core| core.playing().collect());
+        for game in playing {
+            if self.unmade.contains(&game) {
+                continue;
+            }
+            let placed = self.hosted.moving().placed.get(&game).copied();
+            let Some((room, game_id)) = placed else {
+                self.place(game);
+                continue;
+            };
+            if self.rooms.is_over(room) == Some(false) {
+                continue;
+            }
+            match self.ended(game, room, game_id).await? {
+                Some(ended) => {
+                    let change = self.hosted.look(|core| core.ended(game, ended));
+                    self.fold_all(change.into_iter().collect());
+                }
+                // The server ended before the room was made, or with it: nothing was played that could count.
+                None if !self.rooms.is_shutting_down() => self.place(game),
+                None => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// What came of a game whose room is over or gone; `None` if nothing did, and that was nobody's fault.
+    async fn ended(&self, game: usize, room: Id, game_id: Id) -> Result<Option<Ended>, StoreError> {
+        if let Some(kept) = self.rooms.store().finished(game_id).await? {
+            let told = tokio::task::spawn_blocking(move || {
+                let lines = convert::lines_of(&kept);
+                (outcome::outcome(&lines), abort_reason(&lines))
+            });
+            let (outcome, reason) = told
+                .await
+                .map_err(|error| StoreError(format!("a record was not read: {error}")))?;
+            return Ok(match (outcome, reason) {
+                (Ok(outcome), _) => Some(Ended::Played {
+                    shifts: outcome.shifts,
+                    seats: outcome.seats.iter().map(seat_played).collect(),
+                }),
+                (Err(_), Some(v1::AbortReason::Shutdown)) => None,
+                (Err(problem), _) => {
+                    warn!(%game_id, %problem, "a game of a tournament has no result");
+                    Some(Ended::Aborted)
+                }
+            });
+        }
+        let Some(handle) = self.rooms.get(room) else {
+            return Ok(None);
+        };
+        let Ok(described) = handle.describe().await else {
+            return Ok(None);
+        };
+        Ok(match described.abort_reason() {
+            v1::AbortReason::Shutdown => None,
+            _ => {
+                let seats = self.hosted.look(|core| core.games()[game].seats.clone());
+                let away = described.seats.iter().zip(seats);
+                let missing = away
+                    .filter(|(seat, _)| !seat.connected)
+                    .map(|(_, participant)| participant)
+                    .collect();
+                Some(Ended::NeverStarted { missing })
+            }
+        })
+    }
+
+    /// Opens what was withheld of deals whose games have all ended.
+    fn open_series(&self) {
+        if self.hosted.plan.core.deals == Deals::Independent {
+            return;
+        }
+        let moving = self.hosted.moving();
+        let over = matches!(moving.core.state(), State::Finished | State::Closed);
+        let deals: BTreeSet<u32> = (moving.core.games().iter())
+            .filter_map(|game| game.deal)
+            .collect();
+        for deal in deals {
+            let closed = !over && !moving.core.is_deal_open(deal);
+            (self.rooms).close_series(self.hosted.series(deal), closed);
+        }
+    }
+
+    /// Makes the rooms of games that were called, and tells their participants.
+    async fn make_rooms(&mut self) -> Result<(), StoreError> {
+        if self.unmade.is_empty() || self.retry.is_some_and(|retry| Instant::now() < retry) {
+            return Ok(());
+        }
+        self.retry = None;
+        let unmade: Vec<usize> = self.unmade.iter().copied().collect();
+        let making = unmade.iter().map(|game| {
+            let new = self.new_room(*game);
+            let rooms = &self.rooms;
+            async move { (*game, rooms.create(new).await) }
+        });
+        for (game, made) in join_all(making).await {
+            match made {
+                Ok(_) => {
+                    self.unmade.remove(&game);
+                    self.call(game);
+                }
+                Err(CreateError::Store(error)) => return Err(error),
+                // When the server is back, the game is given a room anew.
+                Err(CreateError::ShuttingDown) => self.retry = Some(retry()),
+                Err(error) => {
+                    if self.retry.replace(retry()).is_none() {
+                        warn!(tournament = %self.hosted.id(), %error, "games of a tournament wait");
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Tells the participants of a game that are connected where it is played.
+    fn call(&mut self, game: usize) {
+        let moving = self.hosted.moving();
+        let Some((room, _)) = moving.placed.get(&game).copied() else {
+            return;
+        };
+        let called = moving.core.games()[game].clone();
+        drop(moving);
+        for participant in &called.seats {
+            if !plays_itself(&called, *participant) {
+                continue;
+            }
+            let connection = self.connections.get(participant);
+            let lost = connection.is_some_and(|(_, connection)| !connection.call(Call::Seat(room)));
+            if lost {
+                self.connections.remove(participant);
+                (self.hosted.moving().core).set_present(*participant, false);
+            }
+        }
+    }
+
+    /// The room of a game.
+    fn new_room(&self, number: usize) -> NewRoom {
+        let moving = self.hosted.moving();
+        let game = &moving.core.games()[number];
+        let plan = &self.hosted.plan;
+        let entrants = moving.core.participants();
+        let mut participants = BTreeMap::new();
+        let fills = game.seats.iter().enumerate();
+        let fills = fills
+            .map(|(seat, participant)| {
+                let entrant = &entrants[*participant];
+                if game.forfeited.contains(participant) {
+                    return Fill::BuiltIn(plan.core.filler);
+                }
+                if let Some(kind) = entrant.built_in {
+                    return Fill::BuiltIn(kind);
+                }
+                let kind = convert::participant_kind(entrant.kind);
+                if let Some(ticket) = moving.tickets.get(participant) {
+                    let (name, ticket) = (entrant.name.clone(), *ticket);
+                    participants.insert(seat, SeatedParticipant { name, kind, ticket });
+                }
+                Fill::Open {
+                    reserved_for: Some(kind),
+                }
+            })
+            .collect();
+        let (room_id, game_id) = moving.placed[&number];
+        let place = format!(
+            " · round {}, table {}, game {}",
+            game.round, game.table, game.number
+        );
+        let space = MAX_NAME_CHARS.saturating_sub(place.chars().count());
+        let name: String = self
+            .hosted
+            .header
+            .settings
+            .name
+            .chars()
+            .take(space)
+            .collect();
+        NewRoom {
+            name: name + &place,
+            rules: plan.rules,
+            policy: plan.policy.clone(),
+            fills,
+            recorded: BTreeMap::new(),
+            start: GameStart::default(),
+            game_seed: self.hosted.game_seed(number, game.deal),
+            seating: Some(Seating {
+                game: TournamentGame {
+                    tournament: self.hosted.id(),
+                    series: game.deal.map(|deal| self.hosted.series(deal)),
+                },
+                room_id,
+                game_id,
+                participants,
+                server_seed: game.deal.map(|deal| self.hosted.server_seed(deal)),
+            }),
+        }
+    }
+}
+
+impl Drop for Task {
+    fn drop(&mut self) {
+        let state = self.hosted.look(|core| core.state());
+        info!(tournament = %self.hosted.id(), ?state, "the tournament's task has ended");
+    }
+}
+
+fn retry() -> Instant {
+    Instant::now() + TOURNAMENT_RETRY
+}
+
+/// Whether a participant has a seat of its own in a game.
+fn plays_itself(game: &Game, participant: usize) -> bool {
+    game.seats.contains(&participant) && !game.forfeited.contains(&participant)
+}
+
+fn seat_played(seat: &outcome::SeatOutcome) -> SeatPlayed {
+    SeatPlayed {
+        place: usize::try_from(seat.place).unwrap_or(usize::MAX),
+        points: seat.points,
+        substituted: seat.substituted,
+        decisions: seat.decisions,
+        wrong_actions: seat.wrong_actions,
+        timeouts: seat.timeouts,
+        decision_time_us: seat.decision_time_us,
+        timed_decisions: seat.timed_decisions,
+        performance_score: seat.performance_score,
+    }
+}
+
+/// Why the game of a record was aborted, if it was.
+fn abort_reason(lines: &[v1::RecordLine]) -> Option<v1::AbortReason> {
+    use v1::game_event::Kind;
+    use v1::record_line::Line;
+    lines.iter().rev().find_map(|line| match &line.line {
+        Some(Line::Event(event)) => match &event.kind {
+            Some(Kind::GameAborted(aborted)) => Some(aborted.reason()),
+            _ => None,
+        },
+        _ => None,
+    })
+}

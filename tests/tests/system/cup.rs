@@ -1,0 +1,353 @@
+//! A tournament of sixteen as it is in life: agents in three languages and processes of their own, one that crashes, one that is silent, one
+//! that floods, one that never comes; and a server that is killed in the middle, twice.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+use std::process::Stdio;
+use std::time::Duration;
+
+use chefshat_client::{Backoff, Client, Outcome, PlayError, PlayOptions, RandomAgent};
+use chefshat_proto::v1::{
+    self, Answer, game_event::Kind, play_service_client::PlayServiceClient, record_line::Line,
+    seat_command::Command as SeatDoes,
+};
+use chefshat_tests::{Launch, PATIENCE, one_shift, patiently, set_up};
+use tokio::process::{Child, Command};
+use tokio::sync::mpsc;
+use tokio::task::JoinHandle;
+use tokio_stream::wrappers::ReceiverStream;
+
+const PARTICIPANTS: u32 = 16;
+const ROUNDS: u32 = 3;
+/// Tables of a round.
+const TABLES: u32 = 4;
+/// Agents of the SDK in this process.
+const REGULARS: u32 = 6;
+/// How long the agent that crashes lives.
+const LIFE: Duration = Duration::from_millis(150);
+/// What the agent that floods sends at a time, and how long it waits then.
+const FLOOD: u32 = 500;
+const BETWEEN_FLOODS: Duration = Duration::from_millis(20);
+
+fn options() -> PlayOptions {
+    PlayOptions {
+        backoff: Backoff {
+            first: Duration::from_millis(5),
+            max: Duration::from_millis(40),
+            give_up_after: PATIENCE,
+        },
+        ..PlayOptions::default()
+    }
+}
+
+fn settings() -> v1::TournamentSettings {
+    v1::TournamentSettings {
+        name: "Coppa dello chef".into(),
+        format: v1::TournamentFormat::Swiss.into(),
+        rules: Some(one_shift()),
+        rounds: ROUNDS,
+        built_in_agents: vec!["greedy".into()],
+        start_when_joined: PARTICIPANTS,
+        no_show_time_ms: 4_000,
+        policy: Some(v1::RoomPolicy {
+            decision_time_ms: Some(1_000),
+            bank_ms: Some(0),
+            ..v1::RoomPolicy::default()
+        }),
+        ..v1::TournamentSettings::default()
+    }
+}
+
+/// A participant's ticket.
+async fn ticket(client: &Client, code: &str, name: &str, max_games: u32) -> String {
+    let request = v1::JoinTournamentRequest {
+        join_code: code.to_owned(),
+        name: name.to_owned(),
+        max_games,
+        ..v1::JoinTournamentRequest::default()
+    };
+    let joined = client.join_tournament(request).await;
+    joined.expect("there is a place").ticket
+}
+
+/// Plays to the end with the SDK.
+fn regular(url: &str, ticket: String, seed: u64) -> JoinHandle<Result<Vec<Outcome>, PlayError>> {
+    let url = url.to_owned();
+    tokio::spawn(async move {
+        let client = Client::connect(&url).await.expect("it listens");
+        let make = |_: &v1::Attached| RandomAgent::new(seed);
+        client.play_tournament_with(ticket, make, &options()).await
+    })
+}
+
+/// Dies again and again, and comes back each time knowing nothing but its ticket.
+fn crashing(url: &str, ticket: String) -> JoinHandle<()> {
+    let url = url.to_owned();
+    tokio::spawn(async move {
+        loop {
+            let life = regular(&url, ticket.clone(), 0);
+            tokio::time::sleep(LIFE).await;
+            life.abort();
+            if let Ok(Ok(_)) = life.await {
+                return;
+            }
+        }
+    })
+}
+
+/// Attaches, listens and never says a word; comes back when the connection is lost.
+fn silent(url: &str, ticket: String) -> JoinHandle<()> {
+    noisy(url, ticket, 0)
+}
+
+/// Sends rubbish faster than anybody can read it, and never an answer to what it is asked.
+fn flooding(url: &str, ticket: String) -> JoinHandle<()> {
+    noisy(url, ticket, FLOOD)
+}
+
+fn noisy(url: &str, ticket: String, at_a_time: u32) -> JoinHandle<()> {
+    let url = url.to_owned();
+    tokio::spawn(async move {
+        loop {
+            if let Ok(client) = Client::connect(&url).await {
+                // However it ends, it begins again.
+                let _ = make_noise(client, &ticket, at_a_time).await;
+            }
+            tokio::time::sleep(BETWEEN_FLOODS).await;
+        }
+    })
+}
+
+async fn make_noise(client: Client, ticket: &str, at_a_time: u32) -> Result<(), tonic::Status> {
+    let (requests, queue) = mpsc::channel(4);
+    let command = |handle, command| v1::SeatCommand {
+        handle,
+        command: Some(command),
+    };
+    let attach = v1::Attach {
+        ticket: ticket.to_owned(),
+        ..v1::Attach::default()
+    };
+    let commands = vec![command(0, SeatDoes::Attach(attach))];
+    let _ = requests.send(v1::PlayRequest { commands }).await;
+    let mut service = PlayServiceClient::new(client.channel());
+    let mut responses = service.play(ReceiverStream::new(queue)).await?.into_inner();
+    let mut sent = 0;
+    loop {
+        tokio::select! {
+            response = responses.message() => if response?.is_none() { return Ok(()) },
+            () = tokio::time::sleep(BETWEEN_FLOODS), if at_a_time > 0 => {
+                let rubbish = (0..at_a_time).map(|number| {
+                    sent += 1;
+                    let answer = Answer {
+                        decision_id: sent,
+                        action: number,
+                        annotations: None,
+                    };
+                    let handles = [0, 1 << 31, number, u32::MAX];
+                    command(handles[number as usize % 4], SeatDoes::Answer(answer))
+                });
+                let commands = rubbish.collect();
+                if requests.send(v1::PlayRequest { commands }).await.is_err() {
+                    return Ok(());
+                }
+            }
+        }
+    }
+}
+
+/// Agents in processes of their own, in the languages of the SDKs.
+fn processes(url: &str, code: &str) -> Vec<(String, Child)> {
+    let address = url.trim_start_matches("http://");
+    let way_in = ["--address", address, "--tournament", code];
+    let mut commands = Vec::new();
+    let mut rust = Command::new(set_up("CHEFSHAT_BIN"));
+    rust.args(["tournament", "join", "--agent", "greedy", "--server", url]);
+    rust.args(["--code", code, "--name", "process"]);
+    commands.push(("process".to_owned(), rust));
+    for number in 1..=2 {
+        let name = format!("python {number}");
+        let mut python = Command::new(set_up("CHEFSHAT_PYTHON"));
+        python.args(["-m", "chefshat.agent"]).args(way_in);
+        python.args(["--name", &name]);
+        commands.push((name, python));
+        let name = format!("node {number}");
+        let mut node = Command::new("node");
+        node.arg("agent.js").args(way_in).args(["--name", &name]);
+        node.current_dir(set_up("CHEFSHAT_NODE_DIR"));
+        commands.push((name, node));
+    }
+    let started = commands.into_iter().map(|(name, mut command)| {
+        command.stdin(Stdio::null()).stdout(Stdio::piped());
+        let child = command.kill_on_drop(true).spawn();
+        let child = child.unwrap_or_else(|error| panic!("{name} does not run: {error}"));
+        (name, child)
+    });
+    started.collect()
+}
+
+/// All games of the tournament.
+async fn games(client: &Client, tournament_id: &str) -> Vec<v1::TournamentGame> {
+    let request = v1::ListTournamentGamesRequest {
+        tournament_id: tournament_id.to_owned(),
+        ..v1::ListTournamentGamesRequest::default()
+    };
+    let page = client.tournament_games(request).await.expect("a page");
+    assert_eq!(page.next_page_token, "");
+    page.games
+}
+
+/// Waits until so many games are over and others are being played.
+async fn in_the_middle(client: &Client, tournament_id: &str, games_over: u32) {
+    let reached = async {
+        loop {
+            let now = client.tournament(tournament_id).await.expect("it is there");
+            let is_over = now.state() == v1::TournamentState::Finished;
+            assert!(!is_over, "it ended before the server could be killed");
+            if now.games_over >= games_over && now.games_playing > 0 {
+                return;
+            }
+            tokio::time::sleep(Duration::from_millis(5)).await;
+        }
+    };
+    patiently("the middle", reached).await;
+}
+
+/// Places by seat of a finished game, read from its record and from nothing else.
+fn places(lines: &[v1::RecordLine]) -> BTreeMap<u32, u32> {
+    let events = lines.iter().filter_map(|line| match &line.line {
+        Some(Line::Event(event)) => event.kind.as_ref(),
+        _ => None,
+    });
+    let mut ends = events.filter_map(|kind| match kind {
+        Kind::GameEnded(ended) => Some(&ended.standings),
+        _ => None,
+    });
+    let standings = ends.next().expect("the game ended");
+    assert!(ends.next().is_none(), "and once");
+    let placed = standings
+        .iter()
+        .map(|standing| (standing.seat, standing.place));
+    placed.collect()
+}
+
+/// What every participant scored, from the records of the games alone.
+fn scores(data: &Path, games: &[v1::TournamentGame]) -> BTreeMap<u32, u64> {
+    let mut scores = BTreeMap::new();
+    for game in games {
+        let path = chefshat_records::jsonl::path_of(data, &game.game_id);
+        let lines = chefshat_records::jsonl::read(&path).expect("it was written");
+        chefshat_records::replay::replay(&lines).expect("it replays");
+        let mut placed: Vec<(bool, u32, u32)> = (places(&lines).into_iter())
+            .map(|(seat, place)| {
+                let line = &game.seats[seat as usize];
+                (line.forfeited, place, line.participant)
+            })
+            .collect();
+        // Those who came stand before those who did not, in the order of the game.
+        placed.sort_unstable();
+        for ((forfeited, _, participant), score) in placed.into_iter().zip([5, 3, 1, 0]) {
+            *scores.entry(participant).or_default() += if forfeited { 0 } else { score };
+        }
+    }
+    scores
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_tournament_of_sixteen_goes_on_after_sigkill_and_counts_every_game_once() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let mut launch = Launch::new(folder.path());
+    let mut server = launch.start().await.expect("it starts");
+    let url = launch.url();
+    let client = Client::connect(&url).await.expect("it listens");
+    let made = client.create_tournament(settings()).await;
+    let made = made.expect("it is made");
+    let id = made.tournament.expect("a tournament").tournament_id;
+    let code = made.join_code;
+    let mut regulars = Vec::new();
+    for number in 0..REGULARS {
+        let name = format!("regular {number}");
+        let ticket = ticket(&client, &code, &name, 1 + number % 2).await;
+        regulars.push(regular(&url, ticket, number.into()));
+    }
+    let strange = [
+        crashing(&url, ticket(&client, &code, "crashing", 1).await),
+        silent(&url, ticket(&client, &code, "silent", 1).await),
+        flooding(&url, ticket(&client, &code, "flooding", 1).await),
+    ];
+    ticket(&client, &code, "absent", 1).await;
+    let processes = processes(&url, &code);
+
+    for games_over in [2, 7] {
+        in_the_middle(&client, &id, games_over).await;
+        server.kill().await;
+        server = launch.start().await.expect("it starts again");
+    }
+    let mut follow = client.follow_tournament(&id);
+    let mut last = None;
+    while let Some(now) = patiently("the end", follow.next())
+        .await
+        .expect("it goes on")
+    {
+        last = now.tournament.or(last);
+    }
+    assert_eq!(
+        last.expect("it was told of").state(),
+        v1::TournamentState::Finished
+    );
+    for playing in regulars {
+        let played = patiently("a regular", playing).await.expect("no panic");
+        for outcome in played.expect("it played to the end") {
+            assert!(outcome.standing().is_some(), "no game was given up");
+        }
+    }
+    for (name, child) in processes {
+        let ended = patiently(&name, child.wait_with_output()).await;
+        let ended = ended.expect("it runs");
+        assert!(ended.status.success(), "{name}: {}", ended.status);
+    }
+    for task in strange {
+        task.abort();
+    }
+
+    let games = games(&client, &id).await;
+    let different: BTreeSet<&String> = games.iter().map(|game| &game.game_id).collect();
+    assert_eq!(games.len(), (ROUNDS * TABLES) as usize);
+    assert_eq!(different.len(), games.len());
+    for game in &games {
+        assert_eq!(game.state(), v1::TournamentGameState::Counted, "{game:?}");
+    }
+    // No other game was played in its name.
+    let mut kept = BTreeSet::new();
+    for entry in std::fs::read_dir(folder.path().join("records")).expect("there are records") {
+        let path = entry.expect("an entry").path();
+        let lines = chefshat_records::jsonl::read(&path).expect("a record");
+        if let Some(Line::Header(header)) = &lines[0].line
+            && header.tournament_id == id
+        {
+            kept.insert(header.game_id.clone());
+        }
+    }
+    assert_eq!(kept.iter().collect::<BTreeSet<_>>(), different);
+
+    let results = client.tournament_results(&id).await.expect("results");
+    let participants = &results.tournament.as_ref().expect("it").participants;
+    let scores = scores(folder.path(), &games);
+    assert_eq!(results.standings.len(), PARTICIPANTS as usize);
+    for standing in &results.standings {
+        assert_eq!(standing.score, scores[&standing.participant]);
+        assert_eq!(standing.games, ROUNDS);
+        let name = participants[standing.participant as usize].name.as_str();
+        match name {
+            "absent" => assert_eq!((standing.score, standing.forfeited), (0, ROUNDS)),
+            "silent" => {
+                assert!(standing.timeouts >= 3, "{standing:?}");
+                assert_eq!(standing.substituted, ROUNDS, "{standing:?}");
+            }
+            _ => {}
+        }
+    }
+    let by_score: Vec<u64> = results.standings.iter().map(|it| it.score).collect();
+    assert!(by_score.is_sorted_by(|upper, lower| upper >= lower));
+    assert!(server.stop().await.status.success());
+}

@@ -1,0 +1,210 @@
+//! The examiner passes agents that play well, in all languages, and names the fault of those that have one.
+
+use std::path::Path;
+use std::process::Stdio;
+
+use chefshat_tests::{patiently, set_up};
+use futures::{StreamExt as _, stream};
+use serde_json::Value;
+use tokio::process::Command;
+
+/// Examinations at a time; they mostly wait.
+const AT_A_TIME: usize = 6;
+/// Seconds that an agent without a fault is waited for, however busy the machine.
+const PATIENCE: &str = "30";
+
+/// What came of an examination.
+struct Examined {
+    passed: bool,
+    cases: Vec<Value>,
+    said: String,
+}
+
+impl Examined {
+    /// The codes of all faults, in the order in which they were found.
+    fn codes(&self) -> Vec<&str> {
+        self.cases
+            .iter()
+            .flat_map(|case| case["faults"].as_array().expect("a list"))
+            .map(|fault| fault["code"].as_str().expect("a code"))
+            .collect()
+    }
+}
+
+async fn examine(options: &[&str], agent: &[&str], folder: Option<&Path>) -> Examined {
+    let mut command = Command::new(set_up("CHEFSHAT_BIN"));
+    command.args(["check-agent", "--json"]).args(options);
+    command.arg("--").args(agent);
+    if let Some(folder) = folder {
+        command.current_dir(folder);
+    }
+    let output = command.stdin(Stdio::null()).kill_on_drop(true).output();
+    let output = patiently("the examination", output)
+        .await
+        .expect("the binary runs");
+    let text = String::from_utf8(output.stdout).expect("text");
+    let said = format!("{text}{}", String::from_utf8_lossy(&output.stderr));
+    let lines = text
+        .lines()
+        .map(|line| serde_json::from_str(line).expect(line));
+    let mut cases: Vec<Value> = lines.collect();
+    let summary = cases.pop().unwrap_or_else(|| panic!("no summary: {said}"));
+    assert_eq!(summary["event"], "summary", "{said}");
+    let passed = output.status.success();
+    assert_eq!(summary["ok"], passed, "{said}");
+    assert_eq!(summary["played"], cases.len(), "{said}");
+    Examined {
+        passed,
+        cases,
+        said,
+    }
+}
+
+/// All cases, passed.
+async fn passes(agent: &[&str], folder: Option<&Path>) {
+    let options = ["--patience", PATIENCE, "--start", PATIENCE];
+    let examined = examine(&options, agent, folder).await;
+    assert!(examined.passed, "{}", examined.said);
+    assert!(examined.cases.len() >= 9, "{}", examined.said);
+    for case in &examined.cases {
+        assert_eq!(case["passed"], true, "{}", examined.said);
+    }
+}
+
+#[tokio::test]
+async fn the_agent_of_the_rust_sdk_passes() {
+    let binary = set_up("CHEFSHAT_BIN");
+    let binary = binary.to_str().expect("text");
+    passes(
+        &[
+            binary, "agent", "greedy", "--server", "{url}", "--code", "{code}",
+        ],
+        None,
+    )
+    .await;
+}
+
+#[tokio::test]
+async fn the_agent_of_the_python_package_passes() {
+    let python = set_up("CHEFSHAT_PYTHON");
+    let python = python.to_str().expect("text");
+    let agent = [python, "-m", "chefshat.agent", "--address", "{address}"];
+    let agent = [&agent[..], &["--code", "{code}", "--name", "{name}"]].concat();
+    passes(&agent, None).await;
+}
+
+#[tokio::test]
+async fn the_agent_in_javascript_passes() {
+    let agent = ["node", "agent.js", "--address", "{address}"];
+    let agent = [&agent[..], &["--code", "{code}", "--name", "{name}"]].concat();
+    passes(&agent, Some(&set_up("CHEFSHAT_NODE_DIR"))).await;
+}
+
+#[tokio::test]
+async fn an_agent_without_an_sdk_passes() {
+    passes(
+        &[
+            env!("CARGO_BIN_EXE_bad_agent"),
+            "none",
+            "{address}",
+            "{code}",
+        ],
+        None,
+    )
+    .await;
+}
+
+/// Agents with a fault, the case in which it shows, and the code by which it must be named first.
+const FAULTY: [(&str, &str, &str); 30] = [
+    ("never-joins", "game", "NEVER_JOINED"),
+    ("wrong-code", "game", "JOIN_REFUSED"),
+    ("never-attaches", "game", "NEVER_ATTACHED"),
+    ("wrong-ticket", "game", "ATTACH_REFUSED"),
+    ("uses-act", "game", "NO_PLAY_STREAM"),
+    ("silent", "game", "NOT_ANSWERED"),
+    ("always-illegal", "game", "ILLEGAL_ACTION"),
+    ("ignores-mask", "game", "ILLEGAL_ACTION"),
+    ("answers-twice", "game", "ANSWERED_TWICE"),
+    ("wrong-decision", "game", "ANSWERED_UNASKED"),
+    ("unasked", "game", "ANSWERED_UNASKED"),
+    ("wrong-handle", "game", "HANDLE_UNKNOWN"),
+    ("floods", "game", "FLOODING"),
+    ("large-annotations", "game", "ANNOTATIONS_DROPPED"),
+    ("large-message", "game", "MESSAGE_REFUSED"),
+    ("bad-expression", "game", "COMMAND_REFUSED"),
+    ("detaches", "game", "LEFT_EARLY"),
+    ("one-shift", "game", "EXITED_EARLY"),
+    ("never-leaves", "game", "NEVER_LEFT"),
+    ("never-exits", "game", "NEVER_EXITED"),
+    ("exit-status", "game", "EXIT_STATUS"),
+    ("always-passes", "small", "ACTION_OUT_OF_SPACE"),
+    ("two-hundred", "large", "ILLEGAL_ACTION"),
+    ("too-slow", "deadlines", "TOO_SLOW"),
+    ("exits-when-refused", "refusal", "GAVE_UP_WHEN_REFUSED"),
+    ("ignores-refusal", "refusal", "GAVE_UP_WHEN_REFUSED"),
+    ("no-reconnect", "disconnect", "DID_NOT_RECONNECT"),
+    ("joins-again", "disconnect", "JOINED_AGAIN"),
+    ("skips-events", "disconnect", "EVENTS_SKIPPED"),
+    ("stale-forever", "stale", "REPEATED_AFTER_CLOSED"),
+];
+
+#[tokio::test]
+async fn every_fault_is_named() {
+    let more = [
+        ("stops-when-late", "stale", "STOPPED_AFTER_CLOSED"),
+        ("never-resumes", "substitution", "NEVER_RESUMED"),
+    ];
+    let examined = stream::iter(FAULTY.into_iter().chain(more))
+        .map(|(fault, case, code)| async move {
+            let agent = [
+                env!("CARGO_BIN_EXE_bad_agent"),
+                fault,
+                "{address}",
+                "{code}",
+            ];
+            // Whoever joins at all has the standard time for it.
+            let start = if fault == "never-joins" { "1" } else { "30" };
+            let options = ["--start", start, "--only", case];
+            (fault, code, examine(&options, &agent, None).await)
+        })
+        .buffer_unordered(AT_A_TIME)
+        .collect::<Vec<_>>()
+        .await;
+    let wrong: Vec<String> = examined
+        .iter()
+        .filter(|(_, code, examined)| examined.passed || examined.codes().first() != Some(code))
+        .map(|(fault, code, examined)| format!("{fault} is not {code}: {}", examined.said))
+        .collect();
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// The case of many seats, with the agent that has this fault.
+async fn examine_in_a_tournament(fault: &str) -> Examined {
+    let agent = env!("CARGO_BIN_EXE_bad_agent");
+    let line = format!("exec '{agent}' {fault} {{address}} {{tournament}} here");
+    examine(&["--many", &line], &[], None).await
+}
+
+#[tokio::test]
+async fn an_agent_plays_many_seats_on_one_stream() {
+    let table = [
+        ("none", None),
+        ("one-at-a-time", Some("ONE_AT_A_TIME")),
+        ("own-handles", Some("NOT_ANSWERED")),
+        ("never-leaves", Some("NEVER_LEFT")),
+    ];
+    for (fault, code) in table {
+        let examined = examine_in_a_tournament(fault).await;
+        assert_eq!(examined.cases.len(), 1, "{}", examined.said);
+        assert_eq!(examined.cases[0]["case"], "many-seats");
+        let codes = examined.codes();
+        assert_eq!(codes, Vec::from_iter(code), "{fault}: {}", examined.said);
+    }
+}
+
+#[tokio::test]
+async fn an_examination_without_an_agent_says_so() {
+    let nothing = ["/nowhere/agent", "{address}", "{code}"];
+    let examined = examine(&[], &nothing, None).await;
+    assert_eq!(examined.codes(), ["COMMAND_FAILED"], "{}", examined.said);
+}
