@@ -5,6 +5,11 @@ use std::path::PathBuf;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("cargo::rerun-if-changed=../proto/chefshat");
+    // A release embeds the page for people as it was built last, and a new file there is no change of one that Cargo knows. Other builds
+    // read the page when it is asked for.
+    if std::env::var("PROFILE").is_ok_and(|profile| profile == "release") {
+        println!("cargo::rerun-if-changed=../clients/web/dist");
+    }
     let file = PathBuf::from("../proto/chefshat/v1/play_service.proto");
     let descriptors = protox::compile([file], ["../proto"])?;
     tonic_prost_build::configure()

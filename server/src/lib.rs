@@ -16,4 +16,5 @@ pub mod rooms;
 pub mod serve;
 pub mod store;
 pub mod tournaments;
+pub mod web;
 pub mod wire;

@@ -1,4 +1,4 @@
-//! Serving: all services on one port, for gRPC and gRPC-web, over whatever connections come in; and shutting down so that nobody is left
+//! Serving: all services and the page on one port, for gRPC and gRPC-web, over whatever connections come in; and shutting down so that nobody is left
 //! hanging.
 
 use std::future::Future;
@@ -27,6 +27,7 @@ use crate::grpc;
 use crate::rooms::Rooms;
 use crate::store::{Store, StoreError};
 use crate::tournaments::Tournaments;
+use crate::web::PageLayer;
 
 const KEEPALIVE_INTERVAL: std::time::Duration = std::time::Duration::from_secs(20);
 const KEEPALIVE_TIMEOUT: std::time::Duration = std::time::Duration::from_secs(10);
@@ -159,6 +160,7 @@ impl Server {
             .http2_max_header_list_size(MAX_HEADER_BYTES)
             .max_concurrent_streams(Some(MAX_STREAMS_PER_CONNECTION))
             .layer(cors(&config.allowed_origins)?)
+            .layer(PageLayer)
             .layer(tonic_web::GrpcWebLayer::new())
             .add_routes(routes)
             .serve_with_incoming_shutdown(incoming, async move { closed.cancelled().await });

@@ -7,6 +7,7 @@
 
 mod cli {
     mod branching;
+    mod check_agent;
     mod compare;
     mod conformance;
     mod demo;
@@ -20,5 +21,6 @@ mod cli {
     mod server;
     mod simulate;
     mod tournament;
+    mod tournament_simulate;
     mod verify;
 }

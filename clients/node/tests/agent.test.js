@@ -6,7 +6,7 @@ import { once } from "node:events";
 import { fileURLToPath } from "node:url";
 import { after, test } from "node:test";
 import grpc from "@grpc/grpc-js";
-import { legalActions, play, protocol } from "../agent.js";
+import { legalActions, play, playTournament, protocol } from "../agent.js";
 
 const AGENT = fileURLToPath(new URL("../agent.js", import.meta.url));
 const STANDINGS = [{ seat: 2, points: 15, place: 1 }, { seat: 0, points: 9, place: 2 }];
@@ -24,6 +24,12 @@ async function serve(...connections) {
       else done({ code: grpc.status.PERMISSION_DENIED, details: "no room has this join code" });
     },
   });
+  server.addService(protocol.TournamentService.service, {
+    JoinTournament: ({ request }, done) => {
+      joins.push(request);
+      done(null, { participant: 5, ticket: "cup" });
+    },
+  });
   server.addService(protocol.PlayService.service, {
     Play: async (stream) => {
       const messages = stream[Symbol.asyncIterator]();
@@ -39,10 +45,10 @@ async function serve(...connections) {
   return { address: `127.0.0.1:${port}`, joins, left: connections };
 }
 
-const ask = (decision_id, ...bytes) => ({ handle: 4, decision: { decision_id, action_mask: Buffer.from(bytes) } });
-const events = (...list) => ({ handle: 4, events: { events: list } });
+const ask = (decision_id, ...bytes) => ({ handle: 0, decision: { decision_id, action_mask: Buffer.from(bytes) } });
+const events = (...list) => ({ handle: 0, events: { events: list } });
 const ended = (sequence) => ({ sequence, game_ended: { standings: STANDINGS } });
-const detached = (reason) => ({ handle: 4, detached: { reason: `DETACH_REASON_${reason}` } });
+const detached = (reason) => ({ handle: 0, detached: { reason: `DETACH_REASON_${reason}` } });
 
 for (const [bytes, actions] of [
   [[], []],
@@ -61,11 +67,11 @@ test("a game: attach, answer with a set bit, tell the standings", async () => {
     const [{ attach }] = await read();
     assert.equal(attach.ticket, "a ticket");
     assert.equal(attach.from_sequence, 0);
-    stream.write({ updates: [{ handle: 4, attached: { seat: 2, next_sequence: 1 } }] });
+    stream.write({ updates: [{ handle: 0, attached: { seat: 2, next_sequence: 1 } }] });
     for (let id = 1; id <= 20; id += 1) {
       stream.write({ updates: [events({ sequence: id }), ask(id, 0, 0b0010_0100)] });
       const [{ handle, answer }] = await read();
-      assert.equal(handle, 4);
+      assert.equal(handle, 0);
       answers.push([answer.decision_id, answer.action]);
     }
     stream.write({ updates: [events(ended(21)), detached("GAME_OVER")] });
@@ -111,7 +117,7 @@ test("a refused answer is given anew, a seat is taken over from its substitute",
     const hear = async () => { const [{ handle, answer, resume }] = await read(); heard.push([handle, answer?.decision_id, resume]); };
     await hear();
     for (const status of ["CLOSED", "INVALID"]) {
-      stream.write({ updates: [{ handle: 4, result: { decision_id: 1, status: `ANSWER_STATUS_${status}` } }] });
+      stream.write({ updates: [{ handle: 0, result: { decision_id: 1, status: `ANSWER_STATUS_${status}` } }] });
     }
     await hear();
     stream.write({ updates: [events({ sequence: 1, substituted: { seat: 1 } }, { sequence: 2, substituted: { seat: 2 } })] });
@@ -119,7 +125,7 @@ test("a refused answer is given anew, a seat is taken over from its substitute",
     stream.write({ updates: [events(ended(3)), detached("GAME_OVER")] });
   });
   await play({ address: server.address, code: "TABLE", name: "Ada" });
-  assert.deepEqual(heard, [[4, 1, undefined], [4, 1, undefined], [4, undefined, {}]]);
+  assert.deepEqual(heard, [[0, 1, undefined], [0, 1, undefined], [0, undefined, {}]]);
 });
 
 for (const [what, updates, message] of [
@@ -141,6 +147,61 @@ for (const [what, updates, message] of [
   });
 }
 
+/** An update of a seat that the server attached by itself: the number of the handle among those, and what is said. */
+const called = (number, update) => ({ ...update, handle: 2 ** 31 + number });
+const seated = (number, game_id) => {
+  const attached = { game_id, seat: 2, ticket: `ticket of ${game_id}`, tournament_id: "tournament" };
+  return called(number, { attached });
+};
+const over = (handle) => ({ handle, detached: { reason: "DETACH_REASON_TOURNAMENT_OVER" } });
+
+test("a tournament: several games at a time, over connections that break, to its end", async () => {
+  const attaches = [];
+  const attach = async (read) => attaches.push((await read()).map((command) => [command.attach.ticket, command.attach.from_sequence]));
+  const answers = [];
+  const answer = async (read) => { const [{ handle, answer }] = await read(); answers.push([handle, answer.decision_id]); };
+  const server = await serve(
+    async (stream, read) => {
+      await attach(read);
+      stream.write({ updates: [{ handle: 0, entered: { participant: 5 } }, seated(0, "a"), seated(1, "b")] });
+      stream.write({ updates: [called(1, ask(7, 1)), called(0, events({ sequence: 1 }, { sequence: 2 }))] });
+      await answer(read);
+      stream.write({ updates: [called(0, events(ended(3))), called(0, detached("GAME_OVER")), called(0, ask(9, 1))] });
+      stream.write({ updates: [seated(2, "c"), called(2, ask(8, 1))] });
+      await answer(read);
+      stream.emit("error", { code: grpc.status.UNAVAILABLE, details: "cut" });
+    },
+    async (stream, read) => {
+      await attach(read);
+      stream.write({ updates: [{ handle: 0, attached: { game_id: "b", seat: 2 } }, ask(7, 1)] });
+      await answer(read);
+      stream.write({ updates: [{ handle: 1, refused: { reason: "TICKET_UNKNOWN", message: "its room is gone" } }] });
+      stream.write({ updates: [{ handle: 2, entered: { participant: 5 } }, over(2)] });
+      stream.write({ updates: [events(ended(1)), detached("GAME_OVER")] });
+    },
+  );
+  const played = await playTournament({ address: server.address, tournament: "CUP", name: "Ada", games: "2" });
+  assert.deepEqual([server.joins[0].join_code, server.joins[0].name, server.joins[0].max_games], ["CUP", "Ada", 2]);
+  assert.deepEqual(attaches, [[["cup", 0]], [["ticket of b", 0], ["ticket of c", 0], ["cup", 0]]]);
+  assert.deepEqual(answers, [[2 ** 31 + 1, 7], [2 ** 31 + 2, 8], [0, 7]]);
+  assert.equal(played.participant, 5);
+  assert.deepEqual(played.games, [
+    { game_id: "a", seat: 2, standings: STANDINGS },
+    { game_id: "c", seat: 2, error: "refused: its room is gone (TICKET_UNKNOWN)" },
+    { game_id: "b", seat: 2, standings: STANDINGS },
+  ]);
+});
+
+test("a newer connection in a tournament is an error, and no reason to connect again", async () => {
+  const server = await serve(async (stream, read) => {
+    await read();
+    stream.write({ updates: [{ handle: 0, entered: { participant: 5 } }, detached("SUPERSEDED")] });
+  });
+  const playing = playTournament({ address: server.address, tournament: "CUP", name: "Ada", games: "1" });
+  await assert.rejects(playing, /the tournament is lost \(DETACH_REASON_SUPERSEDED\)/);
+  assert.equal(server.left.length, 0);
+});
+
 /** Runs the agent as a process of its own. */
 async function run(args, env = {}) {
   const agent = spawn(process.execPath, [AGENT, ...args], { env: { ...process.env, ...env } });
@@ -161,6 +222,18 @@ test("the process prints the standings as one line of JSON and exits with 0", as
   assert.equal(status, 0);
   assert.match(out, /^[^\n]+\n$/);
   assert.deepEqual(JSON.parse(out), { seat: 2, standings: STANDINGS });
+});
+
+test("the process takes part in a tournament and prints its games as one line of JSON", async () => {
+  const server = await serve(async (stream, read) => {
+    await read();
+    stream.write({ updates: [seated(0, "a"), called(0, events(ended(1))), called(0, detached("GAME_OVER")), over(0)] });
+  });
+  const { status, out, err } = await run(["--address", server.address, "--tournament", "CUP", "--games", "3"]);
+  assert.deepEqual([status, err], [0, ""]);
+  assert.match(out, /^[^\n]+\n$/);
+  assert.deepEqual(JSON.parse(out), { participant: 5, games: [{ game_id: "a", seat: 2, standings: STANDINGS }] });
+  assert.equal(server.joins[0].max_games, 3);
 });
 
 test("the process says what is wrong and exits with 1", async () => {

@@ -81,8 +81,8 @@ class FakeGame:
             self.tell(seat, events=pb.EventBatch(events=self.events[seat.told :]))
             seat.told = len(self.events)
 
-    def attach(self, seat: FakeSeat, attach: pb.Attach, outbox: Outbox, handle: int) -> None:
-        """Attaches a seat to a stream and starts or resumes the game."""
+    def attach(self, seat: FakeSeat, attach: pb.Attach, outbox: Outbox, handle: int, tournament_id: str = "") -> None:
+        """Attaches a seat to a stream, for a tournament's participant if one is named, and starts or resumes the game."""
         self.tell(seat, detached=pb.Detached(reason=pb.DETACH_REASON_SUPERSEDED))
         seat.outbox, seat.handle, seat.told = outbox, handle, max(attach.from_sequence - 1, 0)
         seat.attaches.append(attach)
@@ -92,6 +92,8 @@ class FakeGame:
             game_id=self.room.game_id,
             seat=seat.number,
             next_sequence=len(self.events) + 1,
+            ticket=seat.ticket if tournament_id else "",
+            tournament_id=tournament_id,
         )
         self.tell(seat, attached=attached)
         if self.over:

@@ -4,10 +4,11 @@ import queue
 import threading
 from collections.abc import Callable, Iterator
 from concurrent import futures
-from typing import NoReturn, Self, TypeAlias
+from typing import NoReturn, Self
 
 import grpc
 from fake_game import QUESTIONS, SIZE, FakeGame, FakeSeat, Outbox
+from fake_tournament import FakeTournaments, Stream
 from fake_vector import ToyVector
 from refusing import Context, refuse
 
@@ -17,13 +18,11 @@ from chefshat._gen.chefshat.v1 import record_service_pb2_grpc as record_grpc
 from chefshat._gen.chefshat.v1 import room_service_pb2_grpc as room_grpc
 from chefshat._gen.chefshat.v1 import server_service_pb2_grpc as server_grpc
 from chefshat._gen.chefshat.v1 import spectator_service_pb2_grpc as spectator_grpc
+from chefshat._gen.chefshat.v1 import tournament_service_pb2_grpc as tournament_grpc
 from chefshat._gen.chefshat.v1 import vector_service_pb2_grpc as vector_grpc
 
 # Bytes a message to the server may have, as on the real one.
 MAX_MESSAGE_BYTES = 64 * 1024
-
-# The seats of a stream by handle: every Attach has a number, a refused one too.
-Handles: TypeAlias = list[tuple[FakeGame, FakeSeat] | None]
 
 
 class FakeServer(
@@ -51,6 +50,8 @@ class FakeServer(
         server_grpc.add_ServerServiceServicer_to_server(self, self._server)
         record_grpc.add_RecordServiceServicer_to_server(self, self._server)
         spectator_grpc.add_SpectatorServiceServicer_to_server(_Spectators(self), self._server)
+        self.tournaments = FakeTournaments(self._tournament_game)
+        tournament_grpc.add_TournamentServiceServicer_to_server(self.tournaments, self._server)
         vector_grpc.add_VectorServiceServicer_to_server(ToyVector(), self._server)
         self.address = f"127.0.0.1:{self._server.add_insecure_port('127.0.0.1:0')}"
 
@@ -66,9 +67,17 @@ class FakeServer(
     def CreateRoom(self, request: pb.CreateRoomRequest, context: Context) -> pb.CreateRoomResponse:
         """Makes a room."""
         self.created.append(request)
+        game = self._make_game(request)
+        return pb.CreateRoomResponse(room=game.room, join_code=game.join_code, owner_token="owner")
+
+    def _make_game(self, request: pb.CreateRoomRequest) -> FakeGame:
         game = FakeGame(len(self.games) + 1, request, self.questions)
         self.games.append(game)
-        return pb.CreateRoomResponse(room=game.room, join_code=game.join_code, owner_token="owner")
+        return game
+
+    def _tournament_game(self, built_in: list[str]) -> FakeGame:
+        """A game of a tournament: built-in agents by seat, empty where a participant plays."""
+        return self._make_game(pb.CreateRoomRequest(seats=[pb.SeatConfig(built_in_agent=name) for name in built_in]))
 
     def GetRoom(self, request: pb.GetRoomRequest, context: Context) -> pb.GetRoomResponse:
         """One room."""
@@ -194,40 +203,42 @@ class FakeServer(
 
     def _read(self, requests: Iterator[pb.PlayRequest], outbox: Outbox, broken: threading.Event) -> None:
         """Reads a stream's commands until it ends, or until a fault breaks it."""
-        handles: Handles = []
+        stream = Stream(outbox)
         try:
             for request in requests:
                 for command in request.commands:
                     if command.HasField("attach"):
-                        self._attach(command.attach, outbox, handles)
-                    elif command.HasField("answer") and not self._answer(command, outbox, handles):
+                        self._attach(command.attach, stream)
+                    elif command.HasField("answer") and not self._answer(command, stream):
                         broken.set()
                         return
         except grpc.RpcError:
             pass  # The client has cancelled.
         finally:
-            for game, seat in filter(None, handles):
+            for game, seat in list(stream.seats.values()):
                 with game.lock:
                     if seat.outbox is outbox:
                         seat.outbox = None
+            self.tournaments.left(stream)
             outbox.put(None)
 
-    def _attach(self, attach: pb.Attach, outbox: Outbox, handles: Handles) -> None:
+    def _attach(self, attach: pb.Attach, stream: Stream) -> None:
+        handle = stream.attaches
+        stream.attaches += 1
         found = self.find(attach.ticket)
-        handles.append(found)
         if found is None:
-            refused = pb.Refused(request_id=attach.request_id, reason="TICKET_UNKNOWN", message="no seat has this ticket")
-            outbox.put(pb.SeatUpdate(handle=len(handles) - 1, refused=refused))
+            if not self.tournaments.enter(attach, stream, handle):
+                refused = pb.Refused(request_id=attach.request_id, reason="TICKET_UNKNOWN", message="no seat has this ticket")
+                stream.tell(handle, refused=refused)
             return
         game, seat = found
         with game.lock:
-            game.attach(seat, attach, outbox, len(handles) - 1)
+            stream.seats[handle] = found
+            game.attach(seat, attach, stream.outbox, handle)
 
-    def _answer(self, command: pb.SeatCommand, outbox: Outbox, handles: Handles) -> bool:
+    def _answer(self, command: pb.SeatCommand, stream: Stream) -> bool:
         """Takes an answer; returns whether the stream goes on."""
-        found = handles[command.handle]
-        assert found is not None
-        game, seat = found
+        game, seat = stream.seats[command.handle]
         with game.lock:
             fault = self.fault(game, seat, command.answer)
             if fault == "before":
@@ -236,11 +247,13 @@ class FakeServer(
             result = game.answer(seat, command.answer)
             if fault == "after":
                 seat.outbox = None
-            if seat.outbox is outbox:
+            if seat.outbox is stream.outbox:
                 game.tell(seat, result=result)
             if was_open and not seat.open:
                 game.advance()
-            return fault != "after"
+        if game.over:
+            self.tournaments.settle()
+        return fault != "after"
 
 
 class _Spectators(spectator_grpc.SpectatorServiceServicer):

@@ -1,17 +1,18 @@
-"""A game that goes on while its server dies and comes back: the agents notice nothing but lost connections."""
+"""Games and tournaments that go on while their server dies and comes back: the agents notice nothing but lost connections."""
 
 import asyncio
 import os
 import threading
 from collections import Counter
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 from real_server import RealServer
 
 import chefshat
-from chefshat import Agent, Backoff, Decision, RandomAgent, SeatResult, aio, pb
+from chefshat import Agent, Backoff, Decision, RandomAgent, SeatInfo, SeatResult, aio, pb
 from chefshat.local_server import BINARY
 
 pytestmark = pytest.mark.server
@@ -41,18 +42,21 @@ def play_asyncio(address: str, agents: Agents) -> dict[str, SeatResult]:
 
 
 class Ledger:
-    """What all agents of the game were told. At certain counts they wait until the server has been killed."""
+    """What all agents were told. At certain counts they wait until the server has been killed."""
 
     def __init__(self) -> None:
-        self.accepted: dict[tuple[int, int], int] = {}
+        # The action of each acknowledged decision, by who took it (the seat, or the game and the seat) and its number.
+        self.accepted: dict[tuple[object, int], int] = {}
+        self.lock = threading.Lock()
         self.reached = {count: threading.Event() for count in KILLS}
         self.killed = {count: threading.Event() for count in KILLS}
 
-    def accept(self, seat: int, result: pb.AnswerResult) -> None:
+    def accept(self, who: object, result: pb.AnswerResult) -> None:
         """Notes an acknowledged decision."""
         assert result.status == pb.ANSWER_STATUS_ACCEPTED
-        self.accepted[seat, result.decision_id] = result.action
-        count = len(self.accepted)
+        with self.lock:
+            self.accepted[who, result.decision_id] = result.action
+            count = len(self.accepted)
         if count in self.reached:
             self.reached[count].set()
             assert self.killed[count].wait(WAIT_S)
@@ -61,9 +65,9 @@ class Ledger:
 class Noting(RandomAgent):
     """Plays at random and notes what is acknowledged."""
 
-    def __init__(self, seat: int, ledger: Ledger) -> None:
-        super().__init__(seat)
-        self.seat = seat
+    def __init__(self, seed: int, ledger: Ledger, who: object) -> None:
+        super().__init__(seed)
+        self.who = who
         self.ledger = ledger
         self.asked: Counter[int] = Counter()
         self.sequences: list[int] = []
@@ -76,7 +80,7 @@ class Noting(RandomAgent):
         self.sequences.append(event.sequence)
 
     def on_result(self, result: pb.AnswerResult) -> None:
-        self.ledger.accept(self.seat, result)
+        self.ledger.accept(self.who, result)
 
 
 @pytest.mark.parametrize("play", [play_blocking, play_asyncio], ids=["blocking", "asyncio"])
@@ -91,7 +95,7 @@ def test_agents_play_on_through_restarts(play: Player, tmp_path: Path) -> None:
         with chefshat.Client(server.address) as client:
             room = client.create_room(rules=pb.RuleSet(target_shifts=2))
             tickets = [client.join_room(room.join_code, f"player {seat}", seat=seat).ticket for seat in range(4)]
-        agents = {ticket: Noting(seat, ledger) for seat, ticket in enumerate(tickets)}
+        agents = {ticket: Noting(seat, ledger, seat) for seat, ticket in enumerate(tickets)}
         playing = threading.Thread(target=lambda: results.update(play(server.address, dict(agents))))
         playing.start()
         for count in KILLS:
@@ -114,5 +118,63 @@ def test_agents_play_on_through_restarts(play: Player, tmp_path: Path) -> None:
         assert results[ticket].finished
         assert results[ticket].reconnects >= len(KILLS)
         # Nobody was asked twice, and no event was missed or told twice.
+        assert set(agent.asked.values()) == {1}
+        assert agent.sequences == list(range(1, len(agent.sequences) + 1))
+
+
+def test_a_tournament_goes_on_through_restarts(tmp_path: Path) -> None:
+    binary = os.environ.get(BINARY)
+    if not binary:
+        pytest.skip(f"{BINARY} is not set: name the chefshat binary to play against the real server")
+    ledger = Ledger()
+    agents: dict[tuple[str, int], Noting] = {}
+
+    def make(seat: SeatInfo) -> Noting:
+        who = (seat.game_id, seat.seat)
+        assert who not in agents, "one agent for each game and seat"
+        return agents.setdefault(who, Noting(seat.seat, ledger, who))
+
+    def play(ticket: str) -> list[SeatResult]:
+        with chefshat.Client(server.address, backoff=PATIENT) as client:
+            return client.play_tournament(ticket, make)
+
+    settings = pb.TournamentSettings(
+        name="Coppa",
+        format=pb.TOURNAMENT_FORMAT_ROUND_ROBIN,
+        rules=pb.RuleSet(target_shifts=1),
+        # Generous times: what is tested is that nothing is lost, not how fast connections are made.
+        policy=pb.RoomPolicy(decision_time_ms=600_000),
+        rounds=2,
+        games_per_pairing=2,
+        built_in_agents=["random", "random"],
+        start_when_joined=4,
+    )
+    with RealServer(Path(binary), tmp_path, host="127.0.0.3") as server, ThreadPoolExecutor(2) as pool:
+        with chefshat.Client(server.address) as client:
+            made = client.create_tournament(settings)
+            names = ("Ada", "Bob")
+            tickets = [client.join_tournament(made.join_code, name, max_games=2).ticket for name in names]
+        playing = [pool.submit(play, ticket) for ticket in tickets]
+        for count in KILLS:
+            assert ledger.reached[count].wait(WAIT_S)
+            server.kill()
+            ledger.killed[count].set()
+            server.start()
+        played = [results.result(WAIT_S) for results in playing]
+        with chefshat.Client(server.address) as client:
+            games = list(client.tournament_games(made.tournament.tournament_id))
+            kept = {
+                ((game.game_id, line.decision.seat), line.decision.decision_id): line.decision.action
+                for game in games
+                for line in client.record(game.game_id)
+                if line.HasField("decision")
+            }
+    assert [game.state for game in games] == [pb.TOURNAMENT_GAME_STATE_COUNTED] * 4
+    assert all(game.rated for game in games), "nobody forfeited or was substituted"
+    for results in played:
+        assert sorted(result.game_id for result in results) == sorted(game.game_id for game in games)
+        assert all(result.finished for result in results)
+    assert ledger.accepted.items() <= kept.items()
+    for agent in agents.values():
         assert set(agent.asked.values()) == {1}
         assert agent.sequences == list(range(1, len(agent.sequences) + 1))

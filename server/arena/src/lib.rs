@@ -34,8 +34,8 @@ pub mod vector;
 pub use agents::{AgentKind, BuiltInAgent};
 pub use batch::{Batch, BatchError};
 pub use duplicate::{
-    Comparison, Contender, Duplicate, DuplicateError, Figure, Measured, Newcomer, SameSeat, SeatPlan,
-    Seating,
+    Comparison, Contender, Duplicate, DuplicateError, Figure, Measured, Newcomer, SameSeat,
+    SeatPlan, Seating,
 };
 pub use network::{
     MAX_FILE_BYTES, Network, NetworkError, NetworkInfo, NetworkInput, NetworkOutput, table_features,

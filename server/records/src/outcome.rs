@@ -83,6 +83,22 @@ pub struct Identity {
     pub built_in: bool,
 }
 
+impl Identity {
+    /// Who a rating of this seat's player is of.
+    pub fn of(seat: &v1::Participant) -> Self {
+        let built_in = !seat.built_in_agent.is_empty();
+        let (name, kind) = match built_in {
+            true => (&seat.built_in_agent, ParticipantKind::Agent),
+            false => (&seat.name, seat.kind()),
+        };
+        Self {
+            name: name.clone(),
+            kind,
+            built_in,
+        }
+    }
+}
+
 impl SeatOutcome {
     /// Who a rating is of.
     pub fn identity(&self) -> Identity {

@@ -16,8 +16,9 @@ use super::{CommandError, data_dir, say};
 use crate::config::ServerConfig;
 use crate::serve::Server;
 use crate::store::{MemoryStore, SqliteStore, Store};
+use crate::web;
 
-/// Host rooms: one port for gRPC, gRPC-web, health checks and reflection.
+/// Host rooms: one port for gRPC, gRPC-web, health checks, reflection, and the page on which people play.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example:\n  chefshat serve --listen 127.0.0.1:50051 --data-dir ./chefshat-data"
@@ -114,6 +115,9 @@ impl Serve {
             }))?;
         }
         eprintln!("listening on http://{address}");
+        if !web::is_built_in() {
+            eprintln!("the page for people is not built in; `cargo xtask web` builds it");
+        }
         let input_ends = self.until_stdin_closes.then(end_of_input);
         let stop = async move {
             tokio::select! {

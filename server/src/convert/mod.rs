@@ -9,6 +9,7 @@ mod policy;
 mod ratings;
 mod record;
 mod room;
+mod standings;
 mod start;
 mod tournament;
 mod vector;
@@ -27,11 +28,12 @@ pub use room::{
     describe, fill_to_proto, fills_from_proto, kind_from_proto, kind_to_proto, participants,
     tournament_id,
 };
+pub use standings::{confidence_to_proto, standings_to_proto};
+pub use start::{start_from_proto, start_to_proto};
 pub use tournament::{
     TournamentPlan, entrant_kind, is_rated, participant_kind, settings_to_proto, tournament_game,
     tournament_participants, tournament_plan, tournament_state,
 };
-pub use start::{start_from_proto, start_to_proto};
 pub use vector::{
     Reset, batch_to_proto, reset_from_proto, setup_from_proto, setup_seeds, started_to_proto,
 };

@@ -305,8 +305,5 @@ pub fn tournament_game(
 
 /// Whether a game counts for ratings: it has a result, the server chose its deals, and all its participants played it themselves.
 pub fn is_rated(game: &Game, plan: &TournamentPlan) -> bool {
-    let result = game.result().filter(|_| plan.deal_seed.is_none());
-    result.is_some_and(|result| {
-        (result.seats.iter()).all(|seat| !seat.forfeited && !seat.substituted)
-    })
+    game.is_rated() && plan.deal_seed.is_none()
 }

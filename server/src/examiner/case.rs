@@ -73,7 +73,7 @@ use v1::DecisionKind::{Exchange, SpecialAction, Turn};
 pub static CASES: [Case; 11] = [
     Case {
         name: "game",
-        about: "a whole game to 15 points: turns and exchanges, legal answers, a good end",
+        about: "a whole game to 15 points: legal answers of all kinds, a good end",
         interferences: &[],
         kinds: &[Turn, Exchange],
         hurried: false,
@@ -113,7 +113,7 @@ pub static CASES: [Case; 11] = [
     },
     Case {
         name: "refusal",
-        about: "an answer comes back as INVALID: the same decision is answered again",
+        about: "an answer comes back as INVALID: it is answered again",
         interferences: &[
             Interference::Refuse,
             Interference::Refuse,
@@ -125,7 +125,7 @@ pub static CASES: [Case; 11] = [
     },
     Case {
         name: "disconnect",
-        about: "the connection is lost while a decision is open: the agent comes back with its ticket",
+        about: "the connection is lost at a decision: it comes back with its ticket",
         interferences: &[
             Interference::CutBeforeAnswer,
             Interference::CutBeforeRequest,
@@ -137,7 +137,7 @@ pub static CASES: [Case; 11] = [
     },
     Case {
         name: "stale",
-        about: "an answer arrives too late: the agent lets it go and plays on",
+        about: "an answer arrives too late: it lets it go and plays on",
         interferences: &[Interference::HoldAnswer],
         kinds: &[Turn],
         hurried: true,
@@ -145,7 +145,7 @@ pub static CASES: [Case; 11] = [
     },
     Case {
         name: "substitution",
-        about: "a substitute plays for the agent: it takes over again",
+        about: "a substitute plays in its place: it takes over again",
         interferences: &[Interference::DropAnswers],
         kinds: &[Turn],
         hurried: true,
@@ -153,7 +153,7 @@ pub static CASES: [Case; 11] = [
     },
     Case {
         name: "original",
-        about: "the rules of the 2020 implementation: any top face opens, a pass binds for one turn",
+        about: "the rules of 2020: any top face opens, a pass binds for one turn",
         interferences: &[],
         kinds: &[Turn],
         hurried: false,
@@ -161,7 +161,7 @@ pub static CASES: [Case; 11] = [
     },
     Case {
         name: "many-seats",
-        about: "a tournament: the server seats the agent in several games at once, on one stream (needs --many)",
+        about: "several games of a tournament at once, on one stream (--many)",
         interferences: &[],
         kinds: &[Turn],
         hurried: false,
@@ -355,6 +355,9 @@ mod tests {
 
     use super::*;
 
+    /// Longest description that leaves a line of the report within 100 columns.
+    const ABOUT: usize = 68;
+
     #[test]
     fn every_case_has_a_name_of_its_own_and_a_room_that_makes_sense() {
         let patience = Patience {
@@ -365,6 +368,7 @@ mod tests {
         names.sort_unstable();
         names.dedup();
         assert_eq!(names.len(), CASES.len());
+        assert!(CASES.iter().all(|case| case.about.len() <= ABOUT));
         for case in &CASES {
             assert!(std::ptr::eq(Case::named(case.name).expect("named"), case));
             let Place::Room(room) = case.place else {

@@ -128,7 +128,7 @@ impl Examination {
         let exam = Exam::new(case, self.patience, venue.clone(), command.is_some());
         let desk = Desk::new(exam, self.patience.each);
         let relay = tokio::spawn(relay::serve(listener, channel, Arc::clone(&desk)));
-        let mut outcome = match command {
+        let mut last_lines = match command {
             None => {
                 waiting(&Waiting { address, code });
                 watch(&desk, None).await?;
@@ -144,7 +144,7 @@ impl Examination {
                 match AgentProcess::start(command, &places, log).await {
                     Ok(mut process) => {
                         watch(&desk, Some(&mut process)).await?;
-                        process.last_lines(LAST_LINES)
+                        process.finish(LAST_LINES).await
                     }
                     Err(error) => {
                         let program = command.words().first().cloned().unwrap_or_default();
@@ -158,12 +158,12 @@ impl Examination {
         self.close(venue, owner_token).await;
         let findings = desk.look().findings().to_vec();
         if findings.is_empty() {
-            outcome.clear();
+            last_lines.clear();
         }
         Ok(Outcome {
             findings,
             took: desk.elapsed(),
-            last_lines: outcome,
+            last_lines,
         })
     }
 

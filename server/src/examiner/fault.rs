@@ -162,7 +162,7 @@ impl Fault {
                 "Give the command that starts your agent after --, as you would type it."
             }
             Self::NeverJoined => {
-                "Connect to {address} and call RoomService.JoinRoom with the join code {code}."
+                "Connect to {address} and call RoomService.JoinRoom with the join code {code}; for a tournament JoinTournament with {tournament}, then attach."
             }
             Self::JoinRefused => {
                 "Call JoinRoom with the join code as given and a name of 1 to 64 characters."

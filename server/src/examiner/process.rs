@@ -7,15 +7,20 @@ use std::io;
 use std::path::PathBuf;
 use std::process::{ExitStatus, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 
 use rustix::process::{Pid, Signal, kill_process_group};
 use tokio::io::{AsyncRead, AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::process::{Child, Command};
+use tokio::task::JoinHandle;
+use tokio::time::timeout;
 
 /// Bytes of an agent's output that are written to its log.
 const MAX_LOG_BYTES: usize = 16 * 1024 * 1024;
 /// Bytes of it that are kept to be shown.
 const MAX_TAIL_BYTES: usize = 4 * 1024;
+/// How long the last of it is waited for when the process has ended.
+const LAST_WORDS: Duration = Duration::from_secs(1);
 
 /// A command with places left open: `{address}`, `{url}`, `{code}` or `{tournament}`, and `{name}`.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -91,6 +96,7 @@ pub(super) struct AgentProcess {
     child: Child,
     group: Option<Pid>,
     log: Arc<Mutex<Log>>,
+    readers: Vec<JoinHandle<()>>,
 }
 
 /// What the process has written.
@@ -106,6 +112,10 @@ impl AgentProcess {
         places: &Places,
         log: Option<PathBuf>,
     ) -> io::Result<Self> {
+        let file = match log {
+            Some(path) => Some(tokio::fs::File::create(path).await?),
+            None => None,
+        };
         let mut words = command.filled(places).into_iter();
         let program = words.next().unwrap_or_default();
         let mut child = Command::new(program)
@@ -121,21 +131,23 @@ impl AgentProcess {
             .and_then(|id| i32::try_from(id).ok())
             .and_then(Pid::from_raw);
         let kept = Arc::new(Mutex::new(Log::default()));
-        let file = match log {
-            Some(path) => Some(tokio::fs::File::create(path).await?),
-            None => None,
-        };
         let file = Arc::new(tokio::sync::Mutex::new((file, MAX_LOG_BYTES)));
+        let mut readers = Vec::new();
         if let Some(stdout) = child.stdout.take() {
-            tokio::spawn(keep(stdout, Arc::clone(&kept), Arc::clone(&file)));
+            readers.push(tokio::spawn(keep(
+                stdout,
+                Arc::clone(&kept),
+                Arc::clone(&file),
+            )));
         }
         if let Some(stderr) = child.stderr.take() {
-            tokio::spawn(keep(stderr, Arc::clone(&kept), file));
+            readers.push(tokio::spawn(keep(stderr, Arc::clone(&kept), file)));
         }
         Ok(Self {
             child,
             group,
             log: kept,
+            readers,
         })
     }
 
@@ -144,8 +156,24 @@ impl AgentProcess {
         self.child.wait().await
     }
 
-    /// The last lines it wrote.
-    pub(super) fn last_lines(&self, most: usize) -> Vec<String> {
+    /// Ends it, and gives the last lines it wrote.
+    pub(super) async fn finish(mut self, most: usize) -> Vec<String> {
+        self.kill();
+        for reader in std::mem::take(&mut self.readers) {
+            // What left the group may hold its output open; nobody waits for that.
+            let _read = timeout(LAST_WORDS, reader).await;
+        }
+        self.last_lines(most)
+    }
+
+    fn kill(&self) {
+        if let Some(group) = self.group {
+            // There may be nothing left of it.
+            let _gone = kill_process_group(group, Signal::KILL);
+        }
+    }
+
+    fn last_lines(&self, most: usize) -> Vec<String> {
         let log = self.log.lock().unwrap_or_else(PoisonError::into_inner);
         let bytes: Vec<u8> = log.tail.iter().copied().collect();
         let text = String::from_utf8_lossy(&bytes);
@@ -159,10 +187,7 @@ impl AgentProcess {
 
 impl Drop for AgentProcess {
     fn drop(&mut self) {
-        if let Some(group) = self.group {
-            // There may be nothing left of it.
-            let _gone = kill_process_group(group, Signal::KILL);
-        }
+        self.kill();
     }
 }
 

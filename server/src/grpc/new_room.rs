@@ -74,7 +74,10 @@ pub(super) async fn new_room(
 }
 
 /// A policy that promises no more than the server's store can keep.
-pub(super) fn kept_policy(recorded: &Recorded, message: &v1::RoomPolicy) -> Result<Policy, FieldProblem> {
+pub(super) fn kept_policy(
+    recorded: &Recorded,
+    message: &v1::RoomPolicy,
+) -> Result<Policy, FieldProblem> {
     let mut policy = convert::policy_from_proto(message)?;
     if !recorded.rooms().store().outlives_server() {
         if message.durability() == v1::Durability::Durable {

@@ -415,10 +415,9 @@ impl Reader {
         }
         let handle = self.next_called;
         self.next_called = self.next_called.wrapping_add(1).max(FIRST_CALLED);
-        match self.bind(attach, handle, Some(ticket)).await {
-            Ok(Some(bound)) => drop(self.seats.insert(handle, bound)),
-            // The game ended before its seat was taken: there is nothing left to play.
-            Ok(None) | Err(RoomGone) => {}
+        // Otherwise the game ended before its seat was taken: there is nothing left to play.
+        if let Ok(Some(bound)) = self.bind(attach, handle, Some(ticket)).await {
+            self.seats.insert(handle, bound);
         }
     }
 

@@ -1,13 +1,10 @@
 //! `TournamentService`: what is asked is checked and handed to the tournament; what it shows of itself is put into messages.
 
-use std::collections::BTreeMap;
 use std::pin::Pin;
 use std::sync::Arc;
 
 use chefshat_arena::ratings::Ratings;
-use chefshat_arena::tournament::{
-    BeginProblem, Format, Game, GameState, JoinProblem, Standing, Tournament,
-};
+use chefshat_arena::tournament::{BeginProblem, Format, Game, GameState, JoinProblem, Tournament};
 use chefshat_proto::v1::{self, tournament_service_server::TournamentService};
 use chefshat_records::convert::FieldProblem;
 use futures::Stream;
@@ -255,11 +252,8 @@ impl TournamentService for TournamentCalls {
         let hosted = self.find(&request.into_inner().tournament_id)?;
         let looked = tokio::task::spawn_blocking(move || {
             let (standings, confidence) = hosted.look(|tournament| {
-                let standings = tournament.standings();
-                (
-                    with_ratings(&hosted, tournament, &standings),
-                    order(tournament),
-                )
+                let confidence = convert::confidence_to_proto(tournament);
+                (standings(&hosted, tournament), confidence)
             });
             v1::GetTournamentResultsResponse {
                 tournament: Some(hosted.describe()),
@@ -305,32 +299,19 @@ impl TournamentService for TournamentCalls {
         request: Request<v1::GetLeaderboardRequest>,
     ) -> Result<Response<v1::GetLeaderboardResponse>, Status> {
         let request = request.into_inner();
-        let kind = convert::kind_from_proto("kind", request.kind)
+        convert::kind_from_proto("kind", request.kind)
             .map_err(|problem| field("KIND_REFUSED", &problem))?;
-        let kind = kind.map(|kind| convert::kind_to_proto(Some(kind)));
         let limit = match request.limit {
             0 => STANDARD_LINES,
             limit => limit.min(MAX_LEADERBOARD_LINES),
         };
         let ratings = self.leaderboard.ratings().await.map_err(not_read)?;
-        let wanted = |who: &crate::tournaments::Who| kind.is_none_or(|kind| who.1 == kind);
-        let lines = ratings.leaderboard(wanted, request.min_games);
-        let rated = (1..)
-            .zip(lines)
-            .take(usize::try_from(limit).unwrap_or(usize::MAX))
-            .map(|(place, ((name, kind, built_in), rated))| v1::Rated {
-                name: name.clone(),
-                kind: *kind,
-                built_in: *built_in,
-                rating: Some(rating(rated)),
-                place,
-                places: rated.places.clone(),
-            })
-            .collect();
-        Ok(Response::new(v1::GetLeaderboardResponse {
-            rated,
-            games: ratings.games(),
-        }))
+        Ok(Response::new(convert::leaderboard(
+            &ratings,
+            request.kind(),
+            request.min_games,
+            usize::try_from(limit).unwrap_or(usize::MAX),
+        )))
     }
 }
 
@@ -360,9 +341,8 @@ async fn follow(
 /// Where a tournament stands.
 fn now(hosted: &Hosted) -> v1::FollowTournamentResponse {
     let (standings, round, by_rounds) = hosted.look(|tournament| {
-        let standings = tournament.standings();
         (
-            with_ratings(hosted, tournament, &standings),
+            standings(hosted, tournament),
             tournament.round(),
             tournament.settings().format != Format::RoundRobin,
         )
@@ -378,75 +358,13 @@ fn now(hosted: &Hosted) -> v1::FollowTournamentResponse {
     }
 }
 
-/// The standings as messages, with ratings from the tournament's rated games alone.
-fn with_ratings(
-    hosted: &Hosted,
-    tournament: &Tournament,
-    standings: &[Standing],
-) -> Vec<v1::TournamentStanding> {
-    let mut ratings: Ratings<usize> = Ratings::default();
-    for game in tournament
-        .games()
-        .iter()
-        .filter(|game| hosted.is_rated(game))
-    {
-        let placed: Vec<(usize, u32)> = (game.result().into_iter())
-            .flat_map(|result| &result.seats)
-            .map(|seat| {
-                (
-                    seat.participant,
-                    u32::try_from(seat.place).unwrap_or(u32::MAX),
-                )
-            })
-            .collect();
-        // What tells nothing is no game of a tournament.
-        let _ = ratings.fold(&placed);
-    }
-    let rated: BTreeMap<usize, v1::Rating> = (ratings.leaderboard(|_| true, 0).into_iter())
-        .map(|(who, rated)| (*who, rating(rated)))
-        .collect();
-    (standings.iter())
-        .map(|standing| v1::TournamentStanding {
-            place: standing.place,
-            participant: u32::try_from(standing.participant).unwrap_or(u32::MAX),
-            last_round: standing.last_round,
-            games: standing.games,
-            byes: standing.byes,
-            score: standing.score,
-            points: standing.points,
-            places: standing.places.clone(),
-            forfeited: standing.forfeited,
-            substituted: standing.substituted,
-            wrong_actions: standing.wrong_actions,
-            timeouts: standing.timeouts,
-            mean_decision_time_us: standing.mean_decision_time_us,
-            performance_score: standing.performance_score,
-            rating: rated.get(&standing.participant).copied(),
-        })
-        .collect()
-}
-
-/// How sure the order of neighbours is.
-fn order(tournament: &Tournament) -> Vec<v1::OrderConfidence> {
-    let number = |value: usize| u32::try_from(value).unwrap_or(u32::MAX);
-    (tournament.order_confidence().into_iter())
-        .map(|pair| v1::OrderConfidence {
-            upper: number(pair.upper),
-            lower: number(pair.lower),
-            difference: pair.order.difference,
-            standard_error: pair.order.standard_error,
-            confidence: pair.order.confidence,
-            more_games: pair.order.more_games,
-        })
-        .collect()
-}
-
-fn rating(rated: &chefshat_arena::ratings::Rated) -> v1::Rating {
-    v1::Rating {
-        mean: rated.rating.mean,
-        deviation: rated.rating.deviation,
-        games: rated.games,
-    }
+/// The standings, with ratings from the tournament's rated games alone.
+fn standings(hosted: &Hosted, tournament: &Tournament) -> Vec<v1::TournamentStanding> {
+    let ratings = match hosted.is_rated() {
+        true => tournament.ratings(),
+        false => Ratings::default(),
+    };
+    convert::standings_to_proto(tournament, &ratings)
 }
 
 fn unknown() -> Status {

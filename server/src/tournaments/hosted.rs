@@ -211,9 +211,9 @@ impl Hosted {
             .collect()
     }
 
-    /// Whether a game of it counts for ratings.
-    pub fn is_rated(&self, game: &Game) -> bool {
-        convert::is_rated(game, &self.plan)
+    /// Whether its games can count for ratings.
+    pub fn is_rated(&self) -> bool {
+        self.plan.deal_seed.is_none()
     }
 
     /// What `look` makes of the tournament.

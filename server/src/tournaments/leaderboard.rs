@@ -1,12 +1,13 @@
 //! The ratings of all who have played a rated game on this server, worked out from the summaries of its games. They are worked out anew when
 //! somebody asks and games have ended since, but not more often than [`LEADERBOARD_AGE`] allows.
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use chefshat_arena::BuiltInAgent;
 use chefshat_arena::ratings::Ratings;
 use chefshat_proto::v1;
+use chefshat_records::outcome::Identity;
 use tokio::sync::Mutex;
 use tokio::time::Instant;
 
@@ -16,8 +17,8 @@ use crate::store::{Store, StoreError};
 /// Summaries read at a time.
 const PAGE: usize = 1_000;
 
-/// Who is rated: name, number of the kind, and whether it is a built-in agent.
-pub type Who = (String, i32, bool);
+/// A rated game: when it ended, its id, and who took which place.
+type RatedGame = (u64, String, Vec<(Identity, u32)>);
 
 /// Why there is no leaderboard.
 pub type BoardError = StoreError;
@@ -27,7 +28,7 @@ pub type BoardError = StoreError;
 pub struct Leaderboard {
     store: Arc<dyn Store>,
     /// The ratings, and when they were worked out.
-    known: Mutex<Option<(Instant, Arc<Ratings<Who>>)>>,
+    known: Mutex<Option<(Instant, Arc<Ratings<Identity>>)>>,
 }
 
 impl Leaderboard {
@@ -43,7 +44,7 @@ impl Leaderboard {
     ///
     /// # Errors
     /// The store's.
-    pub async fn ratings(&self) -> Result<Arc<Ratings<Who>>, BoardError> {
+    pub async fn ratings(&self) -> Result<Arc<Ratings<Identity>>, BoardError> {
         // Whoever asks meanwhile waits for the same answer.
         let mut known = self.known.lock().await;
         if let Some((at, ratings)) = known.as_ref()
@@ -56,14 +57,14 @@ impl Leaderboard {
         Ok(ratings)
     }
 
-    async fn work_out(&self) -> Result<Ratings<Who>, BoardError> {
+    async fn work_out(&self) -> Result<Ratings<Identity>, BoardError> {
         let filter = v1::RecordFilter {
             state: v1::RoomState::Finished.into(),
             origin: v1::GameOrigin::Dealt.into(),
             hosted_here: true,
             ..v1::RecordFilter::default()
         };
-        let mut games: Vec<(u64, String, Vec<(Who, u32)>)> = Vec::new();
+        let mut games: Vec<RatedGame> = Vec::new();
         let mut after = 0;
         loop {
             let page = self.store.list(&filter, after, PAGE).await?;
@@ -87,28 +88,18 @@ impl Leaderboard {
 }
 
 /// Who took which place in a game that is rated; `None` if it is not.
-fn rated(summary: &v1::RecordSummary) -> Option<Vec<(Who, u32)>> {
-    if summary.substituted {
+fn rated(summary: &v1::RecordSummary) -> Option<Vec<(Identity, u32)>> {
+    let replayed = |seat: &v1::Participant| seat.built_in_agent == BuiltInAgent::REPLAY;
+    if summary.substituted || summary.seats.iter().any(replayed) {
         return None;
     }
-    let mut different = BTreeSet::new();
-    let mut placed = Vec::with_capacity(summary.seats.len());
-    for standing in &summary.standings {
-        let seat = summary
-            .seats
-            .iter()
-            .find(|seat| seat.seat == standing.seat)?;
-        let built_in = !seat.built_in_agent.is_empty();
-        let name = match built_in {
-            true if seat.built_in_agent == BuiltInAgent::REPLAY => return None,
-            true => &seat.built_in_agent,
-            false => &seat.name,
-        };
-        let who = (name.clone(), seat.kind, built_in);
-        if !different.insert(who.clone()) {
-            return None;
-        }
-        placed.push((who, standing.place));
-    }
-    (placed.len() >= 2).then_some(placed)
+    let places: BTreeMap<u32, u32> = (summary.standings.iter())
+        .map(|standing| (standing.seat, standing.place))
+        .collect();
+    let placed: BTreeMap<Identity, u32> = (summary.seats.iter())
+        .map(|seat| Some((Identity::of(seat), *places.get(&seat.seat)?)))
+        .collect::<Option<_>>()?;
+    // Who had more than one seat stands there once.
+    let all_differ = placed.len() == summary.seats.len();
+    (all_differ && placed.len() >= 2).then(|| placed.into_iter().collect())
 }

@@ -18,7 +18,7 @@ use tokio_util::task::TaskTracker;
 use tracing::{error, info};
 
 pub use hosted::{Call, Connection, Entry, Hosted, Stopped};
-pub use leaderboard::{BoardError, Leaderboard, Who};
+pub use leaderboard::{BoardError, Leaderboard};
 
 use crate::config::{MAX_TOURNAMENTS, TOURNAMENT_MAILBOX};
 use crate::convert::{self, TournamentPlan};

@@ -6,7 +6,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_arena::tournament::{Change, Deals, Ended, Entrant, Game, SeatPlayed, State};
+use chefshat_arena::tournament::{
+    Change, Deals, Ended, Entrant, Game, SeatPlayed, State, Tournament,
+};
 use chefshat_proto::v1;
 use chefshat_records::outcome;
 use futures::future::join_all;
@@ -24,6 +26,8 @@ use crate::store::StoreError;
 use crate::store::journal::{Fill, GameStart, SeatedParticipant, TournamentGame};
 use crate::store::tournaments::TournamentEntry;
 
+/// Participants from which on a draw may take longer than a server may stand still.
+const MANY: usize = 64;
 /// Messages that are taken before what follows from them is worked out.
 const MESSAGES_AT_A_TIME: usize = 64;
 
@@ -84,7 +88,7 @@ impl Task {
                         return;
                     }
                     for message in messages.drain(..) {
-                        self.receive(message);
+                        self.receive(message).await;
                     }
                 }
                 () = changed => {}
@@ -103,7 +107,7 @@ impl Task {
         u64::try_from(self.began.elapsed().as_millis()).unwrap_or(u64::MAX)
     }
 
-    fn receive(&mut self, message: Message) {
+    async fn receive(&mut self, message: Message) {
         match message {
             Message::Join(entry, reply) => {
                 let joined = self.join(entry);
@@ -112,7 +116,7 @@ impl Task {
                 }));
             }
             Message::Begin(reply) => {
-                let begun = self.hosted.look(|core| core.begin());
+                let begun = self.off_thread(|core| core.begin()).await;
                 let begun = begun.map(|changes| self.fold_all(changes));
                 self.replies.push(Box::new(move || {
                     // Who asked may be gone.
@@ -252,12 +256,7 @@ impl Task {
     async fn settle(&mut self) -> Result<(), StoreError> {
         loop {
             self.look_at_games().await?;
-            let now_ms = self.now_ms();
-            loop {
-                let next = self.hosted.moving().core.next(now_ms);
-                let Some(change) = next else { break };
-                self.fold(change);
-            }
+            self.follow().await;
             let moved = !self.unkept.is_empty();
             if moved {
                 let entries = std::mem::take(&mut self.unkept);
@@ -280,6 +279,41 @@ impl Task {
                 return Ok(());
             }
         }
+    }
+
+    /// Does what follows now. Where rounds may have to be drawn for many, which takes a while, it is worked out elsewhere.
+    async fn follow(&mut self) {
+        let now_ms = self.now_ms();
+        let draws_for_many = self
+            .hosted
+            .look(|core| core.participants().len() > MANY && core.playing().next().is_none());
+        if draws_for_many {
+            let following = move |mut core: Tournament| {
+                let mut changes = Vec::new();
+                while let Some(change) = core.next(now_ms) {
+                    core.fold(&change);
+                    changes.push(change);
+                }
+                changes
+            };
+            let changes = self.off_thread(following).await;
+            self.fold_all(changes);
+        }
+        loop {
+            let next = self.hosted.moving().core.next(now_ms);
+            let Some(change) = next else { return };
+            self.fold(change);
+        }
+    }
+
+    /// What `work` makes of the tournament, on a thread that serves nobody. Nobody else moves it meanwhile.
+    async fn off_thread<T: Send + 'static>(
+        &self,
+        work: impl FnOnce(Tournament) -> T + Send + 'static,
+    ) -> T {
+        let core = self.hosted.look(Tournament::clone);
+        let working = tokio::task::spawn_blocking(move || work(core));
+        working.await.expect("a tournament does not panic")
     }
 
     /// Takes in what came of games that have ended.

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use tempfile::TempDir;
 
 use super::run::chefshat;
-use super::server::{run, serve};
+use super::server::{json as json_of, run, serve};
 
 const AGENTS: [&str; 4] = ["greedy", "random", "random_unmasked", "trained"];
 
@@ -15,8 +15,8 @@ fn fixtures() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/fixtures/records")
 }
 
-/// A data folder with the records of so many games that the server played with its own agents.
-fn played(games: usize) -> TempDir {
+/// A data folder with the records of so many games that the server played with its own agents, and the server's own leaderboard.
+fn played(games: usize) -> (TempDir, Value) {
     let folder = TempDir::new().unwrap();
     let (_server, url) = serve(folder.path());
     for _ in 0..games {
@@ -36,12 +36,13 @@ fn played(games: usize) -> TempDir {
         assert!(Instant::now() < long_enough, "the games were not filed");
         std::thread::sleep(Duration::from_millis(20));
     }
-    folder
+    let board = json_of(&run(&url, &["leaderboard", "--json"]));
+    (folder, board)
 }
 
 #[test]
 fn a_leaderboard_is_recomputed_from_the_records() {
-    let folder = played(12);
+    let (folder, board) = played(12);
     let data_dir = folder.path().to_str().unwrap();
     let fixtures = fixtures();
     let records = folder.path().join("records");
@@ -61,6 +62,9 @@ fn a_leaderboard_is_recomputed_from_the_records() {
     assert_eq!(told["records"], 14);
     assert_eq!(told["rated_games"], 12);
     assert_eq!(told["not_rated"], json!({"substituted": 1, "not_dealt": 1}));
+    // Whoever has the records comes to the same numbers as the server.
+    assert_eq!(board["rated_games"], told["rated_games"]);
+    assert_eq!(board["leaderboard"], told["leaderboard"]);
     let lines = told["leaderboard"].as_array().unwrap();
     let mut names: Vec<&str> = lines
         .iter()

@@ -195,6 +195,44 @@ fn check_games(url: &str, id: &str, data_dir: &Path) {
 }
 
 #[test]
+fn an_agent_that_ended_goes_on_with_its_ticket() {
+    let folder = TempDir::new().unwrap();
+    let (_server, url) = serve(folder.path());
+    let create = "--name final --format knockout --built-in greedy*3 --target-shifts 1 --json";
+    let create = ["tournament", "create"]
+        .into_iter()
+        .chain(create.split(' '));
+    let made = json(&run(&url, &create.collect::<Vec<&str>>()));
+    let code = made["join_code"].as_str().unwrap();
+    let join = ["tournament", "join", "--agent", "random"];
+    let mut first = start(&url, &[&join[..], &["--code", code]].concat());
+    let told = BufReader::new(first.0.stderr.take().unwrap()).lines();
+    let mut tickets = told.filter_map(|line| {
+        let line = line.unwrap();
+        let (_, ticket) = line.split_once("--ticket ")?;
+        Some(ticket.to_owned())
+    });
+    let ticket = tickets.next().unwrap();
+    drop(first);
+
+    let second = start(
+        &url,
+        &[&join[..], &["--ticket", &ticket, "--json"]].concat(),
+    );
+    let id = made["tournament"]["tournamentId"].as_str().unwrap();
+    let owner = made["owner_token"].as_str().unwrap();
+    let begun = run(&url, &["tournament", "start", id, "--owner-token", owner]);
+    assert_eq!(begun.status.code(), Some(0), "{begun:?}");
+    let (code, lines) = ended(second);
+    assert_eq!(code, Some(0), "{lines:?}");
+    let [line] = lines.as_slice() else {
+        panic!("one game was expected: {lines:?}");
+    };
+    let result: Value = serde_json::from_str(line).unwrap();
+    assert_eq!(result["event"], "result");
+}
+
+#[test]
 fn only_its_owner_begins_and_closes_a_tournament() {
     let folder = TempDir::new().unwrap();
     let (_server, url) = serve(folder.path());

@@ -223,10 +223,10 @@ impl Agent {
     async fn event(&mut self, handle: u32, voice: &Voice, event: v1::GameEvent) {
         self.last_event = event.sequence;
         match event.kind {
-            Some(Kind::Substituted(it)) if it.seat == self.seat => {
-                if self.fault != "never-resumes" {
-                    voice.say(handle, Command::Resume(v1::ResumeSeat {})).await;
-                }
+            Some(Kind::Substituted(it))
+                if it.seat == self.seat && self.fault != "never-resumes" =>
+            {
+                voice.say(handle, Command::Resume(v1::ResumeSeat {})).await;
             }
             Some(Kind::ShiftEnded(_)) if self.fault == "one-shift" => std::process::exit(0),
             _ => {}

@@ -74,7 +74,13 @@ async fn ticket(client: &Client, code: &str, name: &str, max_games: u32) -> Stri
 fn regular(url: &str, ticket: String, seed: u64) -> JoinHandle<Result<Vec<Outcome>, PlayError>> {
     let url = url.to_owned();
     tokio::spawn(async move {
-        let client = Client::connect(&url).await.expect("it listens");
+        // The server may be away just now.
+        let client = loop {
+            match Client::connect(&url).await {
+                Ok(client) => break client,
+                Err(_) => tokio::time::sleep(BETWEEN_FLOODS).await,
+            }
+        };
         let make = |_: &v1::Attached| RandomAgent::new(seed);
         client.play_tournament_with(ticket, make, &options()).await
     })

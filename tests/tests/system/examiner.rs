@@ -4,12 +4,13 @@ use std::path::Path;
 use std::process::Stdio;
 
 use chefshat_tests::{patiently, set_up};
+use futures::future::join_all;
 use futures::{StreamExt as _, stream};
 use serde_json::Value;
 use tokio::process::Command;
 
 /// Examinations at a time; they mostly wait.
-const AT_A_TIME: usize = 6;
+const AT_A_TIME: usize = 8;
 /// Seconds that an agent without a fault is waited for, however busy the machine.
 const PATIENCE: &str = "30";
 
@@ -60,28 +61,37 @@ async fn examine(options: &[&str], agent: &[&str], folder: Option<&Path>) -> Exa
     }
 }
 
-/// All cases, passed.
-async fn passes(agent: &[&str], folder: Option<&Path>) {
-    let options = ["--patience", PATIENCE, "--start", PATIENCE];
+/// All cases, passed. `many`: the command line of the same for tournaments.
+async fn passes(agent: &[&str], many: &str, folder: Option<&Path>) {
+    let options = ["--patience", PATIENCE, "--start", PATIENCE, "--many", many];
     let examined = examine(&options, agent, folder).await;
     assert!(examined.passed, "{}", examined.said);
-    assert!(examined.cases.len() >= 9, "{}", examined.said);
+    assert_eq!(examined.cases.len(), 11, "{}", examined.said);
     for case in &examined.cases {
         assert_eq!(case["passed"], true, "{}", examined.said);
     }
 }
 
 #[tokio::test]
-async fn the_agent_of_the_rust_sdk_passes() {
+async fn the_examples_of_the_rust_sdk_pass() {
+    let examples = set_up("CHEFSHAT_BIN").with_file_name("examples");
+    let example = examples.join("random_agent");
+    let example = example.to_str().expect("text");
+    let many = examples.join("tournament_agent");
+    let many = format!("exec '{}' {{tournament}} {{name}} {{url}}", many.display());
+    passes(&[example, "{code}", "{url}"], &many, None).await;
+}
+
+#[tokio::test]
+async fn the_built_in_agents_pass() {
     let binary = set_up("CHEFSHAT_BIN");
     let binary = binary.to_str().expect("text");
-    passes(
-        &[
-            binary, "agent", "greedy", "--server", "{url}", "--code", "{code}",
-        ],
-        None,
-    )
-    .await;
+    let agent = [binary, "agent", "greedy", "--server", "{url}"];
+    let agent = [&agent[..], &["--code", "{code}"]].concat();
+    let many = format!(
+        "exec '{binary}' tournament join --agent greedy --name {{name}} --server {{url}} --code {{tournament}} --games 8"
+    );
+    passes(&agent, &many, None).await;
 }
 
 #[tokio::test]
@@ -90,28 +100,31 @@ async fn the_agent_of_the_python_package_passes() {
     let python = python.to_str().expect("text");
     let agent = [python, "-m", "chefshat.agent", "--address", "{address}"];
     let agent = [&agent[..], &["--code", "{code}", "--name", "{name}"]].concat();
-    passes(&agent, None).await;
+    let many = format!(
+        "exec '{python}' -m chefshat.agent --address {{address}} --tournament {{tournament}} --name {{name}} --games 8"
+    );
+    passes(&agent, &many, None).await;
 }
 
 #[tokio::test]
 async fn the_agent_in_javascript_passes() {
     let agent = ["node", "agent.js", "--address", "{address}"];
     let agent = [&agent[..], &["--code", "{code}", "--name", "{name}"]].concat();
-    passes(&agent, Some(&set_up("CHEFSHAT_NODE_DIR"))).await;
+    let many = "exec node agent.js --address {address} --tournament {tournament} --games 8";
+    passes(&agent, many, Some(&set_up("CHEFSHAT_NODE_DIR"))).await;
+}
+
+/// The agent without an SDK: with a fault or without, in a room or in a tournament.
+const BAD_AGENT: &str = env!("CARGO_BIN_EXE_bad_agent");
+
+fn in_a_tournament(fault: &str) -> String {
+    format!("exec '{BAD_AGENT}' {fault} {{address}} {{tournament}} here")
 }
 
 #[tokio::test]
 async fn an_agent_without_an_sdk_passes() {
-    passes(
-        &[
-            env!("CARGO_BIN_EXE_bad_agent"),
-            "none",
-            "{address}",
-            "{code}",
-        ],
-        None,
-    )
-    .await;
+    let agent = [BAD_AGENT, "none", "{address}", "{code}"];
+    passes(&agent, &in_a_tournament("none"), None).await;
 }
 
 /// Agents with a fault, the case in which it shows, and the code by which it must be named first.
@@ -156,12 +169,7 @@ async fn every_fault_is_named() {
     ];
     let examined = stream::iter(FAULTY.into_iter().chain(more))
         .map(|(fault, case, code)| async move {
-            let agent = [
-                env!("CARGO_BIN_EXE_bad_agent"),
-                fault,
-                "{address}",
-                "{code}",
-            ];
+            let agent = [BAD_AGENT, fault, "{address}", "{code}"];
             // Whoever joins at all has the standard time for it.
             let start = if fault == "never-joins" { "1" } else { "30" };
             let options = ["--start", start, "--only", case];
@@ -180,25 +188,22 @@ async fn every_fault_is_named() {
 
 /// The case of many seats, with the agent that has this fault.
 async fn examine_in_a_tournament(fault: &str) -> Examined {
-    let agent = env!("CARGO_BIN_EXE_bad_agent");
-    let line = format!("exec '{agent}' {fault} {{address}} {{tournament}} here");
-    examine(&["--many", &line], &[], None).await
+    examine(&["--many", &in_a_tournament(fault)], &[], None).await
 }
 
 #[tokio::test]
-async fn an_agent_plays_many_seats_on_one_stream() {
+async fn faults_with_many_seats_are_named() {
     let table = [
-        ("none", None),
-        ("one-at-a-time", Some("ONE_AT_A_TIME")),
-        ("own-handles", Some("NOT_ANSWERED")),
-        ("never-leaves", Some("NEVER_LEFT")),
+        ("one-at-a-time", "ONE_AT_A_TIME"),
+        ("own-handles", "NOT_ANSWERED"),
+        ("never-leaves", "NEVER_LEFT"),
     ];
-    for (fault, code) in table {
-        let examined = examine_in_a_tournament(fault).await;
+    let examined = table.map(|(fault, _)| examine_in_a_tournament(fault));
+    for ((fault, code), examined) in table.into_iter().zip(join_all(examined).await) {
         assert_eq!(examined.cases.len(), 1, "{}", examined.said);
         assert_eq!(examined.cases[0]["case"], "many-seats");
         let codes = examined.codes();
-        assert_eq!(codes, Vec::from_iter(code), "{fault}: {}", examined.said);
+        assert_eq!(codes, [code], "{fault}: {}", examined.said);
     }
 }
 

@@ -1,4 +1,5 @@
-//! What browsers do: gRPC-web over HTTP/1.1, watching on one stream and acting by single calls; and what tools do: reflection.
+//! What browsers do: they get the page and speak gRPC-web on the same port, over HTTP/1.1, watching on one stream and acting by single calls;
+//! and what tools do: reflection. What is on the page is tested beside it, in clients/web.
 
 use std::collections::VecDeque;
 
@@ -103,6 +104,45 @@ async fn a_seat_plays_over_grpc_web_on_the_same_port() {
         others.await.expect("the others play"),
         [v1::DetachReason::GameOver; 3]
     );
+}
+
+#[tokio::test]
+async fn every_address_has_the_page_in_both_versions_of_http_and_calls_are_still_calls() {
+    let server = TestServer::start().await;
+    for http2 in [false, true] {
+        let http = HttpClient::builder(TokioExecutor::new())
+            .http2_only(http2)
+            .build_http::<http_body_util::Empty<bytes::Bytes>>();
+        for (method, path, status) in [
+            ("GET", "/rooms/0123", None),
+            ("HEAD", "/", None),
+            ("GET", "/assets/none.js", Some(http::StatusCode::NOT_FOUND)),
+        ] {
+            let request = http::Request::builder()
+                .method(method)
+                .uri(format!("{}{path}", server.url()))
+                .body(http_body_util::Empty::new())
+                .expect("a request");
+            let answer = patiently("an answer", http.request(request))
+                .await
+                .expect("the server answers");
+            // Without a build of the page the answer is a page as well, which says how to get one.
+            let wanted = status.unwrap_or(match chefshat_server::web::is_built_in() {
+                true => http::StatusCode::OK,
+                false => http::StatusCode::SERVICE_UNAVAILABLE,
+            });
+            assert_eq!(answer.status(), wanted, "{method} {path}");
+            assert_eq!(answer.headers()["x-content-type-options"], "nosniff");
+            let media_type = answer.headers()["content-type"].to_str().expect("text");
+            assert_eq!(
+                media_type.starts_with("text/html"),
+                status.is_none(),
+                "{method} {path}: {media_type}"
+            );
+        }
+    }
+    let client = server.client().await;
+    assert!(client.get_room("0".repeat(32)).await.is_err());
 }
 
 #[tokio::test]

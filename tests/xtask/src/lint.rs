@@ -3,10 +3,11 @@
 use std::process::Command;
 
 use crate::command::{self, cargo};
-use crate::places::{NO_PYTHON_PACKAGE, Places};
+use crate::places::{NO_PYTHON_PACKAGE, NO_WEB_PACKAGE, Places};
 use crate::setup;
 use crate::steps::{Failure, Steps};
 use crate::test::python_command;
+use crate::web;
 
 /// Runs all checks, cheapest first.
 pub(crate) fn run(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
@@ -28,6 +29,12 @@ pub(crate) fn run(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
         python(places, steps)?;
     } else {
         steps.skip("ruff, mypy", NO_PYTHON_PACKAGE);
+    }
+    if places.has_web_package() {
+        steps.run("set up web", || setup::web_package(places))?;
+        web::check(places, steps)?;
+    } else {
+        steps.skip("tsc, biome", NO_WEB_PACKAGE);
     }
 
     let clippy = [

@@ -1,6 +1,6 @@
-//! `cargo xtask`: sets up what the tests of all languages need, runs them, and runs the linters.
+//! `cargo xtask`: sets up what the tests of all languages need, runs them, runs the linters, and builds the page for people.
 //!
-//! The command line lives here. What is run lives in [`lint`] and [`test`], what must be there first in [`setup`]. Nothing here
+//! The command line lives here. What is run lives in [`lint`], [`test`] and [`web`], what must be there first in [`setup`]. Nothing here
 //! knows a crate of the project: this program only starts others and must build when they do not.
 
 mod command;
@@ -9,6 +9,7 @@ mod places;
 mod setup;
 mod steps;
 mod test;
+mod web;
 
 use std::process::ExitCode;
 
@@ -38,6 +39,8 @@ enum Task {
     },
     /// Check format, lints, protocol, licences and images.
     Lint,
+    /// Build the page for people, which the server gives out on its port.
+    Web,
 }
 
 /// A language whose tests can be run alone.
@@ -49,6 +52,8 @@ enum Language {
     Python,
     /// The agent in clients/node.
     Node,
+    /// The page for people in clients/web, in a browser as well.
+    Web,
 }
 
 fn main() -> ExitCode {
@@ -57,6 +62,7 @@ fn main() -> ExitCode {
     let outcome = Places::find().and_then(|places| match cli.task {
         Task::Test { only } => test::run(&places, &mut steps, only),
         Task::Lint => lint::run(&places, &mut steps),
+        Task::Web => web::run(&places, &mut steps),
     });
     print!("{}", steps.summary());
     match outcome {

@@ -11,6 +11,9 @@ pub(crate) const NO_PYTHON_PACKAGE: &str = "there is no clients/python/pyproject
 /// Why steps are skipped where [`Places::has_node_package`] is false.
 pub(crate) const NO_NODE_PACKAGE: &str = "there is no clients/node/package-lock.json";
 
+/// Why steps are skipped where [`Places::has_web_package`] is false.
+pub(crate) const NO_WEB_PACKAGE: &str = "there is no clients/web/package-lock.json";
+
 /// The folders this program works with, all absolute.
 pub(crate) struct Places {
     /// The source tree.
@@ -57,6 +60,31 @@ impl Places {
     /// Whether there is a JavaScript agent to set up.
     pub(crate) fn has_node_package(&self) -> bool {
         self.node_package().join("package-lock.json").exists()
+    }
+
+    /// The page for people.
+    pub(crate) fn web_package(&self) -> PathBuf {
+        self.root.join("clients/web")
+    }
+
+    /// Whether there is a page to build.
+    pub(crate) fn has_web_package(&self) -> bool {
+        self.web_package().join("package-lock.json").exists()
+    }
+
+    /// Where the built page must lie for the server to give it out: the one place in the source tree that is written to, and not kept.
+    pub(crate) fn web_dist(&self) -> PathBuf {
+        self.web_package().join("dist")
+    }
+
+    /// Folder that looks like the source tree to [`Places::web`].
+    pub(crate) fn web_tree(&self) -> PathBuf {
+        self.own.join("web")
+    }
+
+    /// Copy of the page's package, with its modules.
+    pub(crate) fn web(&self) -> PathBuf {
+        self.web_tree().join("clients/web")
     }
 
     /// Virtual environment of the Python package.

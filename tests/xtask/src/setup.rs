@@ -2,6 +2,7 @@
 //! folder and made anew only when what it was made from has changed; a Debian package is installed only when it is missing.
 
 use std::fs;
+use std::os::unix::fs::symlink;
 use std::path::Path;
 use std::process::Command;
 
@@ -37,16 +38,37 @@ pub(crate) fn tools(places: &Places) -> Result<(), Failure> {
     )
 }
 
-/// The JavaScript agent, copied beside its modules: npm writes only next to a package.json.
+/// The JavaScript agent, with its modules.
 pub(crate) fn node_package(places: &Places) -> Result<(), Failure> {
+    npm_package(&places.node_package(), &places.node())
+}
+
+/// The page for people, with its modules, in a folder from which the rest of the source tree is where the page looks for it.
+pub(crate) fn web_package(places: &Places) -> Result<(), Failure> {
+    let tree = places.web_tree();
+    fs::create_dir_all(&tree).map_err(|error| at(&tree, &error))?;
+    for name in ["proto", "server", "tests"] {
+        let link = tree.join(name);
+        let source = places.root.join(name);
+        if fs::read_link(&link).is_ok_and(|pointed| pointed == source) {
+            continue;
+        }
+        // Another source tree has the same build folder.
+        let _ = fs::remove_file(&link);
+        symlink(&source, &link).map_err(|error| at(&link, &error))?;
+    }
+    npm_package(&places.web_package(), &places.web())
+}
+
+/// A package for Node, copied beside its modules: npm writes only next to a package.json.
+fn npm_package(source: &Path, copy: &Path) -> Result<(), Failure> {
     if !succeeds("node", &["--version"]) {
         debian_package("nodejs")?;
     }
     if !succeeds("npm", &["--version"]) {
         debian_package("npm")?;
     }
-    let (source, copy) = (places.node_package(), places.node());
-    copy_package(&source, &copy).map_err(|error| at(&copy, &error))?;
+    copy_package(source, copy).map_err(|error| at(copy, &error))?;
     let lock = source.join("package-lock.json");
     let made_from = fs::read_to_string(&lock).map_err(|error| at(&lock, &error))?;
     let modules = copy.join("node_modules");
@@ -55,8 +77,16 @@ pub(crate) fn node_package(places: &Places) -> Result<(), Failure> {
     }
     run(Command::new("npm")
         .args(["ci", "--no-audit", "--no-fund"])
-        .current_dir(&copy))?;
+        .current_dir(copy))?;
     note_made_from(&modules, &made_from)
+}
+
+/// The browser that the page is tested in.
+pub(crate) fn chromium() -> Result<(), Failure> {
+    if succeeds("chromium", &["--version"]) {
+        return Ok(());
+    }
+    debian_package("chromium")
 }
 
 /// strace, by which a test has a disk fail.
@@ -173,7 +203,7 @@ fn note_made_from(folder: &Path, made_from: &str) -> Result<(), Failure> {
     fs::write(folder.join(MADE_FROM), made_from).map_err(|error| at(folder, &error))
 }
 
-fn at(path: &Path, error: &std::io::Error) -> Failure {
+pub(crate) fn at(path: &Path, error: &std::io::Error) -> Failure {
     Failure::new(format!("{}: {error}", path.display()))
 }
 

@@ -6,9 +6,10 @@ use std::process::Command;
 use crate::Language;
 use crate::command::cargo;
 use crate::lint;
-use crate::places::{NO_NODE_PACKAGE, NO_PYTHON_PACKAGE, Places};
+use crate::places::{NO_NODE_PACKAGE, NO_PYTHON_PACKAGE, NO_WEB_PACKAGE, Places};
 use crate::setup;
 use crate::steps::{Failure, Steps};
+use crate::web;
 
 /// Sets up and runs the tests of one language, or of all.
 pub(crate) fn run(
@@ -18,12 +19,16 @@ pub(crate) fn run(
 ) -> Result<(), Failure> {
     let wants = |language| only.is_none_or(|only| only == language);
     let (has_python, has_node) = (places.has_python_package(), places.has_node_package());
+    let has_web = places.has_web_package();
 
     if has_python && (wants(Language::Rust) || wants(Language::Python)) {
         steps.run("set up Python", || setup::python_package(places))?;
     }
     if has_node && (wants(Language::Rust) || wants(Language::Node)) {
         steps.run("set up Node", || setup::node_package(places))?;
+    }
+    if has_web && (wants(Language::Rust) || wants(Language::Web)) {
+        web::run(places, steps)?;
     }
     // Libraries, programs and tests in one go: the server alone would be built with other features than
     // beside its tests, and hundreds of crates twice.
@@ -63,6 +68,14 @@ pub(crate) fn run(
             steps.skip("node --test", NO_NODE_PACKAGE);
         }
     }
+    if wants(Language::Web) {
+        if has_web {
+            web::test(places, steps)?;
+            web::check(places, steps)?;
+        } else {
+            steps.skip("vitest, browser tests, tsc, biome", NO_WEB_PACKAGE);
+        }
+    }
     Ok(())
 }
 
@@ -88,7 +101,7 @@ pub(crate) fn python_command(places: &Places, module: &str) -> Command {
 }
 
 /// Tells tests where the server, the other languages and the protocol are.
-fn with_environment(places: &Places, mut command: Command) -> Command {
+pub(crate) fn with_environment(places: &Places, mut command: Command) -> Command {
     command.env("CHEFSHAT_BIN", places.chefshat());
     command.env("CHEFSHAT_PYTHON", places.python());
     command.env("CHEFSHAT_NODE_DIR", places.node());

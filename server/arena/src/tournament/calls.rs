@@ -52,23 +52,23 @@ enum Readiness {
 }
 
 impl Tournament {
-    /// Says whether a participant is present: can be seated in games at once. Built-in ones always are.
+    /// Says whether a participant is present: can be seated in games at once. Built-in ones always are. A game's wait
+    /// begins anew when all of its participants were there: whoever comes and goes does not spare those who do not come at all.
     pub fn set_present(&mut self, participant: usize, present: bool) {
-        if participant >= self.course.participants.len() {
+        let Tournament { course, floor, .. } = self;
+        if participant >= course.participants.len() {
             return;
         }
-        let floor = &mut self.floor;
         if floor.present.len() <= participant {
             floor.present.resize(participant + 1, false);
         }
         floor.present[participant] = present;
-        if present {
-            // Whoever leaves again is waited for anew.
-            let games = &self.course.games;
-            floor
-                .waits
-                .retain(|&game, _| !games[game].seats.contains(&participant));
-        }
+        let is_there = |who: &usize| {
+            course.participants[*who].built_in.is_some() || floor.present.get(*who) == Some(&true)
+        };
+        floor
+            .waits
+            .retain(|&game, _| !course.games[game].seats.iter().all(is_there));
     }
 
     /// Whether a participant is present.

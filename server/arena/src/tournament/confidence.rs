@@ -59,7 +59,10 @@ const ROUNDING: f64 = 1e-9;
 /// How sure it is that the one with the scores `upper` is better than the one with the scores `lower`.
 pub fn order_confidence(upper: &[Scored], lower: &[Scored]) -> OrderConfidence {
     let (means, games) = ([mean(upper), mean(lower)], [upper.len(), lower.len()]);
-    let difference = means[0] - means[1];
+    let difference = match means[0] - means[1] {
+        level if level.abs() < ROUNDING => 0.0,
+        difference => difference,
+    };
     let few = occasions(upper).min(occasions(lower));
     if few < 2 {
         return OrderConfidence {

@@ -5,7 +5,7 @@ use std::cmp::{Ordering, Reverse};
 
 use super::Tournament;
 use super::chance::Chance;
-use super::course::{Course, Pairing, Sums};
+use super::course::{Course, Pairing, State, Sums};
 use super::settings::Format;
 
 /// How a participant stands. Games it forfeited count, with a score of 0.
@@ -152,7 +152,9 @@ fn last_tables(course: &Course) -> Vec<usize> {
     }
     let mut places = vec![0; course.participants.len()];
     for pairing in &course.pairings {
-        let is_over = pairing.round < course.drawn || course.is_round_over();
+        // A tournament that was closed has given games up that nobody lost.
+        let is_over =
+            pairing.round < course.drawn || course.is_round_over() && course.state != State::Closed;
         for (index, who) in order_of_pairing(course, pairing).into_iter().enumerate() {
             places[who] = if is_over { index + 1 } else { 0 };
         }

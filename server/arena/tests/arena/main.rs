@@ -17,4 +17,5 @@ mod ratings;
 mod recorded;
 mod same_seat;
 mod tournament;
+mod trust;
 mod vector;

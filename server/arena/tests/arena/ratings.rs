@@ -183,8 +183,5 @@ fn what_cannot_be_rated_changes_nothing() {
 
 #[test]
 fn pairs_of_larger_games_count_less() {
-    assert_eq!(
-        [2, 3, 4, 6].map(pair_weight),
-        [0.75, 0.6, 0.5, 0.375]
-    );
+    assert_eq!([2, 3, 4, 6].map(pair_weight), [0.75, 0.6, 0.5, 0.375]);
 }

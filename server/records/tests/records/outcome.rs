@@ -204,7 +204,8 @@ fn games_that_say_nothing_of_skill_are_not_rated() {
         change(header(&mut lines));
         outcome(&lines).unwrap().unrated
     };
-    let cases: [(fn(&mut v1::RecordHeader), Option<Unrated>); 6] = [
+    type Case = (fn(&mut v1::RecordHeader), Option<Unrated>);
+    let cases: [Case; 6] = [
         (
             |header| header.origin = v1::GameOrigin::Branched.into(),
             Some(Unrated::NotDealt),

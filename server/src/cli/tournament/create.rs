@@ -73,9 +73,6 @@ pub(super) struct Create {
     /// 64 hexadecimal digits from which all deals follow, for an experiment: whoever knows them knows the cards, and games are not rated.
     #[arg(long, value_name = "HEX", value_parser = seed)]
     deal_seed: Option<[u8; 32]>,
-    /// What all deals follow from, 64 hexadecimal digits, for experiments: whoever knows it knows the cards, and such games are not rated.
-    #[arg(long, value_name = "HEX", value_parser = seed)]
-    deal_seed: Option<[u8; 32]>,
     /// Built-in agent that fills up a knockout and plays for those who forfeit; standard random.
     #[arg(long, value_name = "AGENT", value_parser = agent_name)]
     filler: Option<String>,
@@ -96,9 +93,9 @@ pub(super) struct Create {
 
 /// Some built-in agents alike.
 #[derive(Debug, Clone, PartialEq, Eq)]
-struct BuiltIn {
-    name: String,
-    count: usize,
+pub(super) struct BuiltIn {
+    pub(super) name: String,
+    pub(super) count: usize,
 }
 
 impl Create {
@@ -166,7 +163,6 @@ impl Create {
             max_parallel_games: asked("--max-parallel-games", self.max_parallel_games)?,
             draw_seed: self.draw_seed.map_or_else(Vec::new, |seed| seed.to_vec()),
             deal_seed: self.deal_seed.map_or_else(Vec::new, |seed| seed.to_vec()),
-            deal_seed: self.deal_seed.map_or_else(Vec::new, |seed| seed.to_vec()),
             filler: self.filler.clone().unwrap_or_default(),
         })
     }
@@ -203,7 +199,8 @@ fn asked(flag: &str, number: Option<u32>) -> Result<u32, CommandError> {
     }
 }
 
-fn built_in(words: &str) -> Result<BuiltIn, String> {
+/// Reads `greedy` or `greedy*4`.
+pub(super) fn built_in(words: &str) -> Result<BuiltIn, String> {
     let (name, count) = match words.split_once('*') {
         None => (words, Some(1)),
         Some((name, count)) => (name, count.parse().ok()),
@@ -323,7 +320,6 @@ mod tests {
             max_calls: 3,
             max_parallel_games: 7,
             draw_seed: vec![7; 32],
-            deal_seed: vec![7; 32],
             deal_seed: vec![7; 32],
             filler: "greedy".into(),
         };

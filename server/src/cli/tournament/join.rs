@@ -83,7 +83,7 @@ impl Join {
             Some(place) => self.tell_end(&client, &place).await,
             None => {
                 let games = counted(outcomes.len() as u64, "game");
-                anstream::eprintln!("the tournament is over; {games} were played here");
+                anstream::eprintln!("the tournament is over; played here: {games}");
                 Ok(ExitCode::SUCCESS)
             }
         }

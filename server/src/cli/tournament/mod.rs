@@ -8,6 +8,7 @@ mod join;
 mod list;
 mod owner;
 mod results;
+mod simulate;
 mod tables;
 mod words;
 
@@ -47,6 +48,8 @@ enum TournamentAction {
     Follow(follow::Follow),
     /// Show the standings of a tournament, and how sure they are.
     Results(results::Results),
+    /// Play a tournament of built-in agents offline.
+    Simulate(simulate::Simulate),
     /// List the tournaments of a server.
     List(list::List),
     /// List the games of a tournament.
@@ -62,6 +65,7 @@ impl TournamentCommand {
             TournamentAction::Close(command) => command.run().await,
             TournamentAction::Follow(command) => command.run().await,
             TournamentAction::Results(command) => command.run().await,
+            TournamentAction::Simulate(command) => command.run(),
             TournamentAction::List(command) => command.run().await,
             TournamentAction::Games(command) => command.run().await,
         }

@@ -104,7 +104,7 @@ fn text(results: &v1::GetTournamentResultsResponse) -> String {
 }
 
 /// What has to be known about the deals.
-fn of_deals(deals: v1::TournamentDeals) -> Option<&'static str> {
+pub(super) fn of_deals(deals: v1::TournamentDeals) -> Option<&'static str> {
     match deals {
         v1::TournamentDeals::Unspecified | v1::TournamentDeals::Independent => None,
         v1::TournamentDeals::SameAtAllTables => {

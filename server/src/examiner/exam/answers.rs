@@ -101,76 +101,102 @@ impl Exam {
         let Some(seen) = self.seats.get_mut(&key) else {
             return;
         };
-        let (newest, actions) = (seen.newest(), seen.actions);
+        let newest = seen.newest();
         let own = seen.own && self.phase == Phase::Playing;
+        let plays_on = id > seen.read_after && id <= newest;
         let dropping = own && self.dropping;
-        match seen.decisions.get_mut(&id) {
-            // Too long ago to be remembered, or never put.
-            None if id > newest => {
-                let got = match newest {
-                    0 => format!("an answer to decision {id} before any was put"),
-                    _ => format!("an answer to decision {id}, when {newest} was the newest put"),
-                };
-                self.fault(
-                    Fault::AnsweredUnasked,
-                    "answers to decisions that were put",
-                    got,
-                );
+        if plays_on {
+            self.demand
+                .take_if(|demand| demand.fault == Fault::StoppedAfterClosed);
+        }
+        let tampers = match seen.decisions.get_mut(&id) {
+            None => {
+                // What was put too long ago is not remembered.
+                if id > newest {
+                    self.unasked(id, newest);
+                }
+                false
             }
-            None => {}
             Some(decision) if decision.closed_told => {
                 decision.after_closed += 1;
-                if decision.after_closed > CROSSING_ANSWERS {
-                    let times = decision.after_closed;
+                let times = decision.after_closed;
+                if times > CROSSING_ANSWERS {
                     self.fault(
                         Fault::RepeatedAfterClosed,
                         "no more answers to a decision whose result is CLOSED",
                         format!("{times} more answers to decision {id}"),
                     );
                 }
+                false
             }
             Some(decision) => match decision.stand {
-                Stand::Taken | Stand::Answered => self.fault(
-                    Fault::AnsweredTwice,
-                    "one answer to a decision",
-                    format!("another answer to decision {id}, action {}", answer.action),
-                ),
+                Stand::Taken | Stand::Answered => {
+                    let action = answer.action;
+                    self.fault(
+                        Fault::AnsweredTwice,
+                        "one answer to a decision",
+                        format!("another answer to decision {id}, action {action}"),
+                    );
+                    false
+                }
                 // On its way when the clock ran out.
-                Stand::Closed => {}
+                Stand::Closed => false,
                 Stand::Open | Stand::Refused => {
                     decision.stand = Stand::Answered;
-                    let action = answer.action;
-                    let legal = decision.is_legal(action);
+                    decision.tampered |= dropping;
                     let choice = decision.legal_count() > 1;
                     let turn = decision.kind == v1::DecisionKind::Turn;
-                    decision.tampered |= dropping;
-                    let size = if actions > 0 {
-                        actions
-                    } else {
-                        u32::try_from(8 * decision.mask.len()).unwrap_or(u32::MAX)
-                    };
-                    if action >= size {
-                        self.fault(
-                            Fault::ActionOutOfSpace,
-                            format!("an action below {size}"),
-                            format!("action {action} at decision {id}"),
-                        );
-                    } else if !legal {
-                        let kind = kind_in_words(decision.kind);
-                        self.fault(
-                            Fault::IllegalAction,
-                            "an action of the mask",
-                            format!("action {action} at decision {id} ({kind}), which is not legal there"),
-                        );
-                    } else if own && choice && turn && id == newest && !dropping {
-                        return self.tamper(stream, &key, handle, answer, now, passed);
-                    }
+                    let legal = self.judge_action(&key, &answer);
+                    legal && own && choice && turn && id == newest
                 }
             },
+        };
+        if dropping {
+            return;
         }
-        if !dropping {
+        if tampers {
+            self.tamper(stream, &key, handle, answer, now, passed);
+        } else {
             passed.to_server.push(to_server(handle, answer));
         }
+    }
+
+    fn unasked(&mut self, id: u64, newest: u64) {
+        let got = match newest {
+            0 => format!("an answer to decision {id} before any was put"),
+            _ => format!("an answer to decision {id}, when {newest} was the newest put"),
+        };
+        let expected = "answers to decisions that were put";
+        self.fault(Fault::AnsweredUnasked, expected, got);
+    }
+
+    /// Judges the action of an answer to an open decision; says whether it is legal.
+    fn judge_action(&mut self, key: &SeatKey, answer: &v1::Answer) -> bool {
+        let (id, action) = (answer.decision_id, answer.action);
+        let seen = self.seats.get(key);
+        let Some((seen, decision)) = seen.and_then(|seen| Some((seen, seen.decisions.get(&id)?)))
+        else {
+            return false;
+        };
+        let size = match seen.actions {
+            0 => u32::try_from(8 * decision.mask.len()).unwrap_or(u32::MAX),
+            actions => actions,
+        };
+        let (legal, kind) = (decision.is_legal(action), kind_in_words(decision.kind));
+        if action >= size {
+            self.fault(
+                Fault::ActionOutOfSpace,
+                format!("an action below {size}"),
+                format!("action {action} at decision {id}"),
+            );
+        } else if !legal {
+            self.fault(
+                Fault::IllegalAction,
+                "an action of the mask",
+                format!("action {action} at decision {id} ({kind}), which is not legal there"),
+            );
+        }
+        legal
     }
 
     /// A legal answer at a turn with a choice: passes it on, or does what the case is about.
@@ -271,7 +297,6 @@ impl Exam {
                 decision.stand = Stand::Taken;
                 seen.taken += 1;
                 self.fulfil(Fault::GaveUpWhenRefused);
-                self.fulfil(Fault::StoppedAfterClosed);
             }
             v1::AnswerStatus::Invalid => {
                 let exhausted = result.invalid_attempts_left == Some(0);
@@ -299,6 +324,8 @@ impl Exam {
                 }
                 decision.stand = Stand::Closed;
                 if tampered {
+                    // What was put before this was told may be answered without having read it.
+                    seen.read_after = seen.newest();
                     self.demand(
                         Fault::StoppedAfterClosed,
                         "the game to be played on after an answer came too late",

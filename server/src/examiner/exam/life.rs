@@ -211,11 +211,10 @@ impl Exam {
         if self.is_done() {
             return;
         }
+        let asked_since = (self.seats.values()).any(|seen| seen.newest() > seen.read_after);
         if let Some(demand) = self.demand.take()
-            && matches!(
-                demand.fault,
-                Fault::NeverResumed | Fault::StoppedAfterClosed
-            )
+            && (demand.fault == Fault::NeverResumed
+                || demand.fault == Fault::StoppedAfterClosed && asked_since)
         {
             self.fault(
                 demand.fault,
@@ -244,7 +243,9 @@ impl Exam {
             Fault::NeverLeft,
             match self.venue {
                 Venue::Room { .. } => "the stream to be left after Detached (GAME_OVER)",
-                Venue::Tournament { .. } => "the stream to be left after Detached (TOURNAMENT_OVER)",
+                Venue::Tournament { .. } => {
+                    "the stream to be left after Detached (TOURNAMENT_OVER)"
+                }
             },
             Some(now + self.patience.each),
         );

@@ -111,6 +111,8 @@ pub(super) struct SeatSeen {
     pub(super) kinds: BTreeSet<i32>,
     /// The agent wants no masks.
     pub(super) no_mask: bool,
+    /// Newest decision when the agent was told that an answer held back was too late.
+    pub(super) read_after: u64,
     /// Decisions that were the agent's to take, and came to an end.
     pub(super) taken: u32,
     /// Decisions that it lost to the clock.

@@ -3,10 +3,10 @@
 
 use std::collections::BTreeMap;
 
+use chefshat_arena::AgentKind;
 use chefshat_arena::tournament::{
     Change, Deals, Ended, Entrant, EntrantKind, Format, GameState, Settings, State, Tournament,
 };
-use chefshat_arena::AgentKind;
 use proptest::prelude::*;
 
 use super::support::{played, settings};
@@ -158,7 +158,9 @@ impl Run {
     /// The server goes down and comes up again: nobody is there, games that were being played are not.
     fn restart(&mut self) {
         let mut tournament = Tournament::new(self.tournament.settings().clone()).unwrap();
-        self.changes.iter().for_each(|change| tournament.fold(change));
+        self.changes
+            .iter()
+            .for_each(|change| tournament.fold(change));
         assert!(tournament == self.tournament);
         self.tournament = tournament;
         let playing: Vec<usize> = self.tournament.playing().collect();
@@ -190,7 +192,11 @@ fn run(plan: Plan) -> Run {
         run.tournament.set_present(number, true);
         run.present.insert(number, true);
     }
-    run.tournament.begin().unwrap().into_iter().for_each(|change| run.fold(change));
+    run.tournament
+        .begin()
+        .unwrap()
+        .into_iter()
+        .for_each(|change| run.fold(change));
     // Each game ends at most once for each call and each participant; half of the steps below end one, or let time pass.
     let calls = run.tournament.settings().max_calls as usize;
     let players = run.tournament.settings().players;
@@ -216,7 +222,7 @@ fn run(plan: Plan) -> Run {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 96, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 96, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn it_always_ends_and_adds_up(plan in plans()) {
@@ -290,9 +296,16 @@ fn it_goes_on_from_wherever_it_was_interrupted() {
             for change in after {
                 // What the tournament decides by itself it decides as before.
                 if resumed.state() == State::Playing
-                    && !matches!(change, Change::Counted { .. } | Change::Rescheduled { .. } | Change::Voided { .. })
+                    && !matches!(
+                        change,
+                        Change::Counted { .. } | Change::Rescheduled { .. } | Change::Voided { .. }
+                    )
                 {
-                    assert_eq!(resumed.next(0).as_ref(), Some(change), "{format:?}, cut at {cut}");
+                    assert_eq!(
+                        resumed.next(0).as_ref(),
+                        Some(change),
+                        "{format:?}, cut at {cut}"
+                    );
                 }
                 resumed.fold(change);
             }

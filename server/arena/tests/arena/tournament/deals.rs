@@ -40,8 +40,10 @@ fn tables_of_a_round_share_deals_and_nobody_meets_one_twice() {
         assert_eq!(games, tournament.games().len());
         for games in series.values() {
             let games = games.iter().map(|&game| &tournament.games()[game]);
-            let of: BTreeSet<(u32, u32)> =
-                games.clone().map(|game| (game.round, game.number)).collect();
+            let of: BTreeSet<(u32, u32)> = games
+                .clone()
+                .map(|game| (game.round, game.number))
+                .collect();
             assert_eq!(of.len(), 1, "one number of one round");
             let round = of.first().unwrap().0;
             let tables = tournament
@@ -93,7 +95,11 @@ fn a_deal_opens_when_its_last_game_is_over() {
     follow(&mut tournament, 0);
     let close = tournament.close().unwrap();
     tournament.fold(&close);
-    assert_eq!(open(&tournament), [true, true], "nothing is played any more");
+    assert_eq!(
+        open(&tournament),
+        [true, true],
+        "nothing is played any more"
+    );
 }
 
 #[test]

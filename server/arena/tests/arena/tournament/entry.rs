@@ -28,7 +28,9 @@ fn settings_are_refused_by_the_name_of_their_field() {
         }),
         ("rounds", |settings| settings.rounds = Some(0)),
         ("rounds", |settings| settings.rounds = Some(1001)),
-        ("games_per_pairing", |settings| settings.games_per_pairing = 0),
+        ("games_per_pairing", |settings| {
+            settings.games_per_pairing = 0
+        }),
         ("games_per_pairing", |settings| {
             settings.games_per_pairing = 1001;
         }),
@@ -38,13 +40,19 @@ fn settings_are_refused_by_the_name_of_their_field() {
             settings.deals = Deals::Rotated;
         }),
         ("max_participants", |settings| settings.max_participants = 1),
-        ("max_participants", |settings| settings.max_participants = 1025),
-        ("start_when_joined", |settings| settings.start_when_joined = Some(1)),
+        ("max_participants", |settings| {
+            settings.max_participants = 1025
+        }),
+        ("start_when_joined", |settings| {
+            settings.start_when_joined = Some(1)
+        }),
         ("start_when_joined", |settings| {
             settings.start_when_joined = Some(65);
         }),
         ("no_show_time_ms", |settings| settings.no_show_ms = 999),
-        ("no_show_time_ms", |settings| settings.no_show_ms = 86_400_001),
+        ("no_show_time_ms", |settings| {
+            settings.no_show_ms = 86_400_001
+        }),
         ("max_calls", |settings| settings.max_calls = 0),
         ("max_calls", |settings| settings.max_calls = 11),
         ("max_parallel_games", |settings| settings.max_parallel = 0),
@@ -120,7 +128,10 @@ fn it_begins_once_and_with_enough() {
         tournament.fold(&change);
         assert_eq!(tournament.state(), State::Open);
         let changes = tournament.begin().unwrap();
-        assert!(matches!(changes[0], Change::Joined(Entrant { filler: true, .. })));
+        assert!(matches!(
+            changes[0],
+            Change::Joined(Entrant { filler: true, .. })
+        ));
         assert!(matches!(changes[2], Change::Begun { .. }));
         assert!(matches!(changes[3], Change::Drawn { round: 1, .. }));
         assert_eq!(tournament.state(), State::Open, "nothing has happened yet");
@@ -185,7 +196,10 @@ fn closing_gives_up_what_is_not_over() {
     assert_eq!(close, Change::Closed);
     tournament.fold(&close);
     assert_eq!(tournament.state(), State::Closed);
-    assert_eq!((tournament.playing().count(), tournament.games_over()), (0, 14));
+    assert_eq!(
+        (tournament.playing().count(), tournament.games_over()),
+        (0, 14)
+    );
     assert_eq!(tournament.standings(), standings, "what counted stays");
     assert_eq!(tournament.ended(1, played(&[1, 2, 3, 4])), None, "too late");
     assert_eq!((tournament.close(), tournament.next(0)), (None, None));

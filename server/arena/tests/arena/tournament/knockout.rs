@@ -162,6 +162,19 @@ fn a_table_that_nobody_came_to_sends_the_drawn_on() {
     assert!(tournament.standings().iter().all(|line| line.games == 0));
 }
 
+#[test]
+fn the_tables_of_a_round_that_was_not_played_to_its_end_decide_nothing() {
+    let mut tournament = begun(settings(Format::Knockout), 8);
+    follow(&mut tournament, 0);
+    let seats = tournament.games()[0].seats.clone();
+    end(&mut tournament, 0, played(&[1, 2, 3, 4]));
+    let order = standing_order(&tournament);
+    assert_eq!(order[..2], seats[..2], "5 and 3, all others 1 or 0");
+    let close = tournament.close().unwrap();
+    tournament.fold(&close);
+    assert_eq!(standing_order(&tournament), order);
+}
+
 fn lowest(table: &[usize], count: usize) -> Vec<usize> {
     sorted(table)[..count].to_vec()
 }

@@ -3,9 +3,7 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use chefshat_arena::AgentKind;
-use chefshat_arena::tournament::{
-    Deals, Format, OfflineProblem, State, Tournament, play_offline,
-};
+use chefshat_arena::tournament::{Deals, Format, OfflineProblem, State, Tournament, play_offline};
 use chefshat_engine::{RuleSet, RuleSetSpec};
 use rayon::ThreadPoolBuilder;
 
@@ -60,7 +58,10 @@ fn better_agents_stand_higher_in_every_format() {
             let standings = tournament.standings();
             assert_eq!(standings[0].participant % 2, 0, "{format:?}, {deals:?}");
             let greedy = |upper: &[chefshat_arena::tournament::Standing]| {
-                upper.iter().filter(|line| line.participant % 2 == 0).count()
+                upper
+                    .iter()
+                    .filter(|line| line.participant % 2 == 0)
+                    .count()
             };
             assert!(greedy(&standings[..4]) >= 3, "{format:?}, {deals:?}");
             assert!(standings.iter().all(|line| line.performance_score >= 0.0));
@@ -100,7 +101,9 @@ fn duplicate_deals_are_the_same_cards() {
     let places = |game: usize| {
         let result = tournament.games()[game].result().unwrap();
         let seats = result.seats.iter();
-        seats.map(|seat| (seat.place, seat.points)).collect::<Vec<_>>()
+        seats
+            .map(|seat| (seat.place, seat.points))
+            .collect::<Vec<_>>()
     };
     for game in 1..4 {
         assert_eq!(places(game), places(0), "one deal");
@@ -109,7 +112,9 @@ fn duplicate_deals_are_the_same_cards() {
     assert_ne!(places(4), places(0));
     let standings = tournament.standings();
     assert!(
-        standings.iter().all(|line| line.score == standings[0].score),
+        standings
+            .iter()
+            .all(|line| line.score == standings[0].score),
         "everybody has played every hand"
     );
 }
@@ -119,13 +124,11 @@ fn what_cannot_be_played_offline_is_refused() {
     let mut with_people = begun(settings(Format::Swiss), 4);
     let refused = play_offline(&mut with_people, rules(), 0, || {});
     assert_eq!(refused, Err(OfflineProblem::NotBuiltIn(0)));
-    let mut spec = RuleSetSpec::default();
-    spec.players = 3;
-    spec.points = vec![5, 3, 0].try_into().unwrap();
+    let spec = RuleSetSpec {
+        players: 3,
+        ..RuleSetSpec::default()
+    };
     let rules = spec.validate().unwrap();
     let refused = play_offline(&mut with_people, rules, 0, || {});
-    assert_eq!(
-        refused,
-        Err(OfflineProblem::Players { rules: 3, seats: 4 })
-    );
+    assert_eq!(refused, Err(OfflineProblem::Players { rules: 3, seats: 4 }));
 }

@@ -125,12 +125,20 @@ fn who_has_played_less_is_not_behind_for_it() {
     let seats = tournament.games()[1].seats.clone();
     let fresh = (0..5).find(|who| !tournament.games()[0].seats.contains(who));
     let fresh = fresh.unwrap();
-    assert!(seats.contains(&fresh), "the bye of the first round plays now");
+    assert!(
+        seats.contains(&fresh),
+        "the bye of the first round plays now"
+    );
     let places: Vec<usize> = seats
         .iter()
         .map(|&who| match who {
             _ if who == fresh => 1,
-            _ => 2 + seats.iter().filter(|&&other| other < who && other != fresh).count(),
+            _ => {
+                2 + seats
+                    .iter()
+                    .filter(|&&other| other < who && other != fresh)
+                    .count()
+            }
         })
         .collect();
     end(&mut tournament, 1, played(&places));

@@ -41,7 +41,9 @@ pub(super) fn entrant(name: &str) -> Entrant {
 pub(super) fn joined(settings: Settings, participants: usize) -> Tournament {
     let mut tournament = Tournament::new(settings).unwrap();
     for number in 0..participants {
-        let change = tournament.join(entrant(&format!("agent {number}"))).unwrap();
+        let change = tournament
+            .join(entrant(&format!("agent {number}")))
+            .unwrap();
         tournament.fold(&change);
         tournament.set_present(number, true);
     }

@@ -1,0 +1,329 @@
+"""Tournaments with both clients and the command, on the fake server and the real one. Participants alone: `test_participant`."""
+
+import asyncio
+import json
+import subprocess
+import sys
+import threading
+from collections.abc import AsyncIterator, Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import TypeVar
+
+import pytest
+from fake_game import FakeGame, FakeSeat
+from fake_server import FakeServer
+from proxy import Proxy
+
+import chefshat
+from chefshat import Backoff, ChefsHatError, Decision, RandomAgent, SeatInfo, SeatResult, aio, pb
+from chefshat import agent as command
+from chefshat.participant import MakeAgent
+
+PACKAGE = Path(__file__).resolve().parents[1]
+QUICK = Backoff(first_s=0.001, max_s=0.05, attempts=100)
+# Seconds to wait for what must happen: generous, because nothing is measured by it.
+LIMIT_S = 120
+GAMES = 6
+
+Item = TypeVar("Item")
+Player = Callable[[str, str, MakeAgent], list[SeatResult]]
+
+
+def play_blocking(address: str, ticket: str, make: MakeAgent) -> list[SeatResult]:
+    with chefshat.Client(address, backoff=QUICK) as client:
+        return client.play_tournament(ticket, make)
+
+
+def play_asyncio(address: str, ticket: str, make: MakeAgent) -> list[SeatResult]:
+    async def run() -> list[SeatResult]:
+        async with aio.Client(address, backoff=QUICK) as client:
+            return await client.play_tournament(ticket, make)
+
+    return asyncio.run(run())
+
+
+@pytest.fixture(params=[play_blocking, play_asyncio], ids=["blocking", "asyncio"])
+def play(request: pytest.FixtureRequest) -> Player:
+    """The test runs once with each client."""
+    player: Player = request.param
+    return player
+
+
+class Checking(RandomAgent):
+    """Plays at random in one game, and looks at what it is told."""
+
+    def __init__(self, seat: SeatInfo) -> None:
+        super().__init__(seat.seat)
+        self.seat = seat
+        self.sequences: list[int] = []
+        self.ids: list[int] = []
+
+    def decide(self, request: Decision) -> int:
+        self.ids.append(request.decision_id)
+        return super().decide(request)
+
+    def on_event(self, event: pb.GameEvent) -> None:
+        self.sequences.append(event.sequence)
+
+    def on_game_over(self, result: SeatResult) -> None:
+        assert (result.game_id, result.seat) == (self.seat.game_id, self.seat.seat)
+        assert self.sequences == list(range(1, len(self.sequences) + 1)), "each once and in order"
+        assert self.ids == list(range(1, len(self.ids) + 1)), "asked once for each"
+
+
+def settings(*built_in: str, start_when_joined: int = 4) -> pb.TournamentSettings:
+    """Three rounds of two games, for four participants."""
+    return pb.TournamentSettings(
+        name="Coppa",
+        format=pb.TOURNAMENT_FORMAT_ROUND_ROBIN,
+        rules=pb.RuleSet(target_shifts=1),
+        policy=pb.RoomPolicy(decision_time_ms=60_000),
+        rounds=3,
+        games_per_pairing=2,
+        built_in_agents=built_in,
+        start_when_joined=start_when_joined,
+    )
+
+
+def compare(client: chefshat.Client, tournament_id: str, played: list[list[SeatResult]]) -> None:
+    """What participants tell of their games is what the server has counted."""
+    games = list(client.tournament_games(tournament_id))
+    assert len(games) == GAMES
+    for game in games:
+        assert game.state == pb.TOURNAMENT_GAME_STATE_COUNTED
+        for number, line in enumerate(game.seats):
+            if line.participant < len(played):
+                (result,) = [result for result in played[line.participant] if result.game_id == game.game_id]
+                assert (result.seat, result.place, result.points, result.error) == (number, line.place, line.points, None)
+    assert [len(results) for results in played] == [GAMES] * len(played)
+
+
+def test_four_participants_play_a_tournament_to_its_end(address: str, play: Player) -> None:
+    with chefshat.Client(address) as client:
+        made = client.create_tournament(settings())
+        tournament_id = made.tournament.tournament_id
+        joined = [client.join_tournament(made.join_code, f"player {number}", max_games=2) for number in range(4)]
+        assert [entry.participant for entry in joined] == [0, 1, 2, 3]
+        with ThreadPoolExecutor(4) as pool:
+            playing = [pool.submit(play, address, entry.ticket, Checking) for entry in joined]
+            *_, last = client.follow_tournament(tournament_id)
+            played = [results.result(LIMIT_S) for results in playing]
+        assert (last.tournament.state, last.tournament.games_over) == (pb.TOURNAMENT_STATE_FINISHED, GAMES)
+        compare(client, tournament_id, played)
+        results = client.tournament_results(tournament_id)
+        assert sorted(line.place for line in results.standings) == [1, 2, 3, 4]
+        assert [line.games for line in results.standings] == [GAMES] * 4
+        assert len(client.leaderboard().rated) >= 4
+
+
+@pytest.mark.parametrize("moment", ["before", "after"])
+def test_a_broken_stream_is_made_again(fake: FakeServer, play: Player, moment: str) -> None:
+    broken: set[tuple[str, int]] = set()
+
+    def fault(game: FakeGame, seat: FakeSeat, answer: pb.Answer) -> str:
+        mark = (game.room.game_id, answer.decision_id)
+        if answer.decision_id % 2 == 0 or mark in broken:
+            return ""
+        broken.add(mark)
+        return moment
+
+    fake.fault = fault
+    with chefshat.Client(fake.address) as client:
+        made = client.create_tournament(settings("random", "random", "random"))
+        joined = client.join_tournament(made.join_code, "Ada", max_games=2)
+        played = play(fake.address, joined.ticket, Checking)
+        assert len(broken) == 3 * GAMES
+        assert fake.streams > len(broken)
+        compare(client, made.tournament.tournament_id, [played])
+    assert sum(result.reconnects for result in played) >= len(broken)
+
+
+class Cutter(Checking):
+    """Has all connections cut before every fourth decision."""
+
+    def __init__(self, seat: SeatInfo, proxy: Proxy) -> None:
+        super().__init__(seat)
+        self.proxy = proxy
+
+    def decide(self, request: Decision) -> int:
+        if request.decision_id % 4 == 0:
+            self.proxy.cut()
+        return super().decide(request)
+
+
+@pytest.mark.server
+def test_a_cut_connection_is_made_again_with_the_real_server(real_address: str, play: Player) -> None:
+    agents: list[Cutter] = []
+    with chefshat.Client(real_address) as client, Proxy(real_address) as proxy:
+
+        def make(seat: SeatInfo) -> Cutter:
+            agents.append(Cutter(seat, proxy))
+            return agents[-1]
+
+        made = client.create_tournament(settings("greedy", "random", "random"))
+        built_in = 3
+        joined = client.join_tournament(made.join_code, "Ada", max_games=2)
+        assert joined.participant == built_in
+        played = play(proxy.address, joined.ticket, make)
+        assert proxy.cuts > GAMES
+        assert len(agents) == len(played) == GAMES
+        games = {game.game_id: game for game in client.tournament_games(made.tournament.tournament_id)}
+        assert sorted(games) == sorted(result.game_id for result in played)
+        for result in played:
+            line = games[result.game_id].seats[result.seat]
+            assert (line.participant, line.place, line.points) == (built_in, result.place, result.points)
+            assert not line.substituted
+
+
+class Waiting(RandomAgent):
+    """Waits with its first decision until it is let."""
+
+    reached = threading.Event()
+    go_on = threading.Event()
+
+    def decide(self, request: Decision) -> int:
+        self.reached.set()
+        assert self.go_on.wait(LIMIT_S)
+        return super().decide(request)
+
+
+def test_the_newest_connection_takes_part(address: str, play: Player) -> None:
+    Waiting.reached.clear()
+    Waiting.go_on.clear()
+    with chefshat.Client(address) as client, ThreadPoolExecutor(1) as pool:
+        made = client.create_tournament(settings("random", "random", "random"))
+        ticket = client.join_tournament(made.join_code, "Ada").ticket
+        older = pool.submit(play, address, ticket, lambda seat: Waiting())
+        assert Waiting.reached.wait(LIMIT_S)
+        newer = play_blocking(address, ticket, Checking)
+        Waiting.go_on.set()
+        assert len(newer) == GAMES
+        with pytest.raises(ChefsHatError, match="SUPERSEDED"):
+            older.result(LIMIT_S)
+
+
+def test_a_tournament_that_is_closed_ends_for_its_participants(address: str, play: Player) -> None:
+    Waiting.reached.clear()
+    Waiting.go_on.clear()
+    with chefshat.Client(address) as client, ThreadPoolExecutor(1) as pool:
+        made = client.create_tournament(settings("random", "random", "random", start_when_joined=0))
+        tournament_id = made.tournament.tournament_id
+        ticket = client.join_tournament(made.join_code, "Ada").ticket
+        playing = pool.submit(play, address, ticket, lambda seat: Waiting())
+        with pytest.raises(ChefsHatError, match="OWNER_TOKEN_WRONG"):
+            client.start_tournament(tournament_id, "not it")
+        assert client.start_tournament(tournament_id, made.owner_token).state == pb.TOURNAMENT_STATE_PLAYING
+        assert Waiting.reached.wait(LIMIT_S)
+        closed = client.close_tournament(tournament_id, made.owner_token)
+        assert closed.state == pb.TOURNAMENT_STATE_CLOSED
+        Waiting.go_on.set()
+        (result,) = playing.result(LIMIT_S)
+        assert (result.finished, result.abort_reason) == (False, "CLOSED")
+        assert client.get_tournament(tournament_id).state == pb.TOURNAMENT_STATE_CLOSED
+        # Who comes later finds nothing more to play.
+        assert play(address, ticket, Checking) == []
+
+
+def test_an_unknown_ticket_is_refused(address: str, play: Player) -> None:
+    with pytest.raises(ChefsHatError, match="TICKET_UNKNOWN"):
+        play(address, "nobody's", Checking)
+
+
+def test_what_an_agent_cannot_be_made_for_reaches_the_caller(fake: FakeServer, play: Player) -> None:
+    def make(seat: SeatInfo) -> RandomAgent:
+        raise LookupError(f"no agent for seat {seat.seat}")
+
+    with chefshat.Client(fake.address) as client:
+        made = client.create_tournament(settings("random", "random", "random"))
+        ticket = client.join_tournament(made.join_code, "Ada").ticket
+        with pytest.raises(LookupError, match="no agent for seat 0"):
+            play(fake.address, ticket, make)
+
+
+def test_the_calls_of_the_blocking_client(fake: FakeServer) -> None:
+    with chefshat.Client(fake.address) as client:
+        made = [client.create_tournament(settings()).tournament.tournament_id for _ in range(3)]
+        assert [tournament.tournament_id for tournament in client.list_tournaments()] == made
+        assert client.get_tournament(made[1]).settings.name == "Coppa"
+        joined = client.join_tournament("CUP2", "Ada", max_games=3, stateless=True, kind=pb.PARTICIPANT_KIND_ROBOT)
+        assert joined.tournament.tournament_id == made[1]
+        (asked,) = fake.tournaments.joins
+        assert (asked.name, asked.max_games, asked.stateless, asked.kind) == ("Ada", 3, True, pb.PARTICIPANT_KIND_ROBOT)
+        with pytest.raises(ChefsHatError, match="JOIN_CODE_WRONG"):
+            client.join_tournament("WRONG", "Ada")
+        with pytest.raises(ChefsHatError, match="TOURNAMENT_UNKNOWN"):
+            list(client.follow_tournament("nowhere"))
+        with pytest.raises(ValueError, match="max_games"):
+            client.join_tournament("CUP2", "Ada", max_games=0)
+
+
+def test_the_calls_of_the_asyncio_client(fake: FakeServer) -> None:
+    async def listed(items: AsyncIterator[Item]) -> list[Item]:
+        return [item async for item in items]
+
+    async def run() -> None:
+        async with aio.Client(fake.address, backoff=QUICK) as client:
+            ids = [
+                (await client.create_tournament(settings("random", "random", "random"))).tournament.tournament_id for _ in range(3)
+            ]
+            assert [tournament.tournament_id for tournament in await listed(client.list_tournaments())] == ids
+            joined = await client.join_tournament("CUP1", "Ada")
+            following = asyncio.create_task(listed(client.follow_tournament(ids[0])))
+            played = await client.play_tournament(joined.ticket, Checking)
+            reports = await following
+            assert reports[-1].tournament.state == pb.TOURNAMENT_STATE_FINISHED
+            games = await listed(client.tournament_games(ids[0]))
+            assert [game.game_id for game in games] == [result.game_id for result in played]
+            assert len((await client.tournament_results(ids[0])).standings) == 4
+            assert (await client.leaderboard()).games == 4
+            assert (await client.start_tournament(ids[1], "owner")).state == pb.TOURNAMENT_STATE_PLAYING
+            assert (await client.close_tournament(ids[1], "owner")).state == pb.TOURNAMENT_STATE_CLOSED
+            assert (await client.get_tournament(ids[1])).state == pb.TOURNAMENT_STATE_CLOSED
+            with pytest.raises(ChefsHatError, match="TOURNAMENT_UNKNOWN"):
+                await listed(client.follow_tournament("nowhere"))
+
+    asyncio.run(run())
+
+
+@pytest.mark.parametrize("more", [["--seed", "3"], ["--agent", "samples.careful_agent:Careful"]])
+def test_the_command_takes_part(address: str, more: list[str]) -> None:
+    with chefshat.Client(address) as client:
+        made = client.create_tournament(settings("random", "random", "random"))
+        arguments = ["--address", address, "--tournament", made.join_code, "--name", "Ada", "--games", "2", "--json", *more]
+        done = subprocess.run(
+            [sys.executable, "-m", "chefshat.agent", *arguments], capture_output=True, text=True, timeout=LIMIT_S, cwd=PACKAGE
+        )
+        assert done.returncode == 0, done.stderr
+        said = json.loads(done.stdout)
+        results = client.tournament_results(made.tournament.tournament_id)
+    assert (said["event"], said["tournament_id"]) == ("finished", made.tournament.tournament_id)
+    assert [game["event"] for game in said["games"]] == ["finished"] * GAMES
+    assert [line["participant"] for line in said["standings"]] == [line.participant for line in results.standings]
+    assert said["place"] == next(line.place for line in results.standings if line.participant == said["participant"])
+
+
+def test_the_command_prints_a_table(fake: FakeServer, capsys: pytest.CaptureFixture[str]) -> None:
+    with chefshat.Client(fake.address) as client:
+        made = client.create_tournament(settings("random", "random", "random"))
+    assert command.main(["--address", fake.address, "--tournament", made.join_code, "--name", "Ada"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].split() == ["place", "score", "points", "games", "name"]
+    assert lines[1].split() == ["1", "30", "0", "6", "Ada", "<-", "this", "agent"]
+    assert len(lines) == 5
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["--code", "X", "--games", "2"],
+        ["--code", "X", "--stateless"],
+        ["--tournament", "X", "--seat", "1"],
+        ["--tournament", "X", "--games", "0"],
+    ],
+)
+def test_the_command_refuses_what_does_not_go_together(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as exit_info:
+        command.main(["--address", "127.0.0.1:1", "--name", "Ada", *arguments])
+    assert exit_info.value.code == 2
+    assert "error" in capsys.readouterr().err

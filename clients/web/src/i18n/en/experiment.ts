@@ -1,0 +1,5 @@
+// English texts of experiment/.
+
+export const experiment = {
+  title: "Experiment",
+};

@@ -1,0 +1,16 @@
+// All English texts; their form is the form of every language.
+
+import { common } from "./common";
+import { experiment } from "./experiment";
+import { faults } from "./faults";
+import { lobby } from "./lobby";
+import { people } from "./people";
+import { replay } from "./replay";
+import { table } from "./table";
+import { tournaments } from "./tournaments";
+import { tutorial } from "./tutorial";
+
+export const en = { common, experiment, faults, lobby, people, replay, table, tournaments, tutorial };
+
+/** The form of a language's texts. */
+export type Texts = typeof en;

@@ -1,0 +1,5 @@
+// English texts of people/.
+
+export const people = {
+  title: "People",
+};

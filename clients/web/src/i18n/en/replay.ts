@@ -1,0 +1,26 @@
+// English texts of replay/.
+
+export const replay = {
+  title: "Replay",
+  controls: "Replay",
+  first: "To the beginning",
+  before: "One moment back",
+  play: "Play",
+  pause: "Pause",
+  after: "One moment on",
+  last: "To the end",
+  moment: "Moment of the game",
+  decisionOf: (decision: number, all: number) => `${decision} of ${all} decisions taken`,
+  shift: "Shift",
+  speed: "Speed",
+  eyes: "Cards seen",
+  allHands: "all hands",
+  as: (name: string) => `as ${name}`,
+  asSpectator: "as spectators",
+  possible: "What was possible",
+  answered: (name: string, answer: string) => `${name}: ${answer}`,
+  seconds: (seconds: number) => `${seconds.toFixed(1)} s`,
+  estimate: (value: number) => `own estimate ${value.toFixed(2)}`,
+  noTable: "This decision is not a turn: the look-up table has nothing to say about it.",
+  empty: "This record holds no events.",
+};

@@ -1,0 +1,5 @@
+// English texts of tournaments/.
+
+export const tournaments = {
+  title: "Tournaments",
+};

@@ -1,0 +1,55 @@
+// Italian texts that several parts of the page use: the frame, kinds of participants, words of the game.
+
+import type { Texts } from "../en";
+import { ordinals, plurals } from "../plural";
+
+const plural = plurals("it");
+
+export const common: Texts["common"] = {
+  name: "Chef’s Hat",
+  skipToContent: "Vai al contenuto",
+  nav: {
+    label: "Pagine",
+    lobby: "Sala",
+    tournaments: "Tornei",
+    leaderboard: "Classifica",
+    tutorial: "Impara a giocare",
+  },
+  settings: {
+    title: "Impostazioni",
+    language: "Lingua",
+    look: "Aspetto",
+    looks: { system: "Come il sistema", light: "Chiaro", dark: "Scuro" },
+  },
+  kinds: { agent: "agente", human: "persona", robot: "robot", builtIn: "agente incorporato", open: "libero" },
+  roles: { chef: "Chef", sousChef: "Sous-Chef", cook: "Cuoco", waiter: "Cameriere", dishwasher: "Lavapiatti" },
+  faces: [
+    "tartufo",
+    "gambero",
+    "acciuga",
+    "carciofo",
+    "peperoncino",
+    "basilico",
+    "oliva",
+    "peperone",
+    "fungo",
+    "pomodoro",
+    "mozzarella",
+  ],
+  joker: "jolly",
+  golden: "d’oro",
+  cards: (count) => plural(count, { one: "# carta", other: "# carte" }),
+  points: (count) => plural(count, { one: "# punto", other: "# punti" }),
+  place: ordinals("it", { other: "º" }),
+  seat: (seat) => `Posto ${seat}`,
+  close: "Chiudi",
+  cancel: "Annulla",
+  back: "Indietro",
+  retry: "Riprova",
+  copy: "Copia",
+  copied: "Copiato",
+  loading: "Caricamento…",
+  more: "Altri",
+  pageNotLoaded: "Non è stato possibile caricare questa pagina. Controlla la connessione e ricarica.",
+  notFound: { title: "Questa pagina non esiste", text: "L’indirizzo non porta a nulla.", link: "Alla sala" },
+};

@@ -1,0 +1,14 @@
+// All Italian texts.
+
+import type { Texts } from "../en";
+import { common } from "./common";
+import { experiment } from "./experiment";
+import { faults } from "./faults";
+import { lobby } from "./lobby";
+import { people } from "./people";
+import { replay } from "./replay";
+import { table } from "./table";
+import { tournaments } from "./tournaments";
+import { tutorial } from "./tutorial";
+
+export const it: Texts = { common, experiment, faults, lobby, people, replay, table, tournaments, tutorial };

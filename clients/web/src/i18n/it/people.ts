@@ -1,0 +1,7 @@
+// Italian texts of people/.
+
+import type { Texts } from "../en";
+
+export const people: Texts["people"] = {
+  title: "People",
+};

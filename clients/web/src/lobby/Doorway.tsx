@@ -1,0 +1,119 @@
+// A room for those who have no seat in it: who sits there, how to get in, how to watch; for whoever made it, how to invite others and
+// how to close it. The table itself is in table/, which shows this to who has no ticket.
+
+import { useState } from "preact/hooks";
+import { CALL_LIMIT_MS, roomApi } from "../api/client";
+import { inWords, wordsOf } from "../api/faults";
+import { usePolled } from "../api/poll";
+import { ParticipantKind, type Room, RoomState } from "../gen/chefshat/v1/room_pb";
+import { t } from "../i18n";
+import { Button, ButtonLink } from "../parts/Button";
+import { Notice } from "../parts/Notice";
+import { pathOf } from "../router";
+import { HostInvite } from "./Invite";
+import { NameForm } from "./Join";
+import { JoinForm } from "./JoinForm";
+import { RoomStateChip, rulesInShort } from "./RoomCard";
+import { isFree } from "./rooms";
+import { Seats } from "./Seats";
+import { closeRoom, hostedRoom } from "./seat";
+import "./doorway.css";
+
+/** How often the room is asked for, milliseconds. */
+const EVERY_MS = 2000;
+
+/** The room as it is seen from outside. */
+export function Doorway({ roomId }: { roomId: string }) {
+  const words = t().lobby.door;
+  const ask = async (signal: AbortSignal) =>
+    (await roomApi.getRoom({ roomId }, { signal, timeoutMs: CALL_LIMIT_MS })).room;
+  const { value: room, fault } = usePolled(ask, EVERY_MS, roomId);
+  if (!room) {
+    if (!fault) return <p class="soft">{t().common.loading}</p>;
+    return (
+      <section class="sheet doorway">
+        <Notice kind="fault">{wordsOf(fault)}</Notice>
+        <p>
+          <ButtonLink href="/">{words.toLobby}</ButtonLink>
+        </p>
+      </section>
+    );
+  }
+  return (
+    <div class="doorway">
+      <section class="sheet doorway-room">
+        <header class="doorway-head">
+          <h1>{room.name || t().lobby.rooms.unnamed}</h1>
+          <RoomStateChip room={room} />
+        </header>
+        <p class="soft">{rulesInShort(room)}</p>
+        <Seats room={room} />
+        <DoorwayLinks room={room} />
+        {fault && <Notice kind="fault">{wordsOf(fault)}</Notice>}
+      </section>
+      {room.state === RoomState.WAITING && <WayIn room={room} />}
+    </div>
+  );
+}
+
+/** How to get in, while the room waits. */
+function WayIn({ room }: { room: Room }) {
+  const words = t().lobby.door;
+  const hosted = hostedRoom(room.roomId);
+  const seatForPeople = room.seats.some(
+    (seat) => isFree(seat) && [ParticipantKind.UNSPECIFIED, ParticipantKind.HUMAN].includes(seat.reservedFor),
+  );
+  return (
+    <>
+      {seatForPeople && (
+        <section class="sheet doorway-part">
+          <h2>{words.sitDown}</h2>
+          {hosted ? <NameForm code={hosted.joinCode} /> : <JoinForm />}
+        </section>
+      )}
+      {room.seats.some(isFree) && <HostInvite roomId={room.roomId} />}
+      {hosted && <CloseRoom roomId={room.roomId} />}
+    </>
+  );
+}
+
+function DoorwayLinks({ room }: { room: Room }) {
+  const words = t().lobby.rooms;
+  const over = room.state === RoomState.FINISHED || room.state === RoomState.ABORTED;
+  if (room.state === RoomState.ABORTED) return <Notice kind="hint">{t().lobby.door.aborted}</Notice>;
+  return (
+    <div>
+      {over && <ButtonLink href={pathOf({ page: "replay", gameId: room.gameId })}>{words.replay}</ButtonLink>}
+      {!over && room.policy?.spectators && (
+        <ButtonLink href={pathOf({ page: "watch", roomId: room.roomId })}>{words.watch}</ButtonLink>
+      )}
+    </div>
+  );
+}
+
+function CloseRoom({ roomId }: { roomId: string }) {
+  const words = t().lobby.door;
+  const [sure, setSure] = useState(false);
+  const [fault, setFault] = useState<string | null>(null);
+  const close = () => {
+    closeRoom(roomId).catch((error: unknown) => setFault(inWords(error)));
+  };
+  return (
+    <div class="doorway-close">
+      {sure ? (
+        <>
+          <span>{words.closeSure}</span>
+          <Button onClick={close}>{words.close}</Button>
+          <Button look="quiet" onClick={() => setSure(false)}>
+            {t().common.cancel}
+          </Button>
+        </>
+      ) : (
+        <Button look="quiet" onClick={() => setSure(true)}>
+          {words.close}
+        </Button>
+      )}
+      {fault && <Notice kind="fault">{fault}</Notice>}
+    </div>
+  );
+}

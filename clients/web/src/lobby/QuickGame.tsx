@@ -1,0 +1,70 @@
+// One press from the lobby to the table: a room with three built-in agents, clocks without hurry, and the person on the first seat.
+
+import { useState } from "preact/hooks";
+import { inWords } from "../api/faults";
+import { serverInfo } from "../api/server";
+import { t } from "../i18n";
+import { Button, ButtonLink } from "../parts/Button";
+import { Drawing, faceDrawing } from "../parts/Drawing";
+import { TextField } from "../parts/Field";
+import { Notice } from "../parts/Notice";
+import { navigate } from "../router";
+import { MAX_NAME, quickGame } from "./room-form";
+import { lastName, makeRoom, takeSeat } from "./seat";
+import "./quick-game.css";
+
+/** The tile. */
+export function QuickGame() {
+  const words = t().lobby.quick;
+  const [name, setName] = useState(lastName());
+  const [busy, setBusy] = useState(false);
+  const [fault, setFault] = useState<string | null>(null);
+  const start = async (event: Event) => {
+    event.preventDefault();
+    setBusy(true);
+    setFault(null);
+    try {
+      const { builtInAgents } = await serverInfo();
+      const player = name.trim() || words.guest;
+      const { joinCode } = await makeRoom(quickGame(words.roomOf(player), builtInAgents));
+      const room = await takeSeat(joinCode, player);
+      navigate({ page: "room", roomId: room.roomId });
+    } catch (error) {
+      setFault(inWords(error));
+      setBusy(false);
+    }
+  };
+  return (
+    <section class="quick">
+      <div class="quick-cards" aria-hidden="true">
+        {[1, 5, 8, 10].map((face) => (
+          <span key={face} class="quick-card">
+            <b>{face}</b>
+            <Drawing name={faceDrawing(face)} />
+          </span>
+        ))}
+      </div>
+      <h2>{words.title}</h2>
+      <p>{words.text}</p>
+      <form class="quick-form" onSubmit={start}>
+        <TextField
+          label={words.name}
+          value={name}
+          onText={setName}
+          maxLength={MAX_NAME}
+          placeholder={words.guest}
+          autoComplete="nickname"
+        />
+        <Button look="main" type="submit" busy={busy}>
+          {words.start}
+        </Button>
+      </form>
+      {fault && <Notice kind="fault">{fault}</Notice>}
+      <p>
+        <ButtonLink href="/tutorial" look="quiet">
+          {words.learn}
+        </ButtonLink>
+      </p>
+    </section>
+  );
+}

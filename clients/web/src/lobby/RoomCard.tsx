@@ -1,0 +1,86 @@
+// One room of the lobby's lists: its name, where it stands, who sits there, what one can do.
+
+import { type Room, RoomState } from "../gen/chefshat/v1/room_pb";
+import { t } from "../i18n";
+import { ButtonLink } from "../parts/Button";
+import { pathOf } from "../router";
+import { isFree } from "./rooms";
+import { Seats } from "./Seats";
+import { heldSeat, hostedRoom } from "./seat";
+import "./room-card.css";
+
+/** A room in a list. */
+export function RoomCard({ room }: { room: Room }) {
+  const words = t().lobby.rooms;
+  const held = heldSeat(room.roomId);
+  return (
+    <li class="room-card sheet">
+      <header class="room-card-head">
+        <h3>{room.name || words.unnamed}</h3>
+        <RoomStateChip room={room} />
+      </header>
+      <p class="soft small">{rulesInShort(room)}</p>
+      <Seats room={room} mine={held?.seat} />
+      <div class="room-card-actions">
+        <RoomActions room={room} />
+      </div>
+    </li>
+  );
+}
+
+function RoomActions({ room }: { room: Room }) {
+  const words = t().lobby.rooms;
+  const { roomId, gameId } = room;
+  const link = (href: string, label: string, main = false) => (
+    <ButtonLink href={href} look={main ? "main" : "plain"}>
+      {label}
+      <span class="only-heard"> {room.name || words.unnamed}</span>
+    </ButtonLink>
+  );
+  if (room.state === RoomState.FINISHED) return link(pathOf({ page: "replay", gameId }), words.replay);
+  if (heldSeat(roomId)) return link(pathOf({ page: "room", roomId }), words.goBack, true);
+  const watch = room.policy?.spectators && link(pathOf({ page: "watch", roomId }), words.watch);
+  if (room.state === RoomState.PLAYING) return <>{watch || <span class="soft small">{words.closed}</span>}</>;
+  return (
+    <>
+      {room.seats.some(isFree) &&
+        link(pathOf({ page: "room", roomId }), hostedRoom(roomId) ? words.open : words.join, true)}
+      {watch}
+    </>
+  );
+}
+
+/** Where a room stands, by sign and word. */
+export function RoomStateChip({ room }: { room: Room }) {
+  const words = t().lobby.rooms.states;
+  const [sign, word] = ((): [string, string] => {
+    switch (room.state) {
+      case RoomState.WAITING:
+        return ["◔", words.waiting];
+      case RoomState.PLAYING:
+        return ["▶", words.playing];
+      case RoomState.FINISHED:
+        return ["✓", words.finished];
+      default:
+        return ["×", words.aborted];
+    }
+  })();
+  return (
+    <span class={`room-state room-state-${room.state}`}>
+      <span aria-hidden="true">{sign}</span> {word}
+    </span>
+  );
+}
+
+/** How long a game lasts and how long a decision may take, in a line. */
+export function rulesInShort(room: Room): string {
+  const words = t().lobby.rooms;
+  const parts: string[] = [];
+  const stop = room.rules?.stop;
+  if (stop?.case === "targetPoints") parts.push(words.toPoints(stop.value));
+  if (stop?.case === "targetShifts") parts.push(words.shifts(stop.value));
+  const decisionTimeMs = room.policy?.decisionTimeMs;
+  if (decisionTimeMs !== undefined) parts.push(words.decisionTime(decisionTimeMs));
+  if (room.tournamentId) parts.push(words.ofTournament);
+  return parts.join(" · ");
+}

@@ -1,0 +1,171 @@
+// The parts of the form for a new room that are mostly left alone: clock, rules, those who are late or wrong, those who watch.
+
+import type { RuleSet } from "../gen/chefshat/v1/rules_pb";
+import { t } from "../i18n";
+import { CheckField, SelectField, TextField } from "../parts/Field";
+import type { FormProps } from "./NewRoom";
+import { type FieldName, type RoomForm, withPreset } from "./room-form";
+
+/** Names of fields that hold what was typed. */
+type TextName = { [Name in FieldName]: string extends RoomForm[Name] ? Name : never }[FieldName];
+
+/** How fast the game is played. */
+export function ClockFields(props: FormProps) {
+  const { form, change } = props;
+  const words = t().lobby.make.clocks;
+  const choices = ["noHurry", "relaxed", "brisk", "own"] as const;
+  return (
+    <div class="fields">
+      <SelectField
+        label={words.label}
+        hint={form.clock === "own" ? undefined : words.hints[form.clock]}
+        value={form.clock}
+        options={choices.map((value) => ({ value, label: words.names[value] }))}
+        onPick={(clock) => change({ clock })}
+      />
+      {form.clock === "own" && (
+        <>
+          <Typed {...props} name="decisionSeconds" label={words.decision} hint={words.decisionHint} />
+          <Typed {...props} name="bankSeconds" label={words.bank} hint={words.bankHint} />
+        </>
+      )}
+      <Typed {...props} name="paceSeconds" label={words.pace} hint={words.paceHint} />
+    </div>
+  );
+}
+
+/** The rules: a preset, and every field of it. */
+export function RuleFields(props: FormProps & { presets: RuleSet[] }) {
+  const { form, change, presets } = props;
+  const words = t().lobby.make.rule;
+  const names: Record<string, string> = words.presets;
+  return (
+    <>
+      <div class="fields">
+        <SelectField
+          label={words.preset}
+          hint={words.presetHint}
+          value={form.preset}
+          options={presets.map(({ preset }) => ({ value: preset, label: names[preset] ?? preset }))}
+          onPick={(picked) => {
+            const preset = presets.find((one) => one.preset === picked);
+            if (preset) change(withPreset(form, preset));
+          }}
+        />
+        <SelectField
+          label={words.stop}
+          value={form.stop}
+          options={[
+            { value: "points", label: words.stopPoints },
+            { value: "shifts", label: words.stopShifts },
+          ]}
+          onPick={(stop) => change({ stop, target: stop === "points" ? "15" : "3" })}
+        />
+        <Typed {...props} name="target" label={form.stop === "points" ? words.targetPoints : words.targetShifts} />
+        <Typed {...props} name="points" label={words.points} hint={words.pointsHint} />
+        <Typed {...props} name="faces" label={words.faces} hint="4–15" />
+        <Typed {...props} name="jokers" label={words.jokers} hint="0–2" />
+        <SelectField
+          label={words.opening}
+          value={form.opening}
+          options={[
+            { value: "golden", label: words.openingGolden },
+            { value: "anyTopFace", label: words.openingAny },
+          ]}
+          onPick={(opening) => change({ opening })}
+        />
+        <SelectField
+          label={words.passScope}
+          value={form.passScope}
+          options={[
+            { value: "pizza", label: words.passPizza },
+            { value: "turn", label: words.passTurn },
+          ]}
+          onPick={(passScope) => change({ passScope })}
+        />
+        <Typed {...props} name="maxIdlePizzas" label={words.maxIdlePizzas} hint={words.maxIdlePizzasHint} />
+        <Typed {...props} name="maxTurns" label={words.maxTurns} hint={words.maxTurnsHint} />
+      </div>
+      <div class="fields">
+        <CheckField label={words.exchange} checked={form.exchange} onCheck={(exchange) => change({ exchange })} />
+        <CheckField
+          label={words.specialActions}
+          checked={form.specialActions}
+          onCheck={(specialActions) => change({ specialActions })}
+        />
+        <CheckField
+          label={words.openingPass}
+          checked={form.openingPass}
+          onCheck={(openingPass) => change({ openingPass })}
+        />
+      </div>
+    </>
+  );
+}
+
+/** What happens to those who are late or answer what is not legal. */
+export function FaultFields(props: FormProps & { agents: string[] }) {
+  const { form, change, agents } = props;
+  const words = t().lobby.make.fault;
+  const aborts = ["allLost", "anyLost", "never"] as const;
+  return (
+    <div class="fields">
+      <Typed {...props} name="maxInvalidAttempts" label={words.invalid} hint={words.invalidHint} />
+      <Typed {...props} name="maxTimeouts" label={words.timeouts} hint={words.timeoutsHint} />
+      <SelectField
+        label={words.substitute}
+        value={form.substitute}
+        options={agents.map((value) => ({ value, label: value }))}
+        onPick={(substitute) => change({ substitute })}
+      />
+      <SelectField
+        label={words.abort}
+        value={form.abort}
+        options={aborts.map((value) => ({ value, label: words.aborts[value] }))}
+        onPick={(abort) => change({ abort })}
+      />
+    </div>
+  );
+}
+
+/** Who may watch, and what they see when. */
+export function WatchFields(props: FormProps) {
+  const { form, change } = props;
+  const words = t().lobby.make.watch;
+  return (
+    <div class="fields">
+      <CheckField label={words.allowed} checked={form.spectators} onCheck={(spectators) => change({ spectators })} />
+      {form.spectators && (
+        <>
+          <Typed {...props} name="spectatorDelay" label={words.delay} hint={words.delayHint} />
+          <CheckField
+            label={words.hands}
+            hint={props.faults.spectatorsSeeHands ?? words.handsHint}
+            checked={form.spectatorsSeeHands}
+            onCheck={(spectatorsSeeHands) =>
+              change({
+                spectatorsSeeHands,
+                ...(spectatorsSeeHands && form.spectatorDelay === "0" ? { spectatorDelay: "1" } : {}),
+              })
+            }
+          />
+        </>
+      )}
+    </div>
+  );
+}
+
+/** A field of the form that is typed. */
+function Typed(props: FormProps & { name: TextName; label: string; hint?: string }) {
+  const { form, faults, change, name, label, hint } = props;
+  return (
+    <TextField
+      label={label}
+      hint={hint}
+      value={form[name]}
+      fault={faults[name]}
+      onText={(text) => change({ [name]: text })}
+      autoComplete="off"
+    />
+  );
+}

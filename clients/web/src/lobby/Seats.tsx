@@ -1,0 +1,39 @@
+// Who sits in a room: one line for each seat, with its number, its colour, the name, and what it is. Also for whom a free seat is kept.
+
+import { ParticipantKind, type Room } from "../gen/chefshat/v1/room_pb";
+import { t } from "../i18n";
+import { KindBadge, kindWord } from "../parts/KindBadge";
+import { SeatNumber } from "../parts/SeatNumber";
+import { isFree, nameOf } from "./rooms";
+import "./seats.css";
+
+/** The seats of a room. */
+export function Seats({ room, mine }: { room: Room; mine?: number | undefined }) {
+  const words = t().lobby.seats;
+  return (
+    <ul class="seat-list">
+      {room.seats.map((participant) => (
+        <li key={participant.seat} class="seat-list-line">
+          <SeatNumber seat={participant.seat} />
+          <span class="only-heard">{t().common.seat(participant.seat)}:</span>
+          {isFree(participant) ? (
+            <span class="seat-list-free">
+              {participant.reservedFor === ParticipantKind.UNSPECIFIED
+                ? words.free
+                : words.keptFor(kindWord(participant.reservedFor))}
+            </span>
+          ) : (
+            <>
+              <span class="seat-list-name">
+                {nameOf(participant)}
+                {participant.seat === mine && <span class="soft"> {words.you}</span>}
+              </span>
+              <KindBadge kind={participant.kind} builtIn={participant.builtInAgent} />
+              {!participant.connected && <span class="seat-list-away">{words.away}</span>}
+            </>
+          )}
+        </li>
+      ))}
+    </ul>
+  );
+}

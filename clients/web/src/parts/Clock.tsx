@@ -1,0 +1,63 @@
+// The time that is left for a decision, as a bar that shrinks and in seconds: first the decision's own time, then the seat's bank. The server's
+// clock decides; this one shows what it said, counted on here.
+
+import { useEffect, useState } from "preact/hooks";
+import { t } from "../i18n";
+import { announce } from "./Announcer";
+import "./clock.css";
+
+interface ClockProps {
+  /** Milliseconds left of the decision's own time at `sinceMs`. */
+  timeLeftMs: number;
+  /** Milliseconds left in the bank at `sinceMs`. */
+  bankLeftMs: number;
+  /** When that was, by performance.now(). */
+  sinceMs: number;
+  /** Milliseconds of a whole decision, for the length of the bar. */
+  wholeMs: number;
+}
+
+const REFRESH_MS = 200;
+/** Seconds left of everything at which the clock warns. */
+const HURRY_SECONDS = 10;
+
+export function Clock({ timeLeftMs, bankLeftMs, sinceMs, wholeMs }: ClockProps) {
+  const [nowMs, setNowMs] = useState(() => performance.now());
+  useEffect(() => {
+    const timer = setInterval(() => setNowMs(performance.now()), REFRESH_MS);
+    return () => clearInterval(timer);
+  }, []);
+  const passedMs = Math.max(0, nowMs - sinceMs);
+  const ownMs = Math.max(0, timeLeftMs - passedMs);
+  const bankMs = Math.max(0, bankLeftMs - Math.max(0, passedMs - timeLeftMs));
+  const leftSeconds = Math.ceil((ownMs + bankMs) / 1000);
+  const hurry = leftSeconds <= HURRY_SECONDS;
+  useEffect(() => {
+    if (hurry && leftSeconds > 0) announce(t().table.clock.hurry(leftSeconds));
+  }, [hurry]);
+  const words = t().table.clock;
+  const onBank = ownMs === 0;
+  const share = onBank ? (bankLeftMs > 0 ? bankMs / bankLeftMs : 0) : ownMs / Math.max(1, wholeMs, timeLeftMs);
+  return (
+    <div
+      class={`clock ${onBank ? "clock-bank" : ""} ${hurry ? "clock-hurry" : ""}`}
+      role="timer"
+      aria-label={words.label}
+    >
+      <span class="clock-bar" aria-hidden="true">
+        <span style={{ transform: `scaleX(${Math.min(1, share).toFixed(3)})` }} />
+      </span>
+      <span class="clock-words number">
+        <strong>{clockTime(onBank ? bankMs : ownMs)}</strong>{" "}
+        <span class="soft">{onBank ? words.onBank : bankMs > 0 ? words.bank(clockTime(bankMs)) : ""}</span>
+      </span>
+    </div>
+  );
+}
+
+/** So many seconds, or minutes and seconds where they are many. */
+function clockTime(leftMs: number): string {
+  const seconds = Math.ceil(leftMs / 1000);
+  if (seconds < 100) return `${seconds} s`;
+  return `${Math.floor(seconds / 60)}:${String(seconds % 60).padStart(2, "0")}`;
+}

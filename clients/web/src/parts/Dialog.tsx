@@ -1,0 +1,35 @@
+// A dialog over the page. The browser's own <dialog> keeps the focus inside, closes with Escape and gives the focus back.
+
+import type { ComponentChildren } from "preact";
+import { useEffect, useId, useRef } from "preact/hooks";
+import { t } from "../i18n";
+import "./dialog.css";
+
+interface DialogProps {
+  title: string;
+  /** Called when the reader closes it; the owner then stops drawing it. */
+  onClose: () => void;
+  children: ComponentChildren;
+}
+
+/** A dialog, open for as long as it is drawn. */
+export function Dialog({ title, onClose, children }: DialogProps) {
+  const dialog = useRef<HTMLDialogElement>(null);
+  const heading = useId();
+  useEffect(() => {
+    const opened = dialog.current;
+    opened?.showModal();
+    return () => opened?.close();
+  }, []);
+  return (
+    <dialog ref={dialog} class="dialog" aria-labelledby={heading} onClose={onClose}>
+      <header class="dialog-head">
+        <h2 id={heading}>{title}</h2>
+        <button type="button" class="dialog-close" aria-label={t().common.close} onClick={onClose}>
+          <span aria-hidden="true">×</span>
+        </button>
+      </header>
+      <div class="dialog-body">{children}</div>
+    </dialog>
+  );
+}

@@ -1,0 +1,127 @@
+// Fields of forms: a label, the field, a hint below, a fault in words. The field's id joins them for those who do not see it.
+
+import type { ComponentChildren } from "preact";
+import { useId } from "preact/hooks";
+import "./field.css";
+
+interface FieldFrame {
+  label: string;
+  hint?: string | undefined;
+  fault?: string | undefined;
+}
+
+/** Attributes that join a field to its hint and fault. */
+interface Joined {
+  id: string;
+  "aria-describedby": string | undefined;
+  "aria-invalid": boolean;
+}
+
+/** A frame around any field; `children` gets the attributes to put on it. */
+export function Field(props: FieldFrame & { children: (joined: Joined) => ComponentChildren }) {
+  const id = useId();
+  const { label, hint, fault } = props;
+  const described = [hint && `${id}-hint`, fault && `${id}-fault`].filter(Boolean).join(" ");
+  return (
+    <div class="field">
+      <label for={id}>{label}</label>
+      {props.children({ id, "aria-describedby": described || undefined, "aria-invalid": Boolean(fault) })}
+      {hint && (
+        <p id={`${id}-hint`} class="field-hint">
+          {hint}
+        </p>
+      )}
+      {fault && (
+        <p id={`${id}-fault`} class="field-fault" role="alert">
+          {fault}
+        </p>
+      )}
+    </div>
+  );
+}
+
+interface TextProps extends FieldFrame {
+  value: string;
+  onText: (text: string) => void;
+  type?: "text" | "number";
+  name?: string;
+  min?: number;
+  max?: number;
+  maxLength?: number;
+  autoComplete?: string;
+  autoCapitalize?: "characters" | "none" | "words";
+  placeholder?: string;
+  required?: boolean;
+}
+
+/** A line of text, or a number as text. */
+export function TextField({ label, hint, fault, onText, type = "text", ...rest }: TextProps) {
+  return (
+    <Field label={label} hint={hint} fault={fault}>
+      {(joined) => (
+        <input {...rest} {...joined} type={type as "text"} onInput={(event) => onText(event.currentTarget.value)} />
+      )}
+    </Field>
+  );
+}
+
+interface SelectProps<Value extends string> extends FieldFrame {
+  value: Value;
+  options: readonly { value: Value; label: string }[];
+  onPick: (value: Value) => void;
+}
+
+/** One of a few. */
+export function SelectField<Value extends string>({ label, hint, fault, value, options, onPick }: SelectProps<Value>) {
+  return (
+    <Field label={label} hint={hint} fault={fault}>
+      {(joined) => (
+        <select
+          {...joined}
+          value={value}
+          onChange={(event) => {
+            const picked = options[event.currentTarget.selectedIndex];
+            if (picked) onPick(picked.value);
+          }}
+        >
+          {options.map((option) => (
+            <option key={option.value} value={option.value}>
+              {option.label}
+            </option>
+          ))}
+        </select>
+      )}
+    </Field>
+  );
+}
+
+interface CheckProps {
+  label: string;
+  hint?: string | undefined;
+  checked: boolean;
+  disabled?: boolean;
+  onCheck: (checked: boolean) => void;
+}
+
+/** Yes or no. */
+export function CheckField({ label, hint, checked, disabled = false, onCheck }: CheckProps) {
+  const id = useId();
+  return (
+    <div class="field field-check">
+      <input
+        id={id}
+        type="checkbox"
+        checked={checked}
+        disabled={disabled}
+        aria-describedby={hint && `${id}-hint`}
+        onChange={(event) => onCheck(event.currentTarget.checked)}
+      />
+      <label for={id}>{label}</label>
+      {hint && (
+        <p id={`${id}-hint`} class="field-hint">
+          {hint}
+        </p>
+      )}
+    </div>
+  );
+}

@@ -1,0 +1,85 @@
+// The frame of all pages: the dark header with the ways to other pages and the settings, the content, the region that is read out.
+
+import type { ComponentChildren } from "preact";
+import { useEffect, useRef, useState } from "preact/hooks";
+import { t } from "../i18n";
+import type { Route } from "../router";
+import { Announcer } from "./Announcer";
+import { Drawing } from "./Drawing";
+import { Settings } from "./Settings";
+import "./layout.css";
+
+interface LayoutProps {
+  here: Route;
+  children: ComponentChildren;
+}
+
+/** The frame around a page. */
+export function Layout({ here, children }: LayoutProps) {
+  const content = useRef<HTMLElement>(null);
+  const [open, setOpen] = useState(false);
+  const first = useRef(true);
+  // Who goes to another page by keyboard goes on at its beginning, not somewhere in the header.
+  useEffect(() => {
+    if (first.current) first.current = false;
+    else content.current?.focus({ preventScroll: true });
+  }, [here]);
+  const words = t().common;
+  return (
+    <div class={`layout layout-${here.page}`}>
+      <a class="skip" href="#content">
+        {words.skipToContent}
+      </a>
+      <header class="header">
+        <a class="header-name" href="/">
+          <Drawing name="joker" />
+          <span>{words.name}</span>
+        </a>
+        <nav class="header-nav" aria-label={words.nav.label}>
+          {links().map(({ href, label, pages }) => (
+            <a key={href} href={href} aria-current={pages.includes(here.page) ? "page" : undefined}>
+              {label}
+            </a>
+          ))}
+        </nav>
+        <button type="button" class="header-settings" aria-label={words.settings.title} onClick={() => setOpen(true)}>
+          <GearSign />
+        </button>
+      </header>
+      <main id="content" ref={content} tabIndex={-1} class="content">
+        {children}
+      </main>
+      <Announcer />
+      {open && <Settings onClose={() => setOpen(false)} />}
+    </div>
+  );
+}
+
+function links(): { href: string; label: string; pages: Route["page"][] }[] {
+  const words = t().common.nav;
+  return [
+    { href: "/", label: words.lobby, pages: ["lobby", "new", "join"] },
+    { href: "/tournaments", label: words.tournaments, pages: ["tournaments", "tournament"] },
+    { href: "/leaderboard", label: words.leaderboard, pages: ["leaderboard", "person"] },
+    { href: "/tutorial", label: words.tutorial, pages: ["tutorial"] },
+  ];
+}
+
+/** Two sliders: what settings look like without a word. */
+function GearSign() {
+  return (
+    <svg
+      viewBox="0 0 24 24"
+      width="24"
+      height="24"
+      fill="none"
+      stroke="currentColor"
+      stroke-width="2"
+      aria-hidden="true"
+    >
+      <path d="M3 8h9M18 8h3M3 16h3M12 16h9" stroke-linecap="round" />
+      <circle cx="15" cy="8" r="3" />
+      <circle cx="9" cy="16" r="3" />
+    </svg>
+  );
+}

@@ -1,0 +1,18 @@
+// The page of an address that names nothing.
+
+import { t } from "../i18n";
+import { ButtonLink } from "./Button";
+
+/** Says so, and leads back. */
+export function NotFound() {
+  const words = t().common.notFound;
+  return (
+    <section class="sheet not-found">
+      <h1>{words.title}</h1>
+      <p>{words.text}</p>
+      <p>
+        <ButtonLink href="/">{words.link}</ButtonLink>
+      </p>
+    </section>
+  );
+}

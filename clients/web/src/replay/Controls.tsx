@@ -1,0 +1,132 @@
+// The controls of a replay: to and fro, play and pause, a slider over all moments, speed, whose eyes.
+
+import { t } from "../i18n";
+import { SelectField } from "../parts/Field";
+import { nameOf } from "../table/words";
+import type { Eyes } from "./eyes";
+import type { Film, Frame } from "./frames";
+
+/** Moments a second at a speed of 1. */
+export const SPEEDS = [0.5, 1, 2, 4, 8] as const;
+export type Speed = (typeof SPEEDS)[number];
+
+interface ControlsProps {
+  film: Film;
+  frame: Frame;
+  at: number;
+  playing: boolean;
+  speed: Speed;
+  eyes: Eyes;
+  onGo: (at: number) => void;
+  onPlaying: (playing: boolean) => void;
+  onSpeed: (speed: Speed) => void;
+  onEyes: (eyes: Eyes) => void;
+}
+
+export function Controls({ film, frame, at, playing, speed, eyes, onGo, onPlaying, onSpeed, onEyes }: ControlsProps) {
+  const words = t().replay;
+  const last = film.frames.length - 1;
+  const shift = film.shifts.findLast((start) => start.frame <= at);
+  return (
+    <section class="replay" aria-label={words.controls}>
+      <div class="replay-bar sheet">
+        <div class="replay-buttons">
+          <Step label={words.first} path="M18 5v14l-9-7ZM6 5v14" disabled={at === 0} onClick={() => onGo(0)} />
+          <Step label={words.before} path="M15 5v14l-9-7Z" disabled={at === 0} onClick={() => onGo(at - 1)} />
+          <Step
+            label={playing ? words.pause : words.play}
+            path={playing ? "M8 5v14M16 5v14" : "M7 4v16l13-8Z"}
+            main
+            onClick={() => onPlaying(!playing)}
+          />
+          <Step label={words.after} path="M9 5v14l9-7Z" disabled={at === last} onClick={() => onGo(at + 1)} />
+          <Step label={words.last} path="M6 5v14l9-7ZM18 5v14" disabled={at === last} onClick={() => onGo(last)} />
+        </div>
+        <label class="replay-slider">
+          <span class="only-heard">{words.moment}</span>
+          <input
+            type="range"
+            min={0}
+            max={last}
+            value={at}
+            aria-valuetext={words.decisionOf(frame.decisions, film.decisions)}
+            onInput={(event) => onGo(Number(event.currentTarget.value))}
+          />
+          <span class="replay-marks" aria-hidden="true">
+            {film.shifts.map((start) => (
+              <i
+                key={start.shift}
+                style={{ insetInlineStart: `${((start.frame / Math.max(1, last)) * 100).toFixed(2)}%` }}
+              />
+            ))}
+          </span>
+          <span class="small soft number">{words.decisionOf(frame.decisions, film.decisions)}</span>
+        </label>
+      </div>
+      <div class="replay-choices sheet">
+        <SelectField
+          label={words.shift}
+          value={String(shift?.frame ?? 0)}
+          options={film.shifts.map((start) => ({
+            value: String(start.frame),
+            label: t().table.result.shift(start.shift),
+          }))}
+          onPick={(picked) => onGo(Number(picked))}
+        />
+        <SelectField
+          label={words.speed}
+          value={String(speed)}
+          options={SPEEDS.map((value) => ({ value: String(value), label: `× ${value}` }))}
+          onPick={(picked) => onSpeed(SPEEDS.find((value) => String(value) === picked) ?? 1)}
+        />
+        <SelectField
+          label={words.eyes}
+          value={String(eyes)}
+          options={[
+            { value: "all", label: words.allHands },
+            ...frame.table.seats.map(({ seat }) => ({
+              value: String(seat),
+              label: words.as(nameOf(frame.table, seat)),
+            })),
+            { value: "none", label: words.asSpectator },
+          ]}
+          onPick={(picked) => onEyes(picked === "all" || picked === "none" ? picked : Number(picked))}
+        />
+      </div>
+    </section>
+  );
+}
+
+interface StepProps {
+  label: string;
+  path: string;
+  main?: boolean;
+  disabled?: boolean;
+  onClick: () => void;
+}
+
+/** A button that stays in reach of the keyboard when it leads nowhere. */
+function Step({ label, path, main = false, disabled = false, onClick }: StepProps) {
+  return (
+    <button
+      type="button"
+      class={`tool ${main ? "replay-main" : ""}`}
+      aria-label={label}
+      title={label}
+      aria-disabled={disabled}
+      onClick={() => !disabled && onClick()}
+    >
+      <svg
+        viewBox="0 0 24 24"
+        aria-hidden="true"
+        fill="currentColor"
+        stroke="currentColor"
+        stroke-width="2.5"
+        stroke-linecap="round"
+        stroke-linejoin="round"
+      >
+        <path d={path} />
+      </svg>
+    </button>
+  );
+}

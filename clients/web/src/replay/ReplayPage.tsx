@@ -1,0 +1,145 @@
+// A record played back at the table, with all hands or with somebody's eyes, and the look-up table of every turn.
+
+import { useEffect, useState } from "preact/hooks";
+import { recordApi } from "../api/client";
+import { inWords } from "../api/faults";
+import type { PageProps } from "../app";
+import { DecisionKind, type DecisionRequest } from "../gen/chefshat/v1/decision_pb";
+import type { DecisionRecord, RecordLine } from "../gen/chefshat/v1/record_pb";
+import { t } from "../i18n";
+import { Notice } from "../parts/Notice";
+import { useAnnounced } from "../table/following";
+import { legalActions, moveOf } from "../table/model/actions";
+import { lookupOf } from "../table/model/lookup";
+import { emptyTable, type TableState } from "../table/model/state";
+import { LookupTable } from "../table/view/LookupTable";
+import { TableView } from "../table/view/TableView";
+import { distinctName, moveWords } from "../table/words";
+import { Controls, type Speed } from "./Controls";
+import { decidingFor, type Eyes, seenWith } from "./eyes";
+import { type Film, type Frame, filmOf } from "./frames";
+import "./replay.css";
+
+/** How long a moment is seen at a speed of 1. */
+const MOMENT_MS = 1000;
+
+const NO_FRAME: Frame = { table: emptyTable(), open: undefined, decisions: 0 };
+
+/** The page. */
+export function ReplayPage({ route }: PageProps<"replay">) {
+  const { gameId } = route;
+  const [film, setFilm] = useState<Film | undefined>(undefined);
+  const [fault, setFault] = useState("");
+  useEffect(() => {
+    const leaving = new AbortController();
+    const load = async () => {
+      const lines: RecordLine[] = [];
+      try {
+        for await (const part of recordApi.getRecord({ gameId }, { signal: leaving.signal })) lines.push(...part.lines);
+        setFilm(filmOf(lines));
+      } catch (thrown) {
+        if (!leaving.signal.aborted) setFault(inWords(thrown));
+      }
+    };
+    void load();
+    return () => leaving.abort();
+  }, [gameId]);
+  if (fault) return <Notice kind="fault">{fault}</Notice>;
+  if (!film) return <p class="soft">{t().common.loading}</p>;
+  if (film.frames.length === 0) return <Notice kind="hint">{t().replay.empty}</Notice>;
+  return <Playback film={film} />;
+}
+
+function Playback({ film }: { film: Film }) {
+  const [at, setAt] = useState(() => firstFrame(film));
+  const [playing, setPlaying] = useState(false);
+  const [speed, setSpeed] = useState<Speed>(1);
+  const [eyes, setEyes] = useState<Eyes>("all");
+  const last = film.frames.length - 1;
+  useEffect(() => {
+    if (!playing) return;
+    if (at >= last) {
+      setPlaying(false);
+      return;
+    }
+    const timer = setTimeout(() => setAt(at + 1), MOMENT_MS / speed);
+    return () => clearTimeout(timer);
+  }, [playing, at, speed, last]);
+
+  const frame = film.frames[Math.min(at, last)] ?? NO_FRAME;
+  const table = seenWith(frame.table, eyes);
+  const next = decidingFor(frame, eyes);
+  useAnnounced(table, undefined, undefined);
+  const go = (to: number) => setAt(Math.max(0, Math.min(last, to)));
+  const open = next === undefined ? undefined : frame.open;
+  const known = open && (eyes === "all" || eyes === open.seat);
+  return (
+    <TableView
+      table={table}
+      own={typeof eyes === "number" ? eyes : undefined}
+      next={next}
+      nextKind={open?.kind}
+      caption={film.header?.roomName ?? ""}
+      replayed
+    >
+      <Controls
+        film={film}
+        frame={frame}
+        at={at}
+        playing={playing}
+        speed={speed}
+        eyes={eyes}
+        onGo={(to) => {
+          setPlaying(false);
+          go(to);
+        }}
+        onPlaying={(start) => {
+          if (start && at >= last) go(0);
+          setPlaying(start);
+        }}
+        onSpeed={setSpeed}
+        onEyes={setEyes}
+      />
+      {known && <Decision table={frame.table} open={open} />}
+    </TableView>
+  );
+}
+
+/** The open decision: what was answered, how long it took, and what was possible. */
+function Decision({ table, open }: { table: TableState; open: DecisionRecord }) {
+  const words = t().replay;
+  const move = moveOf(open.action, table.faces);
+  const seconds = Number(open.decisionTimeUs) / 1e6;
+  const estimate = open.annotations?.valueEstimate;
+  return (
+    <details class="replay-decision sheet">
+      <summary>
+        <strong>{words.possible}</strong>{" "}
+        <span class="soft">
+          {words.answered(distinctName(table, open.seat), move ? moveWords(move) : open.text)}
+          {seconds > 0 && ` · ${words.seconds(seconds)}`}
+          {estimate !== undefined && ` · ${words.estimate(estimate)}`}
+        </span>
+      </summary>
+      {open.kind === DecisionKind.TURN ? (
+        <LookupTable lookup={lookupAt(table, open)} taken={open.action} />
+      ) : (
+        <p>{words.noTable}</p>
+      )}
+    </details>
+  );
+}
+
+function lookupAt(table: TableState, open: Pick<DecisionRequest, "actionMask"> & { seat: number }) {
+  return lookupOf(table, table.seats[open.seat]?.hand ?? [], new Set(legalActions(open.actionMask)));
+}
+
+/** The moment that the address asks for with ?decision=N, or that of the first cards. */
+function firstFrame(film: Film): number {
+  const asked = Number(new URLSearchParams(location.search).get("decision"));
+  if (asked >= 1) {
+    const found = film.frames.findIndex((frame) => frame.decisions >= asked - 1);
+    if (found >= 0) return found;
+  }
+  return film.shifts[0]?.frame ?? 0;
+}

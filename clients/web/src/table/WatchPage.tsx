@@ -1,0 +1,40 @@
+// A room as those see it who watch: the public events alone, or with hands where the room shows them.
+
+import { useEffect, useState } from "preact/hooks";
+import { wordsOf } from "../api/faults";
+import type { PageProps } from "../app";
+import { t } from "../i18n";
+import { Notice } from "../parts/Notice";
+import { useAnnounced } from "./following";
+import { type Spectating, startSpectating } from "./spectating";
+import { TableView } from "./view/TableView";
+import { WaitingRoom } from "./view/WaitingRoom";
+
+/** The page. */
+export function WatchPage({ route }: PageProps<"watch">) {
+  const [spectating, setSpectating] = useState<Spectating | undefined>(undefined);
+  useEffect(() => {
+    const started = startSpectating(route.roomId);
+    setSpectating(started);
+    return () => started.stop();
+  }, [route.roomId]);
+  return spectating ? <Watched spectating={spectating} /> : <p class="soft">{t().common.loading}</p>;
+}
+
+function Watched({ spectating }: { spectating: Spectating }) {
+  const table = spectating.table.value;
+  const { link, fault } = spectating.following;
+  useAnnounced(table, undefined, undefined);
+  if (link.value === "failed") return <Notice kind="fault">{fault.value && wordsOf(fault.value)}</Notice>;
+  if (table.seats.length === 0) return <p class="soft">{t().common.loading}</p>;
+  const banner = link.value === "lost" ? <Notice kind="fault">{t().table.link.lost}</Notice> : null;
+  if (table.phase === "waiting") return <WaitingRoom table={table} own={undefined} banner={banner} />;
+  return (
+    <TableView
+      table={table}
+      own={undefined}
+      banner={banner}
+      caption={`${table.roomName} · ${t().table.watch.viewer}`}
+    />
+  );
+}

@@ -1,0 +1,56 @@
+// What goes with what happens at a table: it is read out to those who listen, and heard. Whoever catches up with a game after a reload is not
+// told all of it again.
+
+import { useEffect, useRef } from "preact/hooks";
+import { DecisionKind } from "../gen/chefshat/v1/decision_pb";
+import { t } from "../i18n";
+import { announce } from "../parts/Announcer";
+import { demandOf } from "./model/demand";
+import type { OpenDecision } from "./model/live";
+import type { TableState } from "./model/state";
+import { play, soundOf } from "./sounds";
+import { nowHeading } from "./view/Now";
+import { spokenLine } from "./words";
+
+/** More happenings than this at once are a past that is being caught up with. */
+const MOST_AT_ONCE = 14;
+
+/** Announces what happens, with sounds, for as long as the table is drawn. */
+export function useAnnounced(table: TableState, own: number | undefined, decision: OpenDecision | undefined): void {
+  const heard = useRef<number | undefined>(undefined);
+  const last = table.log.at(-1)?.sequence ?? 0;
+  useEffect(() => {
+    const before = heard.current;
+    heard.current = last;
+    if (before === undefined) return;
+    const fresh = table.log.filter(({ sequence }) => sequence > before);
+    if (fresh.length > MOST_AT_ONCE) return;
+    for (const line of fresh) announce(spokenLine(table, line));
+    const sounds = fresh.flatMap((line) => soundOf(line) ?? []);
+    // Together they would be a noise: the last is heard, and it is the most telling.
+    const sound = sounds.at(-1);
+    if (sound) play(sound);
+  }, [last]);
+  useEffect(() => {
+    if (!decision) return;
+    play("yourTurn");
+    announce(`${nowHeading({ table, own, deciding: decision.kind, next: own })}. ${demandWords(table, decision)}`);
+  }, [decision?.id]);
+}
+
+/** What the open turn asks for, to be read out. */
+function demandWords(table: TableState, decision: OpenDecision): string {
+  const words = t().table.now;
+  if (decision.kind !== DecisionKind.TURN) return "";
+  const demand = demandOf(table);
+  switch (demand.kind) {
+    case "anything":
+      return words.anything;
+    case "opening":
+      return `${demand.face} ${demand.golden ? words.openingGolden : words.openingFace}`;
+    case "beat":
+      return demand.face === 0
+        ? words.nothing
+        : `${words.face} ≤ ${demand.face}, ${demand.size} ${words.cards(demand.size)}`;
+  }
+}

@@ -1,0 +1,152 @@
+// What the holder of a seat knows: the table, the decision that is open for the seat, and how the seat is attached. A pure function from one
+// update of the server to the next such value; the stream itself is in session.ts.
+
+import { AnswerStatus, DecisionKind, type DecisionRequest } from "../../gen/chefshat/v1/decision_pb";
+import type { GameEvent } from "../../gen/chefshat/v1/event_pb";
+import { DetachReason, type SeatUpdate } from "../../gen/chefshat/v1/play_service_pb";
+import { legalActions } from "./actions";
+import { type Card, cardsFromCounts } from "./cards";
+import { applyEvent } from "./reduce";
+import { applyObservation, applySnapshot } from "./snapshot";
+import type { TableState } from "./state";
+
+/** A decision that is open for the seat. */
+export interface OpenDecision {
+  readonly id: bigint;
+  readonly kind: DecisionKind;
+  /** Legal actions, ascending. */
+  readonly legal: readonly number[];
+  /** The hand it is decided from, in order. */
+  readonly hand: readonly Card[];
+  /** Milliseconds that were left of the decision's own time when the request came. */
+  readonly timeLeftMs: number;
+  /** Milliseconds that were left in the bank when the request came. */
+  readonly bankLeftMs: number;
+  /** When the request came, on the page's own clock. */
+  readonly receivedAtMs: number;
+  /** Invalid attempts left; undefined if unlimited. */
+  readonly attemptsLeft: number | undefined;
+}
+
+/** How the seat is attached. */
+export type Attachment =
+  | { readonly kind: "none" }
+  | { readonly kind: "attached" }
+  | { readonly kind: "superseded" }
+  | { readonly kind: "over" }
+  | { readonly kind: "refused"; readonly reason: string; readonly message: string };
+
+export interface LiveState {
+  readonly table: TableState;
+  /** The seat; undefined before it is attached for the first time. */
+  readonly own: number | undefined;
+  readonly decision: OpenDecision | undefined;
+  readonly attachment: Attachment;
+  /** Whether a built-in agent plays for the seat. */
+  readonly substituted: boolean;
+}
+
+export function startLive(table: TableState, own?: number): LiveState {
+  return { table, own, decision: undefined, attachment: { kind: "none" }, substituted: false };
+}
+
+/** The state after an update; `nowMs` is the page's own clock. */
+export function applyUpdate(live: LiveState, update: SeatUpdate, nowMs: number): LiveState {
+  const told = update.update;
+  switch (told.case) {
+    case "attached": {
+      const own = told.value.seat;
+      const table = { ...live.table, roomId: told.value.roomId, gameId: told.value.gameId };
+      // What was open may have been closed while nobody listened; if not, it is put again.
+      return { ...live, own, table, decision: undefined, attachment: { kind: "attached" } };
+    }
+    case "events":
+      return told.value.events.reduce(withEvent, live);
+    case "snapshot":
+      return { ...live, table: applySnapshot(live.table, told.value, live.own) };
+    case "decision":
+      return withDecision(live, told.value, nowMs);
+    case "result": {
+      const { decisionId, status, invalidAttemptsLeft: attemptsLeft } = told.value;
+      if (live.decision?.id !== decisionId) return live;
+      if (status === AnswerStatus.INVALID) return { ...live, decision: { ...live.decision, attemptsLeft } };
+      return { ...live, decision: undefined };
+    }
+    case "detached": {
+      const { reason } = told.value;
+      const superseded = reason === DetachReason.SUPERSEDED;
+      return { ...live, decision: undefined, attachment: { kind: superseded ? "superseded" : "over" } };
+    }
+    case "refused": {
+      const { reason, message } = told.value;
+      return { ...live, decision: undefined, attachment: { kind: "refused", reason, message } };
+    }
+    default:
+      return live;
+  }
+}
+
+function withEvent(live: LiveState, event: GameEvent): LiveState {
+  if (Number(event.sequence) < live.table.nextSequence) return live;
+  const table = applyEvent(live.table, event);
+  const kind = event.kind;
+  const substituted =
+    kind.case === "substituted" && kind.value.seat === live.own
+      ? true
+      : kind.case === "returned" && kind.value.seat === live.own
+        ? false
+        : live.substituted;
+  return { ...live, table, substituted, decision: closes(event, live) ? undefined : live.decision };
+}
+
+/** Whether an event says that the seat's open decision has been taken: by itself, by the clock or by a substitute. */
+function closes(event: GameEvent, live: LiveState): boolean {
+  const { own, decision } = live;
+  const kind = event.kind;
+  switch (kind.case) {
+    case "play":
+    case "pass":
+      return kind.value.seat === own && decision?.kind === DecisionKind.TURN;
+    case "specialActionDeclared":
+      return kind.value.seat === own;
+    case "cardsExchanged":
+      return kind.value.giver === own && decision?.kind === DecisionKind.EXCHANGE;
+    case "substituted":
+      return kind.value.seat === own;
+    case "shiftEnded":
+    case "gameEnded":
+    case "gameAborted":
+      return true;
+    default:
+      return false;
+  }
+}
+
+function withDecision(live: LiveState, request: DecisionRequest, nowMs: number): LiveState {
+  const { observation: seen } = request;
+  const before = live.table;
+  // At a turn everything that happened has been told, so that the observation is the whole truth. Gifts of an exchange that is not complete
+  // have left the observed hand already: their event is still to come.
+  const turn = request.kind === DecisionKind.TURN;
+  const table = seen && turn ? { ...applyBoard(before, seen, live.own), next: live.own } : before;
+  const hand = seen ? cardsFromCounts(seen.hand, seen.golden, table.faces) : [];
+  const decision: OpenDecision = {
+    id: request.decisionId,
+    kind: request.kind,
+    legal: legalActions(request.actionMask),
+    hand,
+    timeLeftMs: request.timeLeftMs,
+    bankLeftMs: request.bankLeftMs,
+    receivedAtMs: nowMs,
+    attemptsLeft: request.invalidAttemptsLeft,
+  };
+  return { ...live, table, decision };
+}
+
+/** The observation put in, without losing what only events tell: what was played with the Golden card, what has just been received. */
+function applyBoard(table: TableState, seen: NonNullable<DecisionRequest["observation"]>, own: number | undefined) {
+  const next = applyObservation(table, seen, own);
+  const seats = next.seats.map((seat) => ({ ...seat, received: table.seats[seat.seat]?.received ?? seat.received }));
+  const board = next.board.length === table.board.length ? table.board : next.board;
+  return { ...next, seats, board };
+}

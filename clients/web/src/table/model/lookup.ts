@@ -1,0 +1,45 @@
+// The look-up table of a decision, as in the paper's figure of possible actions: every play by face, quantity and jokers, and what is to be
+// said of it for one hand at one moment. A value; how it is drawn is in view/LookupTable.tsx.
+
+import { actionOf, type Move } from "./actions";
+import type { Card } from "./cards";
+import { allows, demandOf, holds } from "./demand";
+import type { TableState } from "./state";
+
+/** Whether the rules allow an action now, whatever the hand is, and whether the hand holds its cards, whatever lies on the board. */
+export type CellState = "legal" | "notInHand" | "notAllowed" | "impossible";
+
+/** One action of the table. */
+export interface Cell {
+  readonly move: Move;
+  readonly action: number;
+  readonly state: CellState;
+}
+
+export interface Lookup {
+  /** Plays of each face from face 1: of each quantity from 1, without a joker, with one, and so on. */
+  readonly plays: readonly (readonly (readonly Cell[])[])[];
+  /** A joker alone (where the deck has jokers) and passing. */
+  readonly others: readonly Cell[];
+}
+
+/** The table of an open turn. */
+export function lookupOf(table: TableState, hand: readonly Card[], legal: ReadonlySet<number>): Lookup {
+  const demand = demandOf(table);
+  const { faces, jokers } = table;
+  const cell = (move: Move): Cell => {
+    const action = actionOf(move, faces);
+    const held = holds(hand, move);
+    if (legal.has(action)) return { move, action, state: "legal" };
+    if (held) return { move, action, state: "notAllowed" };
+    return { move, action, state: allows(demand, move) ? "notInHand" : "impossible" };
+  };
+  const upTo = (count: number) => Array.from({ length: count }, (_, index) => index + 1);
+  const plays = upTo(faces).map((face) =>
+    upTo(face).map((quantity) =>
+      Array.from({ length: jokers + 1 }, (_, withJokers) => cell({ kind: "play", face, quantity, jokers: withJokers })),
+    ),
+  );
+  const alone: Cell[] = jokers > 0 ? [cell({ kind: "loneJoker" })] : [];
+  return { plays, others: [...alone, cell({ kind: "pass" })] };
+}

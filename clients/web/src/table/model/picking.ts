@@ -1,0 +1,174 @@
+// Picking cards of a hand until they are a legal action: what a click on a card does, which cards can be picked now, and why the others
+// cannot. It chooses among the legal actions that the server sent; rules are known here only to give a reason in words.
+
+import { type Move, moveOf } from "./actions";
+import { type Card, countOf, faceOf } from "./cards";
+import { demandOf } from "./demand";
+import type { TableState } from "./state";
+
+/** Positions in the hand that are picked. */
+export type Picked = ReadonlySet<number>;
+
+/** Why a card cannot be picked. */
+export type Reason =
+  | { readonly kind: "opening"; readonly face: number; readonly golden: boolean }
+  | { readonly kind: "notRarer"; readonly face: number; readonly board: number }
+  | { readonly kind: "nothingRarer" }
+  | { readonly kind: "tooFew"; readonly face: number; readonly need: number; readonly have: number }
+  | { readonly kind: "jokerAlone" }
+  | { readonly kind: "other" };
+
+/** Legal moves of a decision. */
+export function legalMoves(actions: readonly number[], faces: number): Move[] {
+  return actions.flatMap((action) => moveOf(action, faces) ?? []);
+}
+
+/** The cards that a move takes out of a hand: of which face how many, and how many jokers. */
+interface Needs {
+  readonly face: number | undefined;
+  readonly quantity: number;
+  readonly jokers: number;
+}
+
+function needsOf(move: Move): Needs | undefined {
+  switch (move.kind) {
+    case "play":
+      return move;
+    case "give":
+      return { face: move.face, quantity: 1, jokers: 0 };
+    case "loneJoker":
+    case "giveJoker":
+      return { face: undefined, quantity: 0, jokers: 1 };
+    default:
+      return undefined;
+  }
+}
+
+/** Whether a move takes these cards, and perhaps more. */
+function includes(move: Move, cards: readonly Card[]): boolean {
+  const needs = needsOf(move);
+  if (!needs) return false;
+  const jokers = countOf(cards, undefined);
+  const plain = cards.length - jokers;
+  return (
+    cards.every((card) => card.kind === "joker" || card.face === needs.face) &&
+    plain <= needs.quantity &&
+    jokers <= needs.jokers
+  );
+}
+
+/** Whether a move takes these cards and no more. */
+function isExactly(move: Move, cards: readonly Card[]): boolean {
+  const needs = needsOf(move);
+  return needs !== undefined && includes(move, cards) && needs.quantity + needs.jokers === cards.length;
+}
+
+function cardsAt(hand: readonly Card[], picked: Picked): Card[] {
+  return [...picked].flatMap((index) => hand[index] ?? []);
+}
+
+/** The legal move that the picked cards are. */
+export function pickedMove(hand: readonly Card[], picked: Picked, moves: readonly Move[]): Move | undefined {
+  const cards = cardsAt(hand, picked);
+  return cards.length === 0 ? undefined : moves.find((move) => isExactly(move, cards));
+}
+
+/** Whether a card can be picked: with those picked, or in their place. */
+export function canPick(hand: readonly Card[], index: number, moves: readonly Move[]): boolean {
+  const card = hand[index];
+  return card !== undefined && moves.some((move) => includes(move, [card]));
+}
+
+/** How many more cards the picked ones need at least to be a legal move; 0 if they are one, undefined if they cannot become one. */
+export function missing(hand: readonly Card[], picked: Picked, moves: readonly Move[]): number | undefined {
+  const cards = cardsAt(hand, picked);
+  const sizes = moves
+    .filter((move) => includes(move, cards))
+    .map((move) => needsOf(move))
+    .map((needs) => (needs ? needs.quantity + needs.jokers - cards.length : 0));
+  return sizes.length > 0 ? Math.min(...sizes) : undefined;
+}
+
+/**
+ * What is picked after a click on a card. A picked card is put back. Another joins those picked where a legal move has them all; else it takes
+ * their place, together with what the smallest legal move with it needs.
+ */
+export function toggle(hand: readonly Card[], picked: Picked, index: number, moves: readonly Move[]): Picked {
+  const card = hand[index];
+  if (picked.has(index)) return new Set([...picked].filter((other) => other !== index));
+  if (!card || !canPick(hand, index, moves)) return picked;
+  const joined = [...cardsAt(hand, picked), card];
+  if (picked.size > 0 && moves.some((move) => includes(move, joined))) {
+    return withGolden(hand, new Set([...picked, index]), moves);
+  }
+  return withGolden(hand, smallest(hand, index, moves), moves);
+}
+
+/** The picks of the smallest legal move with a card, with the fewest jokers. A joker waits for the card it goes with. */
+function smallest(hand: readonly Card[], index: number, moves: readonly Move[]): Picked {
+  const card = hand[index];
+  if (!card || (card.kind === "joker" && !moves.some((move) => isExactly(move, [card])))) return new Set([index]);
+  const size = (needs: Needs) => (needs.quantity + needs.jokers) * 10 + needs.jokers;
+  const [best] = moves
+    .filter((move) => includes(move, [card]))
+    .flatMap((move) => needsOf(move) ?? [])
+    .sort((left, right) => size(left) - size(right));
+  return best ? pickFor(hand, best, [index]) : new Set([index]);
+}
+
+/** Positions of the cards that a move takes. */
+export function picksOf(hand: readonly Card[], move: Move): Picked {
+  const needs = needsOf(move);
+  return needs ? pickFor(hand, needs, []) : new Set();
+}
+
+function pickFor(hand: readonly Card[], needs: Needs, first: readonly number[]): Picked {
+  const picked = new Set(first);
+  const left = { quantity: needs.quantity, jokers: needs.jokers };
+  for (const index of picked) left[hand[index]?.kind === "joker" ? "jokers" : "quantity"] -= 1;
+  hand.forEach((card, index) => {
+    if (picked.has(index)) return;
+    const part = card.kind === "joker" ? "jokers" : "quantity";
+    const wanted = card.kind === "joker" || card.face === needs.face;
+    if (!wanted || left[part] <= 0) return;
+    left[part] -= 1;
+    picked.add(index);
+  });
+  return picked;
+}
+
+/** Cards of the top face are one action with the Golden card or without: shown is what will go, the Golden card first at a turn. */
+function withGolden(hand: readonly Card[], picked: Picked, moves: readonly Move[]): Picked {
+  const golden = hand.findIndex((card) => card.kind === "golden");
+  const plain = hand.findIndex(
+    (card, index) => card.kind === "face" && card.face === faceOfGolden(hand) && picked.has(index),
+  );
+  const turn = moves.some((move) => move.kind === "play");
+  if (golden < 0 || plain < 0 || picked.has(golden) || !turn) return picked;
+  return new Set([...picked].map((index) => (index === plain ? golden : index)));
+}
+
+function faceOfGolden(hand: readonly Card[]): number | undefined {
+  const golden = hand.find((card) => card.kind === "golden");
+  return golden && faceOf(golden);
+}
+
+/** Why a card cannot be picked at a turn. */
+export function reasonAgainst(table: TableState, hand: readonly Card[], index: number): Reason {
+  const card = hand[index];
+  const demand = demandOf(table);
+  const face = card && faceOf(card);
+  switch (demand.kind) {
+    case "opening":
+      return { kind: "opening", face: demand.face, golden: demand.golden };
+    case "anything":
+      return { kind: "other" };
+    case "beat": {
+      if (demand.face === 0) return { kind: "nothingRarer" };
+      if (face === undefined) return { kind: "jokerAlone" };
+      if (face > demand.face) return { kind: "notRarer", face, board: demand.face + 1 };
+      const have = countOf(hand, face) + countOf(hand, undefined);
+      return have < demand.size ? { kind: "tooFew", face, need: demand.size, have } : { kind: "other" };
+    }
+  }
+}

@@ -1,0 +1,243 @@
+// How an event changes what a viewer knows of a table: one pure function, the same for a seat's own stream, for spectators and for
+// records. It follows the game and decides nothing: what the rules forbid never comes as an event.
+
+import type { GameEvent, Play } from "../../gen/chefshat/v1/event_pb";
+import { DecisionSource } from "../../gen/chefshat/v1/event_pb";
+import { PassScope, Role } from "../../gen/chefshat/v1/rules_pb";
+import { type Card, cardsFromNumbers, faceOf, playedCards, together, without } from "./cards";
+import {
+  type Cause,
+  fromRules,
+  type Happening,
+  MAX_LOG,
+  type SeatState,
+  seatFromParticipant,
+  type TableState,
+} from "./state";
+
+const CAUSES: Record<DecisionSource, Cause> = {
+  [DecisionSource.UNSPECIFIED]: "agent",
+  [DecisionSource.AGENT]: "agent",
+  [DecisionSource.TIMEOUT]: "timeout",
+  [DecisionSource.INVALID]: "invalid",
+  [DecisionSource.DISCONNECTED]: "disconnected",
+  [DecisionSource.SUBSTITUTE]: "substitute",
+  [DecisionSource.RECORDED]: "recorded",
+};
+
+/** The table after an event. An event that it has seen already leaves it as it is. */
+export function applyEvent(table: TableState, event: GameEvent): TableState {
+  const sequence = Number(event.sequence);
+  if (sequence < table.nextSequence) return table;
+  const [changed, happening] = change(table, event, sequence);
+  const log = happening ? [...changed.log, { sequence, happening }].slice(-MAX_LOG) : changed.log;
+  return { ...changed, log, nextSequence: sequence + 1 };
+}
+
+/** The table after events in order. */
+export function applyEvents(table: TableState, events: readonly GameEvent[]): TableState {
+  return events.reduce(applyEvent, table);
+}
+
+type Change = readonly [TableState, Happening | undefined];
+
+function change(table: TableState, event: GameEvent, sequence: number): Change {
+  const kind = event.kind;
+  switch (kind.case) {
+    case "seated": {
+      const { seat, name, kind: what } = kind.value;
+      return [withSeat(table, seat, { name, kind: what, builtIn: "" }), { kind: "seated", seat }];
+    }
+    case "vacated":
+      return [
+        withSeat(table, kind.value.seat, { name: "", kind: 0, connected: false }),
+        { kind: "left", seat: kind.value.seat },
+      ];
+    case "disconnected":
+      return [withSeat(table, kind.value.seat, { connected: false }), { kind: "lost", seat: kind.value.seat }];
+    case "returned":
+      return [
+        withSeat(table, kind.value.seat, { connected: true, substitute: "" }),
+        { kind: "back", seat: kind.value.seat },
+      ];
+    case "substituted": {
+      const { seat, builtInAgent } = kind.value;
+      return [withSeat(table, seat, { substitute: builtInAgent }), { kind: "substituted", seat, agent: builtInAgent }];
+    }
+    case "gameStarted": {
+      const { gameId, rules, policy, seats } = kind.value;
+      const start = { ...table, ...fromRules(rules), gameId, policy, seats: seats.map(seatFromParticipant) };
+      return [{ ...start, phase: "dealt" }, { kind: "gameStarted" }];
+    }
+    case "shiftStarted":
+      return [dealt(table, kind.value), { kind: "dealt", shift: kind.value.shift }];
+    case "rolesAssigned": {
+      const { roles } = kind.value;
+      return [eachSeat(table, (seat) => ({ role: roles[seat.seat] ?? Role.UNSPECIFIED })), undefined];
+    }
+    case "specialActionDeclared":
+      return [table, { kind: "declared", seat: kind.value.seat, action: kind.value.action }];
+    case "cardsExchanged": {
+      const { giver, receiver, count } = kind.value;
+      const cards = cardsFromNumbers(kind.value.cards, kind.value.golden, table.faces);
+      return [exchanged(table, giver, receiver, count, cards), { kind: "gave", giver, receiver, count, cards }];
+    }
+    case "play":
+      return play(table, kind.value);
+    case "pass": {
+      const { seat, source } = kind.value;
+      const out = table.passScope === PassScope.PIZZA;
+      const passed = withSeat(turnTaken(table), seat, { passed: out, lastMove: "pass" });
+      return [
+        { ...passed, next: nextAfter(passed, seat) },
+        { kind: "passed", seat, cause: CAUSES[source] },
+      ];
+    }
+    case "pizzaDone": {
+      const { pizza, nextLeader } = kind.value;
+      const cleared = eachSeat(table, () => ({ passed: false, lastMove: undefined }));
+      return [
+        { ...cleared, board: [], boardBy: undefined, pizza: pizza + 1, next: nextLeader },
+        { kind: "pizzaDone", pizza, nextLeader },
+      ];
+    }
+    case "seatFinished": {
+      const { seat, place } = kind.value;
+      const finished = withSeat(table, seat, { place, cardsLeft: 0 });
+      return [
+        { ...finished, next: nextAfter(finished, seat) },
+        { kind: "finished", seat, place },
+      ];
+    }
+    case "shiftEnded": {
+      const { shift, order, shiftPoints, adjudicated } = kind.value;
+      const points = kind.value.points.map(Number);
+      const ended = eachSeat(table, (seat) => ({
+        points: points[seat.seat] ?? seat.points,
+        place: order.indexOf(seat.seat) + 1,
+      }));
+      const result = { shift, order, shiftPoints, points, adjudicated };
+      return [
+        { ...ended, phase: "shiftOver", result, next: undefined },
+        { kind: "shiftOver", shift, winner: order[0] ?? 0 },
+      ];
+    }
+    case "gameEnded": {
+      const standings = kind.value.standings.map(({ seat, points, place }) => ({
+        seat,
+        points: Number(points),
+        place,
+      }));
+      return [{ ...table, phase: "gameOver", standings, next: undefined }, { kind: "gameOver" }];
+    }
+    case "gameAborted":
+      return [{ ...table, phase: "aborted", next: undefined }, { kind: "aborted" }];
+    case "expressionShown": {
+      const { seat, expression } = kind.value;
+      const label = expression?.label ?? "";
+      return [withSeat(table, seat, { expression: { label, sequence } }), { kind: "expressed", seat, label }];
+    }
+    case "serverRestarted":
+      return [table, { kind: "restarted" }];
+    // An event of a later version of the protocol: its number counts, its content is not known here.
+    case undefined:
+      return [table, undefined];
+  }
+}
+
+function dealt(
+  table: TableState,
+  start: { shift: number; hands: { seat: number; cards: number[]; golden: boolean }[] },
+): TableState {
+  const hands = new Map(start.hands.map((hand) => [hand.seat, cardsFromNumbers(hand.cards, hand.golden, table.faces)]));
+  const deck = (table.faces * (table.faces + 1)) / 2 + table.jokers;
+  const handSize = Math.floor(deck / Math.max(1, table.seats.length));
+  const fresh = eachSeat(table, (seat) => ({
+    hand: hands.get(seat.seat),
+    cardsLeft: handSize,
+    passed: false,
+    place: 0,
+    lastMove: undefined,
+    received: [],
+    role: Role.UNSPECIFIED,
+  }));
+  return {
+    ...fresh,
+    phase: "dealt",
+    shift: start.shift,
+    pizza: 0,
+    turn: 1,
+    board: [],
+    boardBy: undefined,
+    toppings: [],
+    next: undefined,
+    played: Array<number>(table.faces + 1).fill(0),
+  };
+}
+
+function exchanged(
+  table: TableState,
+  giver: number,
+  receiver: number,
+  count: number,
+  cards: readonly Card[],
+): TableState {
+  return eachSeat(table, (seat) => {
+    if (seat.seat === giver) {
+      return { cardsLeft: seat.cardsLeft - count, hand: seat.hand && without(seat.hand, cards) };
+    }
+    if (seat.seat === receiver) {
+      const hand = seat.hand && together(seat.hand, cards);
+      return { cardsLeft: seat.cardsLeft + count, hand, received: together(seat.received, cards) };
+    }
+    return {};
+  });
+}
+
+function play(table: TableState, { seat, face, quantity, jokers, cardsLeft, source }: Play): Change {
+  const alone = face > table.faces;
+  // The opening with the Golden card is the only play of the top face that a Shift's first turn can be under that rule.
+  const hand = table.seats[seat]?.hand;
+  const opens = table.turn === 1 && face === table.faces && !(table.rules?.openingPass ?? false);
+  const golden = opens && (hand ? hand.some((card) => card.kind === "golden") : table.rules?.opening !== 2);
+  const cards = playedCards(face, quantity, jokers, golden);
+  const changed = withSeat(turnTaken(table), seat, {
+    cardsLeft,
+    hand: hand && without(hand, cards),
+    lastMove: cards,
+    received: [],
+  });
+  const played = changed.played.map((count, index) => {
+    if (index === table.faces) return count + jokers;
+    return !alone && index === face - 1 ? count + quantity : count;
+  });
+  const onPizza = table.board.length > 0 ? table.toppings : [];
+  const toppings = [...onPizza, ...cards.map((card) => faceOf(card) ?? table.faces + 1)];
+  const after = { ...changed, played, board: cards, boardBy: seat, toppings };
+  return [
+    { ...after, next: nextAfter(after, seat) },
+    { kind: "played", seat, cards, cause: CAUSES[source] },
+  ];
+}
+
+function turnTaken(table: TableState): TableState {
+  return { ...table, phase: "pizza", pizza: Math.max(1, table.pizza), turn: table.turn + 1 };
+}
+
+/** The next seat to the left that is still in the pizza. */
+function nextAfter(table: TableState, seat: number): number | undefined {
+  const players = table.seats.length;
+  for (let distance = 1; distance < players; distance += 1) {
+    const other = table.seats[(seat + distance) % players];
+    if (other && other.cardsLeft > 0 && !other.passed) return other.seat;
+  }
+  return undefined;
+}
+
+function withSeat(table: TableState, seat: number, changed: Partial<SeatState>): TableState {
+  return eachSeat(table, (other) => (other.seat === seat ? changed : {}));
+}
+
+function eachSeat(table: TableState, changed: (seat: SeatState) => Partial<SeatState>): TableState {
+  return { ...table, seats: table.seats.map((seat) => ({ ...seat, ...changed(seat) })) };
+}

@@ -1,0 +1,48 @@
+// What a viewer knows of a table from a Snapshot or an observation, in place of the events so far. Who acts next and what happened
+// before is not in them.
+
+import type { Observation } from "../../gen/chefshat/v1/decision_pb";
+import type { Snapshot } from "../../gen/chefshat/v1/play_service_pb";
+import { cardsFromCounts, playedCards } from "./cards";
+import { fromRules, seatFromParticipant, type TableState } from "./state";
+
+/** The table as a snapshot shows it to the holder of a seat, or to a spectator. */
+export function applySnapshot(table: TableState, snapshot: Snapshot, own: number | undefined): TableState {
+  const nextSequence = Number(snapshot.nextSequence);
+  const { gameStarted: start, observation } = snapshot;
+  if (!start || !observation) return { ...table, nextSequence };
+  const { gameId, policy } = start;
+  const seats = start.seats.map(seatFromParticipant);
+  const begun = { ...table, ...fromRules(start.rules), gameId, policy, seats, log: [], nextSequence };
+  return applyObservation(begun, observation, own);
+}
+
+/** The table with everything that an observation says put in. */
+export function applyObservation(table: TableState, seen: Observation, own: number | undefined): TableState {
+  const { faces } = table;
+  const alone = seen.boardFace > faces;
+  const quantity = alone ? 0 : seen.boardSize - seen.boardJokers;
+  const seats = table.seats.map((seat) => {
+    const mine = seat.seat === own && seen.hand.length > 0;
+    return {
+      ...seat,
+      hand: mine ? cardsFromCounts(seen.hand, seen.golden, faces) : seat.hand,
+      received: mine ? cardsFromCounts(seen.received, false, faces) : seat.received,
+      cardsLeft: seen.cardsLeft[seat.seat] ?? seat.cardsLeft,
+      passed: seen.passed[seat.seat] === 1,
+      place: seen.places[seat.seat] ?? 0,
+      role: seen.roles[seat.seat] ?? 0,
+      points: Number(seen.points[seat.seat] ?? 0n),
+    };
+  });
+  const board = seen.boardSize > 0 ? playedCards(seen.boardFace, quantity, seen.boardJokers, false) : [];
+  return {
+    ...table,
+    seats,
+    board,
+    phase: seen.pizza > 0 ? "pizza" : "dealt",
+    shift: seen.shift,
+    pizza: seen.pizza,
+    played: Array.from(seen.played),
+  };
+}

@@ -1,0 +1,82 @@
+// The sounds of the table, made as they are needed: no files. They can be turned off, and say nothing that is not also seen and read out.
+
+import { signal } from "@preact/signals";
+import { recall, remember } from "../store";
+import type { LogLine } from "./model/state";
+
+/** Whether sounds are on; kept on this device. */
+export const soundOn = signal(recall("sound") !== "off");
+
+export function setSound(on: boolean): void {
+  soundOn.value = on;
+  remember("sound", on ? null : "off");
+  if (on) play("play");
+}
+
+/** One tone: pitch in hertz, when it begins and how long it is heard in seconds, how loud from 0 to 1. */
+interface Tone {
+  hertz: number;
+  at: number;
+  length: number;
+  loud: number;
+  wave: OscillatorType;
+}
+
+const tone = (hertz: number, at: number, length: number, loud: number, wave: OscillatorType = "sine"): Tone => {
+  return { hertz, at, length, loud, wave };
+};
+
+const SOUNDS = {
+  /** A card is put down. */
+  play: [tone(190, 0, 0.09, 0.5, "triangle"), tone(95, 0.01, 0.12, 0.5)],
+  pass: [tone(240, 0, 0.06, 0.16, "triangle")],
+  pizzaDone: [tone(523, 0, 0.18, 0.2), tone(659, 0.09, 0.22, 0.2)],
+  finished: [tone(659, 0, 0.14, 0.22), tone(784, 0.1, 0.14, 0.22), tone(1047, 0.2, 0.3, 0.22)],
+  shiftOver: [
+    tone(523, 0, 0.2, 0.22),
+    tone(659, 0.14, 0.2, 0.22),
+    tone(784, 0.28, 0.2, 0.22),
+    tone(1047, 0.42, 0.45, 0.22),
+  ],
+  yourTurn: [tone(880, 0, 0.16, 0.24), tone(1175, 0.11, 0.3, 0.24)],
+} as const satisfies Record<string, readonly Tone[]>;
+
+export type Sound = keyof typeof SOUNDS;
+
+let context: AudioContext | undefined;
+
+/** Makes a sound, if sounds are on. Before the first click on the page browsers keep silent. */
+export function play(sound: Sound): void {
+  if (!soundOn.peek() || typeof AudioContext === "undefined") return;
+  context ??= new AudioContext();
+  const audio = context;
+  if (audio.state === "suspended") void audio.resume();
+  for (const { hertz, at, length, loud, wave } of SOUNDS[sound]) {
+    const start = audio.currentTime + at;
+    const oscillator = new OscillatorNode(audio, { type: wave, frequency: hertz });
+    const gain = new GainNode(audio, { gain: 0 });
+    gain.gain.linearRampToValueAtTime(loud * 0.5, start + 0.008);
+    gain.gain.exponentialRampToValueAtTime(0.0001, start + length);
+    oscillator.connect(gain).connect(audio.destination);
+    oscillator.start(start);
+    oscillator.stop(start + length + 0.02);
+  }
+}
+
+/** The sound of what happened. */
+export function soundOf({ happening }: LogLine): Sound | undefined {
+  switch (happening.kind) {
+    case "played":
+      return "play";
+    case "passed":
+      return "pass";
+    case "pizzaDone":
+    case "finished":
+    case "shiftOver":
+      return happening.kind;
+    case "gameOver":
+      return "shiftOver";
+    default:
+      return undefined;
+  }
+}

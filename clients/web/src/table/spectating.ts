@@ -1,0 +1,30 @@
+// Watching a room without a seat: follows its public events. What they mean is in model/reduce.ts.
+
+import { type Signal, signal } from "@preact/signals";
+import { spectatorApi } from "../api/client";
+import { type Following, follow } from "../api/follow";
+import { applyEvents } from "./model/reduce";
+import { applySnapshot } from "./model/snapshot";
+import { emptyTable, type TableState, tableFromRoom } from "./model/state";
+
+export interface Spectating {
+  readonly table: Signal<TableState>;
+  readonly following: Following;
+  stop(): void;
+}
+
+/** Starts to watch a room. */
+export function startSpectating(roomId: string): Spectating {
+  const table = signal(emptyTable());
+  const following = follow(
+    (abort) => spectatorApi.watch({ roomId, fromSequence: BigInt(table.peek().nextSequence) }, { signal: abort }),
+    ({ room, snapshot, events }) => {
+      let next = table.peek();
+      if (room && next.nextSequence === 1) next = tableFromRoom(room);
+      if (snapshot) next = applySnapshot(next, snapshot, undefined);
+      table.value = applyEvents(next, events);
+      return table.value.phase !== "gameOver" && table.value.phase !== "aborted";
+    },
+  );
+  return { table, following, stop: () => following.stop() };
+}

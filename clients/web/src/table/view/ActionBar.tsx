@@ -1,0 +1,148 @@
+// The reader's decision: buttons for what is picked, for passing, giving, declaring; what is missing; the clock. A button that cannot be used now
+// stays where it is and says why, so that the keyboard's focus is never lost.
+
+import type { ComponentChildren } from "preact";
+import { DecisionKind } from "../../gen/chefshat/v1/decision_pb";
+import { Role } from "../../gen/chefshat/v1/rules_pb";
+import { t } from "../../i18n";
+import { Clock } from "../../parts/Clock";
+import { actionOf, type Move } from "../model/actions";
+import type { OpenDecision } from "../model/live";
+import { missing, type Picked } from "../model/picking";
+import type { TableState } from "../model/state";
+import { cardWord, moveWords } from "../words";
+
+interface ActionBarProps {
+  table: TableState;
+  own: number | undefined;
+  decision: OpenDecision | undefined;
+  moves: readonly Move[];
+  picked: Picked;
+  /** The legal move that the picked cards are. */
+  move: Move | undefined;
+  /** An answer is on its way. */
+  sending: boolean;
+  /** A reason or trouble that is to be seen instead of the standing hint. */
+  remark: string;
+  /** Milliseconds of a whole decision; 0: no clock. */
+  wholeMs: number;
+  onAnswer: (action: number) => void;
+  onPutBack: () => void;
+}
+
+export function ActionBar(props: ActionBarProps) {
+  const { table, decision, moves, move, remark, sending } = props;
+  const words = t().table.actions;
+  const answer = (chosen: Move) => props.onAnswer(actionOf(chosen, table.faces));
+  const kind = decision?.kind;
+  const special = kind === DecisionKind.SPECIAL_ACTION;
+  const mayPass = moves.some((legal) => legal.kind === "pass");
+  return (
+    <section class="actions" aria-label={words.label}>
+      <p class={`actions-hint ${remark ? "actions-remark" : ""}`} role="note">
+        {remark || hint(props)}
+      </p>
+      {decision && props.wholeMs > 0 && (
+        <Clock
+          key={String(decision.id)}
+          timeLeftMs={decision.timeLeftMs}
+          bankLeftMs={decision.bankLeftMs}
+          sinceMs={decision.receivedAtMs}
+          wholeMs={props.wholeMs}
+        />
+      )}
+      <div class="actions-buttons">
+        {special ? (
+          <SpecialActions table={table} own={props.own} busy={sending} onAnswer={answer} />
+        ) : kind === DecisionKind.EXCHANGE ? (
+          <Act main ready={move !== undefined && !sending} onClick={() => move && answer(move)} id="give">
+            {move ? words.giveCard(giftWord(props, move)) : words.give}
+          </Act>
+        ) : (
+          <>
+            <Act main ready={move !== undefined && !sending} onClick={() => move && answer(move)} id="play">
+              {move ? words.playCards(moveWords(move)) : words.play}
+            </Act>
+            <Act ready={mayPass && !sending} onClick={() => answer({ kind: "pass" })} id="pass">
+              {words.pass}
+            </Act>
+          </>
+        )}
+        {props.picked.size > 0 && (
+          <Act ready quiet onClick={props.onPutBack} id="put-back">
+            {words.putBack}
+          </Act>
+        )}
+      </div>
+    </section>
+  );
+}
+
+/** The card that will be given: the Golden one only where no plain one is left. */
+function giftWord({ decision, picked }: ActionBarProps, move: Move): string {
+  const [index] = picked;
+  const card = index === undefined ? undefined : decision?.hand[index];
+  return card ? cardWord(card) : moveWords(move);
+}
+
+function hint({ table, decision, moves, picked, move, sending }: ActionBarProps): string {
+  const words = t().table.actions;
+  if (sending) return words.sending;
+  if (!decision) return table.phase === "pizza" || table.phase === "dealt" ? words.notYourTurn : "";
+  if (decision.kind === DecisionKind.SPECIAL_ACTION) return "";
+  if (move) return words.ready;
+  if (decision.kind === DecisionKind.EXCHANGE) return words.pickGift;
+  const mayPass = moves.some((legal) => legal.kind === "pass");
+  if (picked.size > 0) {
+    const more = missing(decision.hand, picked, moves);
+    return more === undefined || more === 0 ? words.pick : words.more(more);
+  }
+  if (moves.every((legal) => legal.kind === "pass")) return words.onlyPass;
+  if (!mayPass) return table.turn === 1 ? words.noPass : words.mustPlay;
+  return words.pick;
+}
+
+interface SpecialProps {
+  table: TableState;
+  own: number | undefined;
+  busy: boolean;
+  onAnswer: (move: Move) => void;
+}
+
+function SpecialActions({ table, own, busy, onAnswer }: SpecialProps) {
+  const words = t().table.actions;
+  const fight = own !== undefined && table.seats[own]?.role === Role.DISHWASHER;
+  return (
+    <>
+      <Act main ready={!busy} onClick={() => onAnswer({ kind: "declare" })} id="declare">
+        {fight ? words.foodFight : words.dinner}
+      </Act>
+      <Act ready={!busy} onClick={() => onAnswer({ kind: "decline" })} id="decline">
+        {words.decline}
+      </Act>
+    </>
+  );
+}
+
+interface ActProps {
+  id: string;
+  ready: boolean;
+  main?: boolean;
+  quiet?: boolean;
+  onClick: () => void;
+  children: ComponentChildren;
+}
+
+function Act({ id, ready, main = false, quiet = false, onClick, children }: ActProps) {
+  return (
+    <button
+      type="button"
+      class={`button ${main ? "button-main" : quiet ? "button-quiet" : "button-plain"}`}
+      aria-disabled={!ready}
+      data-action={id}
+      onClick={() => ready && onClick()}
+    >
+      {children}
+    </button>
+  );
+}

@@ -1,0 +1,55 @@
+// The middle of the table: the pizza that is being made, with everything that has gone onto it, and on it the cards that lie on the board.
+
+import { t } from "../../i18n";
+import { Card } from "../../parts/Card";
+import { Drawing, faceDrawing } from "../../parts/Drawing";
+import type { TableState } from "../model/state";
+import { distinctName, playWords } from "../words";
+
+/** Most toppings that are drawn. */
+const MOST_TOPPINGS = 44;
+/** Turns from one topping to the next by the golden angle, so that they never lie in a row. */
+const GOLDEN_ANGLE = Math.PI * (3 - Math.sqrt(5));
+
+export function Board({ table }: { table: TableState }) {
+  const words = t().table.board;
+  const { board, boardBy } = table;
+  const said =
+    board.length === 0
+      ? words.empty
+      : boardBy === undefined
+        ? playWords(board)
+        : words.by(playWords(board), distinctName(table, boardBy));
+  return (
+    <section class="board" aria-label={words.label}>
+      <div class="pizza" aria-hidden="true">
+        {table.toppings.slice(-MOST_TOPPINGS).map((face, index) => (
+          <Topping key={index} name={face > table.faces ? "joker" : faceDrawing(face)} index={index} />
+        ))}
+      </div>
+      <div
+        class={`board-cards ${board.length > 6 ? "board-many" : ""}`}
+        key={`${table.shift}-${table.turn}-${board.length}`}
+      >
+        {board.map((card, index) => (
+          <Card key={index} card={card} class="board-card" />
+        ))}
+      </div>
+      <p class={`board-words ${board.length === 0 ? "board-empty" : ""}`}>{said}</p>
+    </section>
+  );
+}
+
+/** An ingredient on the pizza, somewhere between the cards and the crust. */
+function Topping({ name, index }: { name: string; index: number }) {
+  const angle = index * GOLDEN_ANGLE * 1.7 + 0.6;
+  const radius = 0.72 + 0.12 * Math.sin(index * 2.3);
+  const left = 50 + 50 * radius * Math.cos(angle);
+  const top = 50 + 50 * radius * Math.sin(angle);
+  const style = { left: `${left.toFixed(1)}%`, top: `${top.toFixed(1)}%`, rotate: `${(index * 67) % 360}deg` };
+  return (
+    <span class="topping" style={style}>
+      <Drawing name={name} />
+    </span>
+  );
+}

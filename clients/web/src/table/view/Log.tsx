@@ -1,0 +1,38 @@
+// What happened at the table, the newest at the end. It is read out line by line by the announcer, not by this list.
+
+import { useEffect, useRef } from "preact/hooks";
+import { t } from "../../i18n";
+import type { TableState } from "../model/state";
+import { happeningWords, nameOf } from "../words";
+
+export function Log({ table }: { table: TableState }) {
+  const list = useRef<HTMLOListElement>(null);
+  const last = table.log.at(-1)?.sequence;
+  useEffect(() => {
+    if (list.current) list.current.scrollTop = list.current.scrollHeight;
+  }, [last]);
+  return (
+    <section class="log sheet" aria-label={t().table.log.title}>
+      <h2>{t().table.log.title}</h2>
+      {/* biome-ignore lint/a11y/noNoninteractiveTabindex: what scrolls must be reached with the keyboard */}
+      <ol ref={list} tabIndex={0}>
+        {table.log.map((line) => {
+          const { seat, text } = happeningWords(table, line.happening);
+          return (
+            <li key={line.sequence} class={seat === undefined ? "log-aside" : ""}>
+              {seat !== undefined && (
+                <>
+                  <span class={`seat-number seat-color-${seat % 6}`} aria-hidden="true">
+                    {seat}
+                  </span>
+                  <strong>{nameOf(table, seat)}</strong>{" "}
+                </>
+              )}
+              {text}
+            </li>
+          );
+        })}
+      </ol>
+    </section>
+  );
+}

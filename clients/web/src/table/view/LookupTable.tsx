@@ -1,0 +1,103 @@
+// The look-up table of a turn as a table: faces down, numbers of cards across, with none, one or two jokers. Every cell says by a sign as well
+// as by colour what it is.
+
+import { t } from "../../i18n";
+import { Drawing, faceDrawing } from "../../parts/Drawing";
+import type { Cell, CellState, Lookup } from "../model/lookup";
+import { moveWords } from "../words";
+import "./lookup.css";
+
+const SIGNS: Record<CellState, string> = { legal: "✓", notInHand: "", notAllowed: "✕", impossible: "" };
+const STATES: readonly CellState[] = ["legal", "notInHand", "notAllowed", "impossible"];
+
+interface LookupTableProps {
+  lookup: Lookup;
+  /** The action that was taken, where that is known. */
+  taken?: number | undefined;
+}
+
+export function LookupTable({ lookup, taken }: LookupTableProps) {
+  const words = t().table.lookup;
+  const faces = lookup.plays.length;
+  const cells = [...lookup.plays.flat(2), ...lookup.others];
+  const legal = cells.filter((cell) => cell.state === "legal").length;
+  return (
+    <div class="lookup">
+      <p class="lookup-count">
+        <strong>{words.count(legal)}</strong> <span class="soft small">{words.groups}</span>
+      </p>
+      {/* biome-ignore lint/a11y/noNoninteractiveTabindex: what scrolls must be reached with the keyboard */}
+      <section class="lookup-scroll" tabIndex={0} aria-label={words.caption}>
+        <table>
+          <caption class="only-heard">{words.caption}</caption>
+          <thead>
+            <tr>
+              <th scope="col">
+                <span class="only-heard">{words.face}</span>
+              </th>
+              {lookup.plays.map((_, index) => (
+                <th scope="col" key={index} class="number">
+                  {index + 1}
+                </th>
+              ))}
+            </tr>
+          </thead>
+          <tbody>
+            {lookup.plays.map((quantities, index) => (
+              <tr key={index}>
+                <th scope="row" class="number">
+                  {index + 1} <Drawing name={faceDrawing(index + 1)} />
+                </th>
+                {quantities.map((group, quantity) => (
+                  <td key={quantity}>
+                    <span class="lookup-group">
+                      {group.map((cell) => (
+                        <Sign key={cell.action} cell={cell} taken={cell.action === taken} />
+                      ))}
+                    </span>
+                  </td>
+                ))}
+                {faces > quantities.length && <td colSpan={faces - quantities.length} />}
+              </tr>
+            ))}
+          </tbody>
+        </table>
+      </section>
+      <p class="lookup-others">
+        {lookup.others.map((cell) => (
+          <span key={cell.action}>
+            <Sign cell={cell} taken={cell.action === taken} />{" "}
+            {cell.move.kind === "pass" ? words.pass : words.loneJoker}
+          </span>
+        ))}
+      </p>
+      <ul class="lookup-key">
+        {STATES.map((state) => (
+          <li key={state}>
+            <span class={`lookup-cell lookup-${state}`} aria-hidden="true">
+              {SIGNS[state]}
+            </span>{" "}
+            {words[state]}
+          </li>
+        ))}
+      </ul>
+    </div>
+  );
+}
+
+function Sign({ cell, taken }: { cell: Cell; taken: boolean }) {
+  const words = t().table.lookup;
+  const said = `${moveWords(cell.move)}: ${words[cell.state]}${taken ? `, ${words.chosen}` : ""}`;
+  const class_ = `lookup-cell lookup-${cell.state} ${taken ? "lookup-taken" : ""}`;
+  if (cell.state !== "legal")
+    return (
+      <span class={class_} title={said} aria-hidden="true">
+        {SIGNS[cell.state]}
+      </span>
+    );
+  return (
+    <span class={class_} title={said} role="img" aria-label={said}>
+      {SIGNS.legal}
+    </span>
+  );
+}

@@ -1,0 +1,106 @@
+// How a Shift or the game ended, over the pizza: everybody by place, with points.
+
+import { t } from "../../i18n";
+import { ButtonLink } from "../../parts/Button";
+import type { ShiftResult, TableState } from "../model/state";
+import { nameOf } from "../words";
+
+interface ResultProps {
+  table: TableState;
+  own: number | undefined;
+  /** Links away from the table once the game is over; not in a replay. */
+  links?: boolean;
+}
+
+/** The result that is to be seen now: of the game once it is over, of the last Shift until the next one is under way. */
+export function Result({ table, own, links = true }: ResultProps) {
+  if (table.phase === "gameOver") return <GameResult table={table} own={own} links={links} />;
+  if (table.result && table.phase !== "pizza" && table.phase !== "aborted") {
+    return <ShiftTable table={table} result={table.result} />;
+  }
+  return null;
+}
+
+function ShiftTable({ table, result }: { table: TableState; result: ShiftResult }) {
+  const words = t().table.result;
+  return (
+    <section class="result sheet" aria-label={words.shift(result.shift)}>
+      <h2>{words.shift(result.shift)}</h2>
+      <table>
+        <thead>
+          <tr>
+            <th scope="col">{words.place}</th>
+            <th scope="col">{words.name}</th>
+            <th scope="col">{words.points}</th>
+            <th scope="col">{words.total}</th>
+          </tr>
+        </thead>
+        <tbody>
+          {result.order.map((seat, index) => (
+            <Row key={seat} table={table} seat={seat} place={index + 1}>
+              <td class="number">+{result.shiftPoints[seat] ?? 0}</td>
+              <td class="number">{result.points[seat] ?? 0}</td>
+            </Row>
+          ))}
+        </tbody>
+      </table>
+      {result.adjudicated && <p class="soft">{words.adjudicated}</p>}
+    </section>
+  );
+}
+
+function GameResult({ table, own, links }: Required<ResultProps>) {
+  const words = t().table.result;
+  const winner = table.standings[0]?.seat;
+  return (
+    <section class="result sheet" aria-label={words.game}>
+      <h2>{winner !== undefined && (winner === own ? words.youWon : words.wins(nameOf(table, winner)))}</h2>
+      <table>
+        <thead>
+          <tr>
+            <th scope="col">{words.place}</th>
+            <th scope="col">{words.name}</th>
+            <th scope="col">{words.points}</th>
+          </tr>
+        </thead>
+        <tbody>
+          {table.standings.map(({ seat, place, points }) => (
+            <Row key={seat} table={table} seat={seat} place={place}>
+              <td class="number">{points}</td>
+            </Row>
+          ))}
+        </tbody>
+      </table>
+      {links && (
+        <p class="result-links">
+          <ButtonLink href={`/replay/${table.gameId}`} look="main">
+            {words.replay}
+          </ButtonLink>
+          <ButtonLink href="/">{words.lobby}</ButtonLink>
+        </p>
+      )}
+    </section>
+  );
+}
+
+interface RowProps {
+  table: TableState;
+  seat: number;
+  place: number;
+  children: preact.ComponentChildren;
+}
+
+function Row({ table, seat, place, children }: RowProps) {
+  return (
+    <tr>
+      <td>{t().common.place(place)}</td>
+      <th scope="row">
+        <span class={`seat-number seat-color-${seat % 6}`} aria-hidden="true">
+          {seat}
+        </span>{" "}
+        {nameOf(table, seat)}
+      </th>
+      {children}
+    </tr>
+  );
+}

@@ -1,0 +1,150 @@
+// What one seat shows: who sits there and what it is, its role, points and cards, what it did last, what it has expressed.
+
+import { DecisionKind } from "../../gen/chefshat/v1/decision_pb";
+import { Role } from "../../gen/chefshat/v1/rules_pb";
+import { t } from "../../i18n";
+import { Card } from "../../parts/Card";
+import { Drawing } from "../../parts/Drawing";
+import { KindBadge } from "../../parts/KindBadge";
+import { isLabel } from "../expressions";
+import { stacks } from "../model/cards";
+import { isTaken, type SeatState, type TableState } from "../model/state";
+import { cardWord, expressionWord, nameOf, playWords, presenceWords, roleWord } from "../words";
+import { Face } from "./Face";
+
+/** Backs that are drawn of a hidden hand; the number beside them counts. */
+const MOST_BACKS = 17;
+
+/** An expression is shown if it is one of so many last events: who comes back to a table does not see an old one as new. */
+const FRESH = 10;
+
+const ROLE_DRAWINGS: Record<Role, string> = {
+  [Role.UNSPECIFIED]: "",
+  [Role.CHEF]: "role-chef",
+  [Role.SOUS_CHEF]: "role-sous-chef",
+  [Role.COOK]: "role-cook",
+  [Role.WAITER]: "role-waiter",
+  [Role.DISHWASHER]: "role-dishwasher",
+};
+
+interface SeatPanelProps {
+  table: TableState;
+  seat: SeatState;
+  /** Whether it is the reader's own. */
+  own?: boolean;
+  /** Whether the open decision is its own, as far as the reader may know. */
+  deciding: boolean;
+  /** What kind of decision, where that is known. */
+  kind?: DecisionKind | undefined;
+  /** Whether its cards are drawn here; the reader's own lie open in the hand. */
+  cards?: boolean;
+}
+
+export function SeatPanel({ table, seat, own = false, deciding, kind, cards = true }: SeatPanelProps) {
+  const words = t().table;
+  const state = seat.place > 0 ? "placed" : deciding ? "deciding" : seat.passed ? "passed" : "";
+  const presence = presenceWords(seat);
+  const role = roleWord(seat.role);
+  return (
+    <article class={`seat ${state ? `seat-${state}` : ""} ${own ? "seat-own" : ""}`} data-seat={seat.seat}>
+      <span class={`seat-number seat-color-${seat.seat % 6}`} aria-hidden="true">
+        {seat.seat}
+      </span>
+      <div class="seat-who">
+        <h3 class="seat-name">
+          {isTaken(seat) ? nameOf(table, seat.seat) : words.freeSeat}
+          {own && <span class="soft"> ({words.you})</span>}
+        </h3>
+        <p class="seat-kind">
+          <KindBadge kind={seat.kind} builtIn={seat.builtIn} />
+          {presence && isTaken(seat) && <span class="seat-presence">{presence}</span>}
+        </p>
+      </div>
+      <p class="seat-points">
+        <strong class="number">{seat.points}</strong> <span class="soft small">{words.pointsWord}</span>
+      </p>
+      <p class="seat-state">
+        {role && (
+          <span class="seat-role">
+            <Drawing name={ROLE_DRAWINGS[seat.role]} /> {role}
+          </span>
+        )}
+        <Chip table={table} seat={seat} state={state} kind={kind} />
+      </p>
+      {cards && table.phase !== "waiting" && <Cards seat={seat} />}
+      {seat.expression && table.nextSequence - seat.expression.sequence <= FRESH && (
+        <Bubble key={seat.expression.sequence} label={seat.expression.label} />
+      )}
+    </article>
+  );
+}
+
+interface ChipProps {
+  table: TableState;
+  seat: SeatState;
+  state: string;
+  kind: DecisionKind | undefined;
+}
+
+function Chip({ table, seat, state, kind }: ChipProps) {
+  const words = t().table.chips;
+  if (state === "placed") {
+    return <span class="chip chip-placed">{t().common.place(gamePlace(table, seat) ?? seat.place)}</span>;
+  }
+  if (state === "deciding") {
+    const word =
+      kind === DecisionKind.EXCHANGE
+        ? words.toGive
+        : kind === DecisionKind.SPECIAL_ACTION
+          ? words.toDeclare
+          : words.toPlay;
+    return <span class="chip chip-deciding">{word}</span>;
+  }
+  if (seat.lastMove === "pass") return <span class="chip chip-passed">{words.passed}</span>;
+  if (seat.lastMove) return <span class="chip chip-played">{playWords(seat.lastMove)}</span>;
+  return null;
+}
+
+/** The place in the game, once that is over. */
+function gamePlace(table: TableState, seat: SeatState): number | undefined {
+  return table.standings.find((line) => line.seat === seat.seat)?.place;
+}
+
+function Cards({ seat }: { seat: SeatState }) {
+  const count = t().common.cards(seat.cardsLeft);
+  if (seat.hand) {
+    return (
+      <div class="seat-cards">
+        <span class="only-heard">{seat.hand.map(cardWord).join("; ")}</span>
+        <div class="seat-open" aria-hidden="true">
+          {stacks(seat.hand).map((stack) => (
+            <span class="seat-stack" key={stack[0]?.kind === "joker" ? "J" : stack[0]?.face}>
+              {stack[0] && <Card card={stack[0]} />}
+              {stack.length > 1 && <b class="seat-stack-count number">×{stack.length}</b>}
+            </span>
+          ))}
+        </div>
+      </div>
+    );
+  }
+  return (
+    <div class="seat-cards">
+      <span class="seat-count number">{count}</span>
+      <div class="seat-backs" aria-hidden="true">
+        {Array.from({ length: Math.min(MOST_BACKS, seat.cardsLeft) }, (_, index) => (
+          <Card key={index} card={undefined} />
+        ))}
+      </div>
+    </div>
+  );
+}
+
+/** An expression, shown for a while. */
+function Bubble({ label }: { label: string }) {
+  return (
+    <p class="bubble">
+      {isLabel(label) && <Face label={label} />}
+      <span>{expressionWord(label)}</span>
+    </p>
+  );
+}

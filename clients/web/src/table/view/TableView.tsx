@@ -1,0 +1,212 @@
+// The whole table: the other seats, the pizza, what happened and what is asked for, the reader's own hand and decision. It draws what it is given
+// and gives back actions; where a table comes from (a seat, a spectator's stream, a record, the tutorial) is not its concern.
+
+import type { ComponentChildren } from "preact";
+import { useEffect, useRef, useState } from "preact/hooks";
+import { DecisionKind } from "../../gen/chefshat/v1/decision_pb";
+import { t } from "../../i18n";
+import type { Label } from "../expressions";
+import { actionOf } from "../model/actions";
+import type { OpenDecision } from "../model/live";
+import { canPick, legalMoves, type Picked, pickedMove, reasonAgainst, toggle } from "../model/picking";
+import type { TableState } from "../model/state";
+import { headingWords, nameOf, reasonWords } from "../words";
+import { ActionBar } from "./ActionBar";
+import { Board } from "./Board";
+import { Hand } from "./Hand";
+import { Log } from "./Log";
+import { Now } from "./Now";
+import { Result } from "./Result";
+import { SeatPanel } from "./SeatPanel";
+import { Expressions, type ShownTurn, Tools } from "./Tools";
+import "./table.css";
+import "./seats.css";
+import "./hand.css";
+
+interface TableViewProps {
+  table: TableState;
+  /** The reader's seat; undefined: all seats are others'. */
+  own: number | undefined;
+  /** The reader's open decision. */
+  decision?: OpenDecision | undefined;
+  /** Whose decision is open, where the table itself cannot tell: in a replay. */
+  next?: number | undefined;
+  /** What kind of decision that is. */
+  nextKind?: DecisionKind | undefined;
+  sending?: boolean;
+  /** What went wrong last, in words. */
+  trouble?: string;
+  /** Something to be said above everything: a lost connection, a lesson. */
+  banner?: ComponentChildren;
+  /** Said instead of the rules' own reason why a card cannot be picked. */
+  refusal?: string | undefined;
+  /** Leave out the clock: nobody waits. */
+  untimed?: boolean;
+  /** It is a record being looked at: nobody is "you", and the end leads nowhere. */
+  replayed?: boolean;
+  /** The name of the room or record. */
+  caption?: string;
+  /** Below the table: the controls of a replay. */
+  children?: ComponentChildren;
+  onAnswer?: (action: number) => void;
+  onExpress?: (label: Label) => void;
+}
+
+const NOTHING: Picked = new Set();
+
+export function TableView(props: TableViewProps) {
+  const { table, own, decision, sending = false } = props;
+  const [picked, setPicked] = useState<Picked>(NOTHING);
+  const [remark, setRemark] = useState("");
+  const lastTurn = useRef<ShownTurn | undefined>(undefined);
+  useEffect(() => {
+    setPicked(NOTHING);
+    setRemark("");
+  }, [decision?.id]);
+  if (decision?.kind === DecisionKind.TURN) lastTurn.current = { table, decision };
+
+  const mine = own === undefined ? undefined : table.seats[own];
+  const hand = decision?.hand ?? mine?.hand ?? [];
+  const moves = decision ? legalMoves(decision.legal, table.faces) : [];
+  const move = pickedMove(hand, picked, moves);
+  const next = props.next ?? (decision ? own : table.next);
+  const kind = decision?.kind ?? props.nextKind;
+
+  const refusal = (index: number): string | undefined => {
+    const words = t().table.reasons;
+    if (!decision) return words.notYourTurn;
+    if (canPick(hand, index, moves)) return undefined;
+    if (props.refusal) return props.refusal;
+    if (decision.kind === DecisionKind.EXCHANGE) return words.gift;
+    return reasonWords(reasonAgainst(table, hand, index));
+  };
+  const putBack = () => {
+    setPicked(NOTHING);
+    setRemark("");
+  };
+  const answer = (action: number) => {
+    setRemark("");
+    props.onAnswer?.(action);
+  };
+  const wholeMs = props.untimed ? 0 : (table.policy?.decisionTimeMs ?? 0);
+
+  const handLabel = props.replayed && mine ? t().table.hand.of(nameOf(table, mine.seat)) : t().table.hand.label;
+
+  return (
+    <div class={`table table-of-${table.seats.length} ${mine ? "table-own" : "table-watched"}`}>
+      <header class="table-head">
+        <h1>{headingWords(table)}</h1>
+        {props.caption && <p class="soft table-caption">{props.caption}</p>}
+        <Tools turn={lastTurn.current} lookup={mine !== undefined && !props.replayed} />
+      </header>
+      {props.banner}
+      <Seats table={table} own={own} next={next} kind={kind} />
+      <div class="middle">
+        <Log table={table} />
+        <div class="centre">
+          <Board table={table} />
+          <Result table={table} own={own} links={!props.replayed} />
+        </div>
+        <Now
+          table={table}
+          own={own}
+          deciding={decision?.kind}
+          next={next}
+          kind={kind}
+          mayPass={moves.some((legal) => legal.kind === "pass")}
+        />
+      </div>
+      {mine ? (
+        <section class={`own sheet ${decision ? "own-deciding" : ""}`} aria-label={handLabel}>
+          <div class="own-head">
+            <SeatPanel
+              table={table}
+              seat={mine}
+              own={!props.replayed}
+              deciding={next === own}
+              kind={kind}
+              cards={false}
+            />
+            {props.onExpress && <Expressions onExpress={props.onExpress} />}
+          </div>
+          <div class="own-cards">
+            <Hand
+              cards={hand}
+              picked={picked}
+              received={mine.received}
+              refusal={refusal}
+              label={handLabel}
+              onToggle={(index) => {
+                setRemark("");
+                setPicked(toggle(hand, picked, index, moves));
+              }}
+              onPlay={() => {
+                if (!move || sending) return false;
+                answer(actionOf(move, table.faces));
+                return true;
+              }}
+              onPutBack={putBack}
+              onRefused={setRemark}
+            />
+          </div>
+          {props.onAnswer && table.phase !== "gameOver" && table.phase !== "aborted" && (
+            <ActionBar
+              table={table}
+              own={own}
+              decision={decision}
+              moves={moves}
+              picked={picked}
+              move={move}
+              sending={sending}
+              remark={remark || props.trouble || ""}
+              wholeMs={wholeMs}
+              onAnswer={answer}
+              onPutBack={putBack}
+            />
+          )}
+        </section>
+      ) : (
+        <Seats table={table} own={own} next={next} kind={kind} lower />
+      )}
+      {props.children}
+    </div>
+  );
+}
+
+interface SeatsProps {
+  table: TableState;
+  own: number | undefined;
+  next: number | undefined;
+  kind: DecisionKind | undefined;
+  /** The row below the pizza, where the reader has no seat. */
+  lower?: boolean;
+}
+
+/** The other seats in a row, in the order of play from the reader's left. Without a seat of the reader's own they go clockwise around the pizza. */
+function Seats({ table, own, next, kind, lower = false }: SeatsProps) {
+  const players = table.seats.length;
+  const below = own === undefined ? Math.max(1, Math.floor(players / 2)) : 0;
+  const numbers = Array.from({ length: players }, (_, index) => index);
+  const shown =
+    own !== undefined
+      ? numbers.slice(1).map((distance) => (own + distance) % players)
+      : lower
+        ? numbers
+            .slice(players - below + 1)
+            .concat(0)
+            .reverse()
+        : numbers.slice(1, players - below + 1);
+  return (
+    <ol class="seats" style={{ "--seats": shown.length }} aria-label={t().table.room.seats}>
+      {shown.map((number) => {
+        const seat = table.seats[number];
+        if (!seat) return null;
+        return (
+          <li key={number}>
+            <SeatPanel table={table} seat={seat} deciding={next === number && seat.place === 0} kind={kind} />
+          </li>
+        );
+      })}
+    </ol>
+  );
+}

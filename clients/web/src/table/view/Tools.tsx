@@ -1,0 +1,105 @@
+// What stands beside the table's heading: sound, the look-up table, and the expressions that can be shown with one click.
+
+import { useState } from "preact/hooks";
+import { t } from "../../i18n";
+import { Dialog } from "../../parts/Dialog";
+import { LABELS, type Label } from "../expressions";
+import type { OpenDecision } from "../model/live";
+import { lookupOf } from "../model/lookup";
+import type { TableState } from "../model/state";
+import { setSound, soundOn } from "../sounds";
+import { Face } from "./Face";
+import { LookupTable } from "./LookupTable";
+
+/** A turn as the look-up table shows it. */
+export interface ShownTurn {
+  readonly table: TableState;
+  readonly decision: Pick<OpenDecision, "hand" | "legal">;
+}
+
+interface ToolsProps {
+  /** The last turn of the reader's own. */
+  turn: ShownTurn | undefined;
+  /** Whether there are turns of the reader's own at all. */
+  lookup: boolean;
+}
+
+export function Tools({ turn, lookup }: ToolsProps) {
+  const words = t().table.tools;
+  const [open, setOpen] = useState<ShownTurn | "none" | undefined>(undefined);
+  const on = soundOn.value;
+  return (
+    <fieldset class="tools" aria-label={words.label}>
+      {lookup && (
+        <button
+          type="button"
+          class="tool"
+          onClick={() => setOpen(turn ?? "none")}
+          aria-label={words.lookup}
+          title={words.lookup}
+        >
+          <svg
+            viewBox="0 0 24 24"
+            aria-hidden="true"
+            fill="none"
+            stroke="currentColor"
+            stroke-width="2"
+            stroke-linejoin="round"
+          >
+            <path d="M4 4h16v16H4ZM4 9.3h16M4 14.6h16M9.3 4v16M14.6 4v16" />
+          </svg>
+        </button>
+      )}
+      <button
+        type="button"
+        class="tool"
+        aria-pressed={on}
+        aria-label={on ? words.soundOn : words.soundOff}
+        title={on ? words.soundOn : words.soundOff}
+        onClick={() => setSound(!on)}
+      >
+        <svg
+          viewBox="0 0 24 24"
+          aria-hidden="true"
+          fill="none"
+          stroke="currentColor"
+          stroke-width="2"
+          stroke-linecap="round"
+          stroke-linejoin="round"
+        >
+          <path fill="currentColor" d="M4 9.5v5h3.5L12 19V5L7.500 9.500Z" />
+          <path d={on ? "M15.500 9a4 4 0 0 1 0 6M18 6.500a8 8 0 0 1 0 11" : "M16 9.500l5 5M21 9.500l-5 5"} />
+        </svg>
+      </button>
+      {open && (
+        <Dialog title={words.lookup} onClose={() => setOpen(undefined)}>
+          {open === "none" ? (
+            <p>{t().table.lookup.none}</p>
+          ) : (
+            <LookupTable lookup={lookupOf(open.table, open.decision.hand, new Set(open.decision.legal))} />
+          )}
+        </Dialog>
+      )}
+    </fieldset>
+  );
+}
+
+export function Expressions({ onExpress }: { onExpress: (label: Label) => void }) {
+  const words = t().table.expressions;
+  return (
+    <fieldset class="expressions" aria-label={words.label}>
+      {LABELS.map((label) => (
+        <button
+          key={label}
+          type="button"
+          class="tool"
+          aria-label={words.words[label]}
+          title={words.words[label]}
+          onClick={() => onExpress(label)}
+        >
+          <Face label={label} />
+        </button>
+      ))}
+    </fieldset>
+  );
+}

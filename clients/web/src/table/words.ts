@@ -1,0 +1,187 @@
+// What the table says in words: cards, what happened, what the open turn asks for. The words themselves are in the texts; here they are put
+// together from the model's values.
+
+import { Role, SpecialAction } from "../gen/chefshat/v1/rules_pb";
+import { t } from "../i18n";
+import { isLabel } from "./expressions";
+import type { Move } from "./model/actions";
+import { type Card, faceOf } from "./model/cards";
+import type { Reason } from "./model/picking";
+import type { Happening, LogLine, SeatState, TableState } from "./model/state";
+
+/** What a seat is called: its name, or its number while nobody has it. */
+export function nameOf(table: TableState, seat: number): string {
+  return table.seats[seat]?.name || t().common.seat(seat);
+}
+
+/** What a seat is called where others may be called the same and its number does not stand beside it. */
+export function distinctName(table: TableState, seat: number): string {
+  const name = nameOf(table, seat);
+  const same = table.seats.some((other) => other.seat !== seat && nameOf(table, other.seat) === name);
+  return same ? `${name} (${seat})` : name;
+}
+
+/** One card, for listeners and in sentences. */
+export function cardWord(card: Card): string {
+  const words = t().table.card;
+  if (card.kind === "joker") return words.joker;
+  const ingredient = t().common.faces[card.face - 1] ?? "";
+  const text = card.kind === "golden" ? words.golden(card.face, ingredient) : words.face(card.face, ingredient);
+  return ingredient ? text : text.replace(/, $/, "");
+}
+
+/** The cards of a play: "3 × 9 + 2 jokers". */
+export function playWords(cards: readonly Card[]): string {
+  const jokers = cards.filter((card) => card.kind === "joker").length;
+  const face = cards.map(faceOf).find((other) => other !== undefined);
+  if (face === undefined) return t().table.jokers(jokers);
+  const golden = cards.some((card) => card.kind === "golden");
+  return t().table.play(cards.length - jokers, face, golden, jokers);
+}
+
+/** A move as cards, for words. */
+export function moveWords(move: Move): string {
+  const words = t().table;
+  switch (move.kind) {
+    case "play":
+      return words.play(move.quantity, move.face, false, move.jokers);
+    case "loneJoker":
+    case "giveJoker":
+      return words.jokers(1);
+    case "give":
+      return cardWord({ kind: "face", face: move.face });
+    case "pass":
+      return words.actions.pass;
+    case "decline":
+      return words.actions.decline;
+    case "declare":
+      return `${words.actions.foodFight} / ${words.actions.dinner}`;
+  }
+}
+
+/** Cards that need not be of one face. */
+function giftWords(cards: readonly Card[], count: number): string {
+  if (cards.length === 0) return t().common.cards(count);
+  return cards
+    .map((card) => {
+      if (card.kind === "joker") return t().table.card.joker;
+      return card.kind === "golden" ? `${card.face} (${t().common.golden})` : String(card.face);
+    })
+    .join(", ");
+}
+
+/** Who a line is about, and what is said of it. */
+export interface SaidLine {
+  readonly seat: number | undefined;
+  readonly text: string;
+}
+
+/** What happened, in words. */
+export function happeningWords(table: TableState, happening: Happening): SaidLine {
+  const words = t().table.log;
+  const because = (cause: keyof typeof words.causes) => (words.causes[cause] ? ` (${words.causes[cause]})` : "");
+  switch (happening.kind) {
+    case "dealt":
+      return { seat: undefined, text: words.dealt(happening.shift) };
+    case "played":
+      return { seat: happening.seat, text: words.plays(playWords(happening.cards)) + because(happening.cause) };
+    case "passed":
+      return { seat: happening.seat, text: words.passes + because(happening.cause) };
+    case "finished":
+      return { seat: happening.seat, text: words.finishes(t().common.place(happening.place)) };
+    case "pizzaDone":
+      return { seat: undefined, text: words.pizzaDone(happening.pizza, distinctName(table, happening.nextLeader)) };
+    case "declared": {
+      const fight = happening.action === SpecialAction.FOOD_FIGHT;
+      return { seat: happening.seat, text: fight ? words.foodFight : words.dinner };
+    }
+    case "gave": {
+      const what = giftWords(happening.cards, happening.count);
+      return { seat: happening.giver, text: words.gives(what, distinctName(table, happening.receiver)) };
+    }
+    case "shiftOver":
+      return { seat: undefined, text: words.shiftOver(happening.shift, distinctName(table, happening.winner)) };
+    case "expressed":
+      return { seat: happening.seat, text: words.shows(expressionWord(happening.label)) };
+    case "substituted":
+      return { seat: happening.seat, text: words.substituted(happening.agent) };
+    case "seated":
+    case "left":
+    case "lost":
+    case "back":
+      return { seat: happening.seat, text: words[happening.kind] };
+    default:
+      return { seat: undefined, text: words[happening.kind] };
+  }
+}
+
+/** A line to be read out. */
+export function spokenLine(table: TableState, { happening }: LogLine): string {
+  const { seat, text } = happeningWords(table, happening);
+  return seat === undefined ? `${text}.` : `${distinctName(table, seat)} ${text}.`;
+}
+
+/** An expression's word: ours where the label is one of ours. */
+export function expressionWord(label: string): string {
+  return isLabel(label) ? t().table.expressions.words[label] : label;
+}
+
+/** The name of a role; empty for none. */
+export function roleWord(role: Role): string {
+  const words = t().common.roles;
+  switch (role) {
+    case Role.CHEF:
+      return words.chef;
+    case Role.SOUS_CHEF:
+      return words.sousChef;
+    case Role.COOK:
+      return words.cook;
+    case Role.WAITER:
+      return words.waiter;
+    case Role.DISHWASHER:
+      return words.dishwasher;
+    default:
+      return "";
+  }
+}
+
+/** Why a card cannot be picked. */
+export function reasonWords(reason: Reason): string {
+  const words = t().table.reasons;
+  switch (reason.kind) {
+    case "opening":
+      return reason.golden ? words.openingGolden(reason.face) : words.openingFace(reason.face);
+    case "notRarer":
+      return words.notRarer(reason.face, reason.board);
+    case "tooFew":
+      return words.tooFew(reason.face, reason.need, reason.have);
+    default:
+      return words[reason.kind];
+  }
+}
+
+/** Where the game stands. */
+export function headingWords(table: TableState): string {
+  const words = t().table.heading;
+  switch (table.phase) {
+    case "waiting":
+      return words.waiting;
+    case "dealt":
+      return words.before(table.shift);
+    case "pizza":
+      return words.turn(table.shift, table.pizza, table.turn);
+    case "shiftOver":
+      return words.shiftOver(table.shift);
+    case "gameOver":
+      return words.gameOver;
+    case "aborted":
+      return words.aborted;
+  }
+}
+
+/** What a seat is beyond its kind: lost, or played for by another. */
+export function presenceWords(seat: SeatState): string {
+  const words = t().table.presence;
+  if (seat.substitute) return words.substituted(seat.substitute);
+  return seat.connected || seat.builtIn ? "" : words.away;
+}

@@ -1,0 +1,153 @@
+// The script of the tutorial: a Shift with small hands in which every decision teaches one rule, and the exchange after it. It is data: the
+// events are those of the protocol and go through the same model as a real game's. The words are in the texts, by the lesson's name.
+
+import { create, type MessageInitShape } from "@bufbuild/protobuf";
+import { DecisionKind } from "../gen/chefshat/v1/decision_pb";
+import { type GameEvent, GameEventSchema } from "../gen/chefshat/v1/event_pb";
+import { ParticipantKind } from "../gen/chefshat/v1/room_pb";
+import { Role } from "../gen/chefshat/v1/rules_pb";
+import type { Texts } from "../i18n/en";
+import { type Move, moveOf } from "../table/model/actions";
+import { cardsFromNumbers } from "../table/model/cards";
+import { emptyTable, type SeatState, type TableState } from "../table/model/state";
+
+type Kind = NonNullable<MessageInitShape<typeof GameEventSchema>["kind"]>;
+
+/** One lesson: what is said, what may be done, what happens then. */
+export interface Lesson {
+  readonly name: keyof Texts["tutorial"]["lessons"];
+  /** The decision to be made; without one the reader goes on by a button. */
+  readonly decision?: { readonly kind: DecisionKind; readonly moves: readonly Move[] };
+  /** What happens after it, given the action taken. */
+  readonly then: (action: number) => readonly Kind[];
+}
+
+const FACES = 11;
+const JOKER = FACES + 1;
+const OWN = 0;
+const GRETA = 1;
+const ROLF = 2;
+const GUSTAV = 3;
+
+/** The reader's hand at the beginning. Every seat has as many cards. */
+const HAND = [3, 5, 5, 8, 8, 10, 11, 11, JOKER];
+/** The hand of the second Shift, before the exchange. */
+const SECOND_HAND = [4, 6, 6, 7, 9, 10, 10, 11, 11];
+/** What the Dishwasher gives then. */
+const GIFT = [1, 3];
+
+const play = (seat: number, quantity: number, face: number, cardsLeft: number, jokers = 0): Kind => {
+  return { case: "play", value: { seat, face, quantity, jokers, cardsLeft } };
+};
+const pass = (seat: number): Kind => ({ case: "pass", value: { seat } });
+const finished = (seat: number, place: number): Kind => ({ case: "seatFinished", value: { seat, place } });
+const done = (pizza: number, lastToPlay: number, nextLeader: number): Kind => {
+  return { case: "pizzaDone", value: { pizza, lastToPlay, nextLeader } };
+};
+const turn = (...moves: Move[]) => ({ kind: DecisionKind.TURN, moves });
+const cards = (face: number, quantity: number, jokers = 0): Move => ({ kind: "play", face, quantity, jokers });
+
+/** Any card of the second hand. */
+const gifts: readonly Move[] = [...new Set(SECOND_HAND)].map((face) => ({ kind: "give", face }));
+const given = (action: number) => {
+  const move = moveOf(action, FACES);
+  return move?.kind === "give" ? move.face : FACES;
+};
+
+export const LESSONS: readonly Lesson[] = [
+  { name: "cards", then: () => [] },
+  {
+    name: "opening",
+    decision: turn(cards(11, 2)),
+    then: () => [play(OWN, 2, 11, 7), play(GRETA, 2, 10, 7), pass(ROLF), play(GUSTAV, 2, 9, 7)],
+  },
+  {
+    name: "beating",
+    decision: turn(cards(8, 2)),
+    then: () => [play(OWN, 2, 8, 5), pass(GRETA), pass(GUSTAV), done(1, OWN, OWN)],
+  },
+  {
+    name: "leading",
+    decision: turn(cards(10, 1)),
+    then: () => [play(OWN, 1, 10, 4), play(GRETA, 1, 7, 6), play(ROLF, 1, 6, 8), play(GUSTAV, 1, 2, 6)],
+  },
+  {
+    name: "passing",
+    decision: turn({ kind: "pass" }),
+    then: () => [pass(OWN), pass(GRETA), pass(ROLF), done(2, GUSTAV, GUSTAV), play(GUSTAV, 2, 6, 4)],
+  },
+  {
+    name: "again",
+    decision: turn(cards(5, 2)),
+    then: () => [play(OWN, 2, 5, 2), pass(GRETA), play(ROLF, 2, 4, 6), pass(GUSTAV)],
+  },
+  {
+    name: "joker",
+    decision: turn(cards(3, 1, 1)),
+    then: () => [
+      play(OWN, 1, 3, 0, 1),
+      finished(OWN, 1),
+      pass(ROLF),
+      done(3, OWN, GRETA),
+      play(GRETA, 6, 11, 0),
+      finished(GRETA, 2),
+      play(ROLF, 6, 9, 0),
+      finished(ROLF, 3),
+      {
+        case: "shiftEnded",
+        value: { shift: 1, order: [OWN, GRETA, ROLF, GUSTAV], shiftPoints: [5, 3, 1, 0], points: [5n, 3n, 1n, 0n] },
+      },
+    ],
+  },
+  {
+    name: "points",
+    then: () => [
+      { case: "shiftStarted", value: { shift: 2, hands: [{ seat: OWN, cards: SECOND_HAND, golden: false }] } },
+      { case: "rolesAssigned", value: { roles: [Role.CHEF, Role.SOUS_CHEF, Role.WAITER, Role.DISHWASHER] } },
+    ],
+  },
+  { name: "special", then: () => [] },
+  {
+    name: "exchange",
+    decision: { kind: DecisionKind.EXCHANGE, moves: gifts },
+    then: (action) => [
+      { case: "cardsExchanged", value: { giver: GUSTAV, receiver: OWN, count: 1, cards: GIFT.slice(0, 1) } },
+      { case: "cardsExchanged", value: { giver: OWN, receiver: GUSTAV, count: 1, cards: [given(action)] } },
+    ],
+  },
+  { name: "end", then: () => [] },
+];
+
+/** The table before the first lesson. */
+export function firstTable(you: string): TableState {
+  const seat = (number: number, name: string, kind: ParticipantKind): SeatState => ({
+    seat: number,
+    name,
+    kind,
+    reservedFor: kind,
+    builtIn: "",
+    connected: true,
+    substitute: "",
+    role: Role.UNSPECIFIED,
+    points: 0,
+    cardsLeft: HAND.length,
+    hand: number === OWN ? cardsFromNumbers(HAND, true, FACES) : undefined,
+    passed: false,
+    place: 0,
+    lastMove: undefined,
+    received: [],
+    expression: undefined,
+  });
+  const seats = [
+    seat(OWN, you, ParticipantKind.HUMAN),
+    seat(GRETA, "Greta", ParticipantKind.AGENT),
+    seat(ROLF, "Rolf", ParticipantKind.ROBOT),
+    seat(GUSTAV, "Gustav", ParticipantKind.HUMAN),
+  ];
+  return { ...emptyTable(seats), phase: "dealt", shift: 1, played: Array<number>(FACES + 1).fill(0) };
+}
+
+/** An event of the script as the next one of a table. */
+export function nextEvent(table: TableState, kind: Kind): GameEvent {
+  return create(GameEventSchema, { sequence: BigInt(table.nextSequence), kind });
+}

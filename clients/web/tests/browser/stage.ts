@@ -1,0 +1,85 @@
+// What a browser test stands on: a server of its own with the built page, and a browser that may be given several people.
+
+import { type ChildProcess, spawn } from "node:child_process";
+import { mkdtempSync, rmSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { createInterface } from "node:readline";
+import { type Browser, type BrowserContextOptions, chromium, type Page } from "playwright-core";
+
+const CHROMIUM = process.env.CHEFSHAT_CHROMIUM ?? "/usr/bin/chromium";
+const FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"];
+FLAGS.push("--disable-background-networking", "--disable-component-update", "--disable-sync");
+
+/** A running server. */
+export class Server {
+  private constructor(
+    private process: ChildProcess,
+    readonly dataDir: string,
+    readonly address: string,
+  ) {}
+
+  /** Starts the server that CHEFSHAT_BIN names, on a free port and a data folder of its own. */
+  static async start(): Promise<Server> {
+    const dataDir = mkdtempSync(join(tmpdir(), "chefshat-web-"));
+    const { child, address } = await serve(dataDir, "127.0.0.1:0");
+    return new Server(child, dataDir, address);
+  }
+
+  /** Where the page is. */
+  get url(): string {
+    return `http://${this.address}`;
+  }
+
+  /** Ends the server as if its machine had lost power, and starts it again on the same port with what it had kept. */
+  async restart(): Promise<void> {
+    await ended(this.process, "SIGKILL");
+    this.process = (await serve(this.dataDir, this.address)).child;
+  }
+
+  /** Ends the server and takes away what it kept. */
+  async stop(): Promise<void> {
+    await ended(this.process, "SIGKILL");
+    rmSync(this.dataDir, { recursive: true, force: true });
+  }
+}
+
+/** A browser; each person in it has a context of its own. */
+export async function startBrowser(): Promise<Browser> {
+  return chromium.launch({ executablePath: CHROMIUM, args: FLAGS });
+}
+
+/** A person's page, in English unless told otherwise; whatever the page throws or logs as an error goes into `faults`. */
+export async function person(
+  browser: Browser,
+  options: BrowserContextOptions = {},
+): Promise<{ page: Page; faults: string[] }> {
+  const context = await browser.newContext({ locale: "en-GB", viewport: { width: 1280, height: 800 }, ...options });
+  const page = await context.newPage();
+  const faults: string[] = [];
+  page.on("pageerror", (error) => faults.push(error.message));
+  page.on("console", (message) => {
+    if (message.type() === "error") faults.push(message.text());
+  });
+  return { page, faults };
+}
+
+async function serve(dataDir: string, listen: string): Promise<{ child: ChildProcess; address: string }> {
+  const program = process.env.CHEFSHAT_BIN;
+  if (!program)
+    throw new Error("CHEFSHAT_BIN must name the server: cargo build, then CHEFSHAT_BIN=…/target/debug/chefshat");
+  const args = ["serve", "--listen", listen, "--data-dir", dataDir, "--json", "--until-stdin-closes"];
+  const child = spawn(program, args, { stdio: ["pipe", "pipe", "ignore"] });
+  for await (const line of createInterface({ input: child.stdout })) {
+    const said: unknown = JSON.parse(line);
+    if (typeof said === "object" && said !== null && "address" in said) return { child, address: String(said.address) };
+  }
+  throw new Error("the server ended before it said where it listens");
+}
+
+async function ended(child: ChildProcess, signal: NodeJS.Signals): Promise<void> {
+  if (child.exitCode !== null || child.signalCode !== null) return;
+  const gone = new Promise((resolve) => child.once("exit", resolve));
+  child.kill(signal);
+  await gone;
+}

@@ -1,0 +1,38 @@
+// What a failed call says to a person: our own words for known reasons, the server's for others, and something when nothing came back.
+
+import { create } from "@bufbuild/protobuf";
+import { Code, ConnectError } from "@connectrpc/connect";
+import { beforeAll, expect, test } from "vitest";
+import { faultOf, inWords, isPassing } from "../src/api/faults";
+import { ErrorInfoSchema } from "../src/gen/google/rpc/error_details_pb";
+import { startLanguage } from "../src/i18n";
+import { en } from "../src/i18n/en";
+
+beforeAll(startLanguage);
+
+function refusal(reason: string, message: string, metadata: Record<string, string> = {}): ConnectError {
+  const error = new ConnectError(message, Code.InvalidArgument);
+  error.details.push({
+    desc: ErrorInfoSchema,
+    value: create(ErrorInfoSchema, { reason, domain: "chefshat", metadata }),
+  });
+  return error;
+}
+
+test("a known reason has words of our own", () => {
+  expect(inWords(refusal("ROOM_FULL", "no seat is free"))).toBe(en.faults.byReason.ROOM_FULL);
+});
+
+test("an unknown reason is said in the server's words, with its field", () => {
+  const error = refusal("RULE_SET_REFUSED", "faces: 99 is not in 4..=15", { field: "faces" });
+  expect(inWords(error)).toBe("faces: 99 is not in 4..=15");
+  expect(faultOf(error).metadata).toEqual({ field: "faces" });
+});
+
+test("a server that is not there comes back perhaps, a refusal does not", () => {
+  const away = new TypeError("Failed to fetch");
+  expect(inWords(away)).toBe(en.faults.notReached);
+  expect(isPassing(faultOf(away))).toBe(true);
+  expect(isPassing(faultOf(refusal("SHUTTING_DOWN", "")))).toBe(true);
+  expect(isPassing(faultOf(refusal("ROOM_FULL", "")))).toBe(false);
+});

@@ -1,0 +1,62 @@
+// Every language has the same texts as English; and the language is picked in the order that is promised.
+
+import { describe, expect, test } from "vitest";
+import { firstKnown } from "../src/i18n";
+import { en } from "../src/i18n/en";
+import { it as italian } from "../src/i18n/it";
+import { ordinals, plurals } from "../src/i18n/plural";
+
+/** The paths of all texts; a function counts as one. */
+function paths(texts: object, above = ""): string[] {
+  return Object.entries(texts).flatMap(([name, text]) =>
+    typeof text === "object" && text !== null ? paths(text, `${above}${name}.`) : [`${above}${name}`],
+  );
+}
+
+/** The paths of texts that say nothing. */
+function silent(texts: object, above = ""): string[] {
+  return Object.entries(texts).flatMap(([name, text]) => {
+    if (typeof text === "string") return text.trim() === "" ? [`${above}${name}`] : [];
+    return typeof text === "object" && text !== null ? silent(text, `${above}${name}.`) : [];
+  });
+}
+
+test("Italian has the texts that English has", () => {
+  expect(paths(italian)).toEqual(expect.arrayContaining(paths(en)));
+  expect(paths(italian).length).toBe(paths(en).length);
+  expect(paths(en).length).toBeGreaterThan(100);
+});
+
+test("what says something in English says something in Italian", () => {
+  expect(silent(italian)).toEqual(silent(en));
+});
+
+test.each([
+  [[null, null, "it-CH", "en"], "it"],
+  [["EN", "it"], "en"],
+  [["de", "fr-FR"], "en"],
+  [["xx", "it"], "it"],
+  [[], "en"],
+])("of %j the language is %s", (candidates, language) => {
+  expect(firstKnown(candidates)).toBe(language);
+});
+
+describe("numbers", () => {
+  test.each([
+    ["en", 1, "1 card"],
+    ["en", 0, "0 cards"],
+    ["en", 1200, "1,200 cards"],
+  ])("%s %d", (language, count, words) => {
+    expect(plurals(language)(count, { one: "# card", other: "# cards" })).toBe(words);
+  });
+
+  test.each([
+    [1, "1st"],
+    [2, "2nd"],
+    [3, "3rd"],
+    [4, "4th"],
+    [11, "11th"],
+  ])("place %d is %s", (place, words) => {
+    expect(ordinals("en", { one: "st", two: "nd", few: "rd", other: "th" })(place)).toBe(words);
+  });
+});

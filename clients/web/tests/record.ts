@@ -1,0 +1,35 @@
+// Recorded games of the whole project's fixtures, as the protocol's messages, and what a viewer of the game would have been told.
+
+import { readFileSync } from "node:fs";
+import { create, fromJson, type JsonValue } from "@bufbuild/protobuf";
+import { type GameEvent, GameEventSchema } from "../src/gen/chefshat/v1/event_pb";
+import { type RecordLine, RecordLineSchema } from "../src/gen/chefshat/v1/record_pb";
+
+const FOLDER = `${import.meta.dirname}/../../../tests/fixtures/records`;
+
+/** The recorded games. */
+export const RECORDS = ["committed", "fixed"] as const;
+
+/** The lines of a recorded game. */
+export function recorded(name: (typeof RECORDS)[number]): RecordLine[] {
+  const lines = readFileSync(`${FOLDER}/${name}.jsonl`, "utf8").trim().split("\n");
+  return lines.map((line) => fromJson(RecordLineSchema, JSON.parse(line) as JsonValue));
+}
+
+/** An event as a seat is told it, or a spectator where no seat is named. */
+export function seenBy(event: GameEvent, seat: number | undefined): GameEvent {
+  const { kind } = event;
+  switch (kind.case) {
+    case "shiftStarted": {
+      const hands = kind.value.hands.filter((hand) => hand.seat === seat);
+      return create(GameEventSchema, { ...event, kind: { case: kind.case, value: { ...kind.value, hands } } });
+    }
+    case "cardsExchanged": {
+      if (kind.value.giver === seat || kind.value.receiver === seat) return event;
+      const value = { ...kind.value, cards: [], golden: false };
+      return create(GameEventSchema, { ...event, kind: { case: kind.case, value } });
+    }
+    default:
+      return event;
+  }
+}

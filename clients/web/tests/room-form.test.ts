@@ -1,0 +1,87 @@
+// What the form for a new room asks the server for, and which of its fields it does not understand.
+
+import { create } from "@bufbuild/protobuf";
+import { expect, test } from "vitest";
+import { ParticipantKind } from "../src/gen/chefshat/v1/room_pb";
+import { CreateRoomRequestSchema } from "../src/gen/chefshat/v1/room_service_pb";
+import { Opening, PassScope, RuleSetSchema } from "../src/gen/chefshat/v1/rules_pb";
+import {
+  MAX_NAME,
+  newForm,
+  quickGame,
+  type RoomForm,
+  requestOf,
+  unreadable,
+  withPlayers,
+  withPreset,
+} from "../src/lobby/room-form";
+
+const AGENTS = ["random", "greedy", "trained"];
+const form = (changed: Partial<RoomForm> = {}): RoomForm => ({ ...newForm(AGENTS), ...changed });
+const asked = (changed: Partial<RoomForm> = {}) => create(CreateRoomRequestSchema, requestOf(form(changed)));
+
+test("a new form seats a person against the strongest agents there are", () => {
+  expect(asked().seats.map(({ filledBy }) => filledBy.value)).toEqual([
+    ParticipantKind.HUMAN,
+    "trained",
+    "greedy",
+    "random",
+  ]);
+  const few = create(CreateRoomRequestSchema, requestOf(newForm(["random"])));
+  expect(few.seats.slice(1).map(({ filledBy }) => filledBy.value)).toEqual(["random", "random", "random"]);
+});
+
+test("clocks are asked for in milliseconds, own ones with a comma as well", () => {
+  const own = asked({ clock: "own", decisionSeconds: "2,5", bankSeconds: "30", paceSeconds: "0.25" }).policy;
+  expect([own?.decisionTimeMs, own?.bankMs, own?.paceMs]).toEqual([2500, 30_000, 250]);
+  const relaxed = asked({ clock: "relaxed", decisionSeconds: "nonsense" }).policy;
+  expect([relaxed?.decisionTimeMs, relaxed?.bankMs]).toEqual([60_000, 300_000]);
+});
+
+test("points are read from a list, and left to the rules when there is none", () => {
+  expect(asked({ points: " 3, 2;1 0 " }).rules?.points).toEqual([3, 2, 1, 0]);
+  expect(asked({ points: "" }).rules?.points).toEqual([]);
+});
+
+test("a preset fills every field that it has", () => {
+  const preset = create(RuleSetSchema, {
+    preset: "original2020",
+    players: 4,
+    faces: 11,
+    jokers: 2,
+    stop: { case: "targetShifts", value: 7 },
+    points: [5, 3, 1, 0],
+    exchange: false,
+    specialActions: false,
+    opening: Opening.ANY_TOP_FACE,
+    openingPass: true,
+    passScope: PassScope.TURN,
+    maxIdlePizzas: 4,
+    maxTurns: 500,
+  });
+  const rules = asked(withPreset(form(), preset)).rules;
+  expect(rules).toEqual(preset);
+});
+
+test("other numbers of seats keep the first ones and forget points that no longer fit", () => {
+  const changed = withPlayers(form({ points: "5, 3, 1, 0" }), 6);
+  expect(changed.seats.length).toBe(6);
+  expect(changed.seats.slice(0, 4)).toEqual(form().seats);
+  expect(changed.points).toBe("");
+  expect(withPlayers(form(), 2).seats).toEqual(form().seats.slice(0, 2));
+});
+
+test.each<[Partial<RoomForm>, string[]]>([
+  [{}, []],
+  [{ faces: "many", target: "-1" }, ["faces", "target"]],
+  [{ clock: "own", decisionSeconds: "" }, ["decisionSeconds"]],
+  [{ clock: "relaxed", decisionSeconds: "" }, []],
+  [{ points: "5, three" }, ["points"]],
+  [{ paceSeconds: "1.2.3" }, ["paceSeconds"]],
+])("of %j the fields %j are not understood", (changed, fields) => {
+  expect(unreadable(form(changed))).toEqual(fields);
+});
+
+test("the name of a quick game is as long as names may be", () => {
+  expect(Array.from(quickGame("🍕".repeat(80), AGENTS).name ?? "").length).toBe(MAX_NAME);
+});

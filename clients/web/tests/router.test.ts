@@ -1,0 +1,32 @@
+// Addresses and routes are each other's inverse, and what names nothing is a page of its own.
+
+import { expect, test } from "vitest";
+import { pathOf, type Route, routeOf } from "../src/router";
+
+const ROUTES: [string, Route][] = [
+  ["/", { page: "lobby" }],
+  ["/new", { page: "new" }],
+  ["/rooms/0123", { page: "room", roomId: "0123" }],
+  ["/join", { page: "join", code: "" }],
+  ["/join/BCDF2345", { page: "join", code: "BCDF2345" }],
+  ["/watch/0123", { page: "watch", roomId: "0123" }],
+  ["/replay/4567", { page: "replay", gameId: "4567" }],
+  ["/tournaments", { page: "tournaments" }],
+  ["/tournaments/89ab", { page: "tournament", tournamentId: "89ab" }],
+  ["/leaderboard", { page: "leaderboard" }],
+  ["/people/Dr.%20R%C3%B6sa%2FII", { page: "person", name: "Dr. Rösa/II" }],
+  ["/tutorial", { page: "tutorial" }],
+];
+
+test.each(ROUTES)("%s is one route and back", (path, route) => {
+  expect(routeOf(path)).toEqual(route);
+  expect(pathOf(route)).toBe(path);
+});
+
+test.each(["/nowhere", "/rooms/1/2", "/lobby/x"])("%s names nothing", (path) => {
+  expect(routeOf(path)).toEqual({ page: "unknown" });
+});
+
+test("a badly encoded part stands for itself", () => {
+  expect(routeOf("/people/%E0%A4%A")).toEqual({ page: "person", name: "%E0%A4%A" });
+});

@@ -1,0 +1,46 @@
+// What this device remembers of its seats and rooms survives a reload and nonsense; join codes are read as people type them.
+
+import { beforeEach, expect, test } from "vitest";
+import { codeIn } from "../src/lobby/JoinForm";
+import { giveUpSeat, heldSeat, hostedRoom, roomOfCode } from "../src/lobby/seat";
+import { forgetAll, remember, remembered } from "../src/store";
+
+beforeEach(forgetAll);
+
+const HELD = { ticket: "secret", seat: 2, name: "Rosa" };
+
+test("a seat is known until it is given up", () => {
+  remember("seat.room1", JSON.stringify(HELD));
+  remember("code.BCDF2345", "room1");
+  expect(heldSeat("room1")).toEqual(HELD);
+  expect(heldSeat("room2")).toBeNull();
+  expect(roomOfCode("bcdf-2345")).toBe("room1");
+  giveUpSeat("room1");
+  expect(heldSeat("room1")).toBeNull();
+  expect(roomOfCode("BCDF2345")).toBeNull();
+});
+
+test.each(["", "null", "3", "[]", "{", '{"ticket":1}'])("%j is no seat and no room", (kept) => {
+  remember("seat.room1", kept);
+  remember("hosted.room1", kept);
+  expect(heldSeat("room1")).toBeNull();
+  expect(hostedRoom("room1")).toBeNull();
+});
+
+test.each([
+  ["bcdf2345", "BCDF2345"],
+  [" bcdf 2345 ", "BCDF2345"],
+  ["http://127.0.0.1:50051/join/bcdf2345?lang=it", "BCDF2345"],
+  ["", ""],
+])("%j is the code %s", (typed, code) => {
+  expect(codeIn(typed)).toBe(code);
+});
+
+test("everything that is remembered can be forgotten, and nothing else is touched", () => {
+  localStorage.setItem("another", "page's");
+  remember("name", "Rosa");
+  expect([...remembered().keys()]).toEqual(["name"]);
+  forgetAll();
+  expect(remembered().size).toBe(0);
+  expect(localStorage.getItem("another")).toBe("page's");
+});

@@ -1,0 +1,141 @@
+// The model of the table against recorded games: after every event it must agree with what the server's engine wrote down, at every
+// decision with the mask of legal actions.
+
+import { describe, expect, test } from "vitest";
+import { DecisionKind } from "../src/gen/chefshat/v1/decision_pb";
+import type { DecisionRecord } from "../src/gen/chefshat/v1/record_pb";
+import { actionOf, legalActions, maskOf, moveOf, turnActions } from "../src/table/model/actions";
+import { allows, demandOf, holds } from "../src/table/model/demand";
+import { lookupOf } from "../src/table/model/lookup";
+import { canPick, legalMoves, pickedMove, picksOf, reasonAgainst, toggle } from "../src/table/model/picking";
+import { applyEvent } from "../src/table/model/reduce";
+import { emptyTable, type TableState } from "../src/table/model/state";
+import { RECORDS, recorded, seenBy } from "./record";
+
+/** Plays a record back and shows every decision with the table as it stood; gives the table at the end. */
+function follow(
+  name: (typeof RECORDS)[number],
+  viewer: number | "all" | undefined,
+  look: (decision: DecisionRecord, table: TableState) => void = () => {},
+): TableState {
+  let table = emptyTable();
+  for (const { line } of recorded(name)) {
+    if (line.case === "decision") look(line.value, table);
+    if (line.case === "event") table = applyEvent(table, viewer === "all" ? line.value : seenBy(line.value, viewer));
+  }
+  return table;
+}
+
+describe.each(RECORDS)("the recorded game %s", (name) => {
+  const lines = recorded(name);
+  const end = lines.flatMap(({ line }) => (line.case === "event" ? [line.value.kind] : [])).at(-1);
+  if (end?.case !== "gameEnded") throw new Error("the fixture has no result");
+
+  test("ends with the result that was recorded", () => {
+    const table = follow(name, "all");
+    expect(table.phase).toBe("gameOver");
+    expect(table.standings).toHaveLength(table.seats.length);
+    for (const { seat, points } of end.value.standings) expect(table.seats[seat]?.points).toBe(Number(points));
+  });
+
+  test("lets every legal action, and no other, be found in the open hands", () => {
+    let decisions = 0;
+    follow(name, "all", ({ seat, kind, actionMask, action }, table) => {
+      if (kind !== DecisionKind.TURN) return;
+      decisions += 1;
+      const hand = table.seats[seat]?.hand ?? [];
+      const legal = new Set(legalActions(actionMask));
+      expect(legal).toContain(action);
+      // By the rules alone, as the words of the page know them: what the turn asks for, and what the hand holds.
+      const demand = demandOf(table);
+      const { plays, others } = lookupOf(table, hand, legal);
+      for (const { move, action: number, state } of [...plays.flat(2), ...others]) {
+        if (move.kind === "pass") continue;
+        expect(allows(demand, move) && holds(hand, move), `${name} ${JSON.stringify(move)}`).toBe(legal.has(number));
+        expect(state === "legal").toBe(legal.has(number));
+      }
+      expect(hand).toHaveLength(table.seats[seat]?.cardsLeft ?? -1);
+    });
+    expect(decisions).toBeGreaterThan(50);
+  });
+
+  test("tells whose turn it is", () => {
+    let told = 0;
+    follow(name, undefined, ({ seat, kind }, table) => {
+      if (kind !== DecisionKind.TURN || table.turn === 1) return;
+      expect(table.next).toBe(seat);
+      told += 1;
+    });
+    expect(told).toBeGreaterThan(50);
+  });
+
+  test("shows a spectator no card of a hand", () => {
+    let table = emptyTable();
+    for (const { line } of lines) {
+      if (line.case !== "event") continue;
+      table = applyEvent(table, seenBy(line.value, undefined));
+      expect(table.seats.every((seat) => seat.hand === undefined && seat.received.length === 0)).toBe(true);
+    }
+  });
+
+  test("shows a seat its own hand as the server sees it", () => {
+    follow(name, 1, ({ seat, kind, actionMask }, table) => {
+      if (seat !== 1 || kind !== DecisionKind.TURN) return;
+      const hand = table.seats[1]?.hand ?? [];
+      for (const move of legalMoves(legalActions(actionMask), table.faces)) {
+        if (move.kind === "pass") continue;
+        expect(pickedMove(hand, picksOf(hand, move), [move])).toEqual(move);
+      }
+      expect(table.seats[0]?.hand).toBeUndefined();
+    });
+  });
+
+  test("gives every card that cannot be picked a reason, and every one that can a way into a legal play", () => {
+    let refused = 0;
+    let ways = 0;
+    follow(name, "all", ({ seat, kind, actionMask }, table) => {
+      if (kind !== DecisionKind.TURN) return;
+      const hand = table.seats[seat]?.hand ?? [];
+      const moves = legalMoves(legalActions(actionMask), table.faces);
+      hand.forEach((card, index) => {
+        if (!canPick(hand, index, moves)) {
+          expect(reasonAgainst(table, hand, index).kind, JSON.stringify(card)).not.toBe("other");
+          refused += 1;
+          return;
+        }
+        const picked = toggle(hand, new Set(), index, moves);
+        if (card.kind !== "joker") {
+          expect(pickedMove(hand, picked, moves)).toBeDefined();
+          ways += 1;
+        }
+        // The Golden card goes before the plain one that was clicked.
+        if (picked.has(index)) expect(toggle(hand, picked, index, moves).has(index)).toBe(false);
+      });
+    });
+    expect(refused).toBeGreaterThan(50);
+    expect(ways).toBeGreaterThan(50);
+  });
+});
+
+test("an event that was seen before changes nothing", () => {
+  const [first, second] = recorded("fixed").flatMap(({ line }) => (line.case === "event" ? [line.value] : []));
+  if (!first || !second) throw new Error("the fixture has no events");
+  const table = applyEvent(applyEvent(emptyTable(), first), second);
+  expect(applyEvent(table, first)).toBe(table);
+});
+
+test("the numbers of actions are those of the rules", () => {
+  expect(turnActions(11)).toBe(200);
+  expect(moveOf(0, 11)).toEqual({ kind: "play", face: 1, quantity: 1, jokers: 0 });
+  expect(moveOf(199, 11)).toEqual({ kind: "pass" });
+  for (const faces of [4, 11, 15]) {
+    const size = turnActions(faces) + faces + 3;
+    for (let action = 0; action < size; action += 1) {
+      const move = moveOf(action, faces);
+      expect(move && actionOf(move, faces)).toBe(action);
+    }
+    expect(moveOf(size, faces)).toBeUndefined();
+    const all = Array.from({ length: size }, (_, action) => action);
+    expect(legalActions(maskOf(all, faces))).toEqual(all);
+  }
+});

@@ -1,0 +1,121 @@
+//! Courses in which the examiner interferes: what is passed on, and what is made of what follows.
+
+use super::*;
+
+#[test]
+fn a_refusal_looks_like_one_of_the_agents_own_answer() {
+    let steps = [begun(), vec![put(2), answer(2, 5)]].concat();
+    let mut course = Course::of("refusal", steps);
+    assert_eq!(course.answers(), [(1, 1), (2, ILLEGAL)]);
+    course.step(result(2, ILLEGAL, AnswerStatus::Invalid));
+    let Some(Update::Result(told)) = course.to_agent.last() else {
+        panic!("no result");
+    };
+    assert_eq!((told.action, told.status()), (5, AnswerStatus::Invalid));
+    course.step(answer(2, 1));
+    assert_eq!(course.answers(), [(1, 1), (2, ILLEGAL), (2, 1)]);
+    course.step(accepted(2));
+    assert!(course.codes().is_empty());
+
+    let refused = [
+        put(2),
+        answer(2, 1),
+        result(2, ILLEGAL, AnswerStatus::Invalid),
+    ];
+    let silent = [&refused[..], &[put(3)]].concat();
+    check("silence", "refusal", silent, &["GAVE_UP_WHEN_REFUSED"]);
+    let ended = [&refused[..], &[Exit(1)]].concat();
+    check("an end", "refusal", ended, &["GAVE_UP_WHEN_REFUSED"]);
+}
+
+#[test]
+fn a_connection_is_cut_before_an_answer_a_request_and_a_result() {
+    let mut course = Course::of("disconnect", begun());
+    course.step(put(2));
+    course.step(answer(2, 1));
+    assert_eq!((course.cuts, course.answers()), (1, vec![(1, 1)]));
+    // What comes on the old stream is lost; on a new one the decision is put again.
+    course.step(answer(2, 1));
+    course.step(Attach(2));
+    course.step(put(2));
+    course.step(answer(2, 1));
+    course.step(accepted(2));
+    assert_eq!(course.answers(), [(1, 1), (2, 1)]);
+    let told = course.to_agent.len();
+    course.step(put(3));
+    assert_eq!((course.cuts, course.to_agent.len()), (3, told));
+    course.step(Attach(0));
+    course.step(put(3));
+    course.step(answer(3, 1));
+    course.step(accepted(3));
+    assert_eq!(course.cuts, 4, "the result is not told");
+    course.step(Attach(2));
+    course.step(put(4));
+    assert!(course.codes().is_empty());
+
+    let cut = [put(2), answer(2, 1)];
+    let with = |rest: &[Step]| [&cut[..], rest].concat();
+    check(
+        "never",
+        "disconnect",
+        with(&[Wait(5)]),
+        &["DID_NOT_RECONNECT"],
+    );
+    check(
+        "an end",
+        "disconnect",
+        with(&[Exit(1)]),
+        &["DID_NOT_RECONNECT"],
+    );
+    check("joining", "disconnect", with(&[Join]), &["JOINED_AGAIN"]);
+    let skipping = with(&[Attach(3), Exit(1)]);
+    let found = ["EVENTS_SKIPPED", "EXITED_EARLY"];
+    check("skipping", "disconnect", skipping, &found);
+}
+
+#[test]
+fn an_answer_is_held_until_its_decision_is_closed() {
+    let closed = result(2, 1, AnswerStatus::Closed);
+    let held = [begun(), vec![put(2), answer(2, 1)]].concat();
+    let mut course = Course::of("stale", held);
+    assert_eq!(course.answers(), [(1, 1)]);
+    course.step(put(3));
+    assert_eq!(course.answers(), [(1, 1), (2, 1)]);
+    let late = [put(2), answer(2, 1), put(3), closed];
+    let ended = [&late[..], &[Exit(1)]].concat();
+    check("an end", "stale", ended, &["STOPPED_AFTER_CLOSED"]);
+    let silent = [&late[..], &(4..=12).map(put).collect::<Vec<_>>()].concat();
+    check("silence", "stale", silent, &["STOPPED_AFTER_CLOSED"]);
+    let unheard = [&late[..], &[answer(3, 1), Exit(1)]].concat();
+    check(
+        "an answer on its way",
+        "stale",
+        unheard,
+        &["STOPPED_AFTER_CLOSED"],
+    );
+    let none = and_good_end([&late[..], &[put(4)]].concat());
+    check("nothing more", "stale", none, &["STOPPED_AFTER_CLOSED"]);
+    let on = and_good_end([&late[..], &[answer(3, 1), accepted(3)]].concat());
+    check("playing on", "stale", on, &[]);
+}
+
+#[test]
+fn answers_are_dropped_until_a_substitute_plays() {
+    let dropped = [put(2), answer(2, 1), put(3), answer(3, 1), substituted(2)];
+    let course = Course::of("substitution", [begun(), dropped.to_vec()].concat());
+    assert_eq!(course.answers(), [(1, 1)]);
+    let with = |rest: &[Step]| [&dropped[..], rest].concat();
+    let found = ["NEVER_RESUMED"];
+    check("never", "substitution", with(&[Wait(5)]), &found);
+    check("an end", "substitution", with(&[Exit(0)]), &found);
+    check(
+        "too late",
+        "substitution",
+        and_good_end(dropped.clone()),
+        &found,
+    );
+    let resumed = and_good_end([with(&[resume()]), played(4, 6)].concat());
+    check("resuming", "substitution", resumed, &[]);
+    let anew = and_good_end([with(&[Leave, Attach(3)]), played(4, 6)].concat());
+    check("attaching anew", "substitution", anew, &[]);
+}

@@ -1,0 +1,238 @@
+//! What a browser is answered: the file that its address names, else the document itself, which knows all pages; how long it may keep
+//! that; and what the page may do there. Where the files come from is not known here.
+
+use bytes::Bytes;
+use http::{HeaderMap, HeaderName, HeaderValue, Method, Request, Response, StatusCode, header};
+
+/// A built file.
+#[derive(Debug, Clone)]
+pub(super) struct File {
+    /// Its media type.
+    pub(super) media_type: String,
+    /// Changes when its bytes change.
+    pub(super) hash: String,
+    /// What is in it.
+    pub(super) bytes: Bytes,
+}
+
+/// The document, which draws the page that the address names.
+const DOCUMENT: &str = "index.html";
+/// Under this every file has a name that changes with what is in it.
+const ASSETS: &str = "assets/";
+/// Said where the page is not built in.
+const ABSENT: &[u8] = include_bytes!("absent.html");
+
+/// Kept for a year, and not asked for again.
+const KEEP: HeaderValue = HeaderValue::from_static("public, max-age=31536000, immutable");
+/// Kept, but asked for again each time whether it is still right.
+const ASK_AGAIN: HeaderValue = HeaderValue::from_static("no-cache");
+/// The page takes everything from its own server and sends nothing elsewhere.
+const RULES: [(HeaderName, HeaderValue); 3] = [
+    (
+        header::CONTENT_SECURITY_POLICY,
+        HeaderValue::from_static(
+            "default-src 'self'; img-src 'self' data:; object-src 'none'; base-uri 'none'; form-action 'self'",
+        ),
+    ),
+    (
+        header::X_CONTENT_TYPE_OPTIONS,
+        HeaderValue::from_static("nosniff"),
+    ),
+    (
+        header::REFERRER_POLICY,
+        HeaderValue::from_static("no-referrer"),
+    ),
+];
+
+/// The answer to a GET or HEAD, out of the files that `find` knows by name.
+pub(super) fn answer<B>(
+    find: impl Fn(&str) -> Option<File>,
+    request: &Request<B>,
+) -> Response<Bytes> {
+    let mut response = chosen(find, request);
+    let length = response.body().len();
+    response.headers_mut().extend(RULES);
+    if response.status() != StatusCode::NOT_MODIFIED {
+        response
+            .headers_mut()
+            .insert(header::CONTENT_LENGTH, length.into());
+    }
+    if request.method() == Method::HEAD {
+        *response.body_mut() = Bytes::new();
+    }
+    response
+}
+
+fn chosen<B>(find: impl Fn(&str) -> Option<File>, request: &Request<B>) -> Response<Bytes> {
+    let path = request.uri().path().trim_start_matches('/');
+    let asset = path.starts_with(ASSETS);
+    let name = match find(path) {
+        Some(_) => path,
+        None if asset => return plain(StatusCode::NOT_FOUND, "text/plain", b"no such file\n"),
+        None => DOCUMENT,
+    };
+    let Some(file) = find(name) else {
+        return plain(
+            StatusCode::SERVICE_UNAVAILABLE,
+            "text/html; charset=utf-8",
+            ABSENT,
+        );
+    };
+    // Beside a file that gains by it lies a compressed twin.
+    let packed = (accepts_gzip(request.headers()))
+        .then(|| find(&format!("{name}.gz")))
+        .flatten();
+    let tag = format!(
+        "\"{}{}\"",
+        file.hash,
+        if packed.is_some() { "-gzip" } else { "" }
+    );
+    let mut response = Response::new(Bytes::new());
+    let headers = response.headers_mut();
+    headers.insert(header::CACHE_CONTROL, if asset { KEEP } else { ASK_AGAIN });
+    headers.insert(header::VARY, header::ACCEPT_ENCODING.into());
+    headers.insert(header::ETAG, word(&tag));
+    let known = (request.headers().get(header::IF_NONE_MATCH))
+        .is_some_and(|tags| tags.as_bytes() == tag.as_bytes());
+    if known {
+        *response.status_mut() = StatusCode::NOT_MODIFIED;
+        return response;
+    }
+    headers.insert(header::CONTENT_TYPE, word(&with_charset(&file.media_type)));
+    if packed.is_some() {
+        headers.insert(header::CONTENT_ENCODING, HeaderValue::from_static("gzip"));
+    }
+    *response.body_mut() = packed.unwrap_or(file).bytes;
+    response
+}
+
+fn plain(status: StatusCode, media_type: &'static str, text: &'static [u8]) -> Response<Bytes> {
+    let mut response = Response::new(Bytes::from_static(text));
+    *response.status_mut() = status;
+    let headers = response.headers_mut();
+    headers.insert(header::CONTENT_TYPE, HeaderValue::from_static(media_type));
+    headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
+    response
+}
+
+/// Whether the browser says that it can unpack gzip.
+fn accepts_gzip(headers: &HeaderMap) -> bool {
+    let offered = headers.get_all(header::ACCEPT_ENCODING).iter();
+    offered
+        .filter_map(|value| value.to_str().ok())
+        .flat_map(|value| value.split(','))
+        .any(|coding| {
+            let mut parts = coding.split(';').map(str::trim);
+            let refused = |weight: &str| weight.trim_end_matches(['0', '.']) == "q=";
+            parts.next() == Some("gzip") && !parts.any(refused)
+        })
+}
+
+fn with_charset(media_type: &str) -> String {
+    match media_type.starts_with("text/") {
+        true => format!("{media_type}; charset=utf-8"),
+        false => media_type.to_owned(),
+    }
+}
+
+fn word(text: &str) -> HeaderValue {
+    HeaderValue::from_str(text).expect("media types and hashes are visible ASCII")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn built(name: &str) -> Option<File> {
+        let (media_type, text) = match name {
+            "index.html" => ("text/html", "document"),
+            "index.html.gz" => ("application/gzip", "packed document"),
+            "assets/a-1.js" => ("text/javascript", "code"),
+            _ => return None,
+        };
+        Some(File {
+            media_type: media_type.to_owned(),
+            hash: format!("hash-of-{name}"),
+            bytes: Bytes::from_static(text.as_bytes()),
+        })
+    }
+
+    fn get(path: &str, headers: &[(HeaderName, &str)]) -> Response<Bytes> {
+        let mut request = Request::get(path);
+        for (name, value) in headers {
+            request = request.header(name, *value);
+        }
+        answer(built, &request.body(()).expect("a request"))
+    }
+
+    #[test]
+    fn every_address_is_a_page_but_an_asset_is_there_or_not() {
+        for (path, status, body) in [
+            ("/", 200, "document"),
+            ("/rooms/0123", 200, "document"),
+            ("/people/Dr.%20Rosa", 200, "document"),
+            ("/assets/a-1.js", 200, "code"),
+            ("/assets/a-2.js", 404, "no such file\n"),
+            ("/assets/../index.html", 404, "no such file\n"),
+        ] {
+            let response = get(path, &[]);
+            assert_eq!(
+                (response.status().as_u16(), response.body().as_ref()),
+                (status, body.as_bytes()),
+                "{path}"
+            );
+            for (name, value) in RULES {
+                assert_eq!(response.headers()[&name], value, "{path}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_never_changes_is_kept_and_the_document_is_asked_for_again() {
+        assert_eq!(get("/assets/a-1.js", &[]).headers()["cache-control"], KEEP);
+        let document = get("/", &[]);
+        assert_eq!(document.headers()["cache-control"], ASK_AGAIN);
+        let tag = document.headers()["etag"].to_str().expect("text");
+        let again = get("/tournaments", &[(header::IF_NONE_MATCH, tag)]);
+        assert_eq!(again.status(), StatusCode::NOT_MODIFIED);
+        assert!(again.body().is_empty());
+    }
+
+    #[test]
+    fn who_can_unpack_gets_less() {
+        for (accepted, packed) in [
+            ("gzip", true),
+            ("br, gzip;q=0.5", true),
+            ("deflate", false),
+            ("gzip;q=0", false),
+            ("gzip; q=0.0, br", false),
+            ("", false),
+        ] {
+            let response = get("/", &[(header::ACCEPT_ENCODING, accepted)]);
+            assert_eq!(
+                response.headers().contains_key("content-encoding"),
+                packed,
+                "{accepted}"
+            );
+            let type_said = &response.headers()["content-type"];
+            assert_eq!(type_said, "text/html; charset=utf-8", "{accepted}");
+        }
+    }
+
+    #[test]
+    fn a_head_has_the_length_and_no_body() {
+        let request = Request::head("/").body(()).expect("a request");
+        let response = answer(built, &request);
+        assert_eq!(response.headers()["content-length"], "8");
+        assert!(response.body().is_empty());
+    }
+
+    #[test]
+    fn without_a_build_the_answer_says_how_to_get_one() {
+        let request = Request::get("/").body(()).expect("a request");
+        let response = answer(|_| None, &request);
+        assert_eq!(response.status(), StatusCode::SERVICE_UNAVAILABLE);
+        let text = String::from_utf8_lossy(response.body()).into_owned();
+        assert!(text.contains("cargo xtask web"), "{text}");
+    }
+}

@@ -1,0 +1,55 @@
+//! `chefshat check-agent`: its list of cases, the report, and commands that cannot be examined. What it finds in agents is a whole-system
+//! test.
+
+use serde_json::Value;
+
+use super::run::{chefshat, typed};
+
+const COMMAND: [&str; 1] = ["check-agent"];
+
+#[test]
+fn the_cases_are_listed() {
+    let listed = typed(&COMMAND, "--list").well();
+    listed.assert_table_fits(9);
+    let json = typed(&COMMAND, "--list --json").well().stdout;
+    for (line, text) in json.lines().zip(listed.stdout.lines()) {
+        let case: Value = serde_json::from_str(line).unwrap();
+        assert!(text.starts_with(case["case"].as_str().unwrap()));
+    }
+    assert_eq!(json.lines().count(), listed.stdout.lines().count());
+}
+
+#[test]
+fn a_report_says_what_was_expected_what_came_and_what_to_do() {
+    let agent = ["sh", "-c", "echo $0 {address}; exit 3", "{code}"];
+    let arguments = ["check-agent", "--only", "game", "--"];
+    let ended = chefshat(&[&arguments[..], &agent[..]].concat());
+    assert_eq!(ended.code, Some(1), "{}", ended.stderr);
+    ended.assert_table_fits(6);
+    for part in [
+        "FAULT game ",
+        "NEVER_JOINED",
+        "expected: ",
+        "its process ended: exit status: 3",
+        "to do: ",
+        " 127.0.0.1:",
+        "0 of 1 cases passed",
+    ] {
+        assert!(ended.stdout.contains(part), "{part:?}: {}", ended.stdout);
+    }
+}
+
+#[test]
+fn commands_that_cannot_be_examined_are_refused() {
+    for (flags, expected) in [
+        ("-- agent --server {address}", "{code}"),
+        ("-- agent --code {code}", "{address}"),
+        ("--many agent -- agent {address} {code}", "{tournament}"),
+        ("--only many-seats -- agent {address} {code}", "--many"),
+        ("--only nothing", "there are game, "),
+        ("--patience 0 -- agent {address} {code}", "0.1 to 3600"),
+    ] {
+        typed(&COMMAND, flags).assert_refused(expected);
+    }
+    typed(&COMMAND, "--help").assert_helps("check-agent -- python agent.py --server {address}");
+}
