@@ -72,7 +72,6 @@ async fn passes(agent: &[&str], many: &str, folder: Option<&Path>) {
     }
 }
 
-#[tokio::test]
 async fn the_examples_of_the_rust_sdk_pass() {
     let examples = set_up("CHEFSHAT_BIN").with_file_name("examples");
     let example = examples.join("random_agent");
@@ -82,7 +81,6 @@ async fn the_examples_of_the_rust_sdk_pass() {
     passes(&[example, "{code}", "{url}"], &many, None).await;
 }
 
-#[tokio::test]
 async fn the_built_in_agents_pass() {
     let binary = set_up("CHEFSHAT_BIN");
     let binary = binary.to_str().expect("text");
@@ -94,7 +92,6 @@ async fn the_built_in_agents_pass() {
     passes(&agent, &many, None).await;
 }
 
-#[tokio::test]
 async fn the_agent_of_the_python_package_passes() {
     let python = set_up("CHEFSHAT_PYTHON");
     let python = python.to_str().expect("text");
@@ -106,7 +103,6 @@ async fn the_agent_of_the_python_package_passes() {
     passes(&agent, &many, None).await;
 }
 
-#[tokio::test]
 async fn the_agent_in_javascript_passes() {
     let agent = ["node", "agent.js", "--address", "{address}"];
     let agent = [&agent[..], &["--code", "{code}", "--name", "{name}"]].concat();
@@ -121,10 +117,21 @@ fn in_a_tournament(fault: &str) -> String {
     format!("exec '{BAD_AGENT}' {fault} {{address}} {{tournament}} here")
 }
 
-#[tokio::test]
 async fn an_agent_without_an_sdk_passes() {
     let agent = [BAD_AGENT, "none", "{address}", "{code}"];
     passes(&agent, &in_a_tournament("none"), None).await;
+}
+
+/// At the same time, for they mostly wait.
+#[tokio::test]
+async fn good_agents_of_all_languages_pass() {
+    tokio::join!(
+        the_examples_of_the_rust_sdk_pass(),
+        the_built_in_agents_pass(),
+        the_agent_of_the_python_package_passes(),
+        the_agent_in_javascript_passes(),
+        an_agent_without_an_sdk_passes(),
+    );
 }
 
 /// Agents with a fault, the case in which it shows, and the code by which it must be named first.

@@ -6,11 +6,13 @@ import { announce } from "../parts/Announcer";
 import { Button, ButtonLink } from "../parts/Button";
 import { useAnnounced } from "../table/following";
 import { actionOf } from "../table/model/actions";
+import { type Card, without } from "../table/model/cards";
+import { holds } from "../table/model/demand";
 import type { OpenDecision } from "../table/model/live";
 import { applyEvent } from "../table/model/reduce";
 import type { TableState } from "../table/model/state";
 import { TableView } from "../table/view/TableView";
-import { firstTable, LESSONS, nextEvent } from "./lessons";
+import { firstTable, givenBy, LESSONS, type Lesson, nextEvent } from "./lessons";
 import "./tutorial.css";
 
 /** From one event of the script to the next, so that they can be followed. */
@@ -20,19 +22,26 @@ const PACE_MS = 850;
 interface Progress {
   readonly lesson: number;
   readonly table: TableState;
-  readonly coming: ReturnType<(typeof LESSONS)[number]["then"]>;
+  readonly coming: ReturnType<Lesson["follows"]>;
+  /** The actions taken so far. */
+  readonly actions: readonly number[];
 }
 
 /** The page. */
 export function TutorialPage() {
   const words = t().tutorial;
-  const [progress, setProgress] = useState<Progress>(() => ({ lesson: 0, table: firstTable(words.you), coming: [] }));
-  const { lesson: at, table, coming } = progress;
+  const [progress, setProgress] = useState<Progress>(() => ({
+    lesson: 0,
+    table: firstTable(words.you),
+    coming: [],
+    actions: [],
+  }));
+  const { lesson: at, table, coming, actions } = progress;
   useEffect(() => {
     const [next, ...rest] = coming;
     if (!next) return;
     const timer = setTimeout(() => {
-      setProgress({ lesson: at, table: applyEvent(table, nextEvent(table, next)), coming: rest });
+      setProgress({ ...progress, table: applyEvent(table, nextEvent(table, next)), coming: rest });
     }, PACE_MS);
     return () => clearTimeout(timer);
   }, [progress]);
@@ -40,9 +49,11 @@ export function TutorialPage() {
   const lesson = LESSONS[Math.min(at, LESSONS.length - 1)];
   const ready = coming.length === 0;
   const goOn = (action: number) => {
-    if (lesson && ready) setProgress({ lesson: at + 1, table, coming: lesson.then(action) });
+    if (!lesson || !ready) return;
+    const taken = lesson.decision ? [...actions, action] : actions;
+    setProgress({ lesson: at + 1, table, coming: lesson.follows(taken), actions: taken });
   };
-  const decision = ready && lesson?.decision ? openDecision(at, table, lesson.decision) : undefined;
+  const decision = ready && lesson?.decision ? openDecision(progress, lesson.decision) : undefined;
   useAnnounced(table, 0, decision);
   const said = lesson ? words.lessons[lesson.name] : "";
   useEffect(() => {
@@ -78,16 +89,15 @@ export function TutorialPage() {
   );
 }
 
-function openDecision(
-  id: number,
-  table: TableState,
-  { kind, moves }: NonNullable<(typeof LESSONS)[number]["decision"]>,
-): OpenDecision {
+/** The lesson's decision, in the form of a real one. Cards given already have left the hand, though nobody has received them yet. */
+function openDecision({ lesson, table, actions }: Progress, asked: NonNullable<Lesson["decision"]>): OpenDecision {
+  const given = givenBy(actions).map((face): Card => ({ kind: "face", face }));
+  const hand = without(table.seats[0]?.hand ?? [], given);
   return {
-    id: BigInt(id),
-    kind,
-    legal: moves.map((move) => actionOf(move, table.faces)),
-    hand: table.seats[0]?.hand ?? [],
+    id: BigInt(lesson),
+    kind: asked.kind,
+    legal: asked.moves.filter((move) => holds(hand, move)).map((move) => actionOf(move, table.faces)),
+    hand,
     timeLeftMs: 0,
     bankLeftMs: 0,
     receivedAtMs: 0,

@@ -18,8 +18,8 @@ export interface Lesson {
   readonly name: keyof Texts["tutorial"]["lessons"];
   /** The decision to be made; without one the reader goes on by a button. */
   readonly decision?: { readonly kind: DecisionKind; readonly moves: readonly Move[] };
-  /** What happens after it, given the action taken. */
-  readonly then: (action: number) => readonly Kind[];
+  /** What happens after it, given all actions taken so far. */
+  readonly follows: (actions: readonly number[]) => readonly Kind[];
 }
 
 const FACES = 11;
@@ -49,42 +49,45 @@ const cards = (face: number, quantity: number, jokers = 0): Move => ({ kind: "pl
 
 /** Any card of the second hand. */
 const gifts: readonly Move[] = [...new Set(SECOND_HAND)].map((face) => ({ kind: "give", face }));
-const given = (action: number) => {
-  const move = moveOf(action, FACES);
-  return move?.kind === "give" ? move.face : FACES;
-};
+/** The cards given by these actions. */
+export function givenBy(actions: readonly number[]): number[] {
+  return actions.flatMap((action) => {
+    const move = moveOf(action, FACES);
+    return move?.kind === "give" ? move.face : [];
+  });
+}
 
 export const LESSONS: readonly Lesson[] = [
-  { name: "cards", then: () => [] },
+  { name: "cards", follows: () => [] },
   {
     name: "opening",
     decision: turn(cards(11, 2)),
-    then: () => [play(OWN, 2, 11, 7), play(GRETA, 2, 10, 7), pass(ROLF), play(GUSTAV, 2, 9, 7)],
+    follows: () => [play(OWN, 2, 11, 7), play(GRETA, 2, 10, 7), pass(ROLF), play(GUSTAV, 2, 9, 7)],
   },
   {
     name: "beating",
     decision: turn(cards(8, 2)),
-    then: () => [play(OWN, 2, 8, 5), pass(GRETA), pass(GUSTAV), done(1, OWN, OWN)],
+    follows: () => [play(OWN, 2, 8, 5), pass(GRETA), pass(GUSTAV), done(1, OWN, OWN)],
   },
   {
     name: "leading",
     decision: turn(cards(10, 1)),
-    then: () => [play(OWN, 1, 10, 4), play(GRETA, 1, 7, 6), play(ROLF, 1, 6, 8), play(GUSTAV, 1, 2, 6)],
+    follows: () => [play(OWN, 1, 10, 4), play(GRETA, 1, 7, 6), play(ROLF, 1, 6, 8), play(GUSTAV, 1, 2, 6)],
   },
   {
     name: "passing",
     decision: turn({ kind: "pass" }),
-    then: () => [pass(OWN), pass(GRETA), pass(ROLF), done(2, GUSTAV, GUSTAV), play(GUSTAV, 2, 6, 4)],
+    follows: () => [pass(OWN), pass(GRETA), pass(ROLF), done(2, GUSTAV, GUSTAV), play(GUSTAV, 2, 6, 4)],
   },
   {
     name: "again",
     decision: turn(cards(5, 2)),
-    then: () => [play(OWN, 2, 5, 2), pass(GRETA), play(ROLF, 2, 4, 6), pass(GUSTAV)],
+    follows: () => [play(OWN, 2, 5, 2), pass(GRETA), play(ROLF, 2, 4, 6), pass(GUSTAV)],
   },
   {
     name: "joker",
     decision: turn(cards(3, 1, 1)),
-    then: () => [
+    follows: () => [
       play(OWN, 1, 3, 0, 1),
       finished(OWN, 1),
       pass(ROLF),
@@ -101,21 +104,26 @@ export const LESSONS: readonly Lesson[] = [
   },
   {
     name: "points",
-    then: () => [
+    follows: () => [
       { case: "shiftStarted", value: { shift: 2, hands: [{ seat: OWN, cards: SECOND_HAND, golden: false }] } },
       { case: "rolesAssigned", value: { roles: [Role.CHEF, Role.SOUS_CHEF, Role.WAITER, Role.DISHWASHER] } },
     ],
   },
-  { name: "special", then: () => [] },
+  { name: "special", follows: () => [] },
   {
     name: "exchange",
     decision: { kind: DecisionKind.EXCHANGE, moves: gifts },
-    then: (action) => [
-      { case: "cardsExchanged", value: { giver: GUSTAV, receiver: OWN, count: 1, cards: GIFT.slice(0, 1) } },
-      { case: "cardsExchanged", value: { giver: OWN, receiver: GUSTAV, count: 1, cards: [given(action)] } },
+    follows: () => [],
+  },
+  {
+    name: "exchangeAgain",
+    decision: { kind: DecisionKind.EXCHANGE, moves: gifts },
+    follows: (actions) => [
+      { case: "cardsExchanged", value: { giver: GUSTAV, receiver: OWN, count: 2, cards: GIFT } },
+      { case: "cardsExchanged", value: { giver: OWN, receiver: GUSTAV, count: 2, cards: givenBy(actions) } },
     ],
   },
-  { name: "end", then: () => [] },
+  { name: "end", follows: () => [] },
 ];
 
 /** The table before the first lesson. */

@@ -28,6 +28,7 @@ export const tutorial = {
       "Now and then somebody is dealt both jokers and may declare it: Dinner is Served, and nobody gives cards away; or, as Dishwasher, Food Fight, and all roles turn around.",
     exchange:
       "Before a Shift cards are given: the Dishwasher's two rarest go to the Chef, who gives back any two; the Waiter and the Sous-Chef do the same with one. You are Chef. Which card can you do without?",
+    exchangeAgain: "And one more. What you receive you see when everybody has chosen.",
     end: "That is all. What you may play is always bright, and the page tells you why the rest is not. Have a seat at a real table.",
   },
 };

@@ -30,6 +30,7 @@ export const tutorial: Texts["tutorial"] = {
       "Ogni tanto qualcuno riceve tutti e due i jolly e può dirlo: Dinner is Served, e nessuno dà carte; oppure, da Lavapiatti, Food Fight, e tutti i ruoli si invertono.",
     exchange:
       "Prima di uno Shift si danno carte: le due più rare del Lavapiatti vanno allo Chef, che ne restituisce due qualsiasi; Cameriere e Sous-Chef fanno lo stesso con una. Sei lo Chef. Di quale carta puoi fare a meno?",
+    exchangeAgain: "E un’altra. Quello che ricevi lo vedi quando tutti hanno scelto.",
     end: "È tutto. Quello che puoi giocare è sempre chiaro, e la pagina dice perché il resto non si può. Siediti a un tavolo vero.",
   },
 };

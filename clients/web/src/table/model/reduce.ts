@@ -151,7 +151,7 @@ function dealt(
 ): TableState {
   const hands = new Map(start.hands.map((hand) => [hand.seat, cardsFromNumbers(hand.cards, hand.golden, table.faces)]));
   const deck = (table.faces * (table.faces + 1)) / 2 + table.jokers;
-  const handSize = Math.floor(deck / Math.max(1, table.seats.length));
+  const handSize = start.hands[0]?.cards.length ?? Math.floor(deck / Math.max(1, table.seats.length));
   const fresh = eachSeat(table, (seat) => ({
     hand: hands.get(seat.seat),
     cardsLeft: handSize,
