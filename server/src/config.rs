@@ -51,20 +51,30 @@ pub const RECORD_SEND_TIMEOUT: Duration = Duration::from_secs(30);
 pub const MAX_TOURNAMENTS: usize = 256;
 /// Messages that wait for one tournament.
 pub const TOURNAMENT_MAILBOX: usize = 256;
-/// Calls to games that wait for one stream: more than its participants can be called to in a moment.
+/// Calls to games that wait for one stream; beyond it the stream is ended.
 pub const MAX_CALLS_WAITING: usize = 4_096;
+/// How long a tournament stays open that nobody joins or begins.
+pub const TOURNAMENT_OPEN_TIME: Duration = Duration::from_secs(7 * 24 * 3_600);
 /// When rooms for games of a tournament that could not be made are tried again.
 pub const TOURNAMENT_RETRY: Duration = Duration::from_secs(1);
 /// Streams that follow tournaments.
 pub const MAX_FOLLOWERS: usize = 256;
 /// How often those who follow a tournament are told of it at most.
 pub const FOLLOW_INTERVAL: Duration = Duration::from_millis(250);
+/// Tournaments of which it is worked out at a time what their followers are told; and those whose results are.
+pub const MAX_RESULTS_IN_HAND: usize = 2;
+/// Most games of which those who follow a tournament are told: 0.3 MB of the 4 MB that clients take by standard. No more can be played at a time.
+pub const MAX_GAMES_FOLLOWED: usize = 512;
+/// How long a follower may take to take in what it is told.
+pub const FOLLOW_SEND_TIMEOUT: Duration = Duration::from_secs(30);
 /// Most games of a tournament in one page.
 pub const MAX_GAMES_PAGE: u32 = 500;
 /// Most lines of a leaderboard.
 pub const MAX_LEADERBOARD_LINES: u32 = 1_000;
-/// How old a leaderboard may be that is shown.
+/// How old a leaderboard may be that is shown although games have ended since.
 pub const LEADERBOARD_AGE: Duration = Duration::from_secs(2);
+/// The part of the time that may go into working it out is one by this.
+pub const LEADERBOARD_PART: u32 = 10;
 /// How long streams and connections that do not close may hold up a shutdown.
 pub const DRAIN_LIMIT: Duration = Duration::from_secs(5);
 /// Longest name of a room or participant, characters.

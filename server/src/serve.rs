@@ -178,6 +178,7 @@ impl Server {
             // Games that end from here on count when the server is back.
             tournaments.stop();
             rooms.shut_down(config.grace).await;
+            tournaments.end();
             closing.cancel();
         };
         let ended_or_drained = async {
@@ -190,7 +191,7 @@ impl Server {
             // Nothing can be acknowledged any more: whoever waits is better told at once, by the end of the process.
             failure = store.failed() => return Err(ServeError::Store(failure)),
         }
-        tournaments.stop();
+        tournaments.end();
         drop((rooms, tournaments));
         tracker.close();
         tracker.wait().await;

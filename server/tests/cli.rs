@@ -14,12 +14,14 @@ mod cli {
     mod experiment;
     mod export;
     mod import;
+    mod participant;
     mod ratings;
     mod render;
     mod room;
     mod run;
     mod server;
     mod simulate;
+    mod terminal;
     mod tournament;
     mod tournament_simulate;
     mod verify;

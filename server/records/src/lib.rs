@@ -9,6 +9,7 @@ pub mod jsonl;
 pub mod outcome;
 pub mod picture;
 pub mod players;
+pub mod pseudonym;
 pub mod replay;
 pub mod seeds;
 pub mod summary;

@@ -10,10 +10,13 @@ mod data_dir;
 mod demo;
 mod experiment;
 mod export;
+mod host;
 mod import;
 mod leaderboard;
 mod narrator;
 mod numbers;
+mod participant;
+mod play;
 mod policy_args;
 mod ratings;
 mod records;
@@ -26,8 +29,10 @@ mod serve;
 mod sheet;
 mod simulate;
 mod threads;
+mod terminal;
 mod tournament;
 mod verify;
+mod watch;
 
 use std::fmt::Display;
 use std::io::{self, IsTerminal as _, Write as _};
@@ -64,6 +69,10 @@ enum Command {
     Agent(agent::AgentCommand),
     /// Examine an agent: play cases with it and say what it got wrong.
     CheckAgent(check_agent::CheckAgent),
+    /// Play as a person at this terminal.
+    Play(play::Play),
+    /// Watch a room or a recorded game at this terminal.
+    Watch(watch::Watch),
     /// Make, list, watch and close rooms of a server.
     Room(room::RoomCommand),
     /// Hold tournaments: make, join, follow them, and see their results.
@@ -90,6 +99,8 @@ enum Command {
     Verify(verify::Verify),
     /// Add the record of a game played elsewhere, at a real table too.
     Import(import::Import),
+    /// Give out or delete what is known of a participant.
+    Participant(participant::ParticipantCommand),
 }
 
 /// Runs what the command line asks for.
@@ -99,6 +110,8 @@ pub fn main() -> ExitCode {
         Command::Serve(command) => in_runtime(command.run()),
         Command::Demo(command) => in_runtime(command.run()),
         Command::Agent(command) => in_runtime(command.run()),
+        Command::Play(command) => in_runtime(command.run()),
+        Command::Watch(command) => in_runtime(command.run()),
         Command::CheckAgent(command) => in_runtime(command.run()),
         Command::Room(command) => in_runtime(command.run()),
         Command::Tournament(command) => in_runtime(command.run()),
@@ -113,6 +126,7 @@ pub fn main() -> ExitCode {
         Command::Conformance(command) => command.run(),
         Command::Verify(command) => command.run(),
         Command::Import(command) => command.run(),
+        Command::Participant(command) => in_runtime(command.run()),
     });
     match result {
         Ok(code) => code,
@@ -148,8 +162,16 @@ fn in_runtime(
 fn start_logging(cli: &Cli) -> Result<(), CommandError> {
     let filter = EnvFilter::try_new(&cli.log)
         .map_err(|error| format!("--log {:?}: {error}; write for instance info", cli.log))?;
+    let terminal = io::stderr().is_terminal();
+    // What is logged there would stand in the middle of the picture; a file takes it.
+    let draws = matches!(cli.command, Command::Play(_) | Command::Watch(_));
+    let filter = if terminal && draws {
+        EnvFilter::new("off")
+    } else {
+        filter
+    };
     let colours =
-        io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|set| set.is_empty());
+        terminal && std::env::var_os("NO_COLOR").is_none_or(|set| set.is_empty());
     let logs = tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_ansi(colours)

@@ -37,3 +37,8 @@ pub use tournament::{
 pub use vector::{
     Reset, batch_to_proto, reset_from_proto, setup_from_proto, setup_seeds, started_to_proto,
 };
+
+/// A number or a count as messages have it. All of them are bounded far below what does not fit.
+pub fn number(value: usize) -> u32 {
+    u32::try_from(value).unwrap_or(u32::MAX)
+}

@@ -4,7 +4,7 @@ use chefshat_arena::ratings::Ratings;
 use chefshat_arena::tournament::Tournament;
 use chefshat_proto::v1;
 
-use super::rating_to_proto;
+use super::{number, rating_to_proto};
 
 /// The standings, best first, with the ratings of the participants by number.
 pub fn standings_to_proto(
@@ -46,8 +46,4 @@ pub fn confidence_to_proto(tournament: &Tournament) -> Vec<v1::OrderConfidence> 
             more_games: pair.order.more_games,
         })
         .collect()
-}
-
-fn number(participant: usize) -> u32 {
-    u32::try_from(participant).unwrap_or(u32::MAX)
 }

@@ -8,6 +8,7 @@ use chefshat_engine::RuleSet;
 use chefshat_proto::v1;
 use chefshat_records::convert::{FieldProblem, rules_from_proto, rules_to_proto};
 
+use super::number;
 use super::policy::{agent, policy_from_proto, policy_to_proto, unknown};
 use super::room::{kind_from_proto, kind_to_proto};
 use crate::ids::Id;
@@ -121,13 +122,18 @@ fn policy(
     if asked.waiting_time_ms.is_some_and(|time| time != no_show_ms) {
         return refuse("waiting_time_ms: set no_show_time_ms of the tournament instead".into());
     }
-    if deals == Deals::SameAtAllTables {
+    if deals != Deals::Independent {
         if asked.spectators == Some(true) {
             return refuse(
-                "spectators: who watches one table would know the cards of the others".into(),
+                "spectators: who watches one game would know the cards of others with the same deal".into(),
             );
         }
         asked.spectators = Some(false);
+    }
+    if deals == Deals::SameAtAllTables && asked.durability() == v1::Durability::Ephemeral {
+        return refuse(
+            "durability: a game that is lost would be dealt once more to those who have seen its cards".into(),
+        );
     }
     asked.abort = v1::AbortPolicy::Never.into();
     asked.waiting_time_ms = Some(no_show_ms);
@@ -164,7 +170,6 @@ fn deals_from_proto(deals: i32) -> Result<Deals, FieldProblem> {
 /// What a tournament is, every field set.
 pub fn settings_to_proto(name: &str, plan: &TournamentPlan) -> v1::TournamentSettings {
     let core = &plan.core;
-    let number = |value: usize| u32::try_from(value).unwrap_or(u32::MAX);
     v1::TournamentSettings {
         name: name.to_owned(),
         format: match core.format {
@@ -232,36 +237,35 @@ pub fn tournament_state(state: State) -> v1::TournamentState {
 pub fn tournament_participants(tournament: &Tournament) -> Vec<v1::TournamentParticipant> {
     let entrants = tournament.participants().iter().enumerate();
     entrants
-        .map(|(number, entrant)| v1::TournamentParticipant {
-            participant: u32::try_from(number).unwrap_or(u32::MAX),
+        .map(|(index, entrant)| v1::TournamentParticipant {
+            participant: number(index),
             name: entrant.name.clone(),
             kind: kind_to_proto(Some(participant_kind(entrant.kind))),
             built_in_agent: (entrant.built_in)
                 .map_or_else(String::new, |kind| kind.name().to_owned()),
             filler: entrant.filler,
             stateless: entrant.stateless,
-            max_games: u32::try_from(entrant.max_games).unwrap_or(u32::MAX),
-            connected: tournament.is_present(number),
+            max_games: number(entrant.max_games),
+            connected: tournament.is_present(index),
         })
         .collect()
 }
 
 /// A game of a tournament. `placed` is the room and the game it is or was played in.
 pub fn tournament_game(
-    number: usize,
+    index: usize,
     game: &Game,
     placed: Option<(Id, Id)>,
     series: Option<Id>,
     plan: &TournamentPlan,
 ) -> v1::TournamentGame {
-    let participant = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
     let seats = match &game.state {
         GameState::Counted(result) => (result.seats.iter())
             .map(|seat| v1::TournamentGameSeat {
-                participant: participant(seat.participant),
+                participant: number(seat.participant),
                 forfeited: seat.forfeited,
                 substituted: seat.substituted,
-                place: u32::try_from(seat.place).unwrap_or(u32::MAX),
+                place: number(seat.place),
                 score: seat.score,
                 points: seat.points,
                 decisions: seat.decisions,
@@ -273,16 +277,16 @@ pub fn tournament_game(
             })
             .collect(),
         _ => (game.seats.iter())
-            .map(|number| v1::TournamentGameSeat {
-                participant: participant(*number),
-                forfeited: game.forfeited.contains(number),
+            .map(|participant| v1::TournamentGameSeat {
+                participant: number(*participant),
+                forfeited: game.forfeited.contains(participant),
                 ..v1::TournamentGameSeat::default()
             })
             .collect(),
     };
     let result = game.result();
     v1::TournamentGame {
-        game: participant(number),
+        game: number(index),
         round: game.round,
         table: game.table,
         number: game.number,

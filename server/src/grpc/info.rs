@@ -18,6 +18,7 @@ use crate::config::{
     MAX_VECTOR_RECORDED_GAMES, MAX_VECTOR_SEATS_IN_ALL, MAX_VECTOR_SEEDS, MAX_VECTOR_STREAMS,
     ServerConfig,
 };
+use crate::convert;
 use crate::room::MAX_SPECTATORS;
 use crate::rooms::Rooms;
 
@@ -95,7 +96,7 @@ impl ServerService for Info {
             presets,
             built_in_agents: AgentKind::ALL.map(|kind| kind.name().to_owned()).to_vec(),
             limits: self.limits.clone(),
-            open_rooms: u32::try_from(self.rooms.open_count()).unwrap_or(u32::MAX),
+            open_rooms: convert::number(self.rooms.open_count()),
             shutting_down: self.rooms.is_shutting_down(),
         }))
     }

@@ -1,5 +1,6 @@
 //! The gRPC services: they translate and forward. No handler owns state, so that one dropped half-way loses nothing.
 
+mod follow;
 mod info;
 mod new_room;
 mod pages;

@@ -96,25 +96,33 @@ fn hosted_rules(message: &v1::RuleSet) -> Result<RuleSet, Status> {
 }
 
 /// Checks that a game by these rules is not longer than one that is hosted may be.
-pub(super) fn check_length(rules: &RuleSet) -> Result<(), Status> {
+fn check_length(rules: &RuleSet) -> Result<(), Status> {
+    let Some(problem) = too_long(rules) else {
+        return Ok(());
+    };
+    Err(status(
+        Code::InvalidArgument,
+        "RULE_SET_REFUSED",
+        problem.message,
+        [
+            ("field", problem.field),
+            ("max_shifts", &MAX_HOSTED_SHIFTS.to_string()),
+        ],
+    ))
+}
+
+/// Why a game by these rules is longer than one that is hosted may be, if it is.
+pub(super) fn too_long(rules: &RuleSet) -> Option<FieldProblem> {
     let (stop_field, length) = match rules.stop() {
         Stop::Points(points) => ("target_points", points),
         Stop::Shifts(shifts) => ("target_shifts", shifts),
     };
-    if length <= MAX_HOSTED_SHIFTS {
-        return Ok(());
-    }
-    Err(status(
-        Code::InvalidArgument,
-        "RULE_SET_REFUSED",
-        format!(
+    (length > MAX_HOSTED_SHIFTS).then(|| {
+        let problem = format!(
             "a hosted game ends after at most {MAX_HOSTED_SHIFTS} points or Shifts, not {length}"
-        ),
-        [
-            ("field", stop_field),
-            ("max_shifts", &MAX_HOSTED_SHIFTS.to_string()),
-        ],
-    ))
+        );
+        FieldProblem::new(stop_field, problem)
+    })
 }
 
 fn game_seed(bytes: &[u8]) -> Result<Option<[u8; 32]>, Status> {

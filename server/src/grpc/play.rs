@@ -307,15 +307,7 @@ impl Reader {
         self.next_handle = self.next_handle.wrapping_add(1);
         let request_id = attach.request_id;
         if !self.has_space() {
-            let refusal = status(
-                Code::ResourceExhausted,
-                "TOO_MANY_SEATS",
-                format!(
-                    "a stream takes at most {MAX_SEATS_PER_STREAM} seats at a time; detach those that are over, or open another"
-                ),
-                [("max_seats_per_stream", &MAX_SEATS_PER_STREAM.to_string())],
-            );
-            return self.refuse(handle, request_id, &refusal);
+            return self.refuse(handle, request_id, &too_many_seats());
         }
         if attach.entropy.len() > MAX_ENTROPY {
             let problem = FieldProblem::new("entropy", format!("at most {MAX_ENTROPY} bytes"));
@@ -361,9 +353,12 @@ impl Reader {
         let entered = Update::Entered(v1::Entered {
             request_id,
             tournament_id: tournament.id().to_string(),
-            participant: u32::try_from(participant).unwrap_or(u32::MAX),
+            participant: convert::number(participant),
         });
-        self.tell(handle, entered);
+        if !self.tell(handle, entered) {
+            // Who does not read what it is told is not entered.
+            return;
+        }
         let connection = CONNECTIONS.fetch_add(1, Ordering::Relaxed);
         let bound = BoundParticipant {
             tournament: Arc::clone(&tournament),
@@ -372,8 +367,12 @@ impl Reader {
             attach,
         };
         self.participants.insert(handle, bound);
-        let calls = self.calls.clone();
-        (tournament.enter(participant, connection, Connection { handle, calls })).await;
+        let way = Connection {
+            handle,
+            calls: self.calls.clone(),
+            outbox: Arc::clone(&self.outbox),
+        };
+        tournament.enter(participant, connection, way).await;
     }
 
     /// Follows calls to games for as long as it is let.
@@ -410,7 +409,15 @@ impl Reader {
         let is_there = (self.seats.values()).any(|seat| {
             seat.secret == ticket.secret && seat.room.id() == room && !seat.has_ended()
         });
-        if is_there || !self.has_space() {
+        let is_newest = (bound.tournament).is_newest(bound.participant, bound.connection);
+        if is_there || !is_newest {
+            return;
+        }
+        if !self.has_space() {
+            self.refuse(participant, 0, &too_many_seats());
+            if let Some(bound) = self.participants.remove(&participant) {
+                bound.leave().await;
+            }
             return;
         }
         let handle = self.next_called;
@@ -425,7 +432,10 @@ impl Reader {
     fn dismiss(&mut self, handle: u32, reason: v1::DetachReason) {
         if self.participants.remove(&handle).is_some() {
             let reason = reason.into();
-            self.tell(handle, Update::Detached(v1::Detached { reason }));
+            let mut last = Updates::default();
+            last.add(handle, Update::Detached(v1::Detached { reason }));
+            // There is one for each participant: it has its place even in an outbox that is full.
+            self.outbox.push_last(&mut last);
         }
     }
 
@@ -514,12 +524,23 @@ impl Reader {
         self.tell(handle, Update::Refused(refused(request_id, refusal)));
     }
 
-    fn tell(&self, handle: u32, update: Update) {
+    /// Tells the client; `false` if it does not read what it was told before.
+    fn tell(&self, handle: u32, update: Update) -> bool {
         let mut updates = Updates::default();
         updates.add(handle, update);
-        // A client that does not read what it is told is not told more.
-        self.outbox.push(&mut updates, None, None);
+        self.outbox.push(&mut updates, None, None)
     }
+}
+
+fn too_many_seats() -> Status {
+    status(
+        Code::ResourceExhausted,
+        "TOO_MANY_SEATS",
+        format!(
+            "a stream takes at most {MAX_SEATS_PER_STREAM} seats at a time; detach those that are over, or open another"
+        ),
+        [("max_seats_per_stream", &MAX_SEATS_PER_STREAM.to_string())],
+    )
 }
 
 fn answer_action(answer: v1::Answer) -> SeatAction {

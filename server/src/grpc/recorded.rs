@@ -68,7 +68,7 @@ impl Recorded {
         let kept = (self.rooms.store().finished(game).await)
             .map_err(not_read)?
             .ok_or_else(unknown)?;
-        if (kept.series()).is_some_and(|series| self.rooms.is_series_closed(series)) {
+        if (kept.tournament()).is_some_and(|game| self.rooms.is_withheld(game)) {
             return Err(status(
                 Code::FailedPrecondition,
                 SERIES_OPEN,

@@ -33,6 +33,16 @@ pub fn status<const N: usize>(
     )
 }
 
+/// A stream is not told of more games before it has taken in those it was told of.
+pub fn calls_not_taken() -> Status {
+    status(
+        Code::Unavailable,
+        "CALLS_NOT_TAKEN",
+        "too many calls to games waited for this stream; connect again, and attach fewer participants to one stream",
+        [],
+    )
+}
+
 /// Whether a status has this reason.
 pub fn has_reason(status: &Status, reason: &str) -> bool {
     (status.get_details_error_info()).is_some_and(|info| info.reason == reason)

@@ -3,24 +3,21 @@
 use std::pin::Pin;
 use std::sync::Arc;
 
-use chefshat_arena::ratings::Ratings;
-use chefshat_arena::tournament::{BeginProblem, Format, Game, GameState, JoinProblem, Tournament};
+use chefshat_arena::tournament::{BeginProblem, JoinProblem};
 use chefshat_proto::v1::{self, tournament_service_server::TournamentService};
 use chefshat_records::convert::FieldProblem;
 use futures::Stream;
 use tokio::sync::{Semaphore, mpsc};
-use tokio::time::{Instant, timeout};
 use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::sync::CancellationToken;
 use tonic::{Code, Request, Response, Status};
 
-use super::new_room::{check_length, check_name, kept_policy};
+use super::follow::{end, follow, not_worked_out};
+use super::new_room::{check_name, kept_policy, too_long};
 use super::pages;
-use super::recorded::{Recorded, not_read};
+use super::recorded::Recorded;
 use super::status::{disk_nearly_full, field, shutting_down, status, store_failed};
-use crate::config::{
-    FOLLOW_INTERVAL, HEARTBEAT, MAX_FOLLOWERS, MAX_GAMES_PAGE, MAX_LEADERBOARD_LINES,
-};
+use crate::config::{MAX_FOLLOWERS, MAX_GAMES_PAGE, MAX_LEADERBOARD_LINES, MAX_RESULTS_IN_HAND};
 use crate::convert;
 use crate::ids::{Id, random_bytes};
 use crate::store::journal::ParticipantKind;
@@ -36,6 +33,10 @@ pub struct TournamentCalls {
     recorded: Recorded,
     leaderboard: Arc<Leaderboard>,
     followers: Arc<Semaphore>,
+    /// Turns to work out what followers are told.
+    telling: Arc<Semaphore>,
+    /// Turns to work out results.
+    summing_up: Arc<Semaphore>,
     /// Cancelled when all streams are to end.
     closing: CancellationToken,
 }
@@ -47,12 +48,13 @@ impl TournamentCalls {
         recorded: Recorded,
         closing: CancellationToken,
     ) -> Self {
-        let store = Arc::clone(recorded.rooms().store());
         Self {
             tournaments,
-            leaderboard: Arc::new(Leaderboard::new(store)),
+            leaderboard: Arc::new(Leaderboard::new(Arc::clone(recorded.rooms()))),
             recorded,
             followers: Arc::new(Semaphore::new(MAX_FOLLOWERS)),
+            telling: Arc::new(Semaphore::new(MAX_RESULTS_IN_HAND)),
+            summing_up: Arc::new(Semaphore::new(MAX_RESULTS_IN_HAND)),
             closing,
         }
     }
@@ -89,10 +91,12 @@ impl TournamentService for TournamentCalls {
         check_name(&name, 1).map_err(|problem| field("NAME_REFUSED", &problem))?;
         let mut plan = convert::tournament_plan(&settings, random_bytes())
             .map_err(|problem| refused(&problem))?;
-        check_length(&plan.rules)?;
+        if let Some(problem) = too_long(&plan.rules) {
+            return Err(refused_within("rules", &problem));
+        }
         let asked = settings.policy.unwrap_or_default();
         plan.policy.durability = kept_policy(&self.recorded, &asked)
-            .map_err(|problem| field("POLICY_REFUSED", &problem))?
+            .map_err(|problem| refused_within("policy", &problem))?
             .durability;
         let (hosted, owner) = self
             .tournaments
@@ -130,10 +134,7 @@ impl TournamentService for TournamentCalls {
             _ => String::new(),
         };
         let tournaments = (found.iter())
-            .map(|(_, hosted)| v1::Tournament {
-                participants: Vec::new(),
-                ..hosted.describe()
-            })
+            .map(|(_, hosted)| hosted.describe_briefly())
             .collect();
         Ok(Response::new(v1::ListTournamentsResponse {
             tournaments,
@@ -185,7 +186,7 @@ impl TournamentService for TournamentCalls {
             .map_err(not_joined)?;
         Ok(Response::new(v1::JoinTournamentResponse {
             tournament: Some(hosted.describe()),
-            participant: u32::try_from(participant).unwrap_or(u32::MAX),
+            participant: convert::number(participant),
             ticket: ticket.word(),
         }))
     }
@@ -234,14 +235,14 @@ impl TournamentService for TournamentCalls {
             )
         })?;
         let (sender, responses) = mpsc::channel(1);
-        let closing = self.closing.clone();
-        tokio::spawn(async move {
-            let _place = place;
-            tokio::select! {
-                () = follow(&hosted, &sender) => {}
-                () = closing.cancelled() => {}
-            }
-        });
+        let (closing, turns) = (self.closing.clone(), Arc::clone(&self.telling));
+        let following = async move {
+            let followed = follow(&hosted, &turns, &sender).await;
+            // One that takes nothing in keeps nobody from following.
+            drop(place);
+            end(&sender, followed).await;
+        };
+        tokio::spawn(closing.run_until_cancelled_owned(following));
         Ok(Response::new(Box::pin(ReceiverStream::new(responses))))
     }
 
@@ -250,21 +251,8 @@ impl TournamentService for TournamentCalls {
         request: Request<v1::GetTournamentResultsRequest>,
     ) -> Result<Response<v1::GetTournamentResultsResponse>, Status> {
         let hosted = self.find(&request.into_inner().tournament_id)?;
-        let looked = tokio::task::spawn_blocking(move || {
-            let (standings, confidence) = hosted.look(|tournament| {
-                let confidence = convert::confidence_to_proto(tournament);
-                (standings(&hosted, tournament), confidence)
-            });
-            v1::GetTournamentResultsResponse {
-                tournament: Some(hosted.describe()),
-                standings,
-                confidence,
-            }
-        });
-        let results = looked.await.map_err(|error| {
-            tracing::error!(%error, "results were not worked out");
-            super::status::internal()
-        })?;
+        let results = hosted.results(&self.summing_up).await;
+        let results = results.map_err(not_worked_out)?.message.clone();
         Ok(Response::new(results))
     }
 
@@ -281,7 +269,7 @@ impl TournamentService for TournamentCalls {
             size => size.min(MAX_GAMES_PAGE),
         };
         let size = usize::try_from(size).unwrap_or(usize::MAX);
-        let mut games = hosted.games(from, size + 1, |_| true);
+        let mut games = hosted.games(from, size + 1);
         let more = games.len() > size;
         games.truncate(size);
         let next_page_token = match more {
@@ -305,7 +293,7 @@ impl TournamentService for TournamentCalls {
             0 => STANDARD_LINES,
             limit => limit.min(MAX_LEADERBOARD_LINES),
         };
-        let ratings = self.leaderboard.ratings().await.map_err(not_read)?;
+        let ratings = self.leaderboard.ratings().await.map_err(not_worked_out)?;
         Ok(Response::new(convert::leaderboard(
             &ratings,
             request.kind(),
@@ -313,58 +301,6 @@ impl TournamentService for TournamentCalls {
             usize::try_from(limit).unwrap_or(usize::MAX),
         )))
     }
-}
-
-/// Sends the tournament whenever it has changed, until it is over or nobody listens.
-async fn follow(
-    hosted: &Hosted,
-    sender: &mpsc::Sender<Result<v1::FollowTournamentResponse, Status>>,
-) {
-    let mut changes = hosted.changes();
-    loop {
-        changes.mark_unchanged();
-        let over = hosted.is_over();
-        let sent = Instant::now();
-        if sender.send(Ok(now(hosted))).await.is_err() || over {
-            return;
-        }
-        tokio::time::sleep_until(sent + FOLLOW_INTERVAL).await;
-        while timeout(HEARTBEAT, changes.changed()).await.is_err() {
-            let heartbeat = v1::FollowTournamentResponse::default();
-            if sender.send(Ok(heartbeat)).await.is_err() {
-                return;
-            }
-        }
-    }
-}
-
-/// Where a tournament stands.
-fn now(hosted: &Hosted) -> v1::FollowTournamentResponse {
-    let (standings, round, by_rounds) = hosted.look(|tournament| {
-        (
-            standings(hosted, tournament),
-            tournament.round(),
-            tournament.settings().format != Format::RoundRobin,
-        )
-    });
-    let wanted = |game: &Game| match by_rounds {
-        true => game.round == round,
-        false => game.state == GameState::Playing,
-    };
-    v1::FollowTournamentResponse {
-        tournament: Some(hosted.describe()),
-        standings,
-        games: hosted.games(0, usize::MAX, wanted),
-    }
-}
-
-/// The standings, with ratings from the tournament's rated games alone.
-fn standings(hosted: &Hosted, tournament: &Tournament) -> Vec<v1::TournamentStanding> {
-    let ratings = match hosted.is_rated() {
-        true => tournament.ratings(),
-        false => Ratings::default(),
-    };
-    convert::standings_to_proto(tournament, &ratings)
 }
 
 fn unknown() -> Status {
@@ -388,6 +324,11 @@ fn refused(problem: &FieldProblem) -> Status {
         _ => "SETTINGS_REFUSED",
     };
     field(reason, problem)
+}
+
+/// The same, of a field within a field, which is named in words.
+fn refused_within(outer: &'static str, problem: &FieldProblem) -> Status {
+    refused(&FieldProblem::new(outer, problem.to_string()))
 }
 
 fn not_made(problem: CreateProblem) -> Status {

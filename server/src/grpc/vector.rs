@@ -225,7 +225,7 @@ impl Runner {
 
     /// Counts the seats of these games among those of all streams, as long as what is returned is kept.
     fn reserve(&self, setup: &VectorSetup) -> Result<OwnedSemaphorePermit, Status> {
-        let seats = setup.games() * u32::try_from(setup.client_seats().count()).unwrap_or(u32::MAX);
+        let seats = setup.games() * convert::number(setup.client_seats().count());
         Arc::clone(&self.service.seats)
             .try_acquire_many_owned(seats)
             .map_err(|_| too_many_games(seats))

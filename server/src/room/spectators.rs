@@ -89,7 +89,10 @@ impl Spectator {
     }
 
     fn event(&self, core: &Core, position: usize) -> Option<v1::GameEvent> {
-        let sees_hands = core.header().policy.spectators_see_hands || core.state().is_over();
+        let header = core.header();
+        // The hands of a series are those of games that others still play.
+        let sees_hands = header.series().is_none()
+            && (header.policy.spectators_see_hands || core.state().is_over());
         let viewer = if sees_hands {
             Viewer::Everything
         } else {

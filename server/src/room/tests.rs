@@ -57,7 +57,7 @@ async fn room(policy: Policy, shifts: u32) -> Handle {
     });
     let store = Arc::new(MemoryStore::default());
     let journal = store
-        .create(Arc::clone(&header))
+        .create(Arc::clone(&header), Vec::new())
         .await
         .expect("memory keeps it");
     go_on(

@@ -4,7 +4,7 @@ mod restore;
 mod table;
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
-use std::sync::atomic::AtomicU64;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, Weak};
 use std::time::Duration;
 
@@ -92,10 +92,12 @@ pub enum CreateError {
 /// The rooms of a server.
 pub struct Rooms {
     table: Mutex<Table>,
-    /// Series of games that are dealt alike, some of which are still to be played.
-    open_series: Mutex<BTreeSet<Id>>,
+    /// Series of games that are dealt alike, some of which are still to be played, and tournaments all of whose games are withheld.
+    closed: Mutex<BTreeSet<Id>>,
     /// Notified when a game has ended or a room has gone.
     changed: Notify,
+    /// Games that have ended since the server was started.
+    ended: AtomicU64,
     context: TaskContext,
     max_rooms: usize,
 }
@@ -105,8 +107,9 @@ impl Rooms {
     pub fn new(config: &ServerConfig, store: Arc<dyn Store>, tracker: TaskTracker) -> Arc<Self> {
         Arc::new_cyclic(|rooms: &Weak<Self>| Self {
             table: Mutex::default(),
-            open_series: Mutex::default(),
+            closed: Mutex::default(),
             changed: Notify::new(),
+            ended: AtomicU64::new(0),
             context: TaskContext {
                 filing: Filing::new(Arc::clone(&store), config.data_dir.clone(), tracker.clone()),
                 store,
@@ -191,23 +194,29 @@ impl Rooms {
         self.changed.notified()
     }
 
-    /// Closes a series of games that are dealt alike, or opens it when all of them have ended.
-    pub fn close_series(&self, series: Id, closed: bool) {
-        let mut open = self.open_series();
-        if closed {
-            open.insert(series);
+    /// Counts the games that end. One that is counted has been kept.
+    pub fn ended(&self) -> u64 {
+        self.ended.load(Ordering::Acquire)
+    }
+
+    /// Withholds what could tell the deals of a series, or of all games of a tournament; or gives it free when all of them have ended.
+    pub fn withhold(&self, series: Id, withheld: bool) {
+        let mut closed = self.closed();
+        if withheld {
+            closed.insert(series);
         } else {
-            open.remove(&series);
+            closed.remove(&series);
         }
     }
 
-    /// Whether what could tell the deals of a series is still to be withheld.
-    pub fn is_series_closed(&self, series: Id) -> bool {
-        self.open_series().contains(&series)
+    /// Whether what could tell the deals of a game is still to be withheld.
+    pub fn is_withheld(&self, game: TournamentGame) -> bool {
+        let closed = self.closed();
+        closed.contains(&game.tournament) || game.series.is_some_and(|it| closed.contains(&it))
     }
 
-    fn open_series(&self) -> MutexGuard<'_, BTreeSet<Id>> {
-        (self.open_series.lock()).expect("nothing that holds this lock can panic")
+    fn closed(&self) -> MutexGuard<'_, BTreeSet<Id>> {
+        (self.closed.lock()).expect("nothing that holds this lock can panic")
     }
 
     /// Rooms in which a game is being played or awaited.
@@ -338,14 +347,14 @@ impl Place {
             owner: owner.hash(),
             tournament: seating.map(|seating| seating.game),
         });
-        let mut journal = rooms.context.store.create(Arc::clone(&header)).await?;
         let mut core = Core::new(Arc::clone(&header));
         for (seat, participant) in new.seating.into_iter().flat_map(|it| it.participants) {
             core.seat(Seat::new(seat), participant);
         }
-        if !core.unkept().is_empty() {
-            journal.append(core.unkept()).await?;
-        }
+        // Who sits there is kept with the room: there is never one whose seats are empty.
+        let seated = std::mem::take(core.unkept());
+        let store = &rooms.context.store;
+        let mut journal = store.create(Arc::clone(&header), seated).await?;
         // Looked at and entered under one lock, so that a shutdown cannot slip in between and miss the room.
         if let Some(mut table) = Some(rooms.lock()).filter(|table| !table.shutting_down) {
             table.make_space(rooms.max_rooms);
@@ -389,6 +398,7 @@ impl RoomWatcher for Watcher {
                 entry.over = true;
             }
             drop(table);
+            rooms.ended.fetch_add(1, Ordering::AcqRel);
             rooms.changed.notify_waiters();
         }
     }

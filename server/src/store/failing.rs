@@ -44,10 +44,11 @@ impl Store for FailingStore {
     fn create(
         &self,
         header: Arc<GameHeader>,
+        entries: Vec<Entry>,
     ) -> BoxFuture<'_, Result<Box<dyn Journal>, StoreError>> {
         let appends_left = Arc::clone(&self.appends_left);
         let has_failed = self.has_failed.clone();
-        let inner = self.inner.create(header);
+        let inner = self.inner.create(header, entries);
         async move {
             let journal: Box<dyn Journal> = Box::new(FailingJournal {
                 inner: inner.await?,
@@ -96,8 +97,9 @@ impl Store for FailingStore {
     fn create_tournament(
         &self,
         header: Arc<TournamentHeader>,
+        entries: Vec<TournamentEntry>,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
-        self.inner.create_tournament(header)
+        self.inner.create_tournament(header, entries)
     }
 
     fn append_tournament(
@@ -109,8 +111,11 @@ impl Store for FailingStore {
         self.inner.append_tournament(tournament, row, entries)
     }
 
-    fn tournaments(&self) -> BoxFuture<'_, Result<Vec<KeptTournament>, StoreError>> {
-        self.inner.tournaments()
+    fn tournaments(
+        &self,
+        newest_over: usize,
+    ) -> BoxFuture<'_, Result<Vec<KeptTournament>, StoreError>> {
+        self.inner.tournaments(newest_over)
     }
 
     fn failed(&self) -> BoxFuture<'static, StoreError> {

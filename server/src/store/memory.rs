@@ -78,10 +78,11 @@ impl Store for MemoryStore {
     fn create(
         &self,
         header: Arc<GameHeader>,
+        entries: Vec<Entry>,
     ) -> BoxFuture<'_, Result<Box<dyn Journal>, StoreError>> {
         let journal = MemoryJournal {
             header,
-            entries: Vec::new(),
+            entries,
             finished: Arc::clone(&self.finished),
         };
         ready(Ok(Box::new(journal) as Box<dyn Journal>)).boxed()
@@ -141,6 +142,7 @@ impl Store for MemoryStore {
     fn create_tournament(
         &self,
         _header: Arc<TournamentHeader>,
+        _entries: Vec<TournamentEntry>,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
         ready(Ok(())).boxed()
     }
@@ -154,7 +156,10 @@ impl Store for MemoryStore {
         ready(Ok(())).boxed()
     }
 
-    fn tournaments(&self) -> BoxFuture<'_, Result<Vec<KeptTournament>, StoreError>> {
+    fn tournaments(
+        &self,
+        _newest_over: usize,
+    ) -> BoxFuture<'_, Result<Vec<KeptTournament>, StoreError>> {
         ready(Ok(Vec::new())).boxed()
     }
 

@@ -14,10 +14,10 @@ use futures::future::BoxFuture;
 
 pub use failing::FailingStore;
 pub use memory::{MAX_FINISHED_ENTRIES, MAX_FINISHED_GAMES, MemoryStore};
-pub use sqlite::{OpenError, SqliteStore};
+pub use sqlite::{ForgetError, Forgetting, Forgotten, OpenError, SqliteStore};
 
 use crate::ids::Id;
-use journal::{Entry, GameHeader};
+use journal::{Entry, GameHeader, TournamentGame};
 use tournaments::{KeptTournament, TournamentEntry, TournamentHeader};
 
 /// Why a store could not do what it was asked, and what to do about it.
@@ -35,10 +35,10 @@ pub enum KeptGame {
 }
 
 impl KeptGame {
-    /// The games that were dealt like this one, if a tournament of this server says so.
-    pub fn series(&self) -> Option<Id> {
+    /// The tournament it belongs to, if it is one of this server's.
+    pub fn tournament(&self) -> Option<TournamentGame> {
         match self {
-            Self::Hosted(header, _) => header.series(),
+            Self::Hosted(header, _) => header.tournament,
             Self::Imported(_) => None,
         }
     }
@@ -64,10 +64,11 @@ pub trait Store: Send + Sync + 'static {
     fn has_space(&self) -> bool {
         true
     }
-    /// Begins a game; its journal is written through what is returned.
+    /// Begins a game with its first entries, kept together or not at all; its journal goes on through what is returned.
     fn create(
         &self,
         header: Arc<GameHeader>,
+        entries: Vec<Entry>,
     ) -> BoxFuture<'_, Result<Box<dyn Journal>, StoreError>>;
     /// The games that were going on when the server ended, and those that had ended since a time (milliseconds since the Unix epoch), of
     /// which somebody may not have heard; oldest first. One that cannot be read is left as it is, and logged.
@@ -92,20 +93,25 @@ pub trait Store: Send + Sync + 'static {
     fn unfiled(&self) -> BoxFuture<'_, Result<Vec<Id>, StoreError>>;
     /// Notes that the record of a game has been written to a file.
     fn note_filed(&self, game: Id) -> BoxFuture<'_, Result<(), StoreError>>;
-    /// Begins a tournament.
+    /// Begins a tournament with the first part, row 0, of what moved it, kept together or not at all.
     fn create_tournament(
         &self,
         header: Arc<TournamentHeader>,
+        entries: Vec<TournamentEntry>,
     ) -> BoxFuture<'_, Result<(), StoreError>>;
-    /// Adds to a tournament the `row`-th part, from 0, of what moved it.
+    /// Adds to a tournament the `row`-th part, from 1, of what moved it.
     fn append_tournament(
         &self,
         tournament: Id,
         row: u64,
         entries: Vec<TournamentEntry>,
     ) -> BoxFuture<'_, Result<(), StoreError>>;
-    /// All tournaments, oldest first. One that cannot be read is left as it is, and logged.
-    fn tournaments(&self) -> BoxFuture<'_, Result<Vec<KeptTournament>, StoreError>>;
+    /// The tournaments that are not over and, of those that are, at most the `newest_over` that were made last; oldest first. One that
+    /// cannot be read is left as it is, and logged.
+    fn tournaments(
+        &self,
+        newest_over: usize,
+    ) -> BoxFuture<'_, Result<Vec<KeptTournament>, StoreError>>;
     /// Returns when the store can keep nothing any more; until then it waits.
     fn failed(&self) -> BoxFuture<'static, StoreError>;
     /// Ends in good order; nothing is asked of it afterwards.

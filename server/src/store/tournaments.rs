@@ -46,6 +46,13 @@ pub enum TournamentEntry {
     },
 }
 
+impl TournamentEntry {
+    /// Whether the tournament is over with it.
+    pub fn is_end(&self) -> bool {
+        matches!(self, Self::Change(Change::Finished | Change::Closed))
+    }
+}
+
 /// A tournament as it was kept.
 #[derive(Debug, Clone)]
 pub struct KeptTournament {

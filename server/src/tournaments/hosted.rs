@@ -1,17 +1,22 @@
 //! One tournament as services reach it: what it shows of itself, and a handle to the task that moves it. What happens when is the task's.
 
-use std::collections::BTreeMap;
-use std::sync::{Mutex, MutexGuard};
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::{Arc, Mutex, MutexGuard};
 
-use chefshat_arena::tournament::{BeginProblem, Game, JoinProblem, State, Tournament};
+use chefshat_arena::tournament::{BeginProblem, Deals, JoinProblem, State, Tournament};
 use chefshat_proto::v1;
 use sha2::{Digest as _, Sha256};
 use tokio::sync::{mpsc, oneshot, watch};
 
+use super::shown::Shown;
 use crate::convert::{self, TournamentPlan};
+use crate::grpc::status::calls_not_taken;
 use crate::ids::{Id, SecretHash, Token};
+use crate::outbox::Outbox;
+use crate::rooms::Rooms;
 use crate::store::journal::ParticipantKind;
 use crate::store::tournaments::TournamentHeader;
+use crate::wire::Updates;
 
 /// What a stream is told that is attached to a participant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,18 +30,24 @@ pub enum Call {
 }
 
 /// The way to a stream that is attached to a participant.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct Connection {
     /// Number of the participant's attachment on the stream.
     pub handle: u32,
     /// Takes what the participant is told.
     pub calls: mpsc::Sender<(u32, Call)>,
+    /// The stream.
+    pub outbox: Arc<Outbox<Updates>>,
 }
 
 impl Connection {
-    /// Tells the stream; `false` if it is gone, or has not taken what it was told before.
+    /// Tells the stream; `false` if it is gone, or has not taken what it was told before: then it is ended, so that its client comes anew.
     pub(super) fn call(&self, call: Call) -> bool {
-        self.calls.try_send((self.handle, call)).is_ok()
+        let told = self.calls.try_send((self.handle, call)).is_ok();
+        if !told {
+            self.outbox.cut(calls_not_taken());
+        }
+        told
     }
 }
 
@@ -73,6 +84,8 @@ pub(super) struct Moving {
     pub(super) tickets: BTreeMap<usize, SecretHash>,
     /// Rooms and games that games of the tournament are or were played in.
     pub(super) placed: BTreeMap<usize, (Id, Id)>,
+    /// Numbers of the connections that have participants now.
+    pub(super) connected: BTreeMap<usize, u64>,
 }
 
 /// A tournament of this server.
@@ -84,6 +97,7 @@ pub struct Hosted {
     pub(super) mailbox: mpsc::Sender<Message>,
     /// Counts what has happened.
     pub(super) changes: watch::Sender<u64>,
+    pub(super) shown: Shown,
 }
 
 impl Hosted {
@@ -119,7 +133,10 @@ impl Hosted {
     /// # Errors
     /// The server ends, or (inside) why it cannot.
     pub async fn join(&self, entry: Entry) -> Result<Result<(usize, Token), JoinProblem>, Stopped> {
-        self.ask(|reply| Message::Join(entry, reply)).await
+        match self.ask(|reply| Message::Join(entry, reply)).await {
+            Err(Stopped) if self.is_over() => Ok(Err(JoinProblem::Started)),
+            joined => joined,
+        }
     }
 
     /// Begins.
@@ -127,7 +144,10 @@ impl Hosted {
     /// # Errors
     /// The server ends, or (inside) why it cannot.
     pub async fn begin(&self) -> Result<Result<(), BeginProblem>, Stopped> {
-        self.ask(Message::Begin).await
+        match self.ask(Message::Begin).await {
+            Err(Stopped) if self.is_over() => Ok(Err(BeginProblem::Started)),
+            begun => begun,
+        }
     }
 
     /// Closes it, unless it is over.
@@ -135,14 +155,27 @@ impl Hosted {
     /// # Errors
     /// The server ends.
     pub async fn close(&self) -> Result<(), Stopped> {
-        self.ask(Message::Close).await
+        match self.ask(Message::Close).await {
+            Err(Stopped) if self.is_over() => Ok(()),
+            closed => closed,
+        }
     }
 
     /// Attaches a stream to a participant; `number` is the connection's own.
     pub async fn enter(&self, participant: usize, number: u64, connection: Connection) {
         let message = Message::Enter(participant, number, connection);
-        // When the server ends, the stream is ended too.
-        let _ = self.mailbox.send(message).await;
+        if let Err(mpsc::error::SendError(Message::Enter(_, _, connection))) =
+            self.mailbox.send(message).await
+            && self.is_over()
+        {
+            connection.call(Call::Over);
+        }
+        // Otherwise the server ends, and the stream with it.
+    }
+
+    /// Whether this connection is the one that has the participant.
+    pub fn is_newest(&self, participant: usize, number: u64) -> bool {
+        self.moving().connected.get(&participant) == Some(&number)
     }
 
     /// The stream with this number has left a participant.
@@ -167,9 +200,23 @@ impl Hosted {
 
     /// The tournament as everybody sees it.
     pub fn describe(&self) -> v1::Tournament {
-        let moving = self.moving();
-        let core = &moving.core;
-        let number = |value: usize| u32::try_from(value).unwrap_or(u32::MAX);
+        self.described(&self.moving().core)
+    }
+
+    /// The same without its participants.
+    pub fn describe_briefly(&self) -> v1::Tournament {
+        self.outlined(&self.moving().core)
+    }
+
+    /// A tournament that stood so, as everybody sees it.
+    pub(super) fn described(&self, core: &Tournament) -> v1::Tournament {
+        v1::Tournament {
+            participants: convert::tournament_participants(core),
+            ..self.outlined(core)
+        }
+    }
+
+    fn outlined(&self, core: &Tournament) -> v1::Tournament {
         let state = core.state();
         let mut settings = self.header.settings.clone();
         if matches!(state, State::Open | State::Playing) {
@@ -181,34 +228,29 @@ impl Hosted {
             tournament_id: self.header.id.to_string(),
             settings: Some(settings),
             state: convert::tournament_state(state).into(),
-            participants: convert::tournament_participants(core),
+            participants: Vec::new(),
             round: core.round(),
             rounds: core.rounds(),
-            games_over: number(core.games_over()),
-            games_playing: number(core.playing().count()),
-            games: number(core.games_expected()),
+            games_over: convert::number(core.games_over()),
+            games_playing: convert::number(core.playing().count()),
+            games: convert::number(core.games_expected()),
             created_at_ms: self.header.created_at_ms,
         }
     }
 
-    /// Its games that are asked for, with what has come of them; at most `most`.
-    pub fn games(
-        &self,
-        from: usize,
-        most: usize,
-        wanted: impl Fn(&Game) -> bool,
-    ) -> Vec<v1::TournamentGame> {
+    /// Its games from the one with this number on, with what has come of them; at most `most`.
+    pub fn games(&self, from: usize, most: usize) -> Vec<v1::TournamentGame> {
         let moving = self.moving();
-        let games = moving.core.games().iter().enumerate().skip(from);
-        games
-            .filter(|(_, game)| wanted(game))
-            .take(most)
-            .map(|(number, game)| {
-                let placed = moving.placed.get(&number).copied();
-                let series = game.deal.map(|deal| self.series(deal));
-                convert::tournament_game(number, game, placed, series, &self.plan)
-            })
-            .collect()
+        let numbers = (from..moving.core.games().len()).take(most);
+        numbers.map(|number| self.game(&moving, number)).collect()
+    }
+
+    /// One of its games, with what has come of it.
+    pub(super) fn game(&self, moving: &Moving, number: usize) -> v1::TournamentGame {
+        let game = &moving.core.games()[number];
+        let placed = moving.placed.get(&number).copied();
+        let series = game.deal.map(|deal| self.series(deal));
+        convert::tournament_game(number, game, placed, series, &self.plan)
     }
 
     /// Whether its games can count for ratings.
@@ -219,6 +261,36 @@ impl Hosted {
     /// What `look` makes of the tournament.
     pub fn look<T>(&self, look: impl FnOnce(&Tournament) -> T) -> T {
         look(&self.moving().core)
+    }
+
+    /// Closes the rooms of games that go on although the tournament is over: the server ended between the one and the other.
+    pub(super) fn close_rooms(&self, rooms: &Rooms) {
+        let placed: Vec<Id> = (self.moving().placed.values())
+            .map(|(room, _)| *room)
+            .collect();
+        for room in placed {
+            if rooms.is_over(room) == Some(false)
+                && let Some(room) = rooms.get(room)
+            {
+                tokio::spawn(async move { room.give_up().await });
+            }
+        }
+    }
+
+    /// Withholds what could tell deals that are still to be played, and gives free the others.
+    pub(super) fn withhold_deals(&self, rooms: &Rooms) {
+        if self.plan.core.deals == Deals::Independent {
+            return;
+        }
+        let moving = self.moving();
+        let over = matches!(moving.core.state(), State::Finished | State::Closed);
+        let deals: BTreeSet<u32> = (moving.core.games().iter())
+            .filter_map(|game| game.deal)
+            .collect();
+        for deal in deals {
+            let withheld = !over && !moving.core.is_deal_open(deal);
+            rooms.withhold(self.series(deal), withheld);
+        }
     }
 
     /// The id of the games that are dealt alike.

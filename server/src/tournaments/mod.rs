@@ -3,6 +3,8 @@
 
 mod hosted;
 mod leaderboard;
+mod shared;
+mod shown;
 mod task;
 
 use std::collections::BTreeMap;
@@ -18,7 +20,8 @@ use tokio_util::task::TaskTracker;
 use tracing::{error, info};
 
 pub use hosted::{Call, Connection, Entry, Hosted, Stopped};
-pub use leaderboard::{BoardError, Leaderboard};
+pub use leaderboard::Leaderboard;
+pub use shared::NotWorkedOut;
 
 use crate::config::{MAX_TOURNAMENTS, TOURNAMENT_MAILBOX};
 use crate::convert::{self, TournamentPlan};
@@ -28,6 +31,7 @@ use crate::rooms::Rooms;
 use crate::store::StoreError;
 use crate::store::tournaments::{KeptTournament, TournamentEntry, TournamentHeader};
 use hosted::Moving;
+use shown::Shown;
 use task::Task;
 
 /// Why no tournament was made.
@@ -55,9 +59,17 @@ pub enum CreateProblem {
 pub struct Tournaments {
     rooms: Arc<Rooms>,
     tracker: TaskTracker,
-    /// Cancelled when no tournament is to move any more.
-    stop: CancellationToken,
+    stop: Stop,
     table: Mutex<Table>,
+}
+
+/// How the tournaments of a server are stopped.
+#[derive(Debug, Clone, Default)]
+struct Stop {
+    /// No game is called or counted any more; participants are still seated in those that go on.
+    no_more_games: CancellationToken,
+    /// No tournament does anything any more.
+    end: CancellationToken,
 }
 
 #[derive(Debug, Default)]
@@ -75,7 +87,7 @@ impl Tournaments {
         Arc::new(Self {
             rooms,
             tracker,
-            stop: CancellationToken::new(),
+            stop: Stop::default(),
             table: Mutex::default(),
         })
     }
@@ -90,7 +102,7 @@ impl Tournaments {
         plan: TournamentPlan,
     ) -> Result<(Arc<Hosted>, Token), CreateProblem> {
         let mut core = Tournament::new(plan.core.clone())?;
-        if self.stop.is_cancelled() || self.rooms.is_shutting_down() {
+        if self.stop.no_more_games.is_cancelled() || self.rooms.is_shutting_down() {
             return Err(CreateProblem::ShuttingDown);
         }
         if !self.rooms.store().has_space() {
@@ -114,13 +126,12 @@ impl Tournaments {
             entries.push(TournamentEntry::Change(change));
         }
         let store = self.rooms.store();
-        store.create_tournament(Arc::new(header.clone())).await?;
-        if !entries.is_empty() {
-            store.append_tournament(id, 0, entries.clone()).await?;
-        }
+        store
+            .create_tournament(Arc::new(header.clone()), entries.clone())
+            .await?;
         let kept = KeptTournament {
             header,
-            rows: u64::from(!entries.is_empty()),
+            rows: 1,
             entries,
         };
         Ok((self.take_up(kept, plan, core), owner))
@@ -132,7 +143,7 @@ impl Tournaments {
     /// The store's.
     pub async fn restore(&self) -> Result<usize, StoreError> {
         let mut going_on = 0;
-        for kept in self.rooms.store().tournaments().await? {
+        for kept in self.rooms.store().tournaments(MAX_TOURNAMENTS).await? {
             let id = kept.header.id;
             match folded(&kept) {
                 Ok((plan, core)) => {
@@ -140,6 +151,8 @@ impl Tournaments {
                     self.take_up(kept, plan, core);
                 }
                 Err(problem) => {
+                    // What it would withhold is not known.
+                    self.rooms.withhold(id, true);
                     error!(tournament = %id, %problem, "a tournament cannot be gone on with; it is left as it is");
                 }
             }
@@ -150,9 +163,14 @@ impl Tournaments {
         Ok(going_on)
     }
 
-    /// No tournament moves any more; their games may end, and count when the server is back.
+    /// No game is called or counted any more; those that end from here on count when the server is back.
     pub fn stop(&self) {
-        self.stop.cancel();
+        self.stop.no_more_games.cancel();
+    }
+
+    /// No tournament does anything any more.
+    pub fn end(&self) {
+        self.stop.end.cancel();
     }
 
     /// A tournament by its id.
@@ -188,6 +206,7 @@ impl Tournaments {
             core,
             tickets: BTreeMap::new(),
             placed: BTreeMap::new(),
+            connected: BTreeMap::new(),
         };
         for entry in kept.entries {
             match entry {
@@ -209,6 +228,7 @@ impl Tournaments {
             moving: Mutex::new(moving),
             mailbox,
             changes: watch::Sender::new(0),
+            shown: Shown::default(),
         });
         let mut table = self.lock();
         while table.by_number.len() >= MAX_TOURNAMENTS
@@ -222,6 +242,12 @@ impl Tournaments {
         table.next_number += 1;
         table.by_number.insert(number, Arc::clone(&hosted));
         drop(table);
+        // Before anybody can ask for a record.
+        hosted.withhold_deals(&self.rooms);
+        if hosted.is_over() {
+            hosted.close_rooms(&self.rooms);
+            return hosted;
+        }
         let task = Task::new(Arc::clone(&hosted), Arc::clone(&self.rooms), kept.rows);
         self.tracker.spawn(task.run(inbox, self.stop.clone()));
         hosted

@@ -7,18 +7,18 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use chefshat_arena::tournament::{
-    Change, Deals, Ended, Entrant, Game, SeatPlayed, State, Tournament,
+    BeginProblem, Change, Ended, Entrant, Game, JoinProblem, SeatPlayed, State, Tournament,
 };
 use chefshat_proto::v1;
 use chefshat_records::outcome;
 use futures::future::join_all;
 use tokio::sync::mpsc;
 use tokio::time::{Instant, sleep_until};
-use tokio_util::sync::CancellationToken;
 use tracing::{error, info, warn};
 
+use super::Stop;
 use super::hosted::{Call, Connection, Entry, Hosted, Message};
-use crate::config::{MAX_NAME_CHARS, TOURNAMENT_RETRY};
+use crate::config::{MAX_NAME_CHARS, TOURNAMENT_OPEN_TIME, TOURNAMENT_RETRY};
 use crate::convert;
 use crate::ids::{Id, Token};
 use crate::rooms::{CreateError, NewRoom, Rooms, Seating};
@@ -26,8 +26,6 @@ use crate::store::StoreError;
 use crate::store::journal::{Fill, GameStart, SeatedParticipant, TournamentGame};
 use crate::store::tournaments::TournamentEntry;
 
-/// Participants from which on a draw may take longer than a server may stand still.
-const MANY: usize = 64;
 /// Messages that are taken before what follows from them is worked out.
 const MESSAGES_AT_A_TIME: usize = 64;
 
@@ -43,6 +41,14 @@ pub(super) struct Task {
     connections: BTreeMap<usize, (u64, Connection)>,
     /// Games that were called and have no room yet.
     unmade: BTreeSet<usize>,
+    /// Games whose rooms were there since the server was started.
+    seen: BTreeSet<usize>,
+    /// Rooms that are to be closed, once it is kept that the tournament is.
+    to_close: Vec<Id>,
+    /// Whether something was seen to change that is not kept.
+    has_changed: bool,
+    /// When somebody last joined, or the server was started.
+    joined_at: Instant,
     /// When rooms that could not be made are tried again.
     retry: Option<Instant>,
     /// Answers that wait for what they promise to be kept.
@@ -60,14 +66,18 @@ impl Task {
             unkept: Vec::new(),
             connections: BTreeMap::new(),
             unmade: BTreeSet::new(),
+            seen: BTreeSet::new(),
+            to_close: Vec::new(),
+            has_changed: false,
+            joined_at: Instant::now(),
             retry: None,
             replies: Vec::new(),
             began: Instant::now(),
         }
     }
 
-    /// Moves the tournament until the server ends, or its store fails.
-    pub(super) async fn run(mut self, mut inbox: mpsc::Receiver<Message>, stop: CancellationToken) {
+    /// Moves the tournament until it is over, the server ends, or its store fails.
+    pub(super) async fn run(mut self, mut inbox: mpsc::Receiver<Message>, stop: Stop) {
         let rooms = Arc::clone(&self.rooms);
         let mut messages = Vec::new();
         loop {
@@ -75,24 +85,37 @@ impl Task {
             tokio::pin!(changed);
             // From here on no end of a game is missed.
             changed.as_mut().enable();
-            if let Err(error) = self.settle().await {
+            if let Err(error) = self.settle(stop.no_more_games.is_cancelled()).await {
                 error!(tournament = %self.hosted.id(), %error, "the tournament stops");
                 return;
             }
-            let wake = self.wake_at();
+            if self.hosted.is_over() {
+                // Whoever comes later is answered by what can be seen.
+                inbox.close();
+                while let Some(message) = inbox.recv().await {
+                    self.answer_late(message);
+                }
+                return;
+            }
+            let wake = self
+                .wake_at()
+                .filter(|_| !stop.no_more_games.is_cancelled());
             let alarm = sleep_until(wake.unwrap_or(self.began));
             tokio::select! {
-                () = stop.cancelled() => return,
+                () = stop.end.cancelled() => return,
                 received = inbox.recv_many(&mut messages, MESSAGES_AT_A_TIME) => {
                     if received == 0 {
                         return;
                     }
                     for message in messages.drain(..) {
-                        self.receive(message).await;
+                        if let Err(error) = self.receive(message).await {
+                            error!(tournament = %self.hosted.id(), %error, "the tournament stops");
+                            return;
+                        }
                     }
                 }
                 () = changed => {}
-                () = alarm, if wake.is_some() => {}
+                () = alarm, if wake.is_some() => self.expire(),
             }
         }
     }
@@ -100,14 +123,41 @@ impl Task {
     fn wake_at(&self) -> Option<Instant> {
         let core = self.hosted.look(|core| core.wake_at());
         let core = core.map(|ms| self.began + Duration::from_millis(ms));
-        core.into_iter().chain(self.retry).min()
+        core.into_iter()
+            .chain(self.retry)
+            .chain(self.open_until())
+            .min()
+    }
+
+    /// When a tournament that nobody begins or joins is closed.
+    fn open_until(&self) -> Option<Instant> {
+        let is_open = self.hosted.look(|core| core.state() == State::Open);
+        is_open.then(|| self.joined_at + TOURNAMENT_OPEN_TIME)
+    }
+
+    fn expire(&mut self) {
+        if (self.open_until()).is_some_and(|until| until <= Instant::now()) {
+            self.close();
+        }
+    }
+
+    /// Answers somebody who came when the tournament was over.
+    fn answer_late(&mut self, message: Message) {
+        // Who asked may be gone.
+        match message {
+            Message::Join(_, reply) => drop(reply.send(Err(JoinProblem::Started))),
+            Message::Begin(reply) => drop(reply.send(Err(BeginProblem::Started))),
+            Message::Close(reply) => drop(reply.send(())),
+            Message::Enter(_, _, connection) => drop(connection.call(Call::Over)),
+            Message::Left(..) => {}
+        }
     }
 
     fn now_ms(&self) -> u64 {
         u64::try_from(self.began.elapsed().as_millis()).unwrap_or(u64::MAX)
     }
 
-    async fn receive(&mut self, message: Message) {
+    async fn receive(&mut self, message: Message) -> Result<(), StoreError> {
         match message {
             Message::Join(entry, reply) => {
                 let joined = self.join(entry);
@@ -116,7 +166,7 @@ impl Task {
                 }));
             }
             Message::Begin(reply) => {
-                let begun = self.off_thread(|core| core.begin()).await;
+                let begun = self.off_thread(|core| core.begin()).await?;
                 let begun = begun.map(|changes| self.fold_all(changes));
                 self.replies.push(Box::new(move || {
                     // Who asked may be gone.
@@ -134,12 +184,10 @@ impl Task {
             }
             Message::Left(participant, number) => self.left(participant, number),
         }
+        Ok(())
     }
 
-    fn join(
-        &mut self,
-        entry: Entry,
-    ) -> Result<(usize, Token), chefshat_arena::tournament::JoinProblem> {
+    fn join(&mut self, entry: Entry) -> Result<(usize, Token), JoinProblem> {
         let entrant = Entrant {
             name: entry.name,
             kind: convert::entrant_kind(entry.kind),
@@ -154,6 +202,7 @@ impl Task {
         let token = Token::random(self.hosted.id());
         let ticket = token.hash();
         self.fold(change);
+        self.joined_at = Instant::now();
         self.hosted.moving().tickets.insert(participant, ticket);
         self.unkept.push(TournamentEntry::Ticket {
             participant,
@@ -171,9 +220,7 @@ impl Task {
         self.fold(change);
         for game in playing {
             let placed = self.hosted.moving().placed.get(&game).copied();
-            if let Some(room) = placed.and_then(|(room, _)| self.rooms.get(room)) {
-                tokio::spawn(async move { room.give_up().await });
-            }
+            self.to_close.extend(placed.map(|(room, _)| room));
         }
         self.unmade.clear();
     }
@@ -186,21 +233,33 @@ impl Task {
             connection.call(Call::Over);
             return;
         }
-        let mut reached = true;
-        for room in self.rooms_of(participant) {
-            reached &= connection.call(Call::Seat(room));
-        }
+        // Known before it is called: a stream takes a seat only as long as it is the newest.
+        (self.hosted.moving().connected).insert(participant, number);
+        let mut rooms = self.rooms_of(participant).into_iter();
+        let reached = rooms.all(|room| connection.call(Call::Seat(room)));
+        self.connections.insert(participant, (number, connection));
         if reached {
-            self.connections.insert(participant, (number, connection));
+            (self.hosted.moving().core).set_present(participant, true);
+            self.has_changed = true;
+        } else {
+            self.away(participant);
         }
-        (self.hosted.moving().core).set_present(participant, reached);
     }
 
     fn left(&mut self, participant: usize, number: u64) {
         if (self.connections.get(&participant)).is_some_and(|(newest, _)| *newest == number) {
-            self.connections.remove(&participant);
-            self.hosted.moving().core.set_present(participant, false);
+            self.away(participant);
         }
+    }
+
+    /// A participant is not to be reached any more.
+    fn away(&mut self, participant: usize) {
+        self.connections.remove(&participant);
+        let mut moving = self.hosted.moving();
+        moving.connected.remove(&participant);
+        moving.core.set_present(participant, false);
+        drop(moving);
+        self.has_changed = true;
     }
 
     /// Rooms in which a participant has a seat now.
@@ -242,9 +301,10 @@ impl Task {
         let mut moving = self.hosted.moving();
         moving.placed.insert(game, (room_id, game_id));
         if let Some(deal) = moving.core.games()[game].deal {
-            self.rooms.close_series(self.hosted.series(deal), true);
+            self.rooms.withhold(self.hosted.series(deal), true);
         }
         self.unmade.insert(game);
+        self.seen.remove(&game);
         self.unkept.push(TournamentEntry::Placed {
             game,
             room_id,
@@ -252,11 +312,13 @@ impl Task {
         });
     }
 
-    /// Does everything that follows now, and keeps it.
-    async fn settle(&mut self) -> Result<(), StoreError> {
+    /// Does everything that follows now, and keeps it. Where there are to be no more games, what came is kept and nothing follows.
+    async fn settle(&mut self, no_more_games: bool) -> Result<(), StoreError> {
         loop {
-            self.look_at_games().await?;
-            self.follow().await;
+            if !no_more_games {
+                self.look_at_games().await?;
+                self.follow().await?;
+            }
             let moved = !self.unkept.is_empty();
             if moved {
                 let entries = std::mem::take(&mut self.unkept);
@@ -267,9 +329,22 @@ impl Task {
             for reply in self.replies.drain(..) {
                 reply();
             }
-            self.hosted.changes.send_modify(|count| *count += 1);
-            self.open_series();
-            self.make_rooms().await?;
+            for room in self
+                .to_close
+                .drain(..)
+                .filter_map(|room| self.rooms.get(room))
+            {
+                tokio::spawn(async move { room.give_up().await });
+            }
+            if moved {
+                self.hosted.withhold_deals(&self.rooms);
+            }
+            if !no_more_games {
+                self.make_rooms().await?;
+            }
+            if std::mem::take(&mut self.has_changed) || moved {
+                self.hosted.changes.send_modify(|count| *count += 1);
+            }
             if self.hosted.is_over() {
                 for (_, connection) in std::mem::take(&mut self.connections).into_values() {
                     connection.call(Call::Over);
@@ -281,13 +356,16 @@ impl Task {
         }
     }
 
-    /// Does what follows now. Where rounds may have to be drawn for many, which takes a while, it is worked out elsewhere.
-    async fn follow(&mut self) {
+    /// Does what follows now. Where a round may have to be drawn it is worked out elsewhere.
+    async fn follow(&mut self) -> Result<(), StoreError> {
         let now_ms = self.now_ms();
-        let draws_for_many = self
-            .hosted
-            .look(|core| core.participants().len() > MANY && core.playing().next().is_none());
-        if draws_for_many {
+        // With nothing being played a round may be due, which takes a while to draw.
+        let may_draw = self.hosted.look(|core| match core.state() {
+            State::Open => core.settings().start_when_joined.is_some(),
+            State::Playing => core.playing().next().is_none(),
+            State::Finished | State::Closed => false,
+        });
+        if may_draw {
             let following = move |mut core: Tournament| {
                 let mut changes = Vec::new();
                 while let Some(change) = core.next(now_ms) {
@@ -296,12 +374,12 @@ impl Task {
                 }
                 changes
             };
-            let changes = self.off_thread(following).await;
+            let changes = self.off_thread(following).await?;
             self.fold_all(changes);
         }
         loop {
             let next = self.hosted.moving().core.next(now_ms);
-            let Some(change) = next else { return };
+            let Some(change) = next else { return Ok(()) };
             self.fold(change);
         }
     }
@@ -310,10 +388,10 @@ impl Task {
     async fn off_thread<T: Send + 'static>(
         &self,
         work: impl FnOnce(Tournament) -> T + Send + 'static,
-    ) -> T {
+    ) -> Result<T, StoreError> {
         let core = self.hosted.look(Tournament::clone);
         let working = tokio::task::spawn_blocking(move || work(core));
-        working.await.expect("a tournament does not panic")
+        (working.await).map_err(|error| StoreError(format!("a draw was not made: {error}")))
     }
 
     /// Takes in what came of games that have ended.
@@ -329,6 +407,7 @@ impl Task {
                 continue;
             };
             if self.rooms.is_over(room) == Some(false) {
+                self.seen.insert(game);
                 continue;
             }
             match self.ended(game, room, game_id).await? {
@@ -374,6 +453,8 @@ impl Task {
         };
         Ok(match described.abort_reason() {
             v1::AbortReason::Shutdown => None,
+            // Who was there when it was given up is not known any more.
+            _ if !self.seen.contains(&game) => None,
             _ => {
                 let seats = self.hosted.look(|core| core.games()[game].seats.clone());
                 let away = described.seats.iter().zip(seats);
@@ -384,22 +465,6 @@ impl Task {
                 Some(Ended::NeverStarted { missing })
             }
         })
-    }
-
-    /// Opens what was withheld of deals whose games have all ended.
-    fn open_series(&self) {
-        if self.hosted.plan.core.deals == Deals::Independent {
-            return;
-        }
-        let moving = self.hosted.moving();
-        let over = matches!(moving.core.state(), State::Finished | State::Closed);
-        let deals: BTreeSet<u32> = (moving.core.games().iter())
-            .filter_map(|game| game.deal)
-            .collect();
-        for deal in deals {
-            let closed = !over && !moving.core.is_deal_open(deal);
-            (self.rooms).close_series(self.hosted.series(deal), closed);
-        }
     }
 
     /// Makes the rooms of games that were called, and tells their participants.
@@ -418,6 +483,8 @@ impl Task {
             match made {
                 Ok(_) => {
                     self.unmade.remove(&game);
+                    self.seen.insert(game);
+                    self.has_changed = true;
                     self.call(game);
                 }
                 Err(CreateError::Store(error)) => return Err(error),
@@ -446,10 +513,8 @@ impl Task {
                 continue;
             }
             let connection = self.connections.get(participant);
-            let lost = connection.is_some_and(|(_, connection)| !connection.call(Call::Seat(room)));
-            if lost {
-                self.connections.remove(participant);
-                (self.hosted.moving().core).set_present(*participant, false);
+            if connection.is_some_and(|(_, connection)| !connection.call(Call::Seat(room))) {
+                self.away(*participant);
             }
         }
     }

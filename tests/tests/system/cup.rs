@@ -23,8 +23,10 @@ const ROUNDS: u32 = 3;
 const TABLES: u32 = 4;
 /// Agents of the SDK in this process.
 const REGULARS: u32 = 6;
-/// How long the agent that crashes lives.
+/// How long the agent that crashes lives at first, and by how much it lives longer each time: however slow the machine is, it is there at
+/// some time.
 const LIFE: Duration = Duration::from_millis(150);
+const LIVES_LONGER: Duration = Duration::from_millis(10);
 /// What the agent that floods sends at a time, and how long it waits then.
 const FLOOD: u32 = 500;
 const BETWEEN_FLOODS: Duration = Duration::from_millis(20);
@@ -90,9 +92,11 @@ fn regular(url: &str, ticket: String, seed: u64) -> JoinHandle<Result<Vec<Outcom
 fn crashing(url: &str, ticket: String) -> JoinHandle<()> {
     let url = url.to_owned();
     tokio::spawn(async move {
+        let mut length = LIFE;
         loop {
             let life = regular(&url, ticket.clone(), 0);
-            tokio::time::sleep(LIFE).await;
+            tokio::time::sleep(length).await;
+            length += LIVES_LONGER;
             life.abort();
             if let Ok(Ok(_)) = life.await {
                 return;

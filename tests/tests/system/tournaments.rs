@@ -1,7 +1,5 @@
-//! Tournaments as participants live them, over real connections: seated by the server, told nothing of deals that others still play, placed
-//! last when they do not come.
-
-use std::collections::BTreeMap;
+//! Tournaments as participants live them, over real connections: seated by the server, placed last when they do not come, refused by name.
+//! What is told of deals that others still play is in `tournament_deals`.
 
 use chefshat_client::Client;
 use chefshat_proto::v1::tournament_service_client::TournamentServiceClient;
@@ -13,9 +11,9 @@ use tonic::Code;
 use tonic::transport::Channel;
 use tonic_types::StatusExt as _;
 
-type Tournaments = TournamentServiceClient<Channel>;
+pub(crate) type Tournaments = TournamentServiceClient<Channel>;
 
-async fn create(
+pub(crate) async fn create(
     service: &mut Tournaments,
     settings: v1::TournamentSettings,
 ) -> v1::CreateTournamentResponse {
@@ -31,17 +29,28 @@ async fn create(
     created.expect("the tournament is made").into_inner()
 }
 
-async fn join(service: &mut Tournaments, code: &str, name: &str) -> v1::JoinTournamentResponse {
+pub(crate) async fn join(
+    service: &mut Tournaments,
+    code: &str,
+    name: &str,
+) -> v1::JoinTournamentResponse {
     let request = v1::JoinTournamentRequest {
         join_code: code.to_owned(),
         name: name.to_owned(),
         ..v1::JoinTournamentRequest::default()
     };
+    join_as(service, request).await
+}
+
+pub(crate) async fn join_as(
+    service: &mut Tournaments,
+    request: v1::JoinTournamentRequest,
+) -> v1::JoinTournamentResponse {
     let joined = service.join_tournament(request).await;
     joined.expect("there is a place").into_inner()
 }
 
-async fn start(service: &mut Tournaments, created: &v1::CreateTournamentResponse) {
+pub(crate) async fn start(service: &mut Tournaments, created: &v1::CreateTournamentResponse) {
     let request = v1::StartTournamentRequest {
         tournament_id: id_of(created),
         owner_token: created.owner_token.clone(),
@@ -49,13 +58,13 @@ async fn start(service: &mut Tournaments, created: &v1::CreateTournamentResponse
     service.start_tournament(request).await.expect("it begins");
 }
 
-fn id_of(created: &v1::CreateTournamentResponse) -> String {
+pub(crate) fn id_of(created: &v1::CreateTournamentResponse) -> String {
     let tournament = created.tournament.as_ref();
     tournament.expect("a tournament").tournament_id.clone()
 }
 
 /// Follows a tournament until it is over.
-async fn over(service: &mut Tournaments, tournament_id: &str) -> v1::Tournament {
+pub(crate) async fn over(service: &mut Tournaments, tournament_id: &str) -> v1::Tournament {
     let request = v1::FollowTournamentRequest {
         tournament_id: tournament_id.to_owned(),
     };
@@ -82,7 +91,10 @@ async fn results(
     results.expect("there are some").into_inner()
 }
 
-async fn games(service: &mut Tournaments, tournament_id: &str) -> Vec<v1::TournamentGame> {
+pub(crate) async fn games(
+    service: &mut Tournaments,
+    tournament_id: &str,
+) -> Vec<v1::TournamentGame> {
     let mut all = Vec::new();
     let mut page_token = String::new();
     loop {
@@ -102,7 +114,7 @@ async fn games(service: &mut Tournaments, tournament_id: &str) -> Vec<v1::Tourna
 }
 
 /// A stream attached to a participant, which is told so.
-async fn entered(server: &TestServer, ticket: &str) -> StreamSeat {
+pub(crate) async fn entered(server: &TestServer, ticket: &str) -> StreamSeat {
     let mut stream = StreamSeat::open(server.channel().await).await;
     let attach = v1::Attach {
         ticket: ticket.to_owned(),
@@ -118,7 +130,64 @@ async fn entered(server: &TestServer, ticket: &str) -> StreamSeat {
 }
 
 /// First handle of seats that the server attaches.
-const CALLED: u32 = 1 << 31;
+pub(crate) const CALLED: u32 = 1 << 31;
+
+/// A game of three built-in agents and one who joins.
+fn three_and_one() -> v1::TournamentSettings {
+    v1::TournamentSettings {
+        format: v1::TournamentFormat::RoundRobin.into(),
+        rounds: 1,
+        built_in_agents: vec!["random".into(); 3],
+        policy: Some(unhurried()),
+        ..v1::TournamentSettings::default()
+    }
+}
+
+/// Nobody loses a decision to the clock.
+pub(crate) fn unhurried() -> v1::RoomPolicy {
+    v1::RoomPolicy {
+        decision_time_ms: Some(3_600_000),
+        ..v1::RoomPolicy::default()
+    }
+}
+
+/// The room in which the server seats a participant next, and its first decision there.
+pub(crate) async fn seated(stream: &mut StreamSeat) -> (String, v1::DecisionRequest) {
+    // The numbers of events begin anew.
+    stream.last_event = 0;
+    let room = match stream.next().await {
+        Update::Attached(attached) => attached.room_id,
+        other => panic!("not attached, but {other:?}"),
+    };
+    (room, stream.decision().await)
+}
+
+/// Plays a game from this decision to its end, by the first action that is legal; gives the last event.
+pub(crate) async fn play_game(
+    stream: &mut StreamSeat,
+    handle: u32,
+    mut decision: v1::DecisionRequest,
+) -> v1::GameEvent {
+    loop {
+        let answer = Answer {
+            decision_id: decision.decision_id,
+            action: first_legal(&decision),
+            annotations: None,
+        };
+        stream.send_to(handle, Command::Answer(answer)).await;
+        decision = loop {
+            match stream.next().await {
+                Update::Decision(decision) => break decision,
+                Update::Result(_) => {}
+                Update::Detached(detached) => {
+                    assert_eq!(detached.reason(), v1::DetachReason::GameOver);
+                    return stream.events.last().cloned().expect("the game ended");
+                }
+                other => panic!("unexpected {other:?}"),
+            }
+        };
+    }
+}
 
 #[tokio::test]
 async fn the_server_seats_a_participant_in_each_of_its_games() {
@@ -237,106 +306,94 @@ async fn who_does_not_come_forfeits_and_the_others_play() {
 }
 
 #[tokio::test]
-async fn deals_that_others_still_play_are_told_to_nobody() {
+async fn the_newest_stream_has_the_participant() {
+    let server = TestServer::start().await;
+    let mut service = TournamentServiceClient::new(server.channel().await);
+    let created = create(&mut service, three_and_one()).await;
+    let joined = join(&mut service, &created.join_code, "Ada").await;
+    let mut older = entered(&server, &joined.ticket).await;
+    start(&mut service, &created).await;
+    let (room, asked) = seated(&mut older).await;
+    let mut newer = entered(&server, &joined.ticket).await;
+    // Both of its participant and of the seat that the server attached.
+    for _ in 0..2 {
+        match older.next().await {
+            Update::Detached(detached) => {
+                assert_eq!(detached.reason(), v1::DetachReason::Superseded);
+            }
+            other => panic!("not detached, but {other:?}"),
+        }
+    }
+    let (again, decision) = seated(&mut newer).await;
+    assert_eq!((&again, decision.decision_id), (&room, asked.decision_id));
+    // What the older one still says is not heard: this would be a strike, or the answer.
+    let nonsense = Answer {
+        decision_id: decision.decision_id,
+        action: 9_999,
+        annotations: None,
+    };
+    older.send_to(CALLED, Command::Answer(nonsense)).await;
+    let ended = play_game(&mut newer, CALLED, decision).await;
+    assert!(matches!(ended.kind, Some(Kind::GameEnded(_))), "{ended:?}");
+    let tournament = over(&mut service, &id_of(&created)).await;
+    assert_eq!(tournament.state(), v1::TournamentState::Finished);
+    let games = games(&mut service, &id_of(&created)).await;
+    assert!(games[0].rated, "nobody took a decision for it");
+    let wrong = games[0].seats.iter().map(|seat| seat.wrong_actions);
+    assert_eq!(wrong.sum::<u64>(), 0);
+}
+
+#[tokio::test]
+async fn what_is_closed_while_it_is_played_counts_no_more_games() {
     let server = TestServer::start().await;
     let mut service = TournamentServiceClient::new(server.channel().await);
     let created = create(
         &mut service,
         v1::TournamentSettings {
-            format: v1::TournamentFormat::RoundRobin.into(),
-            rounds: 1,
-            deals: v1::TournamentDeals::SameAtAllTables.into(),
-            built_in_agents: vec!["random".into(); 7],
-            policy: Some(v1::RoomPolicy {
-                decision_time_ms: Some(3_600_000),
-                ..v1::RoomPolicy::default()
-            }),
-            ..v1::TournamentSettings::default()
+            rounds: 2,
+            ..three_and_one()
         },
     )
     .await;
     let joined = join(&mut service, &created.join_code, "Ada").await;
-    let mut stream = StreamSeat::open(server.channel().await).await;
-    stream
-        .attach(v1::Attach {
-            ticket: joined.ticket,
-            // What one table adds to the seed must not make its deals other ones.
-            entropy: vec![1; 32],
-            ..v1::Attach::default()
-        })
-        .await;
+    let mut stream = entered(&server, &joined.ticket).await;
     start(&mut service, &created).await;
-    assert!(matches!(stream.next().await, Update::Entered(_)));
-    assert!(matches!(stream.next().await, Update::Attached(_)));
-    let mut decision = match stream.next().await {
-        Update::Decision(decision) => decision,
-        other => panic!("no decision, but {other:?}"),
+    let (_, decision) = seated(&mut stream).await;
+    play_game(&mut stream, CALLED, decision).await;
+    let (room, _) = seated(&mut stream).await;
+    let close = v1::CloseTournamentRequest {
+        tournament_id: id_of(&created),
+        owner_token: created.owner_token.clone(),
     };
-    let client = Client::connect(server.url()).await.expect("it listens");
-    // The built-in agents' table has ended, or will without us.
-    let done = loop {
-        let games = games(&mut service, &id_of(&created)).await;
-        let counted = games
-            .into_iter()
-            .find(|game| game.state() == v1::TournamentGameState::Counted);
-        if let Some(done) = counted {
-            break done;
-        }
-        tokio::task::yield_now().await;
-    };
-    let refused = client
-        .record(&done.game_id)
-        .await
-        .expect_err("it is closed");
-    assert_eq!(refused.reason(), Some("SERIES_OPEN"));
-    let watched = client.spectate(&done.room_id, 0).next().await;
-    assert!(watched.is_err(), "nobody may watch");
-    // Then we play on.
-    let mut ended = None;
-    loop {
-        let answer = Answer {
-            decision_id: decision.decision_id,
-            action: first_legal(&decision),
-            annotations: None,
-        };
-        stream.send_to(CALLED, Command::Answer(answer)).await;
-        decision = loop {
-            match stream.next().await {
-                Update::Decision(decision) => break decision,
-                Update::Detached(_) => {
-                    ended = stream.events.last().cloned();
-                    break v1::DecisionRequest::default();
-                }
-                _ => {}
-            }
-        };
-        if ended.is_some() {
-            break;
-        }
-    }
-    match ended.and_then(|event| event.kind) {
-        Some(Kind::GameEnded(ended)) => assert_eq!(ended.reveal, None, "it stands in the record"),
-        other => panic!("the game did not end: {other:?}"),
-    }
-    over(&mut service, &id_of(&created)).await;
+    let closed = service.close_tournament(close).await.expect("it may");
+    let closed = closed.into_inner().tournament.expect("a tournament");
+    assert_eq!(closed.state(), v1::TournamentState::Closed);
+    let results = results(&mut service, &id_of(&created)).await;
+    let state = results.tournament.map(|tournament| tournament.state());
+    assert_eq!(state, Some(v1::TournamentState::Closed));
+    assert!(results.standings.iter().all(|standing| standing.games == 1));
     let games = games(&mut service, &id_of(&created)).await;
-    assert_eq!(games.len(), 2);
-    assert_eq!(games[0].series_id, games[1].series_id);
-    let mut seeds = BTreeMap::new();
-    for game in &games {
-        let lines = client.record(&game.game_id).await.expect("it is open now");
-        chefshat_records::replay::replay(&lines).expect("it replays");
-        let reveal = lines.iter().rev().find_map(|line| match &line.line {
-            Some(Line::Event(event)) => match &event.kind {
-                Some(Kind::GameEnded(ended)) => ended.reveal.clone(),
-                _ => None,
-            },
-            _ => None,
-        });
-        let reveal = reveal.expect("the record reveals it");
-        seeds.insert(reveal.game_seed, reveal.nonce);
+    let states: Vec<_> = games.iter().map(v1::TournamentGame::state).collect();
+    let (counted, void) = (
+        v1::TournamentGameState::Counted,
+        v1::TournamentGameState::Void,
+    );
+    assert_eq!(states, [counted, void]);
+    assert_eq!(games[1].room_id, room);
+    // Who plays is told of both ends, in whichever order.
+    let mut reasons = Vec::new();
+    while reasons.len() < 2 {
+        match stream.next().await {
+            Update::Detached(detached) => reasons.push(detached.reason()),
+            Update::DecisionClosed(_) => {}
+            other => panic!("unexpected {other:?}"),
+        }
     }
-    assert_eq!(seeds.len(), 1, "both tables were dealt alike");
+    assert!(reasons.contains(&v1::DetachReason::TournamentOver));
+    let aborted = stream.events.last().and_then(|event| event.kind.as_ref());
+    assert!(matches!(aborted, Some(Kind::GameAborted(_))), "{aborted:?}");
+    let last = over(&mut service, &id_of(&created)).await;
+    assert_eq!(last.state(), v1::TournamentState::Closed);
 }
 
 #[tokio::test]
@@ -395,6 +452,28 @@ async fn what_cannot_be_is_refused_by_name() {
         ),
         (
             v1::TournamentSettings {
+                policy: Some(v1::RoomPolicy {
+                    durability: v1::Durability::Durable.into(),
+                    ..v1::RoomPolicy::default()
+                }),
+                ..named(swiss)
+            },
+            "POLICY_REFUSED",
+            "policy",
+        ),
+        (
+            v1::TournamentSettings {
+                rules: Some(v1::RuleSet {
+                    stop: Some(v1::rule_set::Stop::TargetShifts(1_001)),
+                    ..v1::RuleSet::default()
+                }),
+                ..named(swiss)
+            },
+            "RULE_SET_REFUSED",
+            "rules",
+        ),
+        (
+            v1::TournamentSettings {
                 built_in_agents: vec!["nobody".into()],
                 ..named(swiss)
             },
@@ -446,7 +525,24 @@ async fn what_cannot_be_is_refused_by_name() {
         ..v1::JoinTournamentRequest::default()
     };
     let first = service.join_tournament(ask("Ada")).await;
-    first.expect("there is a place");
+    let first = first.expect("there is a place").into_inner();
+    let described = first.tournament.expect("a tournament");
+    assert_eq!(described.participants.len(), 1);
+    let listed = service
+        .list_tournaments(v1::ListTournamentsRequest::default())
+        .await;
+    let mut listed = listed.expect("a page").into_inner().tournaments;
+    // Without its participants it is the same.
+    assert_eq!(listed[0].participants, []);
+    listed[0].participants.clone_from(&described.participants);
+    assert_eq!(listed, [described]);
+    let no_kind = v1::GetLeaderboardRequest {
+        kind: 77,
+        ..v1::GetLeaderboardRequest::default()
+    };
+    let refused = service.get_leaderboard(no_kind).await.expect_err("no kind");
+    let info = refused.get_details_error_info().expect("it says why");
+    assert_eq!(info.reason, "KIND_REFUSED");
     let joins = [
         (
             v1::JoinTournamentRequest {

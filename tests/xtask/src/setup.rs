@@ -13,6 +13,9 @@ use crate::steps::Failure;
 /// Version of cargo-deny that deny.toml is written for.
 const CARGO_DENY: &str = "0.20.2";
 
+/// Oldest main version of Node that the packages run on.
+const OLDEST_NODE: u32 = 20;
+
 /// Kept in a folder made by this program: what it was made from.
 const MADE_FROM: &str = ".made-from";
 
@@ -68,6 +71,12 @@ fn npm_package(source: &Path, copy: &Path) -> Result<(), Failure> {
     if !succeeds("npm", &["--version"]) {
         debian_package("npm")?;
     }
+    let version = read(Command::new("node").arg("--version"))?;
+    if !is_new_enough(&version) {
+        return Err(Failure::new(format!(
+            "Node {OLDEST_NODE} or newer is needed, and `node` is {version}; https://nodejs.org has newer ones"
+        )));
+    }
     copy_package(source, copy).map_err(|error| at(copy, &error))?;
     let lock = source.join("package-lock.json");
     let made_from = fs::read_to_string(&lock).map_err(|error| at(&lock, &error))?;
@@ -79,6 +88,13 @@ fn npm_package(source: &Path, copy: &Path) -> Result<(), Failure> {
         .args(["ci", "--no-audit", "--no-fund"])
         .current_dir(copy))?;
     note_made_from(&modules, &made_from)
+}
+
+/// Whether a version as Node says it ("v20.19.4") is one that the packages run on.
+fn is_new_enough(version: &str) -> bool {
+    let main = version.trim_start_matches('v').split('.').next();
+    main.and_then(|main| main.parse().ok())
+        .is_some_and(|main: u32| main >= OLDEST_NODE)
 }
 
 /// The browser that the page is tested in.
@@ -246,6 +262,18 @@ mod tests {
             copy.join("node_modules/ours").exists() && !copy.join("node_modules/theirs").exists()
         );
         fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn old_versions_of_node_are_known() {
+        for (version, new_enough) in [
+            ("v20.19.4", true),
+            ("v24.0.0", true),
+            ("v18.20.4", false),
+            ("", false),
+        ] {
+            assert_eq!(is_new_enough(version), new_enough, "{version}");
+        }
     }
 
     #[test]

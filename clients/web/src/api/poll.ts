@@ -21,12 +21,14 @@ export function usePolled<T>(ask: (signal: AbortSignal) => Promise<T>, everyMs: 
     const stop = new AbortController();
     let timer: ReturnType<typeof setTimeout> | undefined;
     let slowdown = 1;
+    let asking = false;
     const next = () => {
       timer = setTimeout(round, everyMs * slowdown);
     };
     const round = async () => {
       timer = undefined;
       if (document.hidden) return;
+      asking = true;
       try {
         const value = await ask(stop.signal);
         if (stop.signal.aborted) return;
@@ -38,10 +40,11 @@ export function usePolled<T>(ask: (signal: AbortSignal) => Promise<T>, everyMs: 
         const fault = faultOf(error);
         setPolled((before) => ({ ...before, fault }));
       }
+      asking = false;
       next();
     };
     const seenAgain = () => {
-      if (!document.hidden && timer === undefined) void round();
+      if (!document.hidden && !asking && timer === undefined) void round();
     };
     document.addEventListener("visibilitychange", seenAgain);
     void round();

@@ -14,7 +14,7 @@ import { HostInvite } from "./Invite";
 import { NameForm } from "./Join";
 import { JoinForm } from "./JoinForm";
 import { RoomStateChip, rulesInShort } from "./RoomCard";
-import { isFree } from "./rooms";
+import { isFree, isOpen } from "./rooms";
 import { Seats } from "./Seats";
 import { closeRoom, hostedRoom } from "./seat";
 import "./doorway.css";
@@ -51,7 +51,7 @@ export function Doorway({ roomId }: { roomId: string }) {
         <DoorwayLinks room={room} />
         {fault && <Notice kind="fault">{wordsOf(fault)}</Notice>}
       </section>
-      {room.state === RoomState.WAITING && <WayIn room={room} />}
+      {room.state === RoomState.WAITING && room.tournamentId === "" && <WayIn room={room} />}
     </div>
   );
 }
@@ -71,7 +71,7 @@ function WayIn({ room }: { room: Room }) {
           {hosted ? <NameForm code={hosted.joinCode} /> : <JoinForm />}
         </section>
       )}
-      {room.seats.some(isFree) && <HostInvite roomId={room.roomId} />}
+      {isOpen(room) && <HostInvite roomId={room.roomId} />}
       {hosted && <CloseRoom roomId={room.roomId} />}
     </>
   );

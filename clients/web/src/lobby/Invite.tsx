@@ -2,6 +2,7 @@
 
 import { useMemo, useState } from "preact/hooks";
 import { encode } from "uqr";
+import { StudyLinks } from "../experiment/StudyLinks";
 import { t } from "../i18n";
 import { announce } from "../parts/Announcer";
 import { Button } from "../parts/Button";
@@ -20,8 +21,9 @@ export function Invite({ code }: { code: string }) {
       <div class="invite-words">
         <h2>{words.title}</h2>
         <p>{words.text}</p>
-        <Copied label={words.code} text={code} large />
-        <Copied label={words.link} text={address} />
+        <CopyLine label={words.code} text={code} large />
+        <CopyLine label={words.link} text={address} />
+        <CopyLine label={words.agent} text={agentCommand(code)} mono />
       </div>
       <QrCode text={address} label={words.qr} />
     </section>
@@ -33,15 +35,22 @@ export function HostInvite({ roomId }: { roomId: string }) {
   const hosted = hostedRoom(roomId);
   return (
     hosted && (
-      <section class="sheet">
+      <section class="sheet host-invite">
         <Invite code={hosted.joinCode} />
+        <StudyLinks code={hosted.joinCode} />
       </section>
     )
   );
 }
 
+/** What seats an agent from a terminal. */
+function agentCommand(code: string): string {
+  return `chefshat agent greedy --server ${location.origin} --code ${code}`;
+}
+
 /** Something to copy, with its label. */
-function Copied({ label, text, large = false }: { label: string; text: string; large?: boolean }) {
+export function CopyLine(props: { label: string; text: string; large?: boolean; mono?: boolean }) {
+  const { label, text, large = false, mono = false } = props;
   const words = t().common;
   const [copied, setCopied] = useState(false);
   const copy = async () => {
@@ -57,7 +66,11 @@ function Copied({ label, text, large = false }: { label: string; text: string; l
   return (
     <div class="invite-line">
       <span class="soft small">{label}</span>
-      <span class={large ? "invite-code" : "invite-link"}>{text}</span>
+      {mono ? (
+        <code class="invite-link">{text}</code>
+      ) : (
+        <span class={large ? "invite-code" : "invite-link"}>{text}</span>
+      )}
       {navigator.clipboard && (
         <Button onClick={copy}>
           {copied ? `✓ ${words.copied}` : words.copy}

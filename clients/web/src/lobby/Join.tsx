@@ -3,6 +3,8 @@
 import { useEffect, useState } from "preact/hooks";
 import { faultOf, wordsOf } from "../api/faults";
 import type { PageProps } from "../app";
+import { StudyJoin } from "../experiment/StudyJoin";
+import { studyOf } from "../experiment/study";
 import { t } from "../i18n";
 import { Button } from "../parts/Button";
 import { TextField } from "../parts/Field";
@@ -10,18 +12,22 @@ import { Notice } from "../parts/Notice";
 import { navigate } from "../router";
 import { JoinForm } from "./JoinForm";
 import { MAX_NAME } from "./room-form";
-import { canonical, lastName, roomOfCode, takeSeat } from "./seat";
+import { canonical, heldSeat, lastName, roomOfCode, takeSeat } from "./seat";
 import "./join.css";
 
 /** The page. */
 export function Join({ route }: PageProps<"join">) {
   const words = t().lobby.join;
   const code = canonical(route.code);
-  const seated = code === "" ? null : roomOfCode(code);
+  const study = studyOf(location.search);
+  const held = code === "" ? null : roomOfCode(code);
+  // At a device that several take part in a study with, the seat may be that of the one before.
+  const seated = held !== null && study?.name && heldSeat(held)?.name !== study.name ? null : held;
   useEffect(() => {
     if (seated) navigate({ page: "room", roomId: seated }, { replace: true });
   }, [seated]);
   if (seated) return null;
+  if (study && code !== "") return <StudyJoin code={code} study={study} />;
   return (
     <section class="sheet join-page">
       <h1>{words.title}</h1>

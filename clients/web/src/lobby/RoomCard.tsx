@@ -4,7 +4,7 @@ import { type Room, RoomState } from "../gen/chefshat/v1/room_pb";
 import { t } from "../i18n";
 import { ButtonLink } from "../parts/Button";
 import { pathOf } from "../router";
-import { isFree } from "./rooms";
+import { isOpen } from "./rooms";
 import { Seats } from "./Seats";
 import { heldSeat, hostedRoom } from "./seat";
 import "./room-card.css";
@@ -43,8 +43,7 @@ function RoomActions({ room }: { room: Room }) {
   if (room.state === RoomState.PLAYING) return <>{watch || <span class="soft small">{words.closed}</span>}</>;
   return (
     <>
-      {room.seats.some(isFree) &&
-        link(pathOf({ page: "room", roomId }), hostedRoom(roomId) ? words.open : words.join, true)}
+      {isOpen(room) && link(pathOf({ page: "room", roomId }), hostedRoom(roomId) ? words.open : words.join, true)}
       {watch}
     </>
   );

@@ -45,6 +45,11 @@ export function isFree(participant: Participant): boolean {
   return participant.name === "" && participant.builtInAgent === "";
 }
 
+/** Whether somebody may still sit down: the seats of a tournament's room are its participants'. */
+export function isOpen(room: Room): boolean {
+  return room.state === RoomState.WAITING && room.tournamentId === "" && room.seats.some(isFree);
+}
+
 /** The name to show for a participant: its own, else that of the built-in agent. */
 export function nameOf(participant: Participant): string {
   return participant.name || participant.builtInAgent;

@@ -1,4 +1,5 @@
-// What a participant is: person, robot or agent, always by drawing and word together. A built-in agent of the server says its name.
+// What a participant is: person, robot or agent, always by drawing and word together. A built-in agent of the server has a drawing of its
+// own; which one it is stands where its name stands.
 
 import { ParticipantKind } from "../gen/chefshat/v1/room_pb";
 import { t } from "../i18n";
@@ -14,9 +15,9 @@ interface KindBadgeProps {
 /** The badge of a participant. */
 export function KindBadge({ kind, builtIn = "" }: KindBadgeProps) {
   return (
-    <span class="kind-badge">
+    <span class="kind-badge" title={builtIn === "" ? undefined : t().common.kinds.builtIn}>
       <Drawing name={builtIn === "" ? symbols[kind] : "kind-built-in"} />
-      <span>{builtIn === "" ? kindWord(kind) : `${t().common.kinds.agent} · ${builtIn}`}</span>
+      <span>{builtIn === "" ? kindWord(kind) : t().common.kinds.agent}</span>
     </span>
   );
 }

@@ -25,6 +25,10 @@ export function Layout({ here, children }: LayoutProps) {
     else content.current?.focus({ preventScroll: true });
   }, [here]);
   const words = t().common;
+  const title = `${pageName(here)} · ${words.name}`;
+  useEffect(() => {
+    document.title = title;
+  }, [title]);
   return (
     <div class={`layout layout-${here.page}`}>
       <a class="skip" href="#content">
@@ -63,6 +67,36 @@ function links(): { href: string; label: string; pages: Route["page"][] }[] {
     { href: "/leaderboard", label: words.leaderboard, pages: ["leaderboard", "person"] },
     { href: "/tutorial", label: words.tutorial, pages: ["tutorial"] },
   ];
+}
+
+/** What a page is called in the browser's list of tabs. */
+function pageName(here: Route): string {
+  const words = t();
+  switch (here.page) {
+    case "lobby":
+      return words.common.nav.lobby;
+    case "new":
+      return words.lobby.make.title;
+    case "join":
+      return words.lobby.join.title;
+    case "room":
+      return words.table.title;
+    case "watch":
+      return words.lobby.rooms.watch;
+    case "replay":
+      return words.replay.title;
+    case "tournaments":
+    case "tournament":
+      return words.common.nav.tournaments;
+    case "leaderboard":
+      return words.common.nav.leaderboard;
+    case "person":
+      return here.name;
+    case "tutorial":
+      return words.common.nav.tutorial;
+    case "unknown":
+      return words.common.notFound.title;
+  }
 }
 
 /** Two sliders: what settings look like without a word. */

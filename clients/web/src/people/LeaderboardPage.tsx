@@ -1,12 +1,123 @@
-// The ratings of all who have played.
+// The ratings of all who have played rated games here: by kind if one likes, each with its uncertainty as a bar and in numbers.
 
+import { useState } from "preact/hooks";
+import { CALL_LIMIT_MS, tournamentApi } from "../api/client";
+import { wordsOf } from "../api/faults";
+import { usePolled } from "../api/poll";
+import { ParticipantKind } from "../gen/chefshat/v1/room_pb";
+import type { GetLeaderboardResponse } from "../gen/chefshat/v1/tournament_service_pb";
 import { t } from "../i18n";
+import { SelectField } from "../parts/Field";
+import { KindBadge } from "../parts/KindBadge";
+import { Notice } from "../parts/Notice";
+import { PersonName } from "../tournaments/PersonName";
+import { ratingRange, ratingWords } from "./rating";
+import "./people.css";
+
+/** How often it is asked for, milliseconds. */
+const EVERY_MS = 15_000;
+/** Most lines. */
+const LINES = 200;
+
+const KINDS = {
+  all: ParticipantKind.UNSPECIFIED,
+  human: ParticipantKind.HUMAN,
+  robot: ParticipantKind.ROBOT,
+  agent: ParticipantKind.AGENT,
+};
+const MIN_GAMES = ["1", "5", "20", "100"] as const;
 
 /** The page. */
 export function LeaderboardPage() {
+  const words = t().people;
+  const [kind, setKind] = useState<keyof typeof KINDS>("all");
+  const [minGames, setMinGames] = useState<(typeof MIN_GAMES)[number]>("1");
+  const ask = (signal: AbortSignal) =>
+    tournamentApi.getLeaderboard(
+      { kind: KINDS[kind], minGames: Number(minGames), limit: LINES },
+      { signal, timeoutMs: CALL_LIMIT_MS },
+    );
+  const { value, fault } = usePolled(ask, EVERY_MS, `${kind} ${minGames}`);
+  const kinds = Object.keys(KINDS) as (keyof typeof KINDS)[];
+  return (
+    <div class="people">
+      <h1>{words.title}</h1>
+      <p class="soft">{words.text}</p>
+      <div class="people-filter">
+        <SelectField
+          label={words.kinds.label}
+          value={kind}
+          options={kinds.map((value) => ({ value, label: words.kinds[value] }))}
+          onPick={setKind}
+        />
+        <SelectField
+          label={words.minGames.label}
+          value={minGames}
+          options={MIN_GAMES.map((value) => ({ value, label: words.minGames.games(Number(value)) }))}
+          onPick={setMinGames}
+        />
+        {value && <p class="soft people-games">{words.ratedGames(Number(value.games))}</p>}
+      </div>
+      {fault && <Notice kind="fault">{wordsOf(fault)}</Notice>}
+      {value?.rated.length === 0 && <p class="sheet">{words.none}</p>}
+      {value && value.rated.length > 0 && <Lines board={value} />}
+    </div>
+  );
+}
+
+function Lines({ board }: { board: GetLeaderboardResponse }) {
+  const words = t().people.columns;
+  const ranges = board.rated.flatMap(({ rating }) => (rating ? [ratingRange(rating)] : []));
+  const lowest = Math.min(...ranges.map(({ from }) => from));
+  const highest = Math.max(...ranges.map(({ to }) => to));
+  const share = (value: number) => `${((100 * (value - lowest)) / Math.max(1e-9, highest - lowest)).toFixed(1)}%`;
   return (
     <section class="sheet">
-      <h1>{t().people.title}</h1>
+      <table class="leaderboard">
+        <caption class="soft small">{t().people.order}</caption>
+        <thead>
+          <tr>
+            <th scope="col">{words.place}</th>
+            <th scope="col" class="leaderboard-name">
+              {words.name}
+            </th>
+            <th scope="col" title={words.ratingHint}>
+              {words.rating}
+            </th>
+            <td class="leaderboard-range" />
+            <th scope="col" class="leaderboard-minor">
+              {words.games}
+            </th>
+            <th scope="col" class="leaderboard-minor">
+              {words.places}
+            </th>
+          </tr>
+        </thead>
+        <tbody>
+          {board.rated.map((line) => {
+            const range = line.rating && ratingRange(line.rating);
+            return (
+              <tr key={`${line.kind} ${line.builtIn} ${line.name}`}>
+                <td class="number leaderboard-place">{line.place}</td>
+                <th scope="row" class="leaderboard-name">
+                  <PersonName name={line.name} /> <KindBadge kind={line.kind} builtIn={line.builtIn ? line.name : ""} />
+                </th>
+                <td class="number leaderboard-rating">{line.rating && ratingWords(line.rating)}</td>
+                <td class="leaderboard-range" aria-hidden="true">
+                  {range && (
+                    <span class="leaderboard-bar">
+                      <span style={{ left: share(range.from), right: `calc(100% - ${share(range.to)})` }} />
+                      <b style={{ left: share((range.from + range.to) / 2) }} />
+                    </span>
+                  )}
+                </td>
+                <td class="number leaderboard-minor">{line.rating?.games}</td>
+                <td class="number leaderboard-minor">{line.places.join(" · ")}</td>
+              </tr>
+            );
+          })}
+        </tbody>
+      </table>
     </section>
   );
 }

@@ -7,7 +7,7 @@ import type { PageProps } from "../app";
 import { DecisionKind, type DecisionRequest } from "../gen/chefshat/v1/decision_pb";
 import type { DecisionRecord, RecordLine } from "../gen/chefshat/v1/record_pb";
 import { t } from "../i18n";
-import { Notice } from "../parts/Notice";
+import { Faulty } from "../parts/Faulty";
 import { useAnnounced } from "../table/following";
 import { legalActions, moveOf } from "../table/model/actions";
 import { lookupOf } from "../table/model/lookup";
@@ -44,9 +44,9 @@ export function ReplayPage({ route }: PageProps<"replay">) {
     void load();
     return () => leaving.abort();
   }, [gameId]);
-  if (fault) return <Notice kind="fault">{fault}</Notice>;
+  if (fault) return <Faulty title={t().replay.title} words={fault} />;
   if (!film) return <p class="soft">{t().common.loading}</p>;
-  if (film.frames.length === 0) return <Notice kind="hint">{t().replay.empty}</Notice>;
+  if (film.frames.length === 0) return <Faulty title={t().replay.title} words={t().replay.empty} />;
   return <Playback film={film} />;
 }
 

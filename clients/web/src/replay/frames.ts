@@ -31,8 +31,6 @@ export function filmOf(lines: readonly RecordLine[]): Film {
   let decisions = 0;
   const frames: { table: TableState; open: DecisionRecord | undefined; decisions: number }[] = [];
   const shifts: { shift: number; frame: number }[] = [];
-  /** First frame whose open decision is not known yet. */
-  let waiting = 0;
   lines.forEach(({ line }, index) => {
     switch (line.case) {
       case "header":
@@ -40,10 +38,9 @@ export function filmOf(lines: readonly RecordLine[]): Film {
         table = tableFromHeader(line.value);
         break;
       case "decision": {
-        for (; waiting < frames.length; waiting += 1) {
-          const frame = frames[waiting];
-          if (frame) frame.open = line.value;
-        }
+        // Open it is once everything before it has happened: not between the last pass of a pizza and the next leader's turn.
+        const before = frames.at(-1);
+        if (before) before.open = line.value;
         decisions += 1;
         if (lines[index + 1]?.line.case !== "event") frames.push({ table, open: undefined, decisions });
         break;

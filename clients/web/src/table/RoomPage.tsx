@@ -4,18 +4,17 @@ import { useEffect, useState } from "preact/hooks";
 import { CALL_LIMIT_MS, roomApi } from "../api/client";
 import { inWords, wordsOf } from "../api/faults";
 import type { PageProps } from "../app";
+import { AtTable } from "../experiment/AtTable";
 import { t } from "../i18n";
 import { Doorway } from "../lobby/Doorway";
 import { HostInvite } from "../lobby/Invite";
 import { heldSeat } from "../lobby/seat";
 import { Button } from "../parts/Button";
+import { Faulty } from "../parts/Faulty";
 import { Notice } from "../parts/Notice";
-import { gesture } from "./expressions";
-import { useAnnounced } from "./following";
 import { type TableState, tableFromRoom } from "./model/state";
+import { Seated } from "./Seated";
 import { type Session, startSession } from "./session";
-import { TableView } from "./view/TableView";
-import { WaitingRoom } from "./view/WaitingRoom";
 
 /** The page. */
 export function RoomPage({ route }: PageProps<"room">) {
@@ -48,37 +47,21 @@ export function RoomPage({ route }: PageProps<"room">) {
     };
   }, [roomId]);
 
-  if (fault) return <Notice kind="fault">{fault}</Notice>;
+  if (fault) return <Faulty title={t().table.title} words={fault} />;
   if (!table) return <p class="soft">{t().common.loading}</p>;
-  return session ? <Seated session={session} /> : <Doorway roomId={roomId} />;
+  return session ? <Held session={session} /> : <Doorway roomId={roomId} />;
 }
 
-/** The table from a seat. */
-function Seated({ session }: { session: Session }) {
-  const { table, own, decision } = session.live.value;
-  useAnnounced(table, own, decision);
-  const banner = <Banner session={session} />;
-  if (table.phase === "waiting") {
-    return (
-      <>
-        <WaitingRoom table={table} own={own} banner={banner} />
-        <HostInvite roomId={table.roomId} />
-      </>
-    );
-  }
-  return (
-    <TableView
-      table={table}
-      own={own}
-      decision={decision}
-      sending={session.sending.value !== undefined}
-      trouble={session.trouble.value}
-      banner={banner}
-      caption={table.roomName}
-      onAnswer={session.answer}
-      onExpress={(label) => session.express(gesture(label))}
-    />
+/** The table from the seat that this device holds. */
+function Held({ session }: { session: Session }) {
+  const { roomId, phase } = session.live.value.table;
+  const banner = (
+    <>
+      <Banner session={session} />
+      <AtTable roomId={roomId} over={phase === "gameOver" || phase === "aborted"} />
+    </>
   );
+  return <Seated acting={session} banner={banner} below={<HostInvite roomId={roomId} />} />;
 }
 
 /** What is to be said about the connection, if anything. */

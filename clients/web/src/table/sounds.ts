@@ -45,9 +45,9 @@ export type Sound = keyof typeof SOUNDS;
 
 let context: AudioContext | undefined;
 
-/** Makes a sound, if sounds are on. Before the first click on the page browsers keep silent. */
+/** Makes a sound, if sounds are on and the reader has clicked or typed here: before that browsers keep silent. */
 export function play(sound: Sound): void {
-  if (!soundOn.peek() || typeof AudioContext === "undefined") return;
+  if (!soundOn.peek() || typeof AudioContext === "undefined" || !navigator.userActivation?.hasBeenActive) return;
   context ??= new AudioContext();
   const audio = context;
   if (audio.state === "suspended") void audio.resume();

@@ -3,49 +3,23 @@
 //!
 //! A game is called when all its participants are present and have a free place, in the order of the schedule. If nothing but absent ones
 //! hold it up, it waits for them for the no-show time; that counts as a call, and the game waits again, after the others. On the last
-//! call it is played without them. A game that nobody would come to, or that was aborted on its last call, is given up.
+//! call it is played without them. If somebody does not sit down although the last call was heard, the game is called once more without
+//! them; others who are absent then are waited for as before. A game that nobody would come to, or that was aborted on its last call, is
+//! given up. Which games are looked at is in `floor`.
 
-use std::collections::BTreeMap;
+#[cfg(test)]
+mod tests;
 
 use super::Tournament;
 use super::change::{Change, Ended, Game, GameResult, GameState, SeatPlayed, SeatResult};
 use super::course::{Course, State};
-
-/// What a tournament knows of this moment alone; after a restart nobody is present until they come back.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Floor {
-    /// Who is present, by participant.
-    present: Vec<bool>,
-    /// Games that nothing but absent ones hold up, and since when, in milliseconds.
-    waits: BTreeMap<usize, u64>,
-}
-
-impl Floor {
-    fn is_present(&self, course: &Course, participant: usize) -> bool {
-        course.participants[participant].built_in.is_some()
-            || self.present.get(participant) == Some(&true)
-    }
-
-    /// Nobody waits for a game that was called or is over.
-    pub(super) fn fold(&mut self, change: &Change) {
-        match change {
-            Change::Called { game, .. }
-            | Change::Rescheduled { game, .. }
-            | Change::Counted { game, .. }
-            | Change::Voided { game } => {
-                self.waits.remove(game);
-            }
-            Change::Finished | Change::Closed => self.waits.clear(),
-            Change::Joined(_) | Change::Begun { .. } | Change::Drawn { .. } => {}
-        }
-    }
-}
+use super::floor::Floor;
 
 /// What is to be done about a game that is due.
 enum Readiness {
-    /// A participant plays elsewhere.
-    Busy,
-    /// These have not come, and nothing else holds it up.
+    /// This participant plays elsewhere.
+    Busy(usize),
+    /// These have not come or forfeit it, and nothing else holds it up.
     Missing(Vec<usize>),
     /// It can be played; these forfeit it.
     Ready(Vec<usize>),
@@ -59,16 +33,7 @@ impl Tournament {
         if participant >= course.participants.len() {
             return;
         }
-        if floor.present.len() <= participant {
-            floor.present.resize(participant + 1, false);
-        }
-        floor.present[participant] = present;
-        let is_there = |who: &usize| {
-            course.participants[*who].built_in.is_some() || floor.present.get(*who) == Some(&true)
-        };
-        floor
-            .waits
-            .retain(|&game, _| !course.games[game].seats.iter().all(is_there));
+        floor.set_present(course, participant, present);
     }
 
     /// Whether a participant is present.
@@ -100,8 +65,7 @@ impl Tournament {
 
     /// When [`Tournament::next`] is to be asked again although nothing has happened, on the same clock.
     pub fn wake_at(&self) -> Option<u64> {
-        let since = self.floor.waits.values().min()?;
-        Some(since.saturating_add(self.course.settings.no_show_ms))
+        self.floor.wake_at(&self.course)
     }
 
     /// What follows from the end of a game that was called; `None` if it is not being played.
@@ -140,35 +104,29 @@ impl Tournament {
         }
     }
 
-    /// Goes through the games that are due, in order, until one of them has to change.
+    /// Looks at the games that may have to change, in order, until one of them has to.
     fn next_game(&mut self, now_ms: u64) -> Option<Change> {
         let Tournament { course, floor, .. } = self;
-        let settings = &course.settings;
-        if course.playing.len() >= settings.max_parallel {
-            // Not only absent ones hold the games up.
-            floor.waits.clear();
+        if !floor.is_open(course, now_ms) {
             return None;
         }
-        for &(_, index) in &course.due {
+        while let Some(due) = floor.next(course, now_ms) {
+            let (_, index) = due;
             let game = &course.games[index];
             match readiness(course, floor, game) {
-                Readiness::Busy => {
-                    floor.waits.remove(&index);
-                }
+                Readiness::Busy(by) => floor.hold_up(course, due, by),
                 Readiness::Ready(forfeited) => return Some(called(index, game, forfeited)),
                 Readiness::Missing(missing) => {
-                    let since = *floor.waits.entry(index).or_insert(now_ms);
-                    if now_ms.saturating_sub(since) < settings.no_show_ms {
-                        continue;
+                    if floor.has_waited(course, due, now_ms) {
+                        return Some(if game.calls + 1 < course.settings.max_calls {
+                            Change::Rescheduled {
+                                game: index,
+                                missing,
+                            }
+                        } else {
+                            called(index, game, missing)
+                        });
                     }
-                    return Some(if game.calls + 1 < settings.max_calls {
-                        Change::Rescheduled {
-                            game: index,
-                            missing,
-                        }
-                    } else {
-                        called(index, game, missing)
-                    });
                 }
             }
         }
@@ -177,24 +135,26 @@ impl Tournament {
 }
 
 fn readiness(course: &Course, floor: &Floor, game: &Game) -> Readiness {
-    // Those who did not come to the last call forfeit it, and so do those who are away now; others play at once.
+    // Those who did not come to the last call forfeit the game; nobody waits for them.
     let is_decided = game.calls >= course.settings.max_calls;
     let mut out = Vec::new();
+    let mut waits = false;
     for &participant in &game.seats {
         let is_forfeited = game.forfeited.contains(&participant)
             || is_decided && game.missing.contains(&participant);
         if is_forfeited {
             out.push(participant);
         } else if !course.has_place(participant) {
-            return Readiness::Busy;
+            return Readiness::Busy(participant);
         } else if !floor.is_present(course, participant) {
             out.push(participant);
+            waits = true;
         }
     }
-    if is_decided || out.is_empty() {
-        Readiness::Ready(out)
-    } else {
+    if waits {
         Readiness::Missing(out)
+    } else {
+        Readiness::Ready(out)
     }
 }
 

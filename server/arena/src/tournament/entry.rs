@@ -71,7 +71,7 @@ impl Tournament {
     }
 
     /// The changes with which it begins: fillers, the beginning itself, what can be drawn without results (of a round robin every round;
-    /// with hundreds of participants that takes up to a second).
+    /// with hundreds of participants that takes seconds).
     ///
     /// # Errors
     /// If there are too few participants, or it has begun.

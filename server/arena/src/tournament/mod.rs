@@ -52,6 +52,7 @@ pub mod confidence;
 mod course;
 mod draw;
 mod entry;
+mod floor;
 mod knockout;
 mod offline;
 mod rated;
@@ -74,9 +75,9 @@ pub use settings::{
 };
 pub use standings::Standing;
 
-use calls::Floor;
 use course::Course;
 use draw::Drawing;
+use floor::Floor;
 
 /// A tournament. Two are equal if their changes have led them to the same course, whoever is present.
 #[derive(Debug, Clone)]
@@ -110,7 +111,7 @@ impl Tournament {
     /// Lets a change happen. It is not asked whether it follows; one that does not fit does nothing.
     pub fn fold(&mut self, change: &Change) {
         self.course.fold(change);
-        self.floor.fold(change);
+        self.floor.fold(&self.course, change);
     }
 
     /// Where it stands.

@@ -6,10 +6,8 @@ mod table;
 mod verify;
 
 use std::io::Write;
-use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Arc;
 use std::time::Duration;
 
 use chefshat_arena::AgentKind;
@@ -17,17 +15,12 @@ use chefshat_client::Spectator;
 use chefshat_client::v1::{self, game_event::Kind};
 use chefshat_records::jsonl;
 use clap::Args;
-use tokio::net::TcpListener;
-use tokio::task::JoinHandle;
-use tokio_util::sync::CancellationToken;
 
+use super::host::Host;
 use super::narrator::{Narrator, abort_reason, clean, heading, legend, row};
 use super::remote::{MAX_PACE_MS, agent_kind};
 use super::rules_args::{RulesArgs, rules_of};
 use super::{CommandError, data_dir};
-use crate::config::ServerConfig;
-use crate::serve::{ServeError, serve};
-use crate::store::MemoryStore;
 use table::Table;
 
 /// Most agents that can be named: the engine's limit of seats.
@@ -136,11 +129,7 @@ impl Demo {
         table: &Table,
     ) -> Result<(), CommandError> {
         write!(out, "{}", heading("Chef's Hat"))?;
-        write!(
-            out,
-            "{}",
-            row("the server", &format!("http://{}", host.address))
-        )?;
+        write!(out, "{}", row("the server", &host.url()))?;
         write!(out, "{}", row("the room", &table.room.room_id))?;
         let deals = match self.seed {
             Some(seed) => format!("from the seed {seed}"),
@@ -187,39 +176,6 @@ impl Demo {
 enum Ending {
     Finished(v1::GameEnded),
     Aborted(&'static str),
-}
-
-/// The server of the demo.
-struct Host {
-    address: SocketAddr,
-    stop: CancellationToken,
-    serving: JoinHandle<Result<(), ServeError>>,
-}
-
-impl Host {
-    async fn start(data_dir: PathBuf) -> Result<Self, CommandError> {
-        let listener = TcpListener::bind(("127.0.0.1", 0)).await?;
-        let address = listener.local_addr()?;
-        let stop = CancellationToken::new();
-        let config = ServerConfig {
-            data_dir: Some(data_dir),
-            ..ServerConfig::default()
-        };
-        let stopped = stop.clone().cancelled_owned();
-        let store = Arc::new(MemoryStore::default());
-        let serving = tokio::spawn(serve(listener, config, store, stopped));
-        Ok(Self {
-            address,
-            stop,
-            serving,
-        })
-    }
-
-    async fn stop(self) -> Result<(), CommandError> {
-        self.stop.cancel();
-        self.serving.await??;
-        Ok(())
-    }
 }
 
 /// The last line for programs.

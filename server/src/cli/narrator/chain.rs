@@ -243,7 +243,7 @@ impl Chain {
 }
 
 /// Cards as they lie on the board: three 9 and a joker are `3×9+J`.
-fn cards(play: &v1::Play) -> String {
+pub(in crate::cli) fn cards(play: &v1::Play) -> String {
     match (play.quantity, play.jokers) {
         (0, _) => "J".into(),
         (quantity, 0) => format!("{quantity}×{}", play.face),
@@ -253,7 +253,7 @@ fn cards(play: &v1::Play) -> String {
 }
 
 /// Why a decision was not the seat's own, in a word.
-fn reason(source: v1::DecisionSource) -> Option<&'static str> {
+pub(in crate::cli) fn reason(source: v1::DecisionSource) -> Option<&'static str> {
     match source {
         v1::DecisionSource::Timeout => Some("too late"),
         v1::DecisionSource::Invalid => Some("invalid"),

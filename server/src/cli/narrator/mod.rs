@@ -13,9 +13,10 @@ use chefshat_engine::{Opening, PassScope, RuleSet, RuleSetSpec, Stop};
 use chefshat_records::convert::rules_from_proto;
 
 use chain::Chain;
+pub(super) use chain::{cards, reason};
 pub(super) use tables::{abort_reason, ordinal};
-use text::{BOLD, DIM, GOLD, MAX_NAME, PLAIN, Piece, label, seat_style, wrapped};
-pub(super) use text::{clean, heading, row};
+use text::{BOLD, DIM, GOLD, PLAIN, Piece, label, seat_style, wrapped};
+pub(super) use text::{MAX_NAME, clean, columns, heading, row};
 
 /// Where lines that belong to a Shift begin.
 const INDENT: &str = "   ";
@@ -281,7 +282,7 @@ fn name_of(names: &[String], seat: u32) -> String {
 }
 
 /// Names as they are shown: short, safe, and no two alike.
-fn names(seats: &[v1::Participant]) -> Vec<String> {
+pub(super) fn names(seats: &[v1::Participant]) -> Vec<String> {
     let short: Vec<String> = seats
         .iter()
         .map(|seat| clean(&seat.name, MAX_NAME))
@@ -312,7 +313,7 @@ fn participant_label(kind: v1::ParticipantKind, built_in_agent: &str) -> String 
 }
 
 /// The cook's title of a role.
-fn title(role: v1::Role) -> &'static str {
+pub(super) fn title(role: v1::Role) -> &'static str {
     match role {
         v1::Role::Unspecified => "no role",
         v1::Role::Chef => "Chef",

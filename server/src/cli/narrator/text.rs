@@ -6,7 +6,7 @@ use unicode_width::{UnicodeWidthChar as _, UnicodeWidthStr as _};
 /// Columns that no line goes beyond.
 pub(super) const WIDTH: usize = 98;
 /// Most columns of a name.
-pub(super) const MAX_NAME: usize = 15;
+pub(in crate::cli) const MAX_NAME: usize = 15;
 
 /// Columns of the label of a line outside of Shifts.
 const LABEL: usize = 17;
@@ -39,7 +39,7 @@ pub(super) fn seat_style(seat: u32) -> Style {
 }
 
 /// Columns that text takes on a terminal.
-pub(super) fn columns(text: &str) -> usize {
+pub(in crate::cli) fn columns(text: &str) -> usize {
     text.width()
 }
 

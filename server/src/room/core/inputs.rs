@@ -90,6 +90,10 @@ impl Core {
         arrived: Duration,
         handed_before: Option<Duration>,
     ) {
+        // Whoever comes to hear how a game ended was not there at its end.
+        if self.state.is_over() {
+            return;
+        }
         if self.awaited_from(seat).is_some() {
             self.settle_start(now, handed_before);
             self.restart_clock(now, seat);
@@ -119,7 +123,8 @@ impl Core {
         connection: ConnectionId,
         handed: Option<Duration>,
     ) {
-        if self.seats[seat.index()].connection != Some(connection) {
+        // Of a game that is over it stays known who was there at its end.
+        if self.seats[seat.index()].connection != Some(connection) || self.state.is_over() {
             return;
         }
         self.seats[seat.index()].connection = None;
@@ -127,7 +132,7 @@ impl Core {
             self.settle_start(now, handed);
         }
         let state = &mut self.seats[seat.index()];
-        if !self.state.is_over() && state.connection_events < MAX_CONNECTION_EVENTS {
+        if state.connection_events < MAX_CONNECTION_EVENTS {
             state.connection_events += 1;
             self.commit(now, Change::Disconnected(seat));
         }

@@ -27,8 +27,8 @@ impl Orders {
         self.next_row.fetch_add(1, Ordering::Relaxed)
     }
 
-    /// Below every number that a row will have from now on.
-    pub(super) fn first_row(&self) -> i64 {
+    /// The least number that a row can have from now on.
+    fn first_row(&self) -> i64 {
         self.next_row.load(Ordering::Relaxed)
     }
 
@@ -51,26 +51,48 @@ pub(super) struct DurableJournal {
     pub(super) orders: Orders,
 }
 
+impl DurableJournal {
+    /// Begins the game, with its first row if there are entries.
+    pub(super) async fn begin(
+        &mut self,
+        header: &GameHeader,
+        entries: &mut Vec<Entry>,
+    ) -> Result<(), StoreError> {
+        let first_row = self.orders.first_row();
+        let first = (!entries.is_empty()).then(|| self.next_row(entries));
+        let create = Order::Create {
+            number: self.number,
+            game_id: header.game_id,
+            header: form::header_to_bytes(header),
+            first_row,
+            first,
+        };
+        self.orders.give(create).await
+    }
+
+    /// Its next row.
+    fn next_row(&mut self, entries: &mut Vec<Entry>) -> Row {
+        let number = self.orders.new_row();
+        let row = Row {
+            number,
+            game: self.number,
+            position: self.position,
+            previous: self.last_row,
+            entries: encode(entries),
+        };
+        self.position += 1;
+        self.last_row = Some(number);
+        row
+    }
+}
+
 impl Journal for DurableJournal {
     fn append<'a>(
         &'a mut self,
         entries: &'a mut Vec<Entry>,
     ) -> BoxFuture<'a, Result<(), StoreError>> {
-        async move {
-            let number = self.orders.new_row();
-            let row = Row {
-                number,
-                game: self.number,
-                position: self.position,
-                previous: self.last_row,
-                entries: encode(entries),
-            };
-            self.orders.give(Order::Append(row)).await?;
-            self.position += 1;
-            self.last_row = Some(number);
-            Ok(())
-        }
-        .boxed()
+        let row = self.next_row(entries);
+        self.orders.give(Order::Append(row)).boxed()
     }
 
     fn finish(

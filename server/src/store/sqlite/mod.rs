@@ -2,6 +2,7 @@
 //! form of what is kept in `form`; here is the store that they make up.
 
 mod errors;
+mod forget;
 mod form;
 mod journals;
 mod open;
@@ -22,9 +23,10 @@ use tokio::sync::{mpsc, watch};
 use tokio::task::JoinHandle;
 use tracing::error;
 
+pub use forget::{ForgetError, Forgetting, Forgotten};
 pub use open::OpenError;
 
-use super::journal::GameHeader;
+use super::journal::{Entry, GameHeader};
 use super::tournaments::{KeptTournament, TournamentEntry, TournamentHeader};
 use super::{Journal, KeptGame, LeftGame, Store, StoreError};
 use crate::ids::Id;
@@ -32,7 +34,7 @@ use crate::room::policy::Durability;
 use errors::explain;
 use journals::{DurableJournal, EphemeralJournal, Orders};
 use reader::Reader;
-use writer::Order;
+use writer::{Order, TournamentRow};
 
 /// Space on the disk that is left to games that go on: new ones are refused before it is used. Of a small disk this is a share.
 const MAX_RESERVE_BYTES: u64 = 64 * 1024 * 1024;
@@ -102,6 +104,7 @@ impl Store for SqliteStore {
     fn create(
         &self,
         header: Arc<GameHeader>,
+        mut entries: Vec<Entry>,
     ) -> BoxFuture<'_, Result<Box<dyn Journal>, StoreError>> {
         let number = self.numbers.fetch_add(1, Ordering::Relaxed);
         let orders = self.orders.clone();
@@ -109,27 +112,20 @@ impl Store for SqliteStore {
             let journal = EphemeralJournal {
                 number,
                 header,
-                entries: Vec::new(),
+                entries,
                 orders,
             };
             return ready(Ok(Box::new(journal) as Box<dyn Journal>)).boxed();
         }
         async move {
-            orders
-                .give(Order::Create {
-                    number,
-                    game_id: header.game_id,
-                    header: form::header_to_bytes(&header),
-                    first_row: orders.first_row(),
-                })
-                .await?;
-            let journal: Box<dyn Journal> = Box::new(DurableJournal {
+            let mut journal = DurableJournal {
                 number,
                 position: 0,
                 last_row: None,
                 orders,
-            });
-            Ok(journal)
+            };
+            journal.begin(&header, &mut entries).await?;
+            Ok(Box::new(journal) as Box<dyn Journal>)
         }
         .boxed()
     }
@@ -185,10 +181,11 @@ impl Store for SqliteStore {
     fn create_tournament(
         &self,
         header: Arc<TournamentHeader>,
+        entries: Vec<TournamentEntry>,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
         let order = Order::Tournament {
-            id: header.id,
             header: form::tournament_to_bytes(&header),
+            first: TournamentRow::new(header.id, 0, &entries),
         };
         self.orders.give(order).boxed()
     }
@@ -199,16 +196,15 @@ impl Store for SqliteStore {
         row: u64,
         entries: Vec<TournamentEntry>,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
-        let order = Order::TournamentEntries {
-            id: tournament,
-            position: i64::try_from(row).unwrap_or(i64::MAX),
-            entries: form::tournament_entries_to_bytes(&entries),
-        };
-        self.orders.give(order).boxed()
+        let row = TournamentRow::new(tournament, row, &entries);
+        self.orders.give(Order::TournamentEntries(row)).boxed()
     }
 
-    fn tournaments(&self) -> BoxFuture<'_, Result<Vec<KeptTournament>, StoreError>> {
-        self.reader.tournaments().boxed()
+    fn tournaments(
+        &self,
+        newest_over: usize,
+    ) -> BoxFuture<'_, Result<Vec<KeptTournament>, StoreError>> {
+        self.reader.tournaments(newest_over).boxed()
     }
 
     fn failed(&self) -> BoxFuture<'static, StoreError> {

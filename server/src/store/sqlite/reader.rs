@@ -105,12 +105,23 @@ impl Reader {
     }
 
     /// See `Store::tournaments`.
-    pub(super) async fn tournaments(&self) -> Result<Vec<KeptTournament>, StoreError> {
-        let tournaments =
-            sqlx::query("SELECT number, form, header FROM tournaments ORDER BY number")
-                .fetch_all(&self.0)
-                .await
-                .map_err(failure)?;
+    pub(super) async fn tournaments(
+        &self,
+        newest_over: usize,
+    ) -> Result<Vec<KeptTournament>, StoreError> {
+        let tournaments = sqlx::query(
+            "SELECT number, form, header FROM tournaments WHERE number IN (
+                 SELECT number FROM tournaments WHERE over = 0
+                 UNION ALL
+                 SELECT * FROM (
+                     SELECT number FROM tournaments WHERE over = 1
+                     ORDER BY number DESC LIMIT $1))
+             ORDER BY number",
+        )
+        .bind(i64::try_from(newest_over).unwrap_or(i64::MAX))
+        .fetch_all(&self.0)
+        .await
+        .map_err(failure)?;
         let mut kept = Vec::with_capacity(tournaments.len());
         for row in tournaments {
             let number: i64 = row.get(0);

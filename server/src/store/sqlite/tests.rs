@@ -157,7 +157,7 @@ async fn a_game_that_goes_on_is_found_as_it_was_left() {
     let header = Arc::new(header(1, Durability::Durable));
     let entries = entries();
     let store = opened(folder.path()).await;
-    let mut journal = store.create(Arc::clone(&header)).await.expect("kept");
+    let mut journal = store.create(Arc::clone(&header), Vec::new()).await.expect("kept");
     // In parts, as a room hands them over.
     for part in entries.chunks(3) {
         let mut part = part.to_vec();
@@ -208,11 +208,37 @@ async fn a_game_that_goes_on_is_found_as_it_was_left() {
 }
 
 #[tokio::test]
+async fn a_game_begins_with_its_first_entries() {
+    for durability in [Durability::Durable, Durability::Ephemeral] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let header = Arc::new(header(1, durability));
+        let entries = entries();
+        let (first, rest) = entries.split_at(2);
+        let store = opened(folder.path()).await;
+        let begun = store.create(Arc::clone(&header), first.to_vec()).await;
+        let mut journal = begun.expect("kept");
+        if durability == Durability::Durable {
+            // The process might die here: no game is there without them.
+            let left = store.left(u64::MAX).await.expect("readable");
+            assert_eq!(left.len(), 1);
+            assert_eq!(shown(&left[0].entries), shown(&first.to_vec()));
+        }
+        journal.append(&mut rest.to_vec()).await.expect("kept");
+        journal.finish(Some(summary(&header))).await.expect("kept");
+        let kept = store.finished(header.game_id).await.expect("readable");
+        let Some(KeptGame::Hosted(_, journal)) = kept else {
+            panic!("not kept: {kept:?}");
+        };
+        assert_eq!(shown(&journal.to_vec()), shown(&entries));
+    }
+}
+
+#[tokio::test]
 async fn an_ephemeral_game_is_kept_when_it_ends_and_not_before() {
     let folder = tempfile::tempdir().expect("a folder");
     let store = opened(folder.path()).await;
     let header = Arc::new(header(1, Durability::Ephemeral));
-    let mut journal = store.create(Arc::clone(&header)).await.expect("begun");
+    let mut journal = store.create(Arc::clone(&header), Vec::new()).await.expect("begun");
     journal.append(&mut entries()).await.expect("in memory");
     assert!(store.left(u64::MAX).await.expect("readable").is_empty());
     journal.finish(Some(summary(&header))).await.expect("kept");
@@ -233,7 +259,7 @@ async fn many_rooms_share_the_writer() {
         let store = Arc::clone(&store);
         tokio::spawn(async move {
             let header = Arc::new(header(room, Durability::Durable));
-            let mut journal = store.create(header).await.expect("kept");
+            let mut journal = store.create(header, Vec::new()).await.expect("kept");
             for entry in entries() {
                 journal.append(&mut vec![entry]).await.expect("kept");
             }
@@ -257,12 +283,12 @@ async fn lists_are_filtered_and_paged() {
         let mut header = header(game, Durability::Durable);
         header.created_at_ms = u64::from(game) * 1_000;
         let header = Arc::new(header);
-        let mut journal = store.create(Arc::clone(&header)).await.expect("kept");
+        let mut journal = store.create(Arc::clone(&header), Vec::new()).await.expect("kept");
         journal.finish(Some(summary(&header))).await.expect("kept");
     }
     let unheard_of = {
         let mut journal = store
-            .create(Arc::new(header(6, Durability::Durable)))
+            .create(Arc::new(header(6, Durability::Durable)), Vec::new())
             .await
             .expect("kept");
         // Nothing was dealt in it: there is no record.
@@ -420,7 +446,7 @@ async fn a_game_that_cannot_be_read_is_left_and_hinders_no_other() {
     let store = opened(folder.path()).await;
     for game in 1..=4 {
         let mut journal = store
-            .create(Arc::new(header(game, Durability::Durable)))
+            .create(Arc::new(header(game, Durability::Durable)), Vec::new())
             .await
             .expect("kept");
         for entry in entries() {
@@ -457,7 +483,7 @@ async fn a_part_that_is_missing_of_a_finished_game_is_noticed() {
         let headers = [1, 2].map(|game| Arc::new(header(game, Durability::Durable)));
         let mut journals = Vec::new();
         for header in &headers {
-            journals.push(store.create(Arc::clone(header)).await.expect("kept"));
+            journals.push(store.create(Arc::clone(header), Vec::new()).await.expect("kept"));
         }
         // The rows of the two lie among each other.
         for entry in entries() {

@@ -11,10 +11,11 @@ use tokio::sync::{mpsc, oneshot, watch};
 use tracing::error;
 
 use super::errors::explain;
-use super::form::FORM;
+use super::form::{self, FORM};
 use crate::ids::Id;
 use crate::room::since_epoch_ms;
 use crate::store::StoreError;
+use crate::store::tournaments::TournamentEntry;
 
 /// Orders that wait for the writer.
 pub(super) const QUEUE: usize = 1_024;
@@ -32,6 +33,8 @@ pub(super) enum Order {
         header: Vec<u8>,
         /// Its rows come from here on.
         first_row: i64,
+        /// The first of them, if it begins with one.
+        first: Option<Row>,
     },
     /// A game goes on.
     Append(Row),
@@ -61,13 +64,12 @@ pub(super) enum Order {
     /// The record of a game has been written to a file.
     Filed { game_id: Id },
     /// A tournament begins.
-    Tournament { id: Id, header: Vec<u8> },
-    /// A tournament goes on.
-    TournamentEntries {
-        id: Id,
-        position: i64,
-        entries: Vec<u8>,
+    Tournament {
+        header: Vec<u8>,
+        first: TournamentRow,
     },
+    /// A tournament goes on.
+    TournamentEntries(TournamentRow),
     /// Nothing more will be ordered.
     Close,
 }
@@ -82,6 +84,27 @@ pub(super) struct Row {
     /// The number of the game's row before it.
     pub(super) previous: Option<i64>,
     pub(super) entries: Vec<u8>,
+}
+
+/// What moved a tournament, kept at a time.
+pub(super) struct TournamentRow {
+    id: Id,
+    /// Its number in its tournament, from 0.
+    position: i64,
+    entries: Vec<u8>,
+    /// Whether the tournament is over with it.
+    over: bool,
+}
+
+impl TournamentRow {
+    pub(super) fn new(id: Id, row: u64, entries: &[TournamentEntry]) -> Self {
+        Self {
+            id,
+            position: i64::try_from(row).unwrap_or(i64::MAX),
+            entries: form::tournament_entries_to_bytes(entries),
+            over: entries.iter().any(TournamentEntry::is_end),
+        }
+    }
 }
 
 /// An order and whom to tell when it is kept.
@@ -147,7 +170,11 @@ async fn write(connection: &mut SqliteConnection, pending: &mut [Pending]) -> sq
                 game_id,
                 header,
                 first_row,
-            } => create(connection, *number, *game_id, header, *first_row).await?,
+                first,
+            } => {
+                create(connection, *number, *game_id, header, *first_row).await?;
+                rows.extend(first);
+            }
             Order::Finish {
                 number,
                 state,
@@ -216,31 +243,18 @@ async fn write(connection: &mut SqliteConnection, pending: &mut [Pending]) -> sq
                     summarise(connection, *number, summary).await?;
                 }
             }
-            Order::Tournament { id, header } => {
+            Order::Tournament { header, first } => {
                 sqlx::query(
                     "INSERT INTO tournaments (tournament_id, form, header) VALUES ($1, $2, $3)",
                 )
-                .bind(id.0.as_slice())
+                .bind(first.id.0.as_slice())
                 .bind(FORM)
                 .bind(header.as_slice())
                 .execute(&mut *connection)
                 .await?;
+                move_tournament(connection, first).await?;
             }
-            Order::TournamentEntries {
-                id,
-                position,
-                entries,
-            } => {
-                sqlx::query(
-                    "INSERT INTO tournament_entries (tournament, position, entries)
-                     VALUES ((SELECT number FROM tournaments WHERE tournament_id = $1), $2, $3)",
-                )
-                .bind(id.0.as_slice())
-                .bind(*position)
-                .bind(entries.as_slice())
-                .execute(&mut *connection)
-                .await?;
-            }
+            Order::TournamentEntries(row) => move_tournament(connection, row).await?,
             Order::Filed { game_id } => {
                 sqlx::query("UPDATE games SET filed = 1 WHERE game_id = $1")
                     .bind(game_id.0.as_slice())
@@ -302,6 +316,28 @@ async fn create(
     .execute(connection)
     .await
     .map(drop)
+}
+
+async fn move_tournament(
+    connection: &mut SqliteConnection,
+    row: &TournamentRow,
+) -> sqlx::Result<()> {
+    sqlx::query(
+        "INSERT INTO tournament_entries (tournament, position, entries)
+         VALUES ((SELECT number FROM tournaments WHERE tournament_id = $1), $2, $3)",
+    )
+    .bind(row.id.0.as_slice())
+    .bind(row.position)
+    .bind(row.entries.as_slice())
+    .execute(&mut *connection)
+    .await?;
+    if row.over {
+        sqlx::query("UPDATE tournaments SET over = 1 WHERE tournament_id = $1")
+            .bind(row.id.0.as_slice())
+            .execute(&mut *connection)
+            .await?;
+    }
+    Ok(())
 }
 
 /// Notes how a game ended, and by what it is to be found.

@@ -20,6 +20,7 @@ export const faults = {
     SHUTTING_DOWN: "The server is shutting down. Games go on when it is back.",
     GAME_UNKNOWN: "The server has no record of this game.",
     GAME_RUNNING: "The game is still being played; its record comes when it has ended.",
+    SERIES_OPEN: "Other games with the same deals are still being played; the record comes when the round is over.",
     TOURNAMENT_UNKNOWN: "There is no such tournament.",
     TOURNAMENT_STARTED: "The tournament has begun already.",
     TOURNAMENT_FULL: "The tournament is full.",

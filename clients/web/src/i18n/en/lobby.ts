@@ -69,6 +69,7 @@ export const lobby = {
     text: "Send the address, read out the code, or let them point a phone at the picture.",
     code: "Join code",
     link: "Address",
+    agent: "For an agent, in a terminal",
     qr: "QR code of the address",
   },
   door: {

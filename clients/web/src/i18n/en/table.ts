@@ -1,5 +1,6 @@
 // English texts of table/.
 
+import { AbortReason } from "../../gen/chefshat/v1/room_pb";
 import { plurals } from "../plural";
 
 const plural = plurals("en");
@@ -20,13 +21,12 @@ export const table = {
   chips: { toPlay: "to play", toGive: "to give", toDeclare: "to declare?", passed: "passed" },
   presence: {
     away: "not connected",
-    substituted: (agent: string) => `${agent} plays for it`,
+    substituted: (agent: string) => `${agent} stands in`,
   },
   card: {
     face: (face: number, ingredient: string) => `${face}, ${ingredient}`,
     golden: (face: number, ingredient: string) => `Golden ${face}, ${ingredient}`,
     joker: "joker",
-    back: "hidden card",
     received: "received in the exchange",
   },
   /** Cards in short, as in "3 × 9 + 2 jokers". */
@@ -127,6 +127,7 @@ export const table = {
       `${plural(need, { one: "# card", other: "# cards" })} needed; of ${face} and jokers you have ${have}.`,
     jokerAlone: "A joker alone can only open a pizza, and there is nothing to play it with.",
     other: "This card cannot be played now.",
+    declareFirst: "First say whether you declare.",
     gift: "This card cannot be given now.",
     notYourTurn: "It is not your turn.",
   },
@@ -152,7 +153,6 @@ export const table = {
     soundOn: "Sound is on",
     soundOff: "Sound is off",
     lookup: "What is possible",
-    log: "What happened",
   },
   lookup: {
     title: "What is possible",
@@ -162,14 +162,20 @@ export const table = {
     notAllowed: "in this hand, but not allowed now",
     impossible: "neither",
     face: "face",
-    cards: "cards of the face",
-    jokers: "jokers",
     loneJoker: "a joker alone",
     pass: "pass",
     count: (count: number) => plural(count, { one: "# legal action", other: "# legal actions" }),
     chosen: "taken",
     groups: "Rows: faces. Columns: cards of the face; within each column without a joker, with one, with two.",
     none: "No turn is open. The table is shown for your own turns.",
+  },
+  aborted: {
+    [AbortReason.UNSPECIFIED]: "It has no result.",
+    [AbortReason.CLOSED]: "The room was closed by its owner.",
+    [AbortReason.SHUTDOWN]: "The server was shut down.",
+    [AbortReason.PARTICIPANTS_LOST]: "Too many participants were lost to go on.",
+    [AbortReason.NEVER_STARTED]: "Not all seats were taken in time.",
+    [AbortReason.TOO_LONG]: "The game had become longer than the server can keep.",
   },
   result: {
     shift: (shift: number) => `Shift ${shift}`,
@@ -181,7 +187,6 @@ export const table = {
     adjudicated: "Ended by the limit of turns.",
     replay: "See the game again",
     lobby: "To the lobby",
-    close: "Go on",
     youWon: "You have won!",
     wins: (name: string) => `${name} has won`,
   },
@@ -198,10 +203,6 @@ export const table = {
     seats: "Seats",
     waiting: (count: number) => plural(count, { one: "# seat is still free", other: "# seats are still free" }),
     begins: "The game begins as soon as all seats are taken and connected.",
-    noSeat: "You hold no seat in this room.",
-    join: "Join with a code",
-    watch: "Watch",
-    yourSeat: (seat: number) => `You have seat ${seat}.`,
   },
-  watch: { title: (room: string) => `Watching ${room}`, viewer: "as spectators see it" },
+  watch: { viewer: "as spectators see it" },
 };

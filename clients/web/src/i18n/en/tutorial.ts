@@ -2,7 +2,7 @@
 
 export const tutorial = {
   title: "Learn to play",
-  you: "You",
+  you: "Rosa",
   step: (step: number, all: number) => `${step} / ${all}`,
   next: "Go on",
   watch: "The others play…",

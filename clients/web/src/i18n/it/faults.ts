@@ -22,6 +22,7 @@ export const faults: Texts["faults"] = {
     SHUTTING_DOWN: "Il server si sta spegnendo. Le partite continuano quando torna.",
     GAME_UNKNOWN: "Il server non ha la registrazione di questa partita.",
     GAME_RUNNING: "La partita è ancora in corso; la registrazione arriva alla fine.",
+    SERIES_OPEN: "Si giocano ancora altre partite con le stesse carte; la registrazione arriva alla fine del turno.",
     TOURNAMENT_UNKNOWN: "Questo torneo non esiste.",
     TOURNAMENT_STARTED: "Il torneo è già iniziato.",
     TOURNAMENT_FULL: "Il torneo è al completo.",

@@ -70,6 +70,7 @@ export const lobby: Texts["lobby"] = {
     text: "Manda l’indirizzo, detta il codice o fai inquadrare l’immagine con un telefono.",
     code: "Codice d’ingresso",
     link: "Indirizzo",
+    agent: "Per un agente, in un terminale",
     qr: "Codice QR dell’indirizzo",
   },
   door: {

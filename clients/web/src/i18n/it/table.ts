@@ -1,5 +1,6 @@
 // Italian texts of table/.
 
+import { AbortReason } from "../../gen/chefshat/v1/room_pb";
 import type { Texts } from "../en";
 import { plurals } from "../plural";
 
@@ -21,13 +22,12 @@ export const table: Texts["table"] = {
   chips: { toPlay: "gioca", toGive: "dà", toDeclare: "chiama?", passed: "passato" },
   presence: {
     away: "non connesso",
-    substituted: (agent) => `al suo posto gioca ${agent}`,
+    substituted: (agent) => `sostituito da ${agent}`,
   },
   card: {
     face: (face, ingredient) => `${face}, ${ingredient}`,
     golden: (face, ingredient) => `${face} d’oro, ${ingredient}`,
     joker: "jolly",
-    back: "carta coperta",
     received: "ricevuta nello scambio",
   },
   play: (quantity, face, golden, jokers) =>
@@ -127,6 +127,7 @@ export const table: Texts["table"] = {
       `${plural(need, { one: "Serve # carta", other: "Servono # carte" })}; tra ${face} e jolly ne hai ${have}.`,
     jokerAlone: "Un jolly da solo può soltanto aprire una pizza, e non c’è con che giocarlo.",
     other: "Questa carta ora non si può giocare.",
+    declareFirst: "Prima di’ se lo chiami.",
     gift: "Questa carta ora non si può dare.",
     notYourTurn: "Non tocca a te.",
   },
@@ -152,7 +153,6 @@ export const table: Texts["table"] = {
     soundOn: "Suoni accesi",
     soundOff: "Suoni spenti",
     lookup: "Che cosa si può fare",
-    log: "Che cosa è successo",
   },
   lookup: {
     title: "Che cosa si può fare",
@@ -162,14 +162,20 @@ export const table: Texts["table"] = {
     notAllowed: "in mano, ma ora non ammessa",
     impossible: "né l’una né l’altra",
     face: "valore",
-    cards: "carte di quel valore",
-    jokers: "jolly",
     loneJoker: "un jolly da solo",
     pass: "passare",
     count: (count) => plural(count, { one: "# azione permessa", other: "# azioni permesse" }),
     chosen: "scelta",
     groups: "Righe: valori. Colonne: carte di quel valore; in ogni colonna senza jolly, con uno, con due.",
     none: "Nessun turno è aperto. La tabella si vede nei tuoi turni.",
+  },
+  aborted: {
+    [AbortReason.UNSPECIFIED]: "Non ha un risultato.",
+    [AbortReason.CLOSED]: "Chi ha aperto la stanza l’ha chiusa.",
+    [AbortReason.SHUTDOWN]: "Il server è stato spento.",
+    [AbortReason.PARTICIPANTS_LOST]: "Troppi partecipanti persi per andare avanti.",
+    [AbortReason.NEVER_STARTED]: "Non tutti i posti sono stati presi in tempo.",
+    [AbortReason.TOO_LONG]: "La partita era più lunga di quanto il server può tenere.",
   },
   result: {
     shift: (shift) => `Shift ${shift}`,
@@ -181,7 +187,6 @@ export const table: Texts["table"] = {
     adjudicated: "Finito per il limite di turni.",
     replay: "Rivedi la partita",
     lobby: "Alla sala",
-    close: "Continua",
     youWon: "Hai vinto!",
     wins: (name) => `Ha vinto ${name}`,
   },
@@ -198,10 +203,6 @@ export const table: Texts["table"] = {
     seats: "Posti",
     waiting: (count) => plural(count, { one: "# posto è ancora libero", other: "# posti sono ancora liberi" }),
     begins: "La partita comincia quando tutti i posti sono presi e connessi.",
-    noSeat: "Non hai un posto in questa stanza.",
-    join: "Entra con un codice",
-    watch: "Guarda",
-    yourSeat: (seat) => `Hai il posto ${seat}.`,
   },
-  watch: { title: (room) => `Guardando ${room}`, viewer: "come la vede il pubblico" },
+  watch: { viewer: "come la vede il pubblico" },
 };

@@ -4,7 +4,7 @@ import type { Texts } from "../en";
 
 export const tutorial: Texts["tutorial"] = {
   title: "Impara a giocare",
-  you: "Tu",
+  you: "Rosa",
   step: (step, all) => `${step} / ${all}`,
   next: "Avanti",
   watch: "Giocano gli altri…",

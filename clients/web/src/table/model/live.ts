@@ -1,7 +1,7 @@
 // What the holder of a seat knows: the table, the decision that is open for the seat, and how the seat is attached. A pure function from one
 // update of the server to the next such value; the stream itself is in session.ts.
 
-import { AnswerStatus, DecisionKind, type DecisionRequest } from "../../gen/chefshat/v1/decision_pb";
+import { AnswerStatus, DecisionKind, type DecisionRequest, type Observation } from "../../gen/chefshat/v1/decision_pb";
 import type { GameEvent } from "../../gen/chefshat/v1/event_pb";
 import { DetachReason, type SeatUpdate } from "../../gen/chefshat/v1/play_service_pb";
 import { legalActions } from "./actions";
@@ -63,7 +63,7 @@ export function applyUpdate(live: LiveState, update: SeatUpdate, nowMs: number):
     case "events":
       return told.value.events.reduce(withEvent, live);
     case "snapshot":
-      return { ...live, table: applySnapshot(live.table, told.value, live.own) };
+      return withSnapshot(live, applySnapshot(live.table, told.value, live.own));
     case "decision":
       return withDecision(live, told.value, nowMs);
     case "result": {
@@ -84,6 +84,11 @@ export function applyUpdate(live: LiveState, update: SeatUpdate, nowMs: number):
     default:
       return live;
   }
+}
+
+function withSnapshot(live: LiveState, table: TableState): LiveState {
+  const mine = live.own === undefined ? undefined : table.seats[live.own];
+  return { ...live, table, substituted: mine !== undefined && mine.substitute !== "" };
 }
 
 function withEvent(live: LiveState, event: GameEvent): LiveState {
@@ -128,7 +133,11 @@ function withDecision(live: LiveState, request: DecisionRequest, nowMs: number):
   // At a turn everything that happened has been told, so that the observation is the whole truth. Gifts of an exchange that is not complete
   // have left the observed hand already: their event is still to come.
   const turn = request.kind === DecisionKind.TURN;
-  const table = seen && turn ? { ...applyBoard(before, seen, live.own), next: live.own } : before;
+  const table = !seen
+    ? before
+    : turn
+      ? { ...applyBoard(before, seen, live.own), next: live.own }
+      : withPoints(before, seen);
   const hand = seen ? cardsFromCounts(seen.hand, seen.golden, table.faces) : [];
   const decision: OpenDecision = {
     id: request.decisionId,
@@ -143,8 +152,14 @@ function withDecision(live: LiveState, request: DecisionRequest, nowMs: number):
   return { ...live, table, decision };
 }
 
+/** The points put in, which a game that begins in the middle has before its first event tells any. */
+function withPoints(table: TableState, seen: Observation): TableState {
+  const seats = table.seats.map((seat) => ({ ...seat, points: Number(seen.points[seat.seat] ?? seat.points) }));
+  return { ...table, seats };
+}
+
 /** The observation put in, without losing what only events tell: what was played with the Golden card, what has just been received. */
-function applyBoard(table: TableState, seen: NonNullable<DecisionRequest["observation"]>, own: number | undefined) {
+function applyBoard(table: TableState, seen: Observation, own: number | undefined): TableState {
   const next = applyObservation(table, seen, own);
   const seats = next.seats.map((seat) => ({ ...seat, received: table.seats[seat.seat]?.received ?? seat.received }));
   const board = next.board.length === table.board.length ? table.board : next.board;

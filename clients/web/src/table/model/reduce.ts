@@ -131,7 +131,7 @@ function change(table: TableState, event: GameEvent, sequence: number): Change {
       return [{ ...table, phase: "gameOver", standings, next: undefined }, { kind: "gameOver" }];
     }
     case "gameAborted":
-      return [{ ...table, phase: "aborted", next: undefined }, { kind: "aborted" }];
+      return [{ ...table, phase: "aborted", abortReason: kind.value.reason, next: undefined }, { kind: "aborted" }];
     case "expressionShown": {
       const { seat, expression } = kind.value;
       const label = expression?.label ?? "";

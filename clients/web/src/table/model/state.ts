@@ -2,7 +2,7 @@
 // from the protocol's messages by reduce.ts and snapshot.ts; what the viewer may not see is not in it. No view, no clock, no network.
 
 import type { Room, RoomPolicy } from "../../gen/chefshat/v1/room_pb";
-import { type Participant, ParticipantKind } from "../../gen/chefshat/v1/room_pb";
+import { AbortReason, type Participant, ParticipantKind } from "../../gen/chefshat/v1/room_pb";
 import { PassScope, Role, type RuleSet, type SpecialAction } from "../../gen/chefshat/v1/rules_pb";
 import type { Card } from "./cards";
 
@@ -120,6 +120,8 @@ export interface TableState {
   readonly log: readonly LogLine[];
   /** How the last Shift ended. */
   readonly result: ShiftResult | undefined;
+  /** Why the game was given up, if it was. */
+  readonly abortReason: AbortReason;
   /** The final table, best first; empty before the end. */
   readonly standings: readonly StandingLine[];
   /** Number of the next event of the game. */
@@ -173,6 +175,7 @@ export function emptyTable(seats: readonly SeatState[] = []): TableState {
     played: [],
     log: [],
     result: undefined,
+    abortReason: AbortReason.UNSPECIFIED,
     standings: [],
     nextSequence: 1,
   };

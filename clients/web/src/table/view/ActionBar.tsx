@@ -98,7 +98,8 @@ function hint({ table, decision, moves, picked, move, sending }: ActionBarProps)
     return more === undefined || more === 0 ? words.pick : words.more(more);
   }
   if (moves.every((legal) => legal.kind === "pass")) return words.onlyPass;
-  if (!mayPass) return table.turn === 1 ? words.noPass : words.mustPlay;
+  if (!mayPass && table.turn === 1) return words.noPass;
+  if (!mayPass) return table.board.length === 0 ? words.mustPlay : words.pickMust;
   return words.pick;
 }
 

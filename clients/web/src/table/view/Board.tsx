@@ -5,6 +5,7 @@ import { Card } from "../../parts/Card";
 import { Drawing, faceDrawing } from "../../parts/Drawing";
 import type { TableState } from "../model/state";
 import { distinctName, playWords } from "../words";
+import "./board.css";
 
 /** Most toppings that are drawn. */
 const MOST_TOPPINGS = 44;
@@ -42,7 +43,7 @@ export function Board({ table }: { table: TableState }) {
 
 /** An ingredient on the pizza, somewhere between the cards and the crust. */
 function Topping({ name, index }: { name: string; index: number }) {
-  const angle = index * GOLDEN_ANGLE * 1.7 + 0.6;
+  const angle = index * GOLDEN_ANGLE + 0.6;
   const radius = 0.72 + 0.12 * Math.sin(index * 2.3);
   const left = 50 + 50 * radius * Math.cos(angle);
   const top = 50 + 50 * radius * Math.sin(angle);

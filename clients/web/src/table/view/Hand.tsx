@@ -1,6 +1,6 @@
 // The reader's own cards, to be picked. All cards can be reached with the arrow keys; those that cannot be picked now say why instead.
 
-import { useRef, useState } from "preact/hooks";
+import { useLayoutEffect, useRef, useState } from "preact/hooks";
 import { t } from "../../i18n";
 import { announce } from "../../parts/Announcer";
 import { Card } from "../../parts/Card";
@@ -33,7 +33,14 @@ export function Hand(props: HandProps) {
   const { cards, picked, received, refusal } = props;
   const [focus, setFocus] = useState(0);
   const row = useRef<HTMLDivElement>(null);
+  const inside = useRef(false);
   const current = Math.min(focus, Math.max(0, cards.length - 1));
+
+  // A card that is played takes the keyboard's focus with it: it goes on at the card that comes after.
+  useLayoutEffect(() => {
+    if (!inside.current || document.activeElement !== document.body) return;
+    row.current?.querySelectorAll<HTMLElement>(".hand-card")[current]?.focus();
+  }, [cards.length]);
 
   const go = (index: number) => {
     setFocus(index);
@@ -77,6 +84,12 @@ export function Hand(props: HandProps) {
       style={style}
       ref={row}
       onKeyDown={onKeyDown}
+      onFocusIn={() => {
+        inside.current = true;
+      }}
+      onFocusOut={(event) => {
+        if (event.relatedTarget) inside.current = false;
+      }}
     >
       <p id="hand-help" class="only-heard">
         {t().table.hand.help}

@@ -6,6 +6,7 @@ import { t } from "../../i18n";
 import { demandOf } from "../model/demand";
 import type { TableState } from "../model/state";
 import { distinctName, headingWords } from "../words";
+import "./now.css";
 
 /** On a phone what was played is folded away at first. */
 const PHONE = "(max-width: 44rem)";

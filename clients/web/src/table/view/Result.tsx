@@ -4,6 +4,7 @@ import { t } from "../../i18n";
 import { ButtonLink } from "../../parts/Button";
 import type { ShiftResult, TableState } from "../model/state";
 import { nameOf } from "../words";
+import "./result.css";
 
 interface ResultProps {
   table: TableState;
@@ -15,7 +16,8 @@ interface ResultProps {
 /** The result that is to be seen now: of the game once it is over, of the last Shift until the next one is under way. */
 export function Result({ table, own, links = true }: ResultProps) {
   if (table.phase === "gameOver") return <GameResult table={table} own={own} links={links} />;
-  if (table.result && table.phase !== "pizza" && table.phase !== "aborted") {
+  if (table.phase === "aborted") return <Aborted table={table} links={links} />;
+  if (table.result && table.phase !== "pizza") {
     return <ShiftTable table={table} result={table.result} />;
   }
   return null;
@@ -77,6 +79,24 @@ function GameResult({ table, own, links }: Required<ResultProps>) {
             {words.replay}
           </ButtonLink>
           <ButtonLink href="/">{words.lobby}</ButtonLink>
+        </p>
+      )}
+    </section>
+  );
+}
+
+/** A game without a result: why, and the way on. */
+function Aborted({ table, links }: { table: TableState; links: boolean }) {
+  const words = t().table;
+  return (
+    <section class="result sheet" aria-label={words.heading.aborted}>
+      <h2>{words.heading.aborted}</h2>
+      <p>{words.aborted[table.abortReason]}</p>
+      {links && (
+        <p class="result-links">
+          <ButtonLink href="/" look="main">
+            {words.result.lobby}
+          </ButtonLink>
         </p>
       )}
     </section>

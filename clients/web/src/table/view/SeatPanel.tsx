@@ -51,10 +51,10 @@ export function SeatPanel({ table, seat, own = false, deciding, kind, cards = tr
         {seat.seat}
       </span>
       <div class="seat-who">
-        <h3 class="seat-name">
+        <h2 class="seat-name">
           {isTaken(seat) ? nameOf(table, seat.seat) : words.freeSeat}
           {own && <span class="soft"> ({words.you})</span>}
-        </h3>
+        </h2>
         <p class="seat-kind">
           <KindBadge kind={seat.kind} builtIn={seat.builtIn} />
           {presence && isTaken(seat) && <span class="seat-presence">{presence}</span>}

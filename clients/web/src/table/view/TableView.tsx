@@ -72,10 +72,13 @@ export function TableView(props: TableViewProps) {
   const next = props.next ?? (decision ? own : table.next);
   const kind = decision?.kind ?? props.nextKind;
 
+  const special = decision?.kind === DecisionKind.SPECIAL_ACTION;
+
   const refusal = (index: number): string | undefined => {
     const words = t().table.reasons;
     if (!decision) return words.notYourTurn;
     if (canPick(hand, index, moves)) return undefined;
+    if (special) return words.declareFirst;
     if (props.refusal) return props.refusal;
     if (decision.kind === DecisionKind.EXCHANGE) return words.gift;
     return reasonWords(reasonAgainst(table, hand, index));
@@ -117,7 +120,10 @@ export function TableView(props: TableViewProps) {
         />
       </div>
       {mine ? (
-        <section class={`own sheet ${decision ? "own-deciding" : ""}`} aria-label={handLabel}>
+        <section
+          class={`own sheet ${decision ? "own-deciding" : ""} ${decision && !special ? "own-picking" : ""}`}
+          aria-label={handLabel}
+        >
           <div class="own-head">
             <SeatPanel
               table={table}
@@ -129,41 +135,43 @@ export function TableView(props: TableViewProps) {
             />
             {props.onExpress && <Expressions onExpress={props.onExpress} />}
           </div>
-          <div class="own-cards">
-            <Hand
-              cards={hand}
-              picked={picked}
-              received={mine.received}
-              refusal={refusal}
-              label={handLabel}
-              onToggle={(index) => {
-                setRemark("");
-                setPicked(toggle(hand, picked, index, moves));
-              }}
-              onPlay={() => {
-                if (!move || sending) return false;
-                answer(actionOf(move, table.faces));
-                return true;
-              }}
-              onPutBack={putBack}
-              onRefused={setRemark}
-            />
+          <div class="own-play">
+            <div class="own-cards">
+              <Hand
+                cards={hand}
+                picked={picked}
+                received={mine.received}
+                refusal={refusal}
+                label={handLabel}
+                onToggle={(index) => {
+                  setRemark("");
+                  setPicked(toggle(hand, picked, index, moves));
+                }}
+                onPlay={() => {
+                  if (!move || sending) return false;
+                  answer(actionOf(move, table.faces));
+                  return true;
+                }}
+                onPutBack={putBack}
+                onRefused={setRemark}
+              />
+            </div>
+            {props.onAnswer && table.phase !== "gameOver" && table.phase !== "aborted" && (
+              <ActionBar
+                table={table}
+                own={own}
+                decision={decision}
+                moves={moves}
+                picked={picked}
+                move={move}
+                sending={sending}
+                remark={remark || props.trouble || ""}
+                wholeMs={wholeMs}
+                onAnswer={answer}
+                onPutBack={putBack}
+              />
+            )}
           </div>
-          {props.onAnswer && table.phase !== "gameOver" && table.phase !== "aborted" && (
-            <ActionBar
-              table={table}
-              own={own}
-              decision={decision}
-              moves={moves}
-              picked={picked}
-              move={move}
-              sending={sending}
-              remark={remark || props.trouble || ""}
-              wholeMs={wholeMs}
-              onAnswer={answer}
-              onPutBack={putBack}
-            />
-          )}
         </section>
       ) : (
         <Seats table={table} own={own} next={next} kind={kind} lower />

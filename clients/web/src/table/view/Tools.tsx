@@ -33,7 +33,7 @@ export function Tools({ turn, lookup }: ToolsProps) {
       {lookup && (
         <button
           type="button"
-          class="tool"
+          class="tool tool-lookup"
           onClick={() => setOpen(turn ?? "none")}
           aria-label={words.lookup}
           title={words.lookup}

@@ -283,3 +283,41 @@ fn who_comes_and_goes_does_not_spare_those_who_do_not_come_at_all() {
         [rescheduled(0, &[away])]
     );
 }
+
+#[test]
+fn after_a_restart_only_those_who_missed_the_last_call_forfeit_at_once() {
+    let mut tournament = two_tables(|_| {});
+    let [silent, away] = [1, 2].map(|place| seat(&tournament, 0, place));
+    let never_started = Ended::NeverStarted {
+        missing: vec![silent],
+    };
+    for _ in 0..2 {
+        follow(&mut tournament, 0);
+        end(&mut tournament, 0, never_started.clone());
+    }
+    assert_eq!(tournament.games()[0].calls, 2, "that was the last call");
+    // The server is back: nobody is there yet, and nobody has lost a game by it.
+    for who in 0..8 {
+        tournament.set_present(who, false);
+    }
+    assert_eq!(follow(&mut tournament, 0), []);
+    assert_eq!(tournament.wake_at(), Some(NO_SHOW_MS));
+    let mut all_back = tournament.clone();
+    for who in (0..8).filter(|who| ![silent, away].contains(who)) {
+        tournament.set_present(who, true);
+    }
+    assert_eq!(follow(&mut tournament, NO_SHOW_MS - 1), []);
+    assert_eq!(
+        follow(&mut tournament, NO_SHOW_MS),
+        [forfeited(0, &[silent, away])],
+        "the others were waited for, once"
+    );
+    for who in (0..8).filter(|who| *who != silent) {
+        all_back.set_present(who, true);
+    }
+    assert_eq!(
+        follow(&mut all_back, 10),
+        [forfeited(0, &[silent])],
+        "nobody waits for who did not come to the last call"
+    );
+}

@@ -6,8 +6,12 @@ CREATE TABLE tournaments (
     tournament_id BLOB NOT NULL UNIQUE,
     -- Version of the form of the blobs.
     form INTEGER NOT NULL,
+    -- Whether it has been played to its end or closed.
+    over INTEGER NOT NULL DEFAULT 0,
     header BLOB NOT NULL
 );
+
+CREATE INDEX tournaments_by_end ON tournaments (over, number);
 
 -- Each row is what was kept at a time, numbered from 0 in its tournament.
 CREATE TABLE tournament_entries (

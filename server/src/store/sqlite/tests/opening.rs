@@ -68,7 +68,7 @@ async fn a_database_of_which_only_the_log_is_left_is_not_begun_anew() {
     let folder = tempfile::tempdir().expect("a folder");
     let store = opened(folder.path()).await;
     let header = Arc::new(header(1, Durability::Durable));
-    let mut journal = store.create(header).await.expect("kept");
+    let mut journal = store.create(header, Vec::new()).await.expect("kept");
     journal.append(&mut entries()).await.expect("kept");
     // The process dies with most of what it kept in the log of writes.
     let copy = tempfile::tempdir().expect("a folder");
@@ -91,7 +91,7 @@ async fn what_was_given_up_before_a_deal_leaves_nothing_behind() {
     let store = opened(folder.path()).await;
     for game in 1..=2 {
         let header = Arc::new(header(game, Durability::Durable));
-        let mut journal = store.create(header).await.expect("kept");
+        let mut journal = store.create(header, Vec::new()).await.expect("kept");
         journal.append(&mut entries()).await.expect("kept");
         if game == 1 {
             journal.finish(None).await.expect("kept");

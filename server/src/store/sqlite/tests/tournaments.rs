@@ -108,23 +108,22 @@ fn shown(value: &impl std::fmt::Debug) -> String {
 async fn what_was_kept_of_tournaments_is_found_again_in_order() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let store = SqliteStore::open(folder.path()).await.expect("it opens");
-    for number in [7, 3] {
-        let made = store.create_tournament(Arc::new(cup(number))).await;
-        made.expect("it is kept");
-    }
     let entries = moved();
     let (first, rest) = entries.split_at(5);
-    for (row, part) in [(0, first), (1, rest)] {
-        let kept = store.append_tournament(Id([3; 16]), row, part.to_vec());
-        kept.await.expect("it is kept");
+    for (number, begins_with) in [(7, &[][..]), (3, first)] {
+        let header = Arc::new(cup(number));
+        let made = store.create_tournament(header, begins_with.to_vec());
+        made.await.expect("it is kept");
     }
+    let kept = store.append_tournament(Id([3; 16]), 1, rest.to_vec());
+    kept.await.expect("it is kept");
     store.close().await;
     drop(store);
     let store = SqliteStore::open(folder.path()).await.expect("it opens");
-    let found = store.tournaments().await.expect("it reads");
+    let found = store.tournaments(9).await.expect("it reads");
     assert_eq!(found.len(), 2);
     assert_eq!(shown(&found[0].header), shown(&cup(7)));
-    assert_eq!((found[0].rows, found[0].entries.len()), (0, 0));
+    assert_eq!((found[0].rows, found[0].entries.len()), (1, 0));
     assert_eq!(shown(&found[1].header), shown(&cup(3)));
     assert_eq!(found[1].rows, 2);
     assert_eq!(shown(&found[1].entries), shown(&moved()));
@@ -166,5 +165,42 @@ fn a_game_remembers_its_tournament() {
         };
         let read = form::header_from_bytes(&form::header_to_bytes(&header)).expect("readable");
         assert_eq!(read.tournament, Some(game));
+    }
+}
+
+#[tokio::test]
+async fn of_tournaments_that_are_over_the_newest_are_found() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let store = SqliteStore::open(folder.path()).await.expect("it opens");
+    let change = TournamentEntry::Change;
+    let ends = [
+        (1, Some(Change::Finished)),
+        (2, None),
+        (3, Some(Change::Closed)),
+        (4, Some(Change::Finished)),
+        (5, None),
+    ];
+    for (number, end) in ends {
+        let id = Id([number; 16]);
+        let header = Arc::new(cup(number));
+        let begun = vec![change(Change::Begun { rounds: 1 })];
+        let made = store.create_tournament(header, begun);
+        made.await.expect("it is kept");
+        // The end is not the last thing that is kept at once with it.
+        let last = end.into_iter().chain([Change::Voided { game: 0 }]);
+        let kept = store.append_tournament(id, 1, last.map(change).collect());
+        kept.await.expect("it is kept");
+    }
+    for (newest_over, expected) in [
+        (0, &[2, 5][..]),
+        (1, &[2, 4, 5]),
+        (2, &[2, 3, 4, 5]),
+        (9, &[1, 2, 3, 4, 5]),
+        (usize::MAX, &[1, 2, 3, 4, 5]),
+    ] {
+        let found = store.tournaments(newest_over).await.expect("it reads");
+        let numbers: Vec<u8> = found.iter().map(|kept| kept.header.id.0[0]).collect();
+        assert_eq!(numbers, expected, "{newest_over}");
+        assert!(found.iter().all(|kept| kept.rows == 2));
     }
 }

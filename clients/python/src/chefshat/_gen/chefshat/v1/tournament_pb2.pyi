@@ -71,7 +71,7 @@ class _TournamentDealsEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_Tourn
     """
     TOURNAMENT_DEALS_ROTATED: _TournamentDeals.ValueType  # 3
     """Every pairing plays each deal once for each seat, its participants rotated. Only for built-in agents and participants that declared
-    themselves stateless; the results say so.
+    themselves stateless; the results say so. What could tell a deal stays closed until all its games have ended, as above.
     """
 
 class TournamentDeals(_TournamentDeals, metaclass=_TournamentDealsEnumTypeWrapper):
@@ -87,7 +87,7 @@ games have ended: spectators are not admitted and records not given out.
 """
 TOURNAMENT_DEALS_ROTATED: TournamentDeals.ValueType  # 3
 """Every pairing plays each deal once for each seat, its participants rotated. Only for built-in agents and participants that declared
-themselves stateless; the results say so.
+themselves stateless; the results say so. What could tell a deal stays closed until all its games have ended, as above.
 """
 Global___TournamentDeals: _TypeAlias = TournamentDeals  # noqa: Y015
 

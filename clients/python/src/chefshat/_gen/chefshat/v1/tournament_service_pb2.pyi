@@ -391,7 +391,9 @@ class FollowTournamentResponse(_message.Message):
 
     @_builtins.property
     def games(self) -> _containers.RepeatedCompositeFieldContainer[_tournament_pb2.TournamentGame]:
-        """The games of the round that is being played, in order; of ROUND_ROBIN those that are being played."""
+        """The games of the round that is being played, in order; of ROUND_ROBIN those that are being played. At most 512: those that are being played,
+        then the last of those that are over, then those that are due; ListTournamentGames has all.
+        """
 
     def __init__(
         self,

@@ -92,7 +92,8 @@ class TournamentServiceServicer:
     """
 
     def CreateTournament(self, request, context):
-        """Makes a tournament. INVALID_ARGUMENT (RULE_SET_REFUSED, POLICY_REFUSED, SETTINGS_REFUSED, NAME_REFUSED) names the field at fault;
+        """Makes a tournament. INVALID_ARGUMENT (RULE_SET_REFUSED, POLICY_REFUSED, SETTINGS_REFUSED, NAME_REFUSED) names the field of the settings
+        at fault, `rules` or `policy` included; the message names the one within;
         RESOURCE_EXHAUSTED (TOO_MANY_TOURNAMENTS, DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
@@ -116,7 +117,8 @@ class TournamentServiceServicer:
     def JoinTournament(self, request, context):
         """Joins and gives the ticket: attached to a Play or Watch stream it has the server seat the participant in each of its games.
         PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN,
-        NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN).
+        NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN);
+        UNAVAILABLE (SHUTTING_DOWN).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -124,7 +126,7 @@ class TournamentServiceServicer:
 
     def StartTournament(self, request, context):
         """Begins it. PERMISSION_DENIED (OWNER_TOKEN_WRONG); FAILED_PRECONDITION (TOO_FEW_PARTICIPANTS, TOURNAMENT_STARTED); NOT_FOUND
-        (TOURNAMENT_UNKNOWN).
+        (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -132,7 +134,7 @@ class TournamentServiceServicer:
 
     def CloseTournament(self, request, context):
         """Closes it: games that are being played are aborted, what has been counted stays. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND
-        (TOURNAMENT_UNKNOWN).
+        (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -140,7 +142,8 @@ class TournamentServiceServicer:
 
     def FollowTournament(self, request, context):
         """The tournament now, then again whenever it has changed, at most about four times a second, until it is over; between, heartbeats without a
-        tournament. NOT_FOUND (TOURNAMENT_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_FOLLOWERS).
+        tournament. NOT_FOUND (TOURNAMENT_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_FOLLOWERS; FOLLOWER_TOO_SLOW if a message is not taken in
+        within 30 seconds).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -162,7 +165,8 @@ class TournamentServiceServicer:
 
     def GetLeaderboard(self, request, context):
         """Everybody who has played a rated game on this server, best first. Rated are finished games that this server dealt, by its own seed, all of
-        whose seats were played by different participants, without substitutes. Names are not protected: who joins chooses one.
+        whose seats were played by different participants, without substitutes. Names are not protected: who joins chooses one. It may lack the
+        games of the last seconds. INVALID_ARGUMENT (KIND_REFUSED).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

@@ -34,7 +34,8 @@ class TournamentServiceStub:
     @_typing.overload
     def __new__(cls, channel: _aio.Channel) -> TournamentServiceAsyncStub: ...
     CreateTournament: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.CreateTournamentRequest, _tournament_service_pb2.CreateTournamentResponse]
-    """Makes a tournament. INVALID_ARGUMENT (RULE_SET_REFUSED, POLICY_REFUSED, SETTINGS_REFUSED, NAME_REFUSED) names the field at fault;
+    """Makes a tournament. INVALID_ARGUMENT (RULE_SET_REFUSED, POLICY_REFUSED, SETTINGS_REFUSED, NAME_REFUSED) names the field of the settings
+    at fault, `rules` or `policy` included; the message names the one within;
     RESOURCE_EXHAUSTED (TOO_MANY_TOURNAMENTS, DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
     """
     GetTournament: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.GetTournamentRequest, _tournament_service_pb2.GetTournamentResponse]
@@ -44,19 +45,21 @@ class TournamentServiceStub:
     JoinTournament: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.JoinTournamentRequest, _tournament_service_pb2.JoinTournamentResponse]
     """Joins and gives the ticket: attached to a Play or Watch stream it has the server seat the participant in each of its games.
     PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN,
-    NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN).
+    NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN);
+    UNAVAILABLE (SHUTTING_DOWN).
     """
     StartTournament: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.StartTournamentRequest, _tournament_service_pb2.StartTournamentResponse]
     """Begins it. PERMISSION_DENIED (OWNER_TOKEN_WRONG); FAILED_PRECONDITION (TOO_FEW_PARTICIPANTS, TOURNAMENT_STARTED); NOT_FOUND
-    (TOURNAMENT_UNKNOWN).
+    (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
     """
     CloseTournament: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.CloseTournamentRequest, _tournament_service_pb2.CloseTournamentResponse]
     """Closes it: games that are being played are aborted, what has been counted stays. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND
-    (TOURNAMENT_UNKNOWN).
+    (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
     """
     FollowTournament: _grpc.UnaryStreamMultiCallable[_tournament_service_pb2.FollowTournamentRequest, _tournament_service_pb2.FollowTournamentResponse]
     """The tournament now, then again whenever it has changed, at most about four times a second, until it is over; between, heartbeats without a
-    tournament. NOT_FOUND (TOURNAMENT_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_FOLLOWERS).
+    tournament. NOT_FOUND (TOURNAMENT_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_FOLLOWERS; FOLLOWER_TOO_SLOW if a message is not taken in
+    within 30 seconds).
     """
     GetTournamentResults: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.GetTournamentResultsRequest, _tournament_service_pb2.GetTournamentResultsResponse]
     """Standings, ratings, and how sure the order is; final once the tournament is over. NOT_FOUND (TOURNAMENT_UNKNOWN)."""
@@ -64,7 +67,8 @@ class TournamentServiceStub:
     """Games of a tournament, in order. NOT_FOUND (TOURNAMENT_UNKNOWN); INVALID_ARGUMENT (PAGE_TOKEN_REFUSED)."""
     GetLeaderboard: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.GetLeaderboardRequest, _tournament_service_pb2.GetLeaderboardResponse]
     """Everybody who has played a rated game on this server, best first. Rated are finished games that this server dealt, by its own seed, all of
-    whose seats were played by different participants, without substitutes. Names are not protected: who joins chooses one.
+    whose seats were played by different participants, without substitutes. Names are not protected: who joins chooses one. It may lack the
+    games of the last seconds. INVALID_ARGUMENT (KIND_REFUSED).
     """
 
 @_typing.type_check_only
@@ -73,7 +77,8 @@ class TournamentServiceAsyncStub(TournamentServiceStub):
 
     def __init__(self, channel: _aio.Channel) -> None: ...
     CreateTournament: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.CreateTournamentRequest, _tournament_service_pb2.CreateTournamentResponse]  # type: ignore[assignment]
-    """Makes a tournament. INVALID_ARGUMENT (RULE_SET_REFUSED, POLICY_REFUSED, SETTINGS_REFUSED, NAME_REFUSED) names the field at fault;
+    """Makes a tournament. INVALID_ARGUMENT (RULE_SET_REFUSED, POLICY_REFUSED, SETTINGS_REFUSED, NAME_REFUSED) names the field of the settings
+    at fault, `rules` or `policy` included; the message names the one within;
     RESOURCE_EXHAUSTED (TOO_MANY_TOURNAMENTS, DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
     """
     GetTournament: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.GetTournamentRequest, _tournament_service_pb2.GetTournamentResponse]  # type: ignore[assignment]
@@ -83,19 +88,21 @@ class TournamentServiceAsyncStub(TournamentServiceStub):
     JoinTournament: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.JoinTournamentRequest, _tournament_service_pb2.JoinTournamentResponse]  # type: ignore[assignment]
     """Joins and gives the ticket: attached to a Play or Watch stream it has the server seat the participant in each of its games.
     PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN,
-    NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN).
+    NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN);
+    UNAVAILABLE (SHUTTING_DOWN).
     """
     StartTournament: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.StartTournamentRequest, _tournament_service_pb2.StartTournamentResponse]  # type: ignore[assignment]
     """Begins it. PERMISSION_DENIED (OWNER_TOKEN_WRONG); FAILED_PRECONDITION (TOO_FEW_PARTICIPANTS, TOURNAMENT_STARTED); NOT_FOUND
-    (TOURNAMENT_UNKNOWN).
+    (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
     """
     CloseTournament: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.CloseTournamentRequest, _tournament_service_pb2.CloseTournamentResponse]  # type: ignore[assignment]
     """Closes it: games that are being played are aborted, what has been counted stays. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND
-    (TOURNAMENT_UNKNOWN).
+    (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
     """
     FollowTournament: _aio.UnaryStreamMultiCallable[_tournament_service_pb2.FollowTournamentRequest, _tournament_service_pb2.FollowTournamentResponse]  # type: ignore[assignment]
     """The tournament now, then again whenever it has changed, at most about four times a second, until it is over; between, heartbeats without a
-    tournament. NOT_FOUND (TOURNAMENT_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_FOLLOWERS).
+    tournament. NOT_FOUND (TOURNAMENT_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_FOLLOWERS; FOLLOWER_TOO_SLOW if a message is not taken in
+    within 30 seconds).
     """
     GetTournamentResults: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.GetTournamentResultsRequest, _tournament_service_pb2.GetTournamentResultsResponse]  # type: ignore[assignment]
     """Standings, ratings, and how sure the order is; final once the tournament is over. NOT_FOUND (TOURNAMENT_UNKNOWN)."""
@@ -103,7 +110,8 @@ class TournamentServiceAsyncStub(TournamentServiceStub):
     """Games of a tournament, in order. NOT_FOUND (TOURNAMENT_UNKNOWN); INVALID_ARGUMENT (PAGE_TOKEN_REFUSED)."""
     GetLeaderboard: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.GetLeaderboardRequest, _tournament_service_pb2.GetLeaderboardResponse]  # type: ignore[assignment]
     """Everybody who has played a rated game on this server, best first. Rated are finished games that this server dealt, by its own seed, all of
-    whose seats were played by different participants, without substitutes. Names are not protected: who joins chooses one.
+    whose seats were played by different participants, without substitutes. Names are not protected: who joins chooses one. It may lack the
+    games of the last seconds. INVALID_ARGUMENT (KIND_REFUSED).
     """
 
 class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
@@ -115,7 +123,8 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _tournament_service_pb2.CreateTournamentRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_tournament_service_pb2.CreateTournamentResponse, _abc.Awaitable[_tournament_service_pb2.CreateTournamentResponse]]:
-        """Makes a tournament. INVALID_ARGUMENT (RULE_SET_REFUSED, POLICY_REFUSED, SETTINGS_REFUSED, NAME_REFUSED) names the field at fault;
+        """Makes a tournament. INVALID_ARGUMENT (RULE_SET_REFUSED, POLICY_REFUSED, SETTINGS_REFUSED, NAME_REFUSED) names the field of the settings
+        at fault, `rules` or `policy` included; the message names the one within;
         RESOURCE_EXHAUSTED (TOO_MANY_TOURNAMENTS, DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
         """
 
@@ -143,7 +152,8 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
     ) -> _typing.Union[_tournament_service_pb2.JoinTournamentResponse, _abc.Awaitable[_tournament_service_pb2.JoinTournamentResponse]]:
         """Joins and gives the ticket: attached to a Play or Watch stream it has the server seat the participant in each of its games.
         PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN,
-        NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN).
+        NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN);
+        UNAVAILABLE (SHUTTING_DOWN).
         """
 
     @_abc_1.abstractmethod
@@ -153,7 +163,7 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_tournament_service_pb2.StartTournamentResponse, _abc.Awaitable[_tournament_service_pb2.StartTournamentResponse]]:
         """Begins it. PERMISSION_DENIED (OWNER_TOKEN_WRONG); FAILED_PRECONDITION (TOO_FEW_PARTICIPANTS, TOURNAMENT_STARTED); NOT_FOUND
-        (TOURNAMENT_UNKNOWN).
+        (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
         """
 
     @_abc_1.abstractmethod
@@ -163,7 +173,7 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_tournament_service_pb2.CloseTournamentResponse, _abc.Awaitable[_tournament_service_pb2.CloseTournamentResponse]]:
         """Closes it: games that are being played are aborted, what has been counted stays. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND
-        (TOURNAMENT_UNKNOWN).
+        (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
         """
 
     @_abc_1.abstractmethod
@@ -173,7 +183,8 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_abc.Iterator[_tournament_service_pb2.FollowTournamentResponse], _abc.AsyncIterator[_tournament_service_pb2.FollowTournamentResponse]]:
         """The tournament now, then again whenever it has changed, at most about four times a second, until it is over; between, heartbeats without a
-        tournament. NOT_FOUND (TOURNAMENT_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_FOLLOWERS).
+        tournament. NOT_FOUND (TOURNAMENT_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_FOLLOWERS; FOLLOWER_TOO_SLOW if a message is not taken in
+        within 30 seconds).
         """
 
     @_abc_1.abstractmethod
@@ -199,7 +210,8 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_tournament_service_pb2.GetLeaderboardResponse, _abc.Awaitable[_tournament_service_pb2.GetLeaderboardResponse]]:
         """Everybody who has played a rated game on this server, best first. Rated are finished games that this server dealt, by its own seed, all of
-        whose seats were played by different participants, without substitutes. Names are not protected: who joins chooses one.
+        whose seats were played by different participants, without substitutes. Names are not protected: who joins chooses one. It may lack the
+        games of the last seconds. INVALID_ARGUMENT (KIND_REFUSED).
         """
 
 def add_TournamentServiceServicer_to_server(servicer: TournamentServiceServicer, server: _typing.Union[_grpc.Server, _aio.Server]) -> None: ...

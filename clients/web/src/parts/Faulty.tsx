@@ -1,0 +1,19 @@
+// A page that cannot be shown: its name, what went wrong, and the way to the lobby.
+
+import { t } from "../i18n";
+import { ButtonLink } from "./Button";
+import { Notice } from "./Notice";
+import "./notice.css";
+
+/** The page in place of one that failed. */
+export function Faulty({ title, words }: { title: string; words: string }) {
+  return (
+    <section class="faulty">
+      <h1>{title}</h1>
+      <Notice kind="fault">{words}</Notice>
+      <p>
+        <ButtonLink href="/">{t().common.notFound.link}</ButtonLink>
+      </p>
+    </section>
+  );
+}

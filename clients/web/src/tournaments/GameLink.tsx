@@ -1,0 +1,59 @@
+// Where a game of a tournament can be seen: live while it is being played, as a replay once it counts.
+
+import { type Tournament, type TournamentGame, TournamentGameState } from "../gen/chefshat/v1/tournament_pb";
+import { t } from "../i18n";
+import { pathOf } from "../router";
+
+interface GameLinkProps {
+  tournament: Tournament;
+  game: TournamentGame;
+  /** Whether the pairing plays several games: then each link has its number. */
+  several: boolean;
+}
+
+/** A link to the game, or where it stands. */
+export function GameLink({ tournament, game, several }: GameLinkProps) {
+  const words = t().tournaments;
+  const number = several ? ` ${game.number}` : "";
+  const which = words.games.of(`${words.round(game.round)}, ${words.table(game.table)}`, game.number);
+  const heard = <span class="only-heard"> {which}</span>;
+  switch (game.state) {
+    case TournamentGameState.COUNTED:
+      return (
+        <a href={pathOf({ page: "replay", gameId: game.gameId })}>
+          {words.games.replay}
+          {number}
+          {heard}
+        </a>
+      );
+    case TournamentGameState.PLAYING:
+      return tournament.settings?.policy?.spectators && game.roomId !== "" ? (
+        <a href={pathOf({ page: "watch", roomId: game.roomId })}>
+          <span aria-hidden="true">▶ </span>
+          {words.games.watch}
+          {number}
+          {heard}
+        </a>
+      ) : (
+        <span>
+          <span aria-hidden="true">▶ </span>
+          {words.games.playing}
+          {number}
+        </span>
+      );
+    case TournamentGameState.VOID:
+      return (
+        <span class="soft">
+          × {words.games.void}
+          {number}
+        </span>
+      );
+    default:
+      return (
+        <span class="soft">
+          {words.games.due}
+          {number}
+        </span>
+      );
+  }
+}

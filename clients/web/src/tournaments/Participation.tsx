@@ -1,0 +1,137 @@
+// A participant's own part of a tournament's page: that it is there and what comes next, and its game once one has begun, in place of the
+// rest of the page.
+
+import type { ComponentChildren } from "preact";
+import { useEffect, useState } from "preact/hooks";
+import { wordsOf } from "../api/faults";
+import { TournamentState } from "../gen/chefshat/v1/tournament_pb";
+import { t } from "../i18n";
+import { announce } from "../parts/Announcer";
+import { Button } from "../parts/Button";
+import { Notice } from "../parts/Notice";
+import type { Acting } from "../table/acting";
+import { Seated } from "../table/Seated";
+import { gameOf, isEnded } from "./course";
+import type { Heard } from "./following";
+import { type Participation as Part, startParticipation } from "./participation";
+import type { HeldPlace } from "./place";
+
+interface ParticipationProps {
+  held: HeldPlace;
+  heard: Heard;
+  /** The page besides, drawn while no game is. */
+  children: ComponentChildren;
+}
+
+/** The page as a participant sees it. */
+export function Participation({ held, heard, children }: ParticipationProps) {
+  const ended = isEnded(heard.tournament);
+  const [part, setPart] = useState<Part | undefined>(undefined);
+  useEffect(() => {
+    if (ended) return;
+    const started = startParticipation(held.ticket);
+    setPart(started);
+    return () => started.stop();
+  }, [held.ticket, ended]);
+  const game = part?.game.value;
+  const [left, setLeft] = useState<Acting | undefined>(undefined);
+  useEffect(() => {
+    if (game) announce(t().tournaments.part.begins(placeWords(heard, game)));
+  }, [game]);
+  const banner = part && <Banner part={part} />;
+  if (game && game !== left) {
+    return (
+      <Seated
+        acting={game}
+        banner={
+          <>
+            {banner}
+            <GameBanner game={game} onBack={() => setLeft(game)} />
+          </>
+        }
+      />
+    );
+  }
+  return (
+    <>
+      {banner}
+      <OwnState held={held} heard={heard}>
+        {game && !isOverThere(game) && (
+          <Button look="main" onClick={() => setLeft(undefined)}>
+            {t().tournaments.part.toGame}
+          </Button>
+        )}
+      </OwnState>
+      {children}
+    </>
+  );
+}
+
+/** That one takes part, and what to wait for. */
+function OwnState(props: { held: HeldPlace; heard: Heard; children: ComponentChildren }) {
+  const words = t().tournaments.part;
+  const { state } = props.heard.tournament;
+  return (
+    <Notice kind="good">
+      <strong>{words.you(props.held.name)}</strong>{" "}
+      {state === TournamentState.OPEN
+        ? words.waitOpen
+        : state === TournamentState.PLAYING
+          ? words.waitNext
+          : words.over}{" "}
+      {props.children}
+    </Notice>
+  );
+}
+
+/** What is to be said about the connection, if anything. */
+function Banner({ part }: { part: Part }) {
+  const words = t().tournaments.part;
+  const { link, fault } = part.following.value;
+  const failed = link.value === "failed" && fault.value;
+  if (failed) return <Notice kind="fault">{wordsOf(failed)}</Notice>;
+  if (part.presence.value === "refused") return <Notice kind="fault">{t().faults.byReason.TICKET_UNKNOWN}</Notice>;
+  if (part.presence.value === "superseded") {
+    return (
+      <Notice kind="hint">
+        {words.superseded} <Button onClick={part.takeBack}>{words.takeBack}</Button>
+      </Notice>
+    );
+  }
+  return link.value === "lost" ? <Notice kind="fault">{words.lost}</Notice> : null;
+}
+
+/** Within a game: how to come back to the tournament, and to one's own seat after a substitute has played. */
+function GameBanner({ game, onBack }: { game: Acting; onBack: () => void }) {
+  const over = isOverThere(game);
+  const { substituted } = game.live.value;
+  if (over) {
+    return (
+      <Notice kind="good">
+        <Button look="main" onClick={onBack}>
+          {t().tournaments.part.back}
+        </Button>
+      </Notice>
+    );
+  }
+  if (!substituted) return null;
+  return (
+    <Notice kind="hint">
+      {t().table.link.substituted}{" "}
+      <Button look="main" onClick={game.resume}>
+        {t().table.link.resume}
+      </Button>
+    </Notice>
+  );
+}
+
+function isOverThere(game: Acting): boolean {
+  const { phase } = game.live.value.table;
+  return phase === "gameOver" || phase === "aborted";
+}
+
+function placeWords({ games }: Heard, game: Acting): string {
+  const { roomName, gameId } = game.live.peek().table;
+  const found = gameOf(games, gameId);
+  return found ? t().tournaments.part.place(found.round, found.table) : roomName;
+}

@@ -1,0 +1,107 @@
+// A round robin or Swiss tournament as rounds of tables: the newest round open, the others folded. Each line is a game.
+
+import {
+  type Tournament,
+  type TournamentGame,
+  type TournamentGameSeat,
+  TournamentGameState,
+} from "../gen/chefshat/v1/tournament_pb";
+import { t } from "../i18n";
+import { nameOf, type PlayedTable, playedRounds } from "./course";
+import { GameLink } from "./GameLink";
+import "./rounds.css";
+
+interface RoundsProps {
+  tournament: Tournament;
+  games: readonly TournamentGame[];
+  mine?: number | undefined;
+  /** For a wall: the newest round alone, without links. */
+  large?: boolean;
+}
+
+/** The rounds, newest first. */
+export function Rounds({ tournament, games, mine, large = false }: RoundsProps) {
+  const words = t().tournaments;
+  const rounds = playedRounds(games).reverse();
+  const newest = rounds.find(({ round }) => round === tournament.round) ?? rounds[0];
+  if (!newest) return <p class="soft">{words.games.none}</p>;
+  if (large) {
+    return (
+      <section class="rounds-one rounds-large">
+        <h2>{words.round(newest.round)}</h2>
+        <Tables {...{ tournament, mine, large }} tables={newest.tables} />
+      </section>
+    );
+  }
+  return (
+    <div class="rounds">
+      {rounds.map(({ round, tables }) => (
+        <details key={round} class="sheet rounds-one" open={round === newest.round}>
+          <summary>{words.round(round)}</summary>
+          <Tables {...{ tournament, tables, mine, large }} />
+        </details>
+      ))}
+    </div>
+  );
+}
+
+interface TablesProps {
+  tournament: Tournament;
+  tables: readonly PlayedTable[];
+  mine: number | undefined;
+  large: boolean;
+}
+
+function Tables({ tournament, tables, mine, large }: TablesProps) {
+  const words = t().tournaments;
+  return (
+    <ul class="rounds-tables">
+      {tables.map(({ table, games }) => (
+        <li key={table} class="rounds-table">
+          <h3>{words.table(table)}</h3>
+          <ul>
+            {games.map((game) => (
+              <li key={game.game} class="rounds-game">
+                <ol class="rounds-seats">
+                  {byPlace(game).map((seat) => (
+                    <Seat key={seat.participant} {...{ tournament, game, seat }} mine={seat.participant === mine} />
+                  ))}
+                </ol>
+                {!large && <GameLink tournament={tournament} game={game} several={games.length > 1} />}
+              </li>
+            ))}
+          </ul>
+        </li>
+      ))}
+    </ul>
+  );
+}
+
+interface SeatProps {
+  tournament: Tournament;
+  game: TournamentGame;
+  seat: TournamentGameSeat;
+  mine: boolean;
+}
+
+function Seat({ tournament, game, seat, mine }: SeatProps) {
+  const counted = game.state === TournamentGameState.COUNTED;
+  return (
+    <li class={`rounds-seat ${mine ? "rounds-mine" : ""} ${counted && seat.place === 1 ? "rounds-first" : ""}`}>
+      {counted && <span class="number soft">{t().common.place(seat.place)}</span>}
+      <span class="rounds-name">{nameOf(tournament, seat.participant)}</span>
+      {counted &&
+        (seat.forfeited ? (
+          <span class="soft small">{t().tournaments.games.forfeited}</span>
+        ) : (
+          <span class="number">+{seat.score}</span>
+        ))}
+    </li>
+  );
+}
+
+/** The seats of a game: by place once it counts, else in order. */
+function byPlace(game: TournamentGame): TournamentGameSeat[] {
+  if (game.state !== TournamentGameState.COUNTED) return [...game.seats];
+  return [...game.seats].sort((one, other) => one.place - other.place);
+}

@@ -1,0 +1,149 @@
+// The standings of a tournament, as a table; before the first game, who takes part. And how sure the order is, in words.
+
+import {
+  type OrderConfidence,
+  type Tournament,
+  TournamentFormat,
+  type TournamentStanding,
+} from "../gen/chefshat/v1/tournament_pb";
+import { t } from "../i18n";
+import { KindBadge } from "../parts/KindBadge";
+import { gradeOf, isEnded, nameOf, participantOf } from "./course";
+import { PersonName } from "./PersonName";
+import "./standings.css";
+
+interface StandingsProps {
+  tournament: Tournament;
+  standings: readonly TournamentStanding[];
+  /** The participant that this device plays for. */
+  mine?: number | undefined;
+  /** For a wall: without what cannot be read from afar. */
+  large?: boolean;
+}
+
+/** The table of standings. */
+export function Standings({ tournament, standings, mine, large = false }: StandingsProps) {
+  const words = t().tournaments.standings;
+  const knockout = tournament.settings?.format === TournamentFormat.KNOCKOUT;
+  const players = tournament.settings?.rules?.players ?? 4;
+  const caption = isEnded(tournament) ? words.final : words.title;
+  return (
+    <table class={`standings ${large ? "standings-large" : ""}`}>
+      <caption class="only-heard">{caption}</caption>
+      <thead>
+        <tr>
+          <th scope="col">{words.place}</th>
+          <th scope="col" class="standings-name">
+            {words.name}
+          </th>
+          {knockout && <th scope="col">{words.round}</th>}
+          <th scope="col" class="standings-minor">
+            {words.games}
+          </th>
+          <th scope="col" title={words.scoreHint}>
+            {words.score}
+          </th>
+          <th scope="col" class="standings-minor">
+            {words.points}
+          </th>
+          {!large && (
+            <>
+              <th scope="col" class="standings-minor">
+                {words.places}
+              </th>
+              <th scope="col" class="standings-minor" title={words.ratingHint}>
+                {words.rating}
+              </th>
+            </>
+          )}
+        </tr>
+      </thead>
+      <tbody>
+        {standings.map((standing) => (
+          <tr key={standing.participant} class={standing.participant === mine ? "standings-mine" : ""}>
+            <td class="number standings-place">{standing.place}</td>
+            <th scope="row" class="standings-name">
+              <Who tournament={tournament} standing={standing} large={large} />
+            </th>
+            {knockout && <td class="number">{standing.lastRound || "–"}</td>}
+            <td class="number standings-minor">{standing.games}</td>
+            <td class="number">
+              <b>{String(standing.score)}</b>
+            </td>
+            <td class="number standings-minor">{String(standing.points)}</td>
+            {!large && (
+              <>
+                <td class="number standings-minor">
+                  <Places places={standing.places} count={players} />
+                </td>
+                <td class="number standings-minor">{ratingWords(standing)}</td>
+              </>
+            )}
+          </tr>
+        ))}
+      </tbody>
+    </table>
+  );
+}
+
+function Who(props: { tournament: Tournament; standing: TournamentStanding; large: boolean }) {
+  const { tournament, standing, large } = props;
+  const words = t().tournaments.standings;
+  const participant = participantOf(tournament, standing.participant);
+  if (!participant) return null;
+  const remarks = [
+    participant.filler && words.filler,
+    standing.forfeited > 0 && words.forfeited(standing.forfeited),
+    standing.byes > 0 && words.byes(standing.byes),
+    !participant.connected && !isEnded(tournament) && words.away,
+  ].filter(Boolean);
+  return (
+    <>
+      <PersonName name={nameOf(tournament, standing.participant)} builtIn={participant.builtInAgent} linked={!large} />{" "}
+      <KindBadge kind={participant.kind} builtIn={participant.builtInAgent} />
+      {!large && remarks.length > 0 && <span class="soft small standings-remarks">{remarks.join(" · ")}</span>}
+    </>
+  );
+}
+
+/** How often each place was taken. */
+function Places({ places, count }: { places: readonly number[]; count: number }) {
+  const all = Array.from({ length: count }, (_, index) => places[index] ?? 0);
+  return (
+    <>
+      <span aria-hidden="true">{all.join(" · ")}</span>
+      <span class="only-heard">{t().tournaments.standings.placesWords(all)}</span>
+    </>
+  );
+}
+
+function ratingWords({ rating }: TournamentStanding): string {
+  return rating && rating.games > 0 ? `${rating.mean.toFixed(1)} ± ${(1.96 * rating.deviation).toFixed(1)}` : "–";
+}
+
+/** For each two who follow one another, how sure their order is. */
+export function Confidence(props: { tournament: Tournament; confidence: readonly OrderConfidence[] }) {
+  const { tournament, confidence } = props;
+  const words = t().tournaments.confidence;
+  if (confidence.length === 0) return null;
+  return (
+    <details class="sheet confidence">
+      <summary>{words.title}</summary>
+      <p class="soft">{words.text}</p>
+      <ul>
+        {confidence.map((pair) => (
+          <li key={pair.upper}>
+            <span>{words.pair(nameOf(tournament, pair.upper), nameOf(tournament, pair.lower))}</span>
+            <span>
+              <b>{words.grades[gradeOf(pair.confidence)]}</b>{" "}
+              <span class="soft number">
+                {words.percent(Math.floor(100 * pair.confidence))}
+                {pair.moreGames !== undefined && ` · ${words.more(Number(pair.moreGames))}`}
+              </span>
+            </span>
+          </li>
+        ))}
+      </ul>
+    </details>
+  );
+}

@@ -1,0 +1,113 @@
+// Playing in a tournament: one stream for the participant, on which the server seats it in each of its games. Each seat becomes a table to
+// act at; acting itself is in table/acting.ts, what is drawn in Participation.tsx.
+
+import { batch, type Signal, signal } from "@preact/signals";
+import { CALL_LIMIT_MS, playApi, roomApi } from "../api/client";
+import { type Following, follow } from "../api/follow";
+import { type Attached, DetachReason, type SeatUpdate } from "../gen/chefshat/v1/play_service_pb";
+import { type Acting, startActing } from "../table/acting";
+import { tableFromRoom } from "../table/model/state";
+
+/** Seats that the server attaches by itself are numbered from here. */
+const FIRST_SEATED = 2 ** 31;
+
+/** How long to wait after a room could not be asked for. */
+const RETRY_MS = 1_000;
+
+/** How the participant is attached. */
+export type Presence = "coming" | "here" | "superseded" | "over" | "refused";
+
+export interface Participation {
+  readonly presence: Signal<Presence>;
+  readonly following: Signal<Following>;
+  /** The game that was begun last; undefined before the first. */
+  readonly game: Signal<Acting | undefined>;
+  /** Takes the place back from another page that has taken it. */
+  takeBack(): void;
+  stop(): void;
+}
+
+/** What is heard of a seat before its room is known. */
+interface Seated {
+  acting: Acting | undefined;
+  waiting: SeatUpdate[];
+}
+
+/** Takes part with a participant's ticket. */
+export function startParticipation(ticket: string): Participation {
+  const presence = signal<Presence>("coming");
+  const game = signal<Acting | undefined>(undefined);
+  let stopped = false;
+  /** By room: after a lost connection a seat has another handle, but it is the same table. */
+  const rooms = new Map<string, Seated>();
+
+  const seat = (attached: Attached): Seated => {
+    const known = rooms.get(attached.roomId);
+    if (known) return known;
+    const seated: Seated = { acting: undefined, waiting: [] };
+    rooms.set(attached.roomId, seated);
+    const load = async () => {
+      const { room } = await roomApi.getRoom({ roomId: attached.roomId }, { timeoutMs: CALL_LIMIT_MS });
+      if (!room) return;
+      const acting = startActing(attached.ticket, tableFromRoom(room), attached.seat);
+      batch(() => {
+        acting.hear(seated.waiting);
+        game.value = acting;
+      });
+      seated.acting = acting;
+      seated.waiting = [];
+    };
+    // Without its room a table cannot be drawn: the stream is opened again, and with it the seat is announced again.
+    load().catch(() => {
+      rooms.delete(attached.roomId);
+      setTimeout(() => !stopped && reattach(), RETRY_MS);
+    });
+    return seated;
+  };
+
+  const attach = () => {
+    const handles = new Map<number, Seated>();
+    const hear = (update: SeatUpdate) => {
+      if (update.handle < FIRST_SEATED) {
+        presence.value = presenceAfter(update, presence.peek());
+        return;
+      }
+      if (update.update.case === "attached") handles.set(update.handle, seat(update.update.value));
+      const seated = handles.get(update.handle);
+      if (seated?.acting) seated.acting.hear([update]);
+      else seated?.waiting.push(update);
+    };
+    return follow(
+      (abort) => playApi.watch({ seats: [{ ticket }] }, { signal: abort }),
+      ({ updates }) => {
+        batch(() => updates.forEach(hear));
+        return presence.peek() === "coming" || presence.peek() === "here";
+      },
+    );
+  };
+  const following = signal(attach());
+
+  const reattach = () => {
+    following.peek().stop();
+    presence.value = "coming";
+    following.value = attach();
+  };
+  const stop = () => {
+    stopped = true;
+    following.peek().stop();
+  };
+  return { presence, following, game, takeBack: reattach, stop };
+}
+
+function presenceAfter({ update }: SeatUpdate, before: Presence): Presence {
+  switch (update.case) {
+    case "entered":
+      return "here";
+    case "refused":
+      return "refused";
+    case "detached":
+      return update.value.reason === DetachReason.TOURNAMENT_OVER ? "over" : "superseded";
+    default:
+      return before;
+  }
+}

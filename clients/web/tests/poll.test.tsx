@@ -1,0 +1,97 @@
+// Asking again and again: at once, at the interval, more slowly after faults, not while hidden, and never after the page has gone.
+
+import { Code, ConnectError } from "@connectrpc/connect";
+import { render } from "preact";
+import { act } from "preact/test-utils";
+import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { type Polled, usePolled } from "../src/api/poll";
+
+const EVERY_MS = 1000;
+let root: HTMLElement;
+let seen: Polled<number> | undefined;
+
+beforeEach(() => {
+  vi.useFakeTimers();
+  root = document.createElement("div");
+});
+
+afterEach(async () => {
+  await act(() => render(null, root));
+  vi.useRealTimers();
+  vi.restoreAllMocks();
+});
+
+async function shown(ask: (signal: AbortSignal) => Promise<number>, key = "one") {
+  function Page() {
+    seen = usePolled(ask, EVERY_MS, key);
+    return null;
+  }
+  await act(() => render(<Page />, root));
+}
+
+async function pass(ms: number) {
+  await act(async () => {
+    await vi.advanceTimersByTimeAsync(ms);
+  });
+}
+
+test("the newest answer is shown, asked for at once and at the interval", async () => {
+  let answer = 0;
+  await shown(async () => ++answer);
+  await pass(0);
+  expect(seen?.value).toBe(1);
+  await pass(EVERY_MS - 1);
+  expect(seen?.value).toBe(1);
+  await pass(1);
+  expect(seen?.value).toBe(2);
+});
+
+test("a fault keeps what was known and asks more slowly until it has passed", async () => {
+  let asked = 0;
+  await shown(async () => {
+    asked += 1;
+    if (asked === 2) throw new ConnectError("away", Code.Unavailable);
+    return asked;
+  });
+  await pass(EVERY_MS);
+  expect(seen?.value).toBe(1);
+  expect(seen?.fault?.code).toBe(Code.Unavailable);
+  await pass(EVERY_MS);
+  expect(asked).toBe(2);
+  await pass(EVERY_MS);
+  expect(seen).toEqual({ value: 3, fault: null });
+});
+
+test("nothing is asked while the page is hidden; when it is seen again, at once", async () => {
+  const hidden = vi.spyOn(document, "hidden", "get").mockReturnValue(true);
+  let asked = 0;
+  await shown(async () => ++asked);
+  await pass(10 * EVERY_MS);
+  expect(asked).toBe(0);
+  hidden.mockReturnValue(false);
+  document.dispatchEvent(new Event("visibilitychange"));
+  await pass(0);
+  expect(seen?.value).toBe(1);
+});
+
+test("who looks away and back while an answer is awaited does not ask twice", async () => {
+  let asked = 0;
+  await shown(() => new Promise(() => (asked += 1)));
+  document.dispatchEvent(new Event("visibilitychange"));
+  await pass(10 * EVERY_MS);
+  expect(asked).toBe(1);
+});
+
+test("a page that has gone asks no more, and what was under way is called off", async () => {
+  let signal: AbortSignal | undefined;
+  let asked = 0;
+  await shown(async (given) => {
+    signal = given;
+    return ++asked;
+  });
+  await pass(0);
+  await act(() => render(null, root));
+  await pass(10 * EVERY_MS);
+  expect(asked).toBe(1);
+  expect(signal?.aborted).toBe(true);
+});

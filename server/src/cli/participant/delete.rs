@@ -1,0 +1,146 @@
+//! `chefshat participant delete`: the database first, then the files of records. A run that was interrupted is made good by another.
+
+use std::io::{self, BufRead as _, IsTerminal as _, Write as _};
+use std::path::Path;
+use std::process::ExitCode;
+
+use chefshat_records::jsonl;
+use chefshat_records::pseudonym::{Pseudonym, TakenOut};
+use clap::Args;
+use serde_json::json;
+
+use super::super::numbers::counted;
+use super::super::{CommandError, say};
+use super::{Who, read, records_with};
+use crate::store::Forgetting;
+
+const HELP: &str = "\
+The name gives way to a pseudonym, \"deleted participant\" and six digits, in the database and in records/*.jsonl; expressions of the \
+participant and annotations of its decisions (times measured at its side among them) are dropped. What was played stays, so that the \
+games of the others can still be replayed and checked. Copies elsewhere (datasets, backups, other servers) are not touched, nor is what \
+others wrote in theirs. The server must be stopped; while a game or tournament with the name is not over, nothing is changed.
+
+This cannot be undone. `chefshat participant export` first, if the data are still wanted.
+
+Examples:
+  chefshat participant delete P07 --data-dir ./chefshat-data
+  chefshat participant delete \"Rosa L.\" --yes --json";
+
+/// Random bytes of a pseudonym.
+const PSEUDONYM_BYTES: usize = 3;
+
+/// Take a participant out of everything that is kept: the name gives way to a pseudonym.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub(super) struct Delete {
+    #[command(flatten)]
+    who: Who,
+    /// Do not ask.
+    #[arg(long)]
+    yes: bool,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What came of the files.
+#[derive(Default)]
+struct Files {
+    changed: u64,
+    taken_out: TakenOut,
+}
+
+impl Delete {
+    pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
+        let data_dir = self.who.data_dir()?;
+        let mut database = Forgetting::open(&data_dir).await?;
+        self.ask()?;
+        let who = Pseudonym {
+            name: self.who.name.clone(),
+            pseudonym: format!(
+                "deleted participant {}",
+                hex::encode(rand::random::<[u8; PSEUDONYM_BYTES]>())
+            ),
+        };
+        let forgotten = database.forget(&who).await?;
+        let files = rewrite(&data_dir, &who).map_err(|error| {
+            format!("{error}; not all records were rewritten: run the command again")
+        })?;
+        database.finish(&forgotten).await?;
+        let taken_out = TakenOut {
+            names: forgotten.taken_out.names.max(files.taken_out.names),
+            expressions: (forgotten.taken_out.expressions).max(files.taken_out.expressions),
+            annotations: (forgotten.taken_out.annotations).max(files.taken_out.annotations),
+        };
+        let games = forgotten.games.max(files.changed);
+        if self.json {
+            say(json!({
+                "pseudonym": who.pseudonym,
+                "games": games,
+                "tournaments": forgotten.tournaments,
+                "files": files.changed,
+                "expressions": taken_out.expressions,
+                "annotations": taken_out.annotations,
+            }))?;
+        } else if games + forgotten.tournaments == 0 {
+            anstream::eprintln!("nothing is kept of {:?}", who.name);
+        } else {
+            say(format_args!(
+                "{:?} is now {:?} in {}, {} and {}; dropped: {}, {}",
+                who.name,
+                who.pseudonym,
+                counted(games, "game"),
+                counted(forgotten.tournaments, "tournament"),
+                counted(files.changed, "record file"),
+                counted(taken_out.expressions, "expression"),
+                counted(taken_out.annotations, "annotation"),
+            ))?;
+        }
+        let found = games + forgotten.tournaments > 0;
+        Ok(if found {
+            ExitCode::SUCCESS
+        } else {
+            ExitCode::FAILURE
+        })
+    }
+
+    /// Asks whether this is meant.
+    fn ask(&self) -> Result<(), CommandError> {
+        if self.yes {
+            return Ok(());
+        }
+        if !io::stdin().is_terminal() {
+            return Err("nothing was changed: say --yes if this is meant".into());
+        }
+        let name = &self.who.name;
+        let mut out = anstream::stderr();
+        write!(
+            out,
+            "This takes {name:?} out of everything kept here and cannot be undone. Type the name to go on: "
+        )?;
+        out.flush()?;
+        let mut answer = String::new();
+        io::stdin().lock().read_line(&mut answer)?;
+        if answer.trim_end_matches(['\r', '\n']) == name {
+            Ok(())
+        } else {
+            Err("nothing was changed".into())
+        }
+    }
+}
+
+/// Rewrites the files of the records in which the name stands, each whole or not at all.
+fn rewrite(data_dir: &Path, who: &Pseudonym) -> Result<Files, CommandError> {
+    let mut files = Files::default();
+    for path in records_with(data_dir, &who.name)? {
+        let mut lines = read(&path)?;
+        let taken_out = who.take_out(&mut lines);
+        if taken_out == TakenOut::default() {
+            continue;
+        }
+        jsonl::write(&path, &lines)?;
+        files.changed += 1;
+        files.taken_out += taken_out;
+    }
+    Ok(files)
+}

@@ -1,0 +1,287 @@
+//! The screen of `chefshat play`: the table, below it the person's hand, what is asked of it, and the keys.
+
+use chefshat_client::v1;
+use ratatui::Frame;
+use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::text::{Line, Span};
+use ratatui::widgets::Paragraph;
+
+use super::super::terminal::cards::{self, Shown};
+use super::super::terminal::look::{Look, ingredient};
+use super::super::terminal::table::End;
+use super::super::terminal::view::{boxed, draw as draw_table, end_lines, popup};
+use super::app::{App, Dialog, EXPRESSIONS, Link, Open};
+
+/// Rows below the table: the hand (7), what is asked (2), the keys (1).
+const ROWS: u16 = 10;
+/// Columns of the bar of the clock.
+const BAR: u64 = 10;
+/// Below this the clock warns.
+const SHORT_MS: u64 = 5_000;
+
+const KEYS: &str = " ←→ card  ↑↓ how many  j joker  Enter play  p pass  e feeling  ? help  q leave";
+
+const HELP: [&str; 15] = [
+    "You want to be the first without cards. A play is cards of one",
+    "face, jokers with them or not. It must be of a lower face than",
+    "the one on the board, and of no fewer cards. Who passes is out",
+    "until the next pizza.",
+    "",
+    "← →       to another card     Tab   to the next that can be used",
+    "1 … 9, 0  to the first, second, … tenth card of the hand",
+    "↑ ↓       more or fewer of it   j   jokers with it",
+    "Enter     play (or give) what is picked",
+    "p         pass",
+    "d, n      declare a special action, or do not",
+    "e         show a feeling to the table",
+    "r         play on yourself after a substitute has played for you",
+    "q         leave; a substitute will play for you",
+    "",
+];
+
+/// Draws everything.
+pub(super) fn draw(frame: &mut Frame<'_>, look: Look, app: &App, now_ms: u64) {
+    let status = match &app.link {
+        Link::Connecting => "○ connecting",
+        Link::Live => "● connected",
+        Link::Lost(_) => "✕ connection lost",
+        Link::Over(_) => "○ over",
+    };
+    let Some(area) = draw_table(frame, look, &app.table, app.me, status, ROWS) else {
+        return;
+    };
+    let [hand, asked, keys] = Layout::vertical([
+        Constraint::Length(ROWS - 3),
+        Constraint::Length(2),
+        Constraint::Length(1),
+    ])
+    .areas(area);
+    draw_hand(frame, look, app, hand);
+    draw_asked(frame, look, app, now_ms, asked);
+    frame.render_widget(Paragraph::new(KEYS).style(look.dim()), keys);
+    draw_over(frame, look, app);
+}
+
+fn draw_hand(frame: &mut Frame<'_>, look: Look, app: &App, area: Rect) {
+    let faces = app.table.faces();
+    let place = app.me.and_then(|me| app.table.seat(me));
+    let open = app
+        .open
+        .as_ref()
+        .filter(|open| open.decision.kind() != v1::DecisionKind::SpecialAction);
+    let shown: Vec<Shown> = match (open, place.and_then(|place| place.hand.as_ref())) {
+        (Some(open), _) => shown(open),
+        (None, Some(hand)) => hand
+            .stacks()
+            .into_iter()
+            .map(|stack| Shown {
+                stack,
+                active: app.open.is_some(),
+                picked: None,
+                along: 0,
+            })
+            .collect(),
+        (None, None) => Vec::new(),
+    };
+    let count: u32 = shown.iter().map(|it| u32::from(it.stack.count)).sum();
+    let title = match count {
+        0 => " your hand ".to_owned(),
+        count => format!(
+            " your hand · {} ",
+            super::super::numbers::counted(count.into(), "card")
+        ),
+    };
+    let block = boxed(look, title);
+    let inner = block.inner(area);
+    frame.render_widget(block, area);
+    if shown.is_empty() {
+        let words = match place.and_then(|place| place.finished) {
+            Some(_) => "You are out of cards.",
+            None => "No cards yet.",
+        };
+        let lines = vec![Line::default(), Line::from(format!("  {words}"))];
+        frame.render_widget(Paragraph::new(lines), inner);
+        return;
+    }
+    let columns = usize::from(inner.width).saturating_sub(1);
+    let mut lines = cards::hand(look, faces, &shown, columns);
+    for line in &mut lines {
+        line.spans.insert(0, Span::raw(" "));
+    }
+    frame.render_widget(Paragraph::new(lines), inner);
+}
+
+/// The stacks of an open decision, with what is picked.
+fn shown(open: &Open) -> Vec<Shown> {
+    let decision = &open.decision;
+    let stacks = decision.stacks.iter().enumerate();
+    stacks
+        .map(|(at, stack)| Shown {
+            stack: *stack,
+            active: decision.is_active(at),
+            picked: (at == decision.at).then_some(decision.quantity),
+            along: if stack.joker && at != decision.at {
+                decision.jokers
+            } else {
+                0
+            },
+        })
+        .collect()
+}
+
+fn draw_asked(frame: &mut Frame<'_>, look: Look, app: &App, now_ms: u64, area: Rect) {
+    let mut first = vec![Span::styled(format!(" {}", asked(app)), look.bold())];
+    if let (Some((time, bank)), Some(open)) = (app.clock(now_ms), &app.open) {
+        let line: usize = first.iter().map(Span::width).sum();
+        let clock = clock(open, time, bank);
+        let space = usize::from(area.width).saturating_sub(line + Span::raw(&*clock).width() + 1);
+        first.push(Span::raw(" ".repeat(space)));
+        let style = if time < SHORT_MS {
+            look.warning()
+        } else {
+            look.bold()
+        };
+        first.push(Span::styled(clock, style));
+    }
+    let second = match &app.open {
+        _ if !app.notice.is_empty() => Span::styled(format!(" ! {}", app.notice), look.warning()),
+        Some(open) if !open.sent => match open.decision.objection() {
+            Some(why) => Span::styled(format!(" ✕ {why}"), look.dim()),
+            None => Span::raw(hint(open, app.table.faces())),
+        },
+        _ => Span::raw(""),
+    };
+    frame.render_widget(
+        Paragraph::new(vec![Line::from(first), Line::from(second)]),
+        area,
+    );
+}
+
+/// What the person is asked, or who is.
+fn asked(app: &App) -> String {
+    if let Link::Lost(why) = &app.link {
+        return format!("The connection is lost and being made again: {why}");
+    }
+    if app.substituted() {
+        return "A substitute plays for you. Press r to play on yourself.".to_owned();
+    }
+    let Some(open) = &app.open else {
+        return match app.table.turn {
+            _ if !app.table.started => "The game has not begun.".to_owned(),
+            Some(seat) if app.me != Some(seat) => format!("It is {}'s turn.", app.table.name(seat)),
+            _ => "Wait.".to_owned(),
+        };
+    };
+    let decision = &open.decision;
+    if open.sent {
+        return "Sent.".to_owned();
+    }
+    match decision.kind() {
+        v1::DecisionKind::SpecialAction => {
+            let dishwasher = app.me.and_then(|me| app.table.seat(me));
+            let dishwasher = dishwasher.is_some_and(|it| it.role == v1::Role::Dishwasher);
+            let what = if dishwasher {
+                "Food Fight: all roles turn around"
+            } else {
+                "Dinner is Served: nobody exchanges cards"
+            };
+            let [declare, decline] = if decision.at == 0 {
+                ["[d declare]", " n decline "]
+            } else {
+                [" d declare ", "[n decline]"]
+            };
+            format!("Two jokers! {what}?  {declare} {decline}")
+        }
+        v1::DecisionKind::Exchange => format!("Give a card to your partner: {}?", decision.words()),
+        _ if !decision.can_play() => "Your turn: nothing can be played, pass with p.".to_owned(),
+        _ => format!("Your turn: {}?", decision.words()),
+    }
+}
+
+/// What Enter would do.
+fn hint(open: &Open, faces: u32) -> String {
+    let decision = &open.decision;
+    if decision.kind() == v1::DecisionKind::SpecialAction {
+        return " ← → chooses, Enter decides.".to_owned();
+    }
+    let name = decision.stacks.get(decision.at);
+    let name = name.and_then(|stack| ingredient(stack.face, faces));
+    let name = name.map_or_else(String::new, |name| format!(" ({name})"));
+    match decision.pass_objection() {
+        None => format!(" Enter: {}{name}. p: pass.", decision.words()),
+        Some(_) => format!(" Enter: {}{name}.", decision.words()),
+    }
+}
+
+/// The clock: a bar, the time for this decision, the bank.
+fn clock(open: &Open, time_ms: u64, bank_ms: u64) -> String {
+    let full = u64::from(open.decision.request.time_left_ms).max(1);
+    let filled = (time_ms * BAR).div_ceil(full).min(BAR);
+    let bar: String = (0..BAR)
+        .map(|cell| if cell < filled { '█' } else { '░' })
+        .collect();
+    format!("{bar} {} · bank {}", time(time_ms), time(bank_ms))
+}
+
+/// `1:05` or `9 s`.
+fn time(ms: u64) -> String {
+    let seconds = ms.div_ceil(1000);
+    if seconds < 60 {
+        format!("{seconds} s")
+    } else {
+        format!("{}:{:02}", seconds / 60, seconds % 60)
+    }
+}
+
+/// What stands over the table: the end, or a dialog.
+fn draw_over(frame: &mut Frame<'_>, look: Look, app: &App) {
+    let plain = |words: &str| Line::from(words.to_owned());
+    match (&app.table.end, &app.link, app.dialog) {
+        (Some(end), ..) => {
+            let mut lines = vec![plain("")];
+            lines.extend(end_lines(look, &app.table, end));
+            lines.push(plain(""));
+            lines.push(plain(&format!("game {}", app.table.game_id)));
+            lines.push(plain(""));
+            lines.push(Line::from(Span::styled("Enter ends", look.dim())));
+            let title = match end {
+                End::Finished(_) => "the game is over",
+                End::Aborted(_) => "no result",
+            };
+            popup(frame, look, title, lines);
+        }
+        (None, Link::Over(why), _) => {
+            let why = why
+                .clone()
+                .unwrap_or_else(|| "the seat has left the table".to_owned());
+            popup(
+                frame,
+                look,
+                "the seat is lost",
+                vec![plain(&why), plain(""), plain("Enter ends")],
+            );
+        }
+        (None, _, Some(Dialog::Help)) => {
+            let mut lines: Vec<Line<'_>> = HELP.iter().map(|line| plain(line)).collect();
+            lines.push(Line::from(Span::styled("any key goes back", look.dim())));
+            popup(frame, look, "help", lines);
+        }
+        (None, _, Some(Dialog::Leave)) => popup(
+            frame,
+            look,
+            "leave",
+            vec![
+                plain("Leave the table? A substitute will play for you."),
+                plain(""),
+                plain("y leaves, any other key stays"),
+            ],
+        ),
+        (None, _, Some(Dialog::Express)) => {
+            let lines = (1..)
+                .zip(EXPRESSIONS)
+                .map(|(key, (label, ..))| plain(&format!("{key}  {label}")));
+            popup(frame, look, "show the table", lines.collect());
+        }
+        (None, _, None) => {}
+    }
+}

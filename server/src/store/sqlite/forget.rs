@@ -1,0 +1,337 @@
+//! Taking a participant out of the database: one transaction over everything in which the name stands. Journals are rewritten row by row, so
+//! that every game still folds. The records' files are not known here.
+
+use std::path::Path;
+
+use chefshat_arena::tournament::Change as TournamentChange;
+use chefshat_proto::v1;
+use chefshat_records::convert::seat_number;
+use chefshat_records::pseudonym::{OwnSeats, Pseudonym, TakenOut};
+use prost::Message as _;
+use sqlx::sqlite::{SqliteConnection, SqliteRow};
+use sqlx::{Connection as _, Row as _};
+
+use super::errors::explain;
+use super::form::{self, Unreadable};
+use super::open::{self, Opened};
+use crate::store::StoreError;
+use crate::store::journal::{Change, Entry};
+use crate::store::tournaments::TournamentEntry;
+
+/// The database of a data directory while somebody is taken out of it: no server has the directory meanwhile.
+pub struct Forgetting(Opened);
+
+/// What was taken out of the database.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Forgotten {
+    /// Games in which the name stood.
+    pub games: u64,
+    /// Tournaments in which it stood.
+    pub tournaments: u64,
+    /// What was changed in the games.
+    pub taken_out: TakenOut,
+    /// Numbers of the games whose record had been written to a file, which is to be written anew.
+    filed: Vec<i64>,
+}
+
+/// Why somebody cannot be taken out; nothing was changed.
+#[derive(Debug, thiserror::Error)]
+pub enum ForgetError {
+    /// A game with the name goes on.
+    #[error(
+        "{0:?} has a seat in a game that is not over; nothing was changed: start the server, let the game end or close its room, stop the server"
+    )]
+    GameGoesOn(String),
+    /// A tournament with the name goes on.
+    #[error(
+        "{0:?} takes part in a tournament that is not over; nothing was changed: start the server, let it end or close it, stop the server"
+    )]
+    TournamentGoesOn(String),
+    /// Something that was kept cannot be read.
+    #[error("{what} cannot be read: {problem}; nothing was changed")]
+    Unreadable {
+        /// What.
+        what: String,
+        /// Why.
+        problem: String,
+    },
+    /// The database failed.
+    #[error("{0}")]
+    Store(#[from] StoreError),
+}
+
+impl From<sqlx::Error> for ForgetError {
+    fn from(error: sqlx::Error) -> Self {
+        Self::Store(StoreError(explain(&error)))
+    }
+}
+
+impl Forgetting {
+    /// Opens the database of a data directory.
+    ///
+    /// # Errors
+    /// It cannot be used, or a server uses it.
+    pub async fn open(data_dir: &Path) -> Result<Self, open::OpenError> {
+        open::open(data_dir).await.map(Self)
+    }
+
+    /// Takes somebody out. The records of the games stand as not yet written: after a crash the server writes them when it next starts.
+    ///
+    /// # Errors
+    /// See [`ForgetError`].
+    pub async fn forget(&mut self, who: &Pseudonym) -> Result<Forgotten, ForgetError> {
+        let mut transaction = self.0.writer.begin().await?;
+        let mut forgotten = Forgotten::default();
+        let games = sqlx::query(
+            "SELECT number, state, last_row, header, summary, record, filed FROM games LEFT JOIN added_records ON game = number
+             WHERE number IN (SELECT game FROM participants WHERE name = $1
+                              UNION SELECT game FROM journal WHERE instr(entries, CAST($1 AS BLOB)) > 0
+                              UNION SELECT game FROM added_records WHERE instr(record, CAST($1 AS BLOB)) > 0)
+             ORDER BY number",
+        )
+        .bind(who.name.as_str())
+        .fetch_all(&mut *transaction)
+        .await?;
+        for game in &games {
+            let taken_out = forget_game(&mut transaction, game, who).await?;
+            if taken_out != TakenOut::default() {
+                forgotten.games += 1;
+                forgotten.taken_out += taken_out;
+                if game.get::<bool, _>("filed") {
+                    forgotten.filed.push(game.get("number"));
+                }
+            }
+        }
+        forgotten.tournaments = forget_tournaments(&mut transaction, who).await?;
+        transaction.commit().await?;
+        Ok(forgotten)
+    }
+
+    /// Notes that the records have been written anew, and writes the database anew, so that nothing of what was there before is left in parts
+    /// of it that are not used any more, or in the log of writes. This takes as much space on the disk as the database has.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn finish(mut self, forgotten: &Forgotten) -> Result<(), ForgetError> {
+        for number in &forgotten.filed {
+            sqlx::query("UPDATE games SET filed = 1 WHERE number = $1")
+                .bind(*number)
+                .execute(&mut self.0.writer)
+                .await?;
+        }
+        self.0.readers.close().await;
+        for tidying in ["VACUUM", "PRAGMA wal_checkpoint(TRUNCATE)"] {
+            sqlx::query(tidying).execute(&mut self.0.writer).await?;
+        }
+        Ok(self.0.writer.close().await?)
+    }
+}
+
+/// Takes somebody out of one game.
+async fn forget_game(
+    connection: &mut SqliteConnection,
+    game: &SqliteRow,
+    who: &Pseudonym,
+) -> Result<TakenOut, ForgetError> {
+    let number: i64 = game.get("number");
+    let unreadable = |problem: Unreadable| ForgetError::Unreadable {
+        what: format!("game number {number}"),
+        problem: problem.to_string(),
+    };
+    let mut taken_out = forget_journal(connection, game, who).await?;
+    if let Some(record) = game.get::<Option<Vec<u8>>, _>("record") {
+        let mut lines = form::lines_from_bytes(&record).map_err(unreadable)?;
+        taken_out += who.take_out(&mut lines);
+        sqlx::query("UPDATE added_records SET record = $2 WHERE game = $1")
+            .bind(number)
+            .bind(form::lines_to_bytes(&lines))
+            .execute(&mut *connection)
+            .await?;
+    }
+    if taken_out == TakenOut::default() {
+        return Ok(taken_out);
+    }
+    if game.get::<i64, _>("state") == 0 {
+        return Err(ForgetError::GameGoesOn(who.name.clone()));
+    }
+    if let Some(header) = game.get::<Option<Vec<u8>>, _>("header") {
+        let mut header = form::header_from_bytes(&header).map_err(unreadable)?;
+        taken_out.names += who.in_text(&mut header.name);
+        sqlx::query("UPDATE games SET header = $2 WHERE number = $1")
+            .bind(number)
+            .bind(form::header_to_bytes(&header))
+            .execute(&mut *connection)
+            .await?;
+    }
+    if let Some(summary) = game.get::<Option<Vec<u8>>, _>("summary") {
+        let mut summary = v1::RecordSummary::decode(summary.as_slice())
+            .map_err(|error| unreadable(error.into()))?;
+        who.in_seats(&mut summary.seats);
+        who.in_text(&mut summary.room_name);
+        sqlx::query("UPDATE games SET summary = $2, room_name = $3, filed = 0 WHERE number = $1")
+            .bind(number)
+            .bind(summary.encode_to_vec())
+            .bind(summary.room_name.as_str())
+            .execute(&mut *connection)
+            .await?;
+    }
+    sqlx::query("UPDATE participants SET name = $3 WHERE game = $1 AND name = $2 AND agent = ''")
+        .bind(number)
+        .bind(who.name.as_str())
+        .bind(who.pseudonym.as_str())
+        .execute(&mut *connection)
+        .await?;
+    Ok(taken_out)
+}
+
+/// Takes somebody out of the journal of a game, of which only the rows that change are written.
+async fn forget_journal(
+    connection: &mut SqliteConnection,
+    game: &SqliteRow,
+    who: &Pseudonym,
+) -> Result<TakenOut, ForgetError> {
+    let number: i64 = game.get("number");
+    let last_row: Option<i64> = game.get("last_row");
+    let rows = sqlx::query(match last_row {
+        Some(_) => {
+            "WITH RECURSIVE own (row, entries, previous) AS (
+                 SELECT row, entries, previous FROM journal WHERE row = $1 AND game = $2
+                 UNION ALL
+                 SELECT journal.row, journal.entries, journal.previous FROM own JOIN journal ON journal.row = own.previous
+                 WHERE journal.row < own.row AND journal.game = $2)
+             SELECT row, entries FROM own ORDER BY row"
+        }
+        // It goes on: where its last row stands is not known.
+        None => "SELECT row, entries FROM journal WHERE $1 IS NULL AND game = $2 ORDER BY row",
+    })
+    .bind(last_row)
+    .bind(number)
+    .fetch_all(&mut *connection)
+    .await?;
+    let (mut own, mut all) = (OwnSeats::default(), TakenOut::default());
+    for row in rows {
+        let mut entries = Vec::new();
+        form::read_entries(row.get("entries"), &mut entries).map_err(|problem| {
+            ForgetError::Unreadable {
+                what: format!("the journal of game number {number}"),
+                problem: problem.to_string(),
+            }
+        })?;
+        let taken_out = forget_entries(&mut entries, &mut own, who);
+        if taken_out == TakenOut::default() {
+            continue;
+        }
+        all += taken_out;
+        let mut bytes = Vec::new();
+        for entry in &entries {
+            form::put_entry(entry, &mut bytes);
+        }
+        sqlx::query("UPDATE journal SET entries = $2 WHERE row = $1")
+            .bind(row.get::<i64, _>("row"))
+            .bind(bytes)
+            .execute(&mut *connection)
+            .await?;
+    }
+    Ok(all)
+}
+
+fn forget_entries(entries: &mut Vec<Entry>, own: &mut OwnSeats, who: &Pseudonym) -> TakenOut {
+    let mut out = TakenOut::default();
+    entries.retain_mut(|entry| match &mut entry.change {
+        Change::Seated { seat, participant } => {
+            let is_own = participant.name == who.name;
+            own.seated(seat_number(*seat), is_own);
+            if is_own {
+                participant.name.clone_from(&who.pseudonym);
+                out.names += 1;
+            }
+            true
+        }
+        Change::Vacated(seat) => {
+            own.vacated(seat_number(*seat));
+            true
+        }
+        Change::Decided(decided) => {
+            if own.has(seat_number(decided.seat)) && decided.annotations.take().is_some() {
+                out.annotations += 1;
+            }
+            true
+        }
+        Change::Expressed { seat, .. } => {
+            let drop = own.has(seat_number(*seat));
+            out.expressions += u64::from(drop);
+            !drop
+        }
+        _ => true,
+    });
+    out
+}
+
+/// Takes somebody out of the tournaments; out of how many.
+async fn forget_tournaments(
+    connection: &mut SqliteConnection,
+    who: &Pseudonym,
+) -> Result<u64, ForgetError> {
+    let tournaments: Vec<i64> = sqlx::query_scalar(
+        "SELECT DISTINCT tournament FROM tournament_entries WHERE instr(entries, CAST($1 AS BLOB)) > 0",
+    )
+    .bind(who.name.as_str())
+    .fetch_all(&mut *connection)
+    .await?;
+    let mut changed = 0;
+    for tournament in tournaments {
+        changed += u64::from(forget_tournament(connection, tournament, who).await?);
+    }
+    Ok(changed)
+}
+
+async fn forget_tournament(
+    connection: &mut SqliteConnection,
+    tournament: i64,
+    who: &Pseudonym,
+) -> Result<bool, ForgetError> {
+    let parts = sqlx::query(
+        "SELECT position, entries FROM tournament_entries WHERE tournament = $1 ORDER BY position",
+    )
+    .bind(tournament)
+    .fetch_all(&mut *connection)
+    .await?;
+    let (mut is_in_it, mut over) = (false, false);
+    for part in parts {
+        let read = form::tournament_entries_from_bytes(part.get("entries"));
+        let mut entries = read.map_err(|problem| ForgetError::Unreadable {
+            what: format!("tournament number {tournament}"),
+            problem: problem.to_string(),
+        })?;
+        let mut changed = false;
+        for entry in &mut entries {
+            match entry {
+                TournamentEntry::Change(TournamentChange::Joined(entrant))
+                    if entrant.built_in.is_none() && entrant.name == who.name =>
+                {
+                    entrant.name.clone_from(&who.pseudonym);
+                    changed = true;
+                }
+                TournamentEntry::Change(TournamentChange::Finished | TournamentChange::Closed) => {
+                    over = true
+                }
+                _ => {}
+            }
+        }
+        if changed {
+            is_in_it = true;
+            sqlx::query(
+                "UPDATE tournament_entries SET entries = $3 WHERE tournament = $1 AND position = $2",
+            )
+            .bind(tournament)
+            .bind(part.get::<i64, _>("position"))
+            .bind(form::tournament_entries_to_bytes(&entries))
+            .execute(&mut *connection)
+            .await?;
+        }
+    }
+    if is_in_it && !over {
+        return Err(ForgetError::TournamentGoesOn(who.name.clone()));
+    }
+    Ok(is_in_it)
+}

@@ -1,0 +1,301 @@
+//! What everybody is shown of a tournament: how often it is worked out, and how large it can become.
+
+use std::collections::BTreeMap;
+use std::sync::Mutex;
+
+use chefshat_arena::AgentKind;
+use chefshat_arena::tournament::{
+    Change, Ended, Entrant, EntrantKind, MAX_GAMES_AT_A_TIME, MAX_PARTICIPANTS, SeatPlayed,
+};
+use chefshat_engine::MAX_SEATS;
+use prost::Message as _;
+use tokio::sync::{mpsc, watch};
+
+use super::*;
+use crate::config::MAX_NAME_CHARS;
+use crate::ids::{Id, Token};
+use crate::tournaments::hosted::Moving;
+
+/// What standard gRPC clients take, bytes.
+const STANDARD_LIMIT: usize = 4 * 1024 * 1024;
+
+impl Hosted {
+    /// A tournament with so many built-in agents that nobody moves.
+    pub(crate) fn for_tests(participants: usize) -> Arc<Self> {
+        Self::with_settings(
+            participants,
+            v1::TournamentSettings {
+                format: v1::TournamentFormat::Swiss.into(),
+                ..v1::TournamentSettings::default()
+            },
+        )
+    }
+
+    fn with_settings(participants: usize, settings: v1::TournamentSettings) -> Arc<Self> {
+        let settings = v1::TournamentSettings {
+            max_participants: convert::number(participants.max(2)),
+            ..settings
+        };
+        let plan = convert::tournament_plan(&settings, [1; 32]).expect("it can be held");
+        let mut core = Tournament::new(plan.core.clone()).expect("it can be held");
+        for number in 0..participants {
+            // As long as a name can be.
+            let digits = format!("{number:04}");
+            let long = "🍕".repeat(MAX_NAME_CHARS - digits.len());
+            core.fold(&Change::Joined(Entrant {
+                name: digits + &long,
+                kind: EntrantKind::Agent,
+                built_in: Some(AgentKind::Random),
+                filler: false,
+                stateless: true,
+                max_games: MAX_GAMES_AT_A_TIME,
+            }));
+        }
+        let id = Id::random();
+        Arc::new(Self {
+            header: crate::store::tournaments::TournamentHeader {
+                id,
+                settings: convert::settings_to_proto(&"🍕".repeat(MAX_NAME_CHARS), &plan),
+                created_at_ms: 1,
+                join_code: crate::ids::join_code(),
+                owner: Token::random(id).hash(),
+                deal_secret: [2; 32],
+            },
+            plan,
+            moving: Mutex::new(Moving {
+                core,
+                tickets: BTreeMap::new(),
+                placed: BTreeMap::new(),
+                connected: BTreeMap::new(),
+            }),
+            mailbox: mpsc::channel(1).0,
+            changes: watch::Sender::new(0),
+            shown: Shown::default(),
+        })
+    }
+
+    fn begun(self: Arc<Self>) -> Arc<Self> {
+        let begun = self.look(Tournament::begin).expect("there are enough");
+        for change in begun {
+            self.moving().core.fold(&change);
+        }
+        self
+    }
+
+    /// Calls all games that can be called.
+    fn call_games(&self) {
+        let mut moving = self.moving();
+        while let Some(change) = moving.core.next(0) {
+            if let Change::Called { game, .. } = change {
+                moving.placed.insert(game, (Id::random(), Id::random()));
+            }
+            moving.core.fold(&change);
+        }
+    }
+
+    /// Ends all games that were called.
+    fn end_games(&self) {
+        let mut moving = self.moving();
+        let playing: Vec<usize> = moving.core.playing().collect();
+        for game in playing {
+            let seats = moving.core.games()[game].seats.len();
+            let seats = (1..=seats).map(|place| SeatPlayed {
+                place,
+                points: 3,
+                ..SeatPlayed::default()
+            });
+            let ended = Ended::Played {
+                shifts: 1,
+                seats: seats.collect(),
+            };
+            let change = moving.core.ended(game, ended).expect("it was played");
+            moving.core.fold(&change);
+        }
+    }
+}
+
+fn turns() -> Arc<Semaphore> {
+    Arc::new(Semaphore::new(1))
+}
+
+#[tokio::test]
+async fn what_is_shown_is_worked_out_once_for_each_change() {
+    let (hosted, turns) = (Hosted::for_tests(8), turns());
+    let told = hosted.told(&turns).await.expect("it is worked out");
+    let results = hosted.results(&turns).await.expect("they are worked out");
+    let same = hosted.told(&turns).await.expect("it is worked out");
+    assert!(Arc::ptr_eq(&told, &same));
+    let same = hosted.results(&turns).await.expect("they are worked out");
+    assert!(Arc::ptr_eq(&results, &same));
+    hosted.changes.send_modify(|count| *count += 1);
+    let other = hosted.told(&turns).await.expect("it is worked out");
+    assert!(!Arc::ptr_eq(&told, &other));
+    // Who was told that it has begun before the change was counted is shown no less.
+    let hosted = hosted.begun();
+    let begun = hosted.results(&turns).await.expect("they are worked out");
+    let state = begun.message.tournament.as_ref().map(|it| it.state());
+    assert_eq!(state, Some(v1::TournamentState::Playing));
+}
+
+#[tokio::test]
+async fn who_asks_waits_for_a_turn_and_holds_no_lock() {
+    let (hosted, turns) = (Hosted::for_tests(8), turns());
+    let taken = Arc::clone(&turns)
+        .acquire_owned()
+        .await
+        .expect("it is open");
+    let mut asking = Box::pin(hosted.results(&turns));
+    assert!(futures::poll!(&mut asking).is_pending());
+    assert_eq!(hosted.describe().participants.len(), 8);
+    drop(taken);
+    let results = asking.await.expect("they are worked out");
+    assert_eq!(results.message.standings.len(), 8);
+}
+
+#[test]
+fn followers_are_told_of_the_games_being_played_and_of_the_last_ones() {
+    let hosted = Hosted::with_settings(
+        64,
+        v1::TournamentSettings {
+            format: v1::TournamentFormat::Swiss.into(),
+            rounds: 1,
+            games_per_pairing: 1_000,
+            ..v1::TournamentSettings::default()
+        },
+    )
+    .begun();
+    hosted.call_games();
+    let first = hosted.tell().games;
+    assert_eq!(first.len(), MAX_GAMES_FOLLOWED);
+    let in_state = |games: &[v1::TournamentGame], state| {
+        let numbers = games.iter().filter(|game| game.state() == state);
+        numbers.map(|game| game.game).collect::<Vec<_>>()
+    };
+    assert_eq!(in_state(&first, v1::TournamentGameState::Playing).len(), 64);
+    let due = MAX_GAMES_FOLLOWED - 64;
+    assert_eq!(in_state(&first, v1::TournamentGameState::Due).len(), due);
+    for _ in 0..10 {
+        hosted.end_games();
+        hosted.call_games();
+    }
+    let told = hosted.tell();
+    let playing: Vec<u32> = hosted.look(|core| core.playing().map(convert::number).collect());
+    assert_eq!(
+        in_state(&told.games, v1::TournamentGameState::Playing),
+        playing
+    );
+    let counted: Vec<u32> = hosted.look(|core| {
+        let games = core.games().iter().enumerate();
+        let counted = games.filter(|(_, game)| game.is_over());
+        counted.map(|(number, _)| convert::number(number)).collect()
+    });
+    assert_eq!(counted.len(), 640);
+    let shown = MAX_GAMES_FOLLOWED - playing.len();
+    assert_eq!(
+        in_state(&told.games, v1::TournamentGameState::Counted),
+        counted[counted.len() - shown..]
+    );
+    assert!(told.games.is_sorted_by_key(|game| game.game));
+    assert!(
+        told.games
+            .iter()
+            .all(|game| !game.room_id.is_empty() || game.calls == 0)
+    );
+}
+
+#[test]
+fn of_a_round_robin_followers_are_told_what_is_being_played() {
+    let hosted = Hosted::with_settings(
+        8,
+        v1::TournamentSettings {
+            format: v1::TournamentFormat::RoundRobin.into(),
+            max_parallel_games: 3,
+            ..v1::TournamentSettings::default()
+        },
+    )
+    .begun();
+    hosted.call_games();
+    hosted.end_games();
+    hosted.call_games();
+    let games = hosted.tell().games;
+    assert_eq!(games.len(), 3);
+    let playing = v1::TournamentGameState::Playing;
+    assert!(games.iter().all(|game| game.state() == playing));
+}
+
+#[test]
+fn no_message_outgrows_what_standard_clients_take() {
+    let hosted = Hosted::for_tests(MAX_PARTICIPANTS);
+    let mut results = hosted.sum_up();
+    for standing in &mut results.standings {
+        *standing = v1::TournamentStanding {
+            place: u32::MAX,
+            participant: u32::MAX,
+            last_round: u32::MAX,
+            games: u32::MAX,
+            byes: u32::MAX,
+            score: u64::MAX,
+            points: u64::MAX,
+            places: vec![u32::MAX; MAX_SEATS],
+            forfeited: u32::MAX,
+            substituted: u32::MAX,
+            wrong_actions: u64::MAX,
+            timeouts: u64::MAX,
+            mean_decision_time_us: 1.0,
+            performance_score: 1.0,
+            rating: Some(v1::Rating {
+                mean: 1.0,
+                deviation: 1.0,
+                games: u32::MAX,
+            }),
+        };
+    }
+    assert_eq!(results.confidence.len(), MAX_PARTICIPANTS - 1);
+    for pair in &mut results.confidence {
+        *pair = v1::OrderConfidence {
+            upper: u32::MAX,
+            lower: u32::MAX,
+            difference: 1.0,
+            standard_error: 1.0,
+            confidence: 1.0,
+            more_games: Some(u64::MAX),
+        };
+    }
+    let size = results.encoded_len();
+    assert!(size < STANDARD_LIMIT, "{size} bytes of results");
+    let seat = v1::TournamentGameSeat {
+        participant: u32::MAX,
+        forfeited: true,
+        substituted: true,
+        place: u32::MAX,
+        score: u32::MAX,
+        points: u64::MAX,
+        decisions: u64::MAX,
+        wrong_actions: u64::MAX,
+        timeouts: u64::MAX,
+        decision_time_us: u64::MAX,
+        timed_decisions: u64::MAX,
+        performance_score: 1.0,
+    };
+    let game = v1::TournamentGame {
+        game: u32::MAX,
+        round: u32::MAX,
+        table: u32::MAX,
+        number: u32::MAX,
+        state: v1::TournamentGameState::Counted.into(),
+        seats: vec![seat; MAX_SEATS],
+        room_id: Id::random().to_string(),
+        game_id: Id::random().to_string(),
+        calls: u32::MAX,
+        series_id: Id::random().to_string(),
+        rated: true,
+        shifts: u32::MAX,
+    };
+    let told = v1::FollowTournamentResponse {
+        games: vec![game; MAX_GAMES_FOLLOWED],
+        standings: results.standings,
+        ..hosted.tell()
+    };
+    let size = told.encoded_len();
+    assert!(size < STANDARD_LIMIT, "{size} bytes for a follower");
+}

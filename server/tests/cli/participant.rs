@@ -1,0 +1,278 @@
+//! `chefshat participant` over the data folder of a server that was played on: what is given out, what is left after a deletion, what is
+//! refused.
+
+use std::path::Path;
+
+use chefshat_client::{Action, Agent, Client, RandomAgent, v1};
+use serde_json::{Value, json};
+use tempfile::TempDir;
+
+use super::run::{Ended, chefshat};
+use super::server::serve;
+
+/// Who is given out and deleted. Letters beyond ASCII, so that nobody gets by with bytes alone.
+const NAME: &str = "Rosa Müßig";
+const OTHER: &str = "Bruno";
+
+/// Plays anyhow, and says something about each decision.
+struct Talker(RandomAgent, String);
+
+impl Agent for Talker {
+    fn decide(&mut self, request: &v1::DecisionRequest) -> Action {
+        self.0.decide(request)
+    }
+
+    fn annotate(&mut self) -> Option<v1::Annotations> {
+        Some(v1::Annotations {
+            extra: [("said".to_owned(), self.1.clone())].into(),
+            ..v1::Annotations::default()
+        })
+    }
+}
+
+fn in_runtime<T>(what: impl Future<Output = T>) -> T {
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .enable_all()
+        .build();
+    runtime.unwrap().block_on(what)
+}
+
+fn one_shift() -> Option<v1::RuleSet> {
+    Some(v1::RuleSet {
+        stop: Some(v1::rule_set::Stop::TargetShifts(1)),
+        ..v1::RuleSet::default()
+    })
+}
+
+fn expression(label: &str, record_only: bool) -> v1::Expression {
+    v1::Expression {
+        label: label.to_owned(),
+        record_only,
+        ..v1::Expression::default()
+    }
+}
+
+/// A game of two participants, in which both express themselves, and two built-in agents; gives its id.
+async fn play_game(client: &Client) -> String {
+    let built_in = || v1::SeatConfig {
+        filled_by: Some(v1::seat_config::FilledBy::BuiltInAgent("random".into())),
+    };
+    let made = client
+        .create_room(v1::CreateRoomRequest {
+            name: format!("{NAME}’s table"),
+            rules: one_shift(),
+            seats: vec![
+                v1::SeatConfig::default(),
+                built_in(),
+                v1::SeatConfig::default(),
+                built_in(),
+            ],
+            ..v1::CreateRoomRequest::default()
+        })
+        .await
+        .unwrap();
+    let mut seats = Vec::new();
+    for name in [NAME, OTHER] {
+        let joined = client.join_with_code(made.join_code.as_str(), name).await;
+        let ticket = joined.unwrap().ticket;
+        for record_only in [false, true] {
+            let label = format!("as {name}");
+            let shown = client.express(ticket.as_str(), expression(&label, record_only));
+            shown.await.unwrap();
+        }
+        let said = format!("said by {name}");
+        seats.push((ticket, Talker(RandomAgent::new(7), said)));
+    }
+    for outcome in client.play_many(seats).await {
+        outcome.unwrap();
+    }
+    made.room.unwrap().game_id
+}
+
+async fn play_tournament(client: &Client) {
+    let made = client
+        .create_tournament(v1::TournamentSettings {
+            name: "friday".into(),
+            format: v1::TournamentFormat::Swiss.into(),
+            rounds: 1,
+            rules: one_shift(),
+            built_in_agents: vec!["random".into(); 3],
+            start_when_joined: 4,
+            ..v1::TournamentSettings::default()
+        })
+        .await
+        .unwrap();
+    let request = v1::JoinTournamentRequest {
+        join_code: made.join_code,
+        name: NAME.into(),
+        ..v1::JoinTournamentRequest::default()
+    };
+    let ticket = client.join_tournament(request).await.unwrap().ticket;
+    let played = client.play_tournament(ticket, |_| RandomAgent::new(7));
+    assert_eq!(played.await.unwrap().len(), 1);
+}
+
+fn participant(arguments: &[&str], data_dir: &Path) -> Ended {
+    let data_dir = data_dir.to_str().unwrap();
+    chefshat(&[&["participant"], arguments, &["--data-dir", data_dir]].concat())
+}
+
+fn verify(data_dir: &Path) -> Ended {
+    chefshat(&["verify", "--data-dir", data_dir.to_str().unwrap()]).well()
+}
+
+/// Asserts that the letters of a text stand in no file of a folder.
+fn assert_nowhere(folder: &Path, text: &str) -> usize {
+    let mut files = 0;
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            files += assert_nowhere(&path, text);
+            continue;
+        }
+        let bytes = std::fs::read(&path).unwrap();
+        let found = bytes
+            .windows(text.len())
+            .any(|part| part == text.as_bytes());
+        assert!(!found, "{text} stands in {}", path.display());
+        files += 1;
+    }
+    files
+}
+
+fn values(text: &str) -> Vec<Value> {
+    text.lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect()
+}
+
+#[test]
+fn a_participant_is_given_out_and_deleted_and_every_record_still_fits() {
+    let folder = TempDir::new().unwrap();
+    let data_dir = folder.path().join("data");
+    let (server, url) = serve(&data_dir);
+    let game_id = in_runtime(async {
+        let client = Client::connect(&url).await.unwrap();
+        let game_id = play_game(&client).await;
+        play_tournament(&client).await;
+        game_id
+    });
+    // A server that has the folder keeps it.
+    let refused = participant(&["delete", NAME, "--yes"], &data_dir);
+    refused.assert_refused("another chefshat server uses");
+    drop(server);
+
+    let out = folder.path().join("out.jsonl");
+    let export = ["export", NAME, "--out", out.to_str().unwrap(), "--json"];
+    let told = participant(&export, &data_dir).well().json();
+    assert_eq!(
+        (&told["games"], &told["tournaments"], &told["expressions"]),
+        (&json!(2), &json!(1), &json!(2))
+    );
+    check_export(&std::fs::read_to_string(&out).unwrap(), &game_id, &told);
+    participant(&export, &data_dir).assert_refused("is there already");
+
+    participant(&["delete", NAME], &data_dir).assert_refused("say --yes");
+    let deleted = participant(&["delete", NAME, "--yes", "--json"], &data_dir);
+    let deleted = deleted.well().json();
+    let pseudonym = deleted["pseudonym"].as_str().unwrap();
+    assert!(pseudonym.starts_with("deleted participant "), "{pseudonym}");
+    assert_eq!(
+        (&deleted["games"], &deleted["tournaments"]),
+        (&json!(2), &json!(1))
+    );
+    assert_eq!(
+        (&deleted["expressions"], &deleted["annotations"]),
+        (&json!(2), &told_annotations(&out))
+    );
+    assert!(assert_nowhere(&data_dir, NAME) > 2);
+    verify(&data_dir);
+    check_left(&data_dir, &game_id, pseudonym);
+
+    let again = participant(&["delete", NAME, "--yes"], &data_dir);
+    assert_eq!(again.code, Some(1));
+    assert!(again.stderr.contains("nothing is kept"), "{}", again.stderr);
+}
+
+/// What was given out: the participant's own, all of it, and nothing of the other.
+fn check_export(text: &str, game_id: &str, told: &Value) {
+    let lines = values(text);
+    assert_eq!(lines[0]["participant"]["name"], NAME);
+    let of =
+        |key: &str| -> Vec<&Value> { lines.iter().filter(|line| !line[key].is_null()).collect() };
+    assert_eq!(of("game").len(), 2);
+    assert_eq!(of("tournament")[0]["tournament"]["name"], "friday");
+    assert_eq!(of("expression").len(), 2);
+    assert_eq!(json!(of("decision").len()), told["decisions"]);
+    let of_game: Vec<&Value> = (of("decision").into_iter())
+        .filter(|line| line["game_id"] == game_id)
+        .collect();
+    assert!(of_game.len() > 3);
+    for line in of_game {
+        let said = &line["decision"]["annotations"]["extra"]["said"];
+        assert_eq!(said, &format!("said by {NAME}"));
+    }
+    assert!(!text.contains(OTHER));
+}
+
+fn told_annotations(out: &Path) -> Value {
+    let lines = values(&std::fs::read_to_string(out).unwrap());
+    let annotated = |line: &&Value| !line["decision"]["annotations"].is_null();
+    json!(lines.iter().filter(annotated).count())
+}
+
+/// What is left: the other's part as it was, and a file that says what the server's database says.
+fn check_left(data_dir: &Path, game_id: &str, pseudonym: &str) {
+    let path = data_dir.join("records").join(format!("{game_id}.jsonl"));
+    let text = std::fs::read_to_string(path).unwrap();
+    assert!(text.contains(&format!("as {OTHER}")));
+    assert!(text.contains(&format!("said by {OTHER}")));
+    assert!(text.contains(&format!("{pseudonym}’s table")));
+    let file = values(&text);
+    let (_server, url) = serve(data_dir);
+    let (record, rated) = in_runtime(async {
+        let client = Client::connect(&url).await.unwrap();
+        let record = client.record(game_id).await.unwrap();
+        let tournaments = client
+            .list_tournaments(v1::ListTournamentsRequest::default())
+            .await;
+        let id = &tournaments.unwrap().tournaments[0].tournament_id;
+        (record, client.tournament(id.as_str()).await.unwrap())
+    });
+    let held: Vec<Value> = (record.iter())
+        .map(|line| serde_json::to_value(line).unwrap())
+        .collect();
+    assert_eq!(file, held);
+    let names: Vec<&str> = (rated.participants.iter())
+        .map(|participant| participant.name.as_str())
+        .collect();
+    assert!(names.contains(&pseudonym), "{names:?}");
+}
+
+#[test]
+fn nobody_is_deleted_from_a_game_that_is_not_over() {
+    let folder = TempDir::new().unwrap();
+    let (server, url) = serve(folder.path());
+    in_runtime(async {
+        let client = Client::connect(&url).await.unwrap();
+        let made = client.create_room(v1::CreateRoomRequest::default()).await;
+        let code = made.unwrap().join_code;
+        client.join_with_code(code, NAME).await.unwrap();
+    });
+    drop(server);
+    let before = std::fs::read(folder.path().join("games.sqlite3")).unwrap();
+    let refused = participant(&["delete", NAME, "--yes"], folder.path());
+    refused.assert_refused("a game that is not over");
+    let after = std::fs::read(folder.path().join("games.sqlite3")).unwrap();
+    assert!(before.len() <= after.len());
+}
+
+#[test]
+fn a_folder_that_is_not_there_is_not_made() {
+    let folder = TempDir::new().unwrap();
+    let missing = folder.path().join("missing");
+    participant(&["delete", NAME, "--yes"], &missing).assert_refused("there is no data folder");
+    assert!(!missing.exists());
+    chefshat(&["participant", "delete", "--help"]).assert_helps("chefshat participant delete P07");
+    chefshat(&["participant", "export", "--help"]).assert_helps("chefshat participant export P07");
+}
