@@ -63,7 +63,8 @@ pub const MAX_FOLLOWERS: usize = 256;
 pub const FOLLOW_INTERVAL: Duration = Duration::from_millis(250);
 /// Tournaments of which it is worked out at a time what their followers are told; and those whose results are.
 pub const MAX_RESULTS_IN_HAND: usize = 2;
-/// Most games of which those who follow a tournament are told: 0.3 MB of the 4 MB that clients take by standard. No more can be played at a time.
+/// Most games of which those who follow a tournament are told, so that a message stays well below the 4 MB that clients take by standard. At a
+/// time only half as many can be played.
 pub const MAX_GAMES_FOLLOWED: usize = 512;
 /// How long a follower may take to take in what it is told.
 pub const FOLLOW_SEND_TIMEOUT: Duration = Duration::from_secs(30);

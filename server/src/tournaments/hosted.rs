@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard};
 
-use chefshat_arena::tournament::{BeginProblem, Deals, JoinProblem, State, Tournament};
+use chefshat_arena::tournament::{BeginProblem, JoinProblem, State, Tournament};
 use chefshat_proto::v1;
 use sha2::{Digest as _, Sha256};
 use tokio::sync::{mpsc, oneshot, watch};
@@ -277,17 +277,18 @@ impl Hosted {
         }
     }
 
-    /// Withholds what could tell deals that are still to be played, and gives free the others.
-    pub(super) fn withhold_deals(&self, rooms: &Rooms) {
-        if self.plan.core.deals == Deals::Independent {
-            return;
-        }
+    /// All deals that games share.
+    pub(super) fn deals(&self) -> BTreeSet<u32> {
+        let moving = self.moving();
+        let games = moving.core.games().iter();
+        games.filter_map(|game| game.deal).collect()
+    }
+
+    /// Of some deals, withholds what could tell those that are still to be played, and gives free the others.
+    pub(super) fn withhold(&self, deals: &BTreeSet<u32>, rooms: &Rooms) {
         let moving = self.moving();
         let over = matches!(moving.core.state(), State::Finished | State::Closed);
-        let deals: BTreeSet<u32> = (moving.core.games().iter())
-            .filter_map(|game| game.deal)
-            .collect();
-        for deal in deals {
+        for &deal in deals {
             let withheld = !over && !moving.core.is_deal_open(deal);
             rooms.withhold(self.series(deal), withheld);
         }

@@ -1,6 +1,7 @@
 //! The tournaments of a server: making them, finding them, going on with them after the server ended. Who plays whom and what counts is
 //! decided in `chefshat_arena::tournament`; a tournament is moved by its `task`.
 
+mod games;
 mod hosted;
 mod leaderboard;
 mod shared;
@@ -243,7 +244,7 @@ impl Tournaments {
         table.by_number.insert(number, Arc::clone(&hosted));
         drop(table);
         // Before anybody can ask for a record.
-        hosted.withhold_deals(&self.rooms);
+        hosted.withhold(&hosted.deals(), &self.rooms);
         if hosted.is_over() {
             hosted.close_rooms(&self.rooms);
             return hosted;

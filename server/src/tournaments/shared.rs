@@ -35,7 +35,8 @@ impl<T> Default for Shared<T> {
 }
 
 impl<T: Send + Sync + 'static> Shared<T> {
-    /// What was worked out last if that still `serves`, else what `work` makes anew. Whoever asks meanwhile waits, and is served by it if it can be.
+    /// What was worked out last if that still `serves`, else what `work` makes anew. Whoever asks meanwhile waits, and is served by it if that
+    /// will do.
     pub(super) async fn get(
         &self,
         serves: impl FnOnce(&T) -> bool,

@@ -1,29 +1,23 @@
-//! The task that moves one tournament: it lets the core say what follows, keeps it, and only then makes rooms for games that are called
-//! and tells participants where they play. It sees that a game has ended by the room and reads what came of it from the store, so that
-//! a game counts once, whenever the server ended in between.
+//! The task that moves one tournament: it takes in who joins, comes and goes, lets the core say what follows, keeps it, and only then has
+//! anything done about it. What is done about games and their rooms is in `games`.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_arena::tournament::{
-    BeginProblem, Change, Ended, Entrant, Game, JoinProblem, SeatPlayed, State, Tournament,
-};
-use chefshat_proto::v1;
-use chefshat_records::outcome;
-use futures::future::join_all;
+use chefshat_arena::tournament::{BeginProblem, Change, Entrant, JoinProblem, State, Tournament};
 use tokio::sync::mpsc;
 use tokio::time::{Instant, sleep_until};
-use tracing::{error, info, warn};
+use tracing::{error, info};
 
 use super::Stop;
+use super::games::plays_itself;
 use super::hosted::{Call, Connection, Entry, Hosted, Message};
-use crate::config::{MAX_NAME_CHARS, TOURNAMENT_OPEN_TIME, TOURNAMENT_RETRY};
+use crate::config::TOURNAMENT_OPEN_TIME;
 use crate::convert;
 use crate::ids::{Id, Token};
-use crate::rooms::{CreateError, NewRoom, Rooms, Seating};
+use crate::rooms::Rooms;
 use crate::store::StoreError;
-use crate::store::journal::{Fill, GameStart, SeatedParticipant, TournamentGame};
 use crate::store::tournaments::TournamentEntry;
 
 /// Messages that are taken before what follows from them is worked out.
@@ -31,29 +25,31 @@ const MESSAGES_AT_A_TIME: usize = 64;
 
 /// Moves a tournament until the server ends.
 pub(super) struct Task {
-    hosted: Arc<Hosted>,
-    rooms: Arc<Rooms>,
+    pub(super) hosted: Arc<Hosted>,
+    pub(super) rooms: Arc<Rooms>,
     /// Rows that have been kept.
-    rows: u64,
+    pub(super) rows: u64,
     /// What is to be kept next.
-    unkept: Vec<TournamentEntry>,
+    pub(super) unkept: Vec<TournamentEntry>,
     /// Streams of participants, with the numbers of the connections.
-    connections: BTreeMap<usize, (u64, Connection)>,
+    pub(super) connections: BTreeMap<usize, (u64, Connection)>,
     /// Games that were called and have no room yet.
-    unmade: BTreeSet<usize>,
+    pub(super) unmade: BTreeSet<usize>,
     /// Games whose rooms were there since the server was started.
-    seen: BTreeSet<usize>,
+    pub(super) seen: BTreeSet<usize>,
     /// Rooms that are to be closed, once it is kept that the tournament is.
-    to_close: Vec<Id>,
+    pub(super) to_close: Vec<Id>,
+    /// Deals of which it is to be looked whether they are still to be played.
+    deals: BTreeSet<u32>,
     /// Whether something was seen to change that is not kept.
-    has_changed: bool,
+    pub(super) has_changed: bool,
     /// When somebody last joined, or the server was started.
-    joined_at: Instant,
+    pub(super) joined_at: Instant,
     /// When rooms that could not be made are tried again.
-    retry: Option<Instant>,
+    pub(super) retry: Option<Instant>,
     /// Answers that wait for what they promise to be kept.
-    replies: Vec<Box<dyn FnOnce() + Send + Sync>>,
-    began: Instant,
+    pub(super) replies: Vec<Box<dyn FnOnce() + Send + Sync>>,
+    pub(super) began: Instant,
 }
 
 impl Task {
@@ -68,6 +64,7 @@ impl Task {
             unmade: BTreeSet::new(),
             seen: BTreeSet::new(),
             to_close: Vec::new(),
+            deals: BTreeSet::new(),
             has_changed: false,
             joined_at: Instant::now(),
             retry: None,
@@ -253,7 +250,7 @@ impl Task {
     }
 
     /// A participant is not to be reached any more.
-    fn away(&mut self, participant: usize) {
+    pub(super) fn away(&mut self, participant: usize) {
         self.connections.remove(&participant);
         let mut moving = self.hosted.moving();
         moving.connected.remove(&participant);
@@ -276,40 +273,31 @@ impl Task {
 
     /// Folds a change and puts it where it will be kept.
     fn fold(&mut self, change: Change) {
-        let mut moving = self.hosted.moving();
-        moving.core.fold(&change);
         let placed = match &change {
             Change::Called { game, .. } => Some(*game),
             _ => None,
         };
+        match &change {
+            Change::Rescheduled { game, .. }
+            | Change::Counted { game, .. }
+            | Change::Voided { game } => {
+                self.deals
+                    .extend(self.hosted.look(|core| core.games()[*game].deal));
+            }
+            Change::Finished | Change::Closed => self.deals = self.hosted.deals(),
+            _ => {}
+        }
+        self.hosted.moving().core.fold(&change);
         self.unkept.push(TournamentEntry::Change(change));
-        drop(moving);
         if let Some(game) = placed {
             self.place(game);
         }
     }
 
-    fn fold_all(&mut self, changes: Vec<Change>) {
+    pub(super) fn fold_all(&mut self, changes: Vec<Change>) {
         for change in changes {
             self.fold(change);
         }
-    }
-
-    /// Gives a game a room, which is made when that is kept.
-    fn place(&mut self, game: usize) {
-        let (room_id, game_id) = (Id::random(), Id::random());
-        let mut moving = self.hosted.moving();
-        moving.placed.insert(game, (room_id, game_id));
-        if let Some(deal) = moving.core.games()[game].deal {
-            self.rooms.withhold(self.hosted.series(deal), true);
-        }
-        self.unmade.insert(game);
-        self.seen.remove(&game);
-        self.unkept.push(TournamentEntry::Placed {
-            game,
-            room_id,
-            game_id,
-        });
     }
 
     /// Does everything that follows now, and keeps it. Where there are to be no more games, what came is kept and nothing follows.
@@ -337,7 +325,8 @@ impl Task {
                 tokio::spawn(async move { room.give_up().await });
             }
             if moved {
-                self.hosted.withhold_deals(&self.rooms);
+                let deals = std::mem::take(&mut self.deals);
+                self.hosted.withhold(&deals, &self.rooms);
             }
             if !no_more_games {
                 self.make_rooms().await?;
@@ -393,193 +382,6 @@ impl Task {
         let working = tokio::task::spawn_blocking(move || work(core));
         (working.await).map_err(|error| StoreError(format!("a draw was not made: {error}")))
     }
-
-    /// Takes in what came of games that have ended.
-    async fn look_at_games(&mut self) -> Result<(), StoreError> {
-        let playing: Vec<usize> = self.hosted.look(|core| core.playing().collect());
-        for game in playing {
-            if self.unmade.contains(&game) {
-                continue;
-            }
-            let placed = self.hosted.moving().placed.get(&game).copied();
-            let Some((room, game_id)) = placed else {
-                self.place(game);
-                continue;
-            };
-            if self.rooms.is_over(room) == Some(false) {
-                self.seen.insert(game);
-                continue;
-            }
-            match self.ended(game, room, game_id).await? {
-                Some(ended) => {
-                    let change = self.hosted.look(|core| core.ended(game, ended));
-                    self.fold_all(change.into_iter().collect());
-                }
-                // The server ended before the room was made, or with it: nothing was played that could count.
-                None if !self.rooms.is_shutting_down() => self.place(game),
-                None => {}
-            }
-        }
-        Ok(())
-    }
-
-    /// What came of a game whose room is over or gone; `None` if nothing did, and that was nobody's fault.
-    async fn ended(&self, game: usize, room: Id, game_id: Id) -> Result<Option<Ended>, StoreError> {
-        if let Some(kept) = self.rooms.store().finished(game_id).await? {
-            let told = tokio::task::spawn_blocking(move || {
-                let lines = convert::lines_of(&kept);
-                (outcome::outcome(&lines), abort_reason(&lines))
-            });
-            let (outcome, reason) = told
-                .await
-                .map_err(|error| StoreError(format!("a record was not read: {error}")))?;
-            return Ok(match (outcome, reason) {
-                (Ok(outcome), _) => Some(Ended::Played {
-                    shifts: outcome.shifts,
-                    seats: outcome.seats.iter().map(seat_played).collect(),
-                }),
-                (Err(_), Some(v1::AbortReason::Shutdown)) => None,
-                (Err(problem), _) => {
-                    warn!(%game_id, %problem, "a game of a tournament has no result");
-                    Some(Ended::Aborted)
-                }
-            });
-        }
-        let Some(handle) = self.rooms.get(room) else {
-            return Ok(None);
-        };
-        let Ok(described) = handle.describe().await else {
-            return Ok(None);
-        };
-        Ok(match described.abort_reason() {
-            v1::AbortReason::Shutdown => None,
-            // Who was there when it was given up is not known any more.
-            _ if !self.seen.contains(&game) => None,
-            _ => {
-                let seats = self.hosted.look(|core| core.games()[game].seats.clone());
-                let away = described.seats.iter().zip(seats);
-                let missing = away
-                    .filter(|(seat, _)| !seat.connected)
-                    .map(|(_, participant)| participant)
-                    .collect();
-                Some(Ended::NeverStarted { missing })
-            }
-        })
-    }
-
-    /// Makes the rooms of games that were called, and tells their participants.
-    async fn make_rooms(&mut self) -> Result<(), StoreError> {
-        if self.unmade.is_empty() || self.retry.is_some_and(|retry| Instant::now() < retry) {
-            return Ok(());
-        }
-        self.retry = None;
-        let unmade: Vec<usize> = self.unmade.iter().copied().collect();
-        let making = unmade.iter().map(|game| {
-            let new = self.new_room(*game);
-            let rooms = &self.rooms;
-            async move { (*game, rooms.create(new).await) }
-        });
-        for (game, made) in join_all(making).await {
-            match made {
-                Ok(_) => {
-                    self.unmade.remove(&game);
-                    self.seen.insert(game);
-                    self.has_changed = true;
-                    self.call(game);
-                }
-                Err(CreateError::Store(error)) => return Err(error),
-                // When the server is back, the game is given a room anew.
-                Err(CreateError::ShuttingDown) => self.retry = Some(retry()),
-                Err(error) => {
-                    if self.retry.replace(retry()).is_none() {
-                        warn!(tournament = %self.hosted.id(), %error, "games of a tournament wait");
-                    }
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// Tells the participants of a game that are connected where it is played.
-    fn call(&mut self, game: usize) {
-        let moving = self.hosted.moving();
-        let Some((room, _)) = moving.placed.get(&game).copied() else {
-            return;
-        };
-        let called = moving.core.games()[game].clone();
-        drop(moving);
-        for participant in &called.seats {
-            if !plays_itself(&called, *participant) {
-                continue;
-            }
-            let connection = self.connections.get(participant);
-            if connection.is_some_and(|(_, connection)| !connection.call(Call::Seat(room))) {
-                self.away(*participant);
-            }
-        }
-    }
-
-    /// The room of a game.
-    fn new_room(&self, number: usize) -> NewRoom {
-        let moving = self.hosted.moving();
-        let game = &moving.core.games()[number];
-        let plan = &self.hosted.plan;
-        let entrants = moving.core.participants();
-        let mut participants = BTreeMap::new();
-        let fills = game.seats.iter().enumerate();
-        let fills = fills
-            .map(|(seat, participant)| {
-                let entrant = &entrants[*participant];
-                if game.forfeited.contains(participant) {
-                    return Fill::BuiltIn(plan.core.filler);
-                }
-                if let Some(kind) = entrant.built_in {
-                    return Fill::BuiltIn(kind);
-                }
-                let kind = convert::participant_kind(entrant.kind);
-                if let Some(ticket) = moving.tickets.get(participant) {
-                    let (name, ticket) = (entrant.name.clone(), *ticket);
-                    participants.insert(seat, SeatedParticipant { name, kind, ticket });
-                }
-                Fill::Open {
-                    reserved_for: Some(kind),
-                }
-            })
-            .collect();
-        let (room_id, game_id) = moving.placed[&number];
-        let place = format!(
-            " · round {}, table {}, game {}",
-            game.round, game.table, game.number
-        );
-        let space = MAX_NAME_CHARS.saturating_sub(place.chars().count());
-        let name: String = self
-            .hosted
-            .header
-            .settings
-            .name
-            .chars()
-            .take(space)
-            .collect();
-        NewRoom {
-            name: name + &place,
-            rules: plan.rules,
-            policy: plan.policy.clone(),
-            fills,
-            recorded: BTreeMap::new(),
-            start: GameStart::default(),
-            game_seed: self.hosted.game_seed(number, game.deal),
-            seating: Some(Seating {
-                game: TournamentGame {
-                    tournament: self.hosted.id(),
-                    series: game.deal.map(|deal| self.hosted.series(deal)),
-                },
-                room_id,
-                game_id,
-                participants,
-                server_seed: game.deal.map(|deal| self.hosted.server_seed(deal)),
-            }),
-        }
-    }
 }
 
 impl Drop for Task {
@@ -587,40 +389,4 @@ impl Drop for Task {
         let state = self.hosted.look(|core| core.state());
         info!(tournament = %self.hosted.id(), ?state, "the tournament's task has ended");
     }
-}
-
-fn retry() -> Instant {
-    Instant::now() + TOURNAMENT_RETRY
-}
-
-/// Whether a participant has a seat of its own in a game.
-fn plays_itself(game: &Game, participant: usize) -> bool {
-    game.seats.contains(&participant) && !game.forfeited.contains(&participant)
-}
-
-fn seat_played(seat: &outcome::SeatOutcome) -> SeatPlayed {
-    SeatPlayed {
-        place: usize::try_from(seat.place).unwrap_or(usize::MAX),
-        points: seat.points,
-        substituted: seat.substituted,
-        decisions: seat.decisions,
-        wrong_actions: seat.wrong_actions,
-        timeouts: seat.timeouts,
-        decision_time_us: seat.decision_time_us,
-        timed_decisions: seat.timed_decisions,
-        performance_score: seat.performance_score,
-    }
-}
-
-/// Why the game of a record was aborted, if it was.
-fn abort_reason(lines: &[v1::RecordLine]) -> Option<v1::AbortReason> {
-    use v1::game_event::Kind;
-    use v1::record_line::Line;
-    lines.iter().rev().find_map(|line| match &line.line {
-        Some(Line::Event(event)) => match &event.kind {
-            Some(Kind::GameAborted(aborted)) => Some(aborted.reason()),
-            _ => None,
-        },
-        _ => None,
-    })
 }

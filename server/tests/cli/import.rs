@@ -9,7 +9,7 @@ use tempfile::TempDir;
 use super::run::{Ended, chefshat};
 
 /// A game of two players that was watched to its end.
-const TRANSCRIPT: &str = "\
+pub(super) const TRANSCRIPT: &str = "\
 shift,seat,what,value
 ,,rules,paper players=2 faces=4 jokers=0 target_shifts=1
 ,0,human,Ana

@@ -7,8 +7,9 @@ use chefshat_client::{Action, Agent, Client, RandomAgent, v1};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
+use super::import::TRANSCRIPT;
 use super::run::{Ended, chefshat};
-use super::server::serve;
+use super::server::{run, serve, serve_with};
 
 /// Who is given out and deleted. Letters beyond ASCII, so that nobody gets by with bytes alone.
 const NAME: &str = "Rosa Müßig";
@@ -250,21 +251,84 @@ fn check_left(data_dir: &Path, game_id: &str, pseudonym: &str) {
 }
 
 #[test]
-fn nobody_is_deleted_from_a_game_that_is_not_over() {
+fn nobody_is_deleted_from_what_is_not_over() {
     let folder = TempDir::new().unwrap();
     let (server, url) = serve(folder.path());
-    in_runtime(async {
+    let room_id = in_runtime(async {
         let client = Client::connect(&url).await.unwrap();
         let made = client.create_room(v1::CreateRoomRequest::default()).await;
-        let code = made.unwrap().join_code;
-        client.join_with_code(code, NAME).await.unwrap();
+        let made = made.unwrap();
+        client.join_with_code(made.join_code, NAME).await.unwrap();
+        let settings = v1::TournamentSettings {
+            name: "friday".into(),
+            format: v1::TournamentFormat::Swiss.into(),
+            ..v1::TournamentSettings::default()
+        };
+        let tournament = client.create_tournament(settings).await.unwrap();
+        let request = v1::JoinTournamentRequest {
+            join_code: tournament.join_code,
+            name: OTHER.into(),
+            ..v1::JoinTournamentRequest::default()
+        };
+        client.join_tournament(request).await.unwrap();
+        made.room.unwrap().room_id
     });
     drop(server);
-    let before = std::fs::read(folder.path().join("games.sqlite3")).unwrap();
     let refused = participant(&["delete", NAME, "--yes"], folder.path());
     refused.assert_refused("a game that is not over");
-    let after = std::fs::read(folder.path().join("games.sqlite3")).unwrap();
-    assert!(before.len() <= after.len());
+    let refused = participant(&["delete", OTHER, "--yes"], folder.path());
+    refused.assert_refused("a tournament that is not over");
+
+    // Everything is as it was.
+    let (_server, url) = serve(folder.path());
+    let (room, tournaments) = in_runtime(async {
+        let client = Client::connect(&url).await.unwrap();
+        let request = v1::ListTournamentsRequest::default();
+        let tournaments = client.list_tournaments(request).await.unwrap().tournaments;
+        let tournament = client.tournament(tournaments[0].tournament_id.as_str());
+        (
+            client.get_room(room_id).await.unwrap(),
+            tournament.await.unwrap(),
+        )
+    });
+    assert_eq!(room.seats[0].name, NAME);
+    assert_eq!(tournaments.participants[0].name, OTHER);
+}
+
+#[test]
+fn a_player_of_a_real_table_is_deleted_from_the_file_and_from_a_server_that_was_given_it() {
+    let folder = TempDir::new().unwrap();
+    let (data_dir, transcript) = (folder.path().join("data"), folder.path().join("table.csv"));
+    std::fs::write(&transcript, TRANSCRIPT).unwrap();
+    let import = ["import", transcript.to_str().unwrap(), "--json"];
+    let told = chefshat(&[&import[..], &["--data-dir", data_dir.to_str().unwrap()]].concat());
+    let told = told.well().json();
+    let (file, game_id) = (
+        told["file"].as_str().unwrap(),
+        told["game_id"].as_str().unwrap(),
+    );
+    let (server, url) = serve_with(&data_dir, &["--allow-import"]);
+    assert!(run(&url, &["records", "import", file]).status.success());
+    drop(server);
+
+    let deleted = participant(&["delete", "Ana", "--yes", "--json"], &data_dir);
+    let deleted = deleted.well().json();
+    assert_eq!(
+        (&deleted["games"], &deleted["files"]),
+        (&json!(1), &json!(1))
+    );
+    assert_nowhere(&data_dir, "\"Ana\"");
+    verify(&data_dir);
+    let names = |text: &str| -> Vec<Value> {
+        let seats = values(text)[0]["header"]["seats"].clone();
+        let seats = seats.as_array().unwrap();
+        seats.iter().map(|seat| seat["name"].clone()).collect()
+    };
+    let expected = [deleted["pseudonym"].clone(), json!("Pepper")];
+    assert_eq!(names(&std::fs::read_to_string(file).unwrap()), expected);
+    let (_server, url) = serve(&data_dir);
+    let got = run(&url, &["records", "get", game_id]);
+    assert_eq!(names(std::str::from_utf8(&got.stdout).unwrap()), expected);
 }
 
 #[test]
@@ -273,6 +337,8 @@ fn a_folder_that_is_not_there_is_not_made() {
     let missing = folder.path().join("missing");
     participant(&["delete", NAME, "--yes"], &missing).assert_refused("there is no data folder");
     assert!(!missing.exists());
+    // Seats that nobody has taken have this name.
+    participant(&["delete", "", "--yes"], folder.path()).assert_refused("a value is required");
     chefshat(&["participant", "delete", "--help"]).assert_helps("chefshat participant delete P07");
     chefshat(&["participant", "export", "--help"]).assert_helps("chefshat participant export P07");
 }

@@ -19,6 +19,7 @@ mod stranger;
 mod terminal;
 mod tournament_agents;
 mod tournament_deals;
+mod tournament_refusals;
 mod tournaments;
 mod vector_columns;
 mod vectors;

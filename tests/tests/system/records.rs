@@ -1,8 +1,12 @@
 //! Records of games that have ended: listed, read, streamed, and carried from one server to another. The same over both stores.
 
 use std::sync::Arc;
+use std::time::Duration;
 
-use chefshat_proto::v1::{self, record_line::Line, record_service_client::RecordServiceClient};
+use chefshat_proto::v1::{
+    self, record_line::Line, record_service_client::RecordServiceClient,
+    tournament_service_client::TournamentServiceClient,
+};
 use chefshat_server::store::{MemoryStore, SqliteStore, Store};
 use chefshat_tests::{TestServer, one_shift, patiently, play_out, room_of_four};
 use futures::TryStreamExt as _;
@@ -10,6 +14,8 @@ use tempfile::TempDir;
 use tonic::transport::Channel;
 use tonic::{Code, Status};
 use tonic_types::StatusExt as _;
+
+use crate::played::{built_in, ended};
 
 const GAMES: usize = 5;
 
@@ -275,4 +281,37 @@ async fn what_is_not_held_or_not_wanted_is_refused() {
     let refused = service.stream_records(request).await.expect_err("no kind");
     assert_eq!(reason(&refused), "FILTER_REFUSED");
     server.stop().await;
+}
+
+#[tokio::test]
+async fn the_leaderboard_learns_of_games_that_end_after_it_was_asked() {
+    let server = TestServer::start().await;
+    let client = server.client().await;
+    let mut service = TournamentServiceClient::new(server.channel().await);
+    for games in 0..=2 {
+        // It is told a moment later.
+        let learnt = async {
+            loop {
+                let request = v1::GetLeaderboardRequest::default();
+                let board = service.get_leaderboard(request).await.expect("a board");
+                let board = board.into_inner();
+                assert!(board.games <= games);
+                if board.games == games {
+                    return board;
+                }
+                tokio::time::sleep(Duration::from_millis(50)).await;
+            }
+        };
+        let board = patiently("the game to be rated", learnt).await;
+        let shown = if games == 0 { 0 } else { 4 };
+        assert_eq!(board.rated.len(), shown);
+        let request = v1::CreateRoomRequest {
+            rules: Some(one_shift()),
+            seats: ["greedy", "random", "random_unmasked", "trained"]
+                .map(built_in)
+                .into(),
+            ..v1::CreateRoomRequest::default()
+        };
+        ended(&client, request).await;
+    }
 }

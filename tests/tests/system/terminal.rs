@@ -156,7 +156,7 @@ async fn a_person_plays_two_shifts_with_one_command() {
     terminal.press("?");
     // Two sizes it must bear with, and the first again.
     terminal.tmux(&["resize-window", "-x", "60", "-y", "20"]);
-    terminal.wait_for("Make it larger").await;
+    terminal.wait_for("The table needs").await;
     terminal.tmux(&["resize-window", "-x", "120", "-y", "40"]);
     terminal.wait_for("your hand").await;
     terminal.tmux(&["resize-window", "-x", "80", "-y", "24"]);

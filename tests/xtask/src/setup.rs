@@ -113,6 +113,14 @@ pub(crate) fn strace() -> Result<(), Failure> {
     debian_package("strace")
 }
 
+/// tmux, in which commands that draw on a terminal are tested.
+pub(crate) fn tmux() -> Result<(), Failure> {
+    if succeeds("tmux", &["-V"]) {
+        return Ok(());
+    }
+    debian_package("tmux")
+}
+
 /// cargo-deny: the one on the path if it is of the right version, else one built here. Returns the program to start.
 pub(crate) fn cargo_deny(places: &Places) -> Result<Command, Failure> {
     let wanted = format!("cargo-deny {CARGO_DENY}");

@@ -47,6 +47,9 @@ pub(crate) fn run(
         if let Err(failure) = setup::strace() {
             steps.skip("a disk that does not sync", &failure.to_string());
         }
+        if let Err(failure) = setup::tmux() {
+            steps.skip("commands at a terminal", &failure.to_string());
+        }
         let test = ["test", "--workspace"];
         steps.program("cargo test", cargo_command(places).args(test))?;
     }

@@ -11,7 +11,7 @@ import { Notice } from "../parts/Notice";
 import { navigate } from "../router";
 import { remember } from "../store";
 import { QuestionnaireLink } from "./QuestionnaireLink";
-import { hostOf, rememberStudy, type Study } from "./study";
+import { hostOf, languageOf, rememberStudy, type Study } from "./study";
 import "./experiment.css";
 
 type Step = "consent" | "declined" | "before" | "seat";
@@ -73,7 +73,7 @@ function TakeSeat({ code, study }: { code: string; study: Study }) {
       // The next one at this device is somebody else.
       remember("name", before === "" ? null : before);
       rememberStudy(room.roomId, { ...study, name: name.trim() });
-      navigate({ page: "room", roomId: room.roomId }, { replace: true });
+      navigate({ page: "room", roomId: room.roomId }, { replace: true, search: languageOf(location.search) });
     } catch (thrown) {
       setFault(inWords(thrown));
       setBusy(false);

@@ -88,14 +88,14 @@ export function StudyLinks({ code }: { code: string }) {
         </Field>
         <TextField
           label={words.before}
-          hint={words.questionnaireHint}
+          hint={words.beforeHint}
           value={before}
           onText={setBefore}
           fault={addressFault(before)}
         />
         <TextField
           label={words.after}
-          hint={words.questionnaireHint}
+          hint={words.afterHint}
           value={after}
           onText={setAfter}
           fault={addressFault(after)}

@@ -59,6 +59,12 @@ export function searchOf(study: Study, language: string): string {
   return `?${asked}`;
 }
 
+/** What an address says of the language, to be said by the next one too: so a reload there keeps what the link has fixed. */
+export function languageOf(search: string): string {
+  const language = new URLSearchParams(search).get("lang");
+  return language === null ? "" : `?lang=${encodeURIComponent(language)}`;
+}
+
 /** An address that a questionnaire may have; empty if it is none: a link must not run anything. */
 export function questionnaire(address: string | null): string {
   try {

@@ -4,7 +4,7 @@ import { useEffect, useState } from "preact/hooks";
 import { faultOf, wordsOf } from "../api/faults";
 import type { PageProps } from "../app";
 import { StudyJoin } from "../experiment/StudyJoin";
-import { studyOf } from "../experiment/study";
+import { languageOf, studyOf } from "../experiment/study";
 import { t } from "../i18n";
 import { Button } from "../parts/Button";
 import { TextField } from "../parts/Field";
@@ -24,7 +24,7 @@ export function Join({ route }: PageProps<"join">) {
   // At a device that several take part in a study with, the seat may be that of the one before.
   const seated = held !== null && study?.name && heldSeat(held)?.name !== study.name ? null : held;
   useEffect(() => {
-    if (seated) navigate({ page: "room", roomId: seated }, { replace: true });
+    if (seated) navigate({ page: "room", roomId: seated }, { replace: true, search: languageOf(location.search) });
   }, [seated]);
   if (seated) return null;
   if (study && code !== "") return <StudyJoin code={code} study={study} />;

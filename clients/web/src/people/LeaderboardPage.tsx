@@ -70,6 +70,7 @@ function Lines({ board }: { board: GetLeaderboardResponse }) {
   const ranges = board.rated.flatMap(({ rating }) => (rating ? [ratingRange(rating)] : []));
   const lowest = Math.min(...ranges.map(({ from }) => from));
   const highest = Math.max(...ranges.map(({ to }) => to));
+  const places = Math.max(...board.rated.map((line) => line.places.length));
   const share = (value: number) => `${((100 * (value - lowest)) / Math.max(1e-9, highest - lowest)).toFixed(1)}%`;
   return (
     <section class="sheet">
@@ -112,7 +113,9 @@ function Lines({ board }: { board: GetLeaderboardResponse }) {
                   )}
                 </td>
                 <td class="number leaderboard-minor">{line.rating?.games}</td>
-                <td class="number leaderboard-minor">{line.places.join(" · ")}</td>
+                <td class="number leaderboard-minor">
+                  {Array.from({ length: places }, (_, index) => line.places[index] ?? 0).join(" · ")}
+                </td>
               </tr>
             );
           })}

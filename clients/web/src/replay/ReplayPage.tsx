@@ -23,6 +23,9 @@ import "./replay.css";
 /** How long a moment is seen at a speed of 1. */
 const MOMENT_MS = 1000;
 
+/** A shorter time would be said as 0.0 s. */
+const SHOWN_SECONDS = 0.05;
+
 const NO_FRAME: Frame = { table: emptyTable(), open: undefined, decisions: 0 };
 
 /** The page. */
@@ -117,7 +120,7 @@ function Decision({ table, open }: { table: TableState; open: DecisionRecord }) 
         <strong>{words.possible}</strong>{" "}
         <span class="soft">
           {words.answered(distinctName(table, open.seat), move ? moveWords(move) : open.text)}
-          {seconds > 0 && ` · ${words.seconds(seconds)}`}
+          {seconds >= SHOWN_SECONDS && ` · ${words.seconds(seconds)}`}
           {estimate !== undefined && ` · ${words.estimate(estimate)}`}
         </span>
       </summary>

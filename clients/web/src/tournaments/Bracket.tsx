@@ -60,10 +60,7 @@ function Box({ tournament, table, mine, final, large }: BoxProps) {
   const over = table.games.length > 0 && table.games.every(isOver);
   const playing = table.games.length > 0 && !over;
   return (
-    <section
-      class={`bracket-table ${playing ? "bracket-playing" : ""} ${table.seats.length === 0 ? "bracket-empty" : ""}`}
-      aria-label={final ? words.final : words.table(table.table)}
-    >
+    <div class={`bracket-table ${playing ? "bracket-playing" : ""} ${table.seats.length === 0 ? "bracket-empty" : ""}`}>
       <header>
         <span>{final ? "" : words.table(table.table)}</span>
         {!large && (
@@ -89,7 +86,7 @@ function Box({ tournament, table, mine, final, large }: BoxProps) {
           ))}
         </ol>
       )}
-    </section>
+    </div>
   );
 }
 

@@ -61,7 +61,9 @@ export function Standings({ tournament, standings, mine, large = false }: Standi
       <tbody>
         {standings.map((standing) => (
           <tr key={standing.participant} class={standing.participant === mine ? "standings-mine" : ""}>
-            <td class="number standings-place">{standing.place}</td>
+            <td class={`number standings-place ${standing.place === 1 && standing.games > 0 ? "standings-first" : ""}`}>
+              {standing.place}
+            </td>
             <th scope="row" class="standings-name">
               <Who tournament={tournament} standing={standing} large={large} />
             </th>

@@ -1,6 +1,7 @@
 // One tournament, as it goes on: where it stands, the standings, the bracket or the rounds. Who has joined here plays here. With ?wall it is
 // drawn for a wall.
 
+import type { ComponentChildren } from "preact";
 import { useState } from "preact/hooks";
 import { wordsOf } from "../api/faults";
 import type { PageProps } from "../app";
@@ -51,26 +52,31 @@ function Followed({ followed }: { followed: FollowedTournament }) {
 
 /** The page for a visitor, or for a participant. */
 function Visited({ heard }: { heard: Heard }) {
-  const [held, setHeld] = useState<HeldPlace | null>(() => heldPlace(heard.tournament.tournamentId));
-  const course = <Course heard={heard} mine={held?.participant} />;
+  const { tournament } = heard;
+  const [held, setHeld] = useState<HeldPlace | null>(() => heldPlace(tournament.tournamentId));
   if (held) {
     return (
       <Participation held={held} heard={heard}>
-        {course}
+        <Course heard={heard} mine={held.participant} />
       </Participation>
     );
   }
   return (
-    <>
-      {course}
-      {heard.tournament.state === TournamentState.OPEN && (
-        <JoinTournament tournament={heard.tournament} onJoined={setHeld} />
-      )}
-    </>
+    <Course heard={heard} mine={undefined}>
+      {tournament.state === TournamentState.OPEN && <JoinTournament tournament={tournament} onJoined={setHeld} />}
+    </Course>
   );
 }
 
-function Course({ heard, mine }: { heard: Heard; mine: number | undefined }) {
+interface CourseProps {
+  heard: Heard;
+  /** The participant that this device plays for. */
+  mine: number | undefined;
+  /** Between the head and the standings. */
+  children?: ComponentChildren;
+}
+
+function Course({ heard, mine, children }: CourseProps) {
   const { tournament, standings } = heard;
   const words = t().tournaments;
   const games = useGames(heard);
@@ -91,6 +97,7 @@ function Course({ heard, mine }: { heard: Heard; mine: number | undefined }) {
           {words.wall.open}
         </ButtonLink>
       </header>
+      {children}
       <section class="sheet tournament-part">
         <h2>{standingsTitle(heard)}</h2>
         {standings.length === 0 ? (
@@ -100,15 +107,17 @@ function Course({ heard, mine }: { heard: Heard; mine: number | undefined }) {
         )}
       </section>
       <Confidence tournament={tournament} confidence={confidence} />
-      <section class="tournament-part">
-        <h2>{knockout ? words.games.bracket : words.games.title}</h2>
-        {knockout ? (
-          <Bracket tournament={tournament} games={games} mine={mine} />
-        ) : (
-          <Rounds tournament={tournament} games={games} mine={mine} />
-        )}
-        {games.length === MAX_GAMES && <p class="soft">{words.games.truncated(MAX_GAMES)}</p>}
-      </section>
+      {tournament.state !== TournamentState.OPEN && (
+        <section class="tournament-part">
+          <h2>{knockout ? words.games.bracket : words.games.title}</h2>
+          {knockout ? (
+            <Bracket tournament={tournament} games={games} mine={mine} />
+          ) : (
+            <Rounds tournament={tournament} games={games} mine={mine} />
+          )}
+          {games.length === MAX_GAMES && <p class="soft">{words.games.truncated(MAX_GAMES)}</p>}
+        </section>
+      )}
     </>
   );
 }

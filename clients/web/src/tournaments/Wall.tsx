@@ -45,9 +45,12 @@ export function Wall({ heard }: { heard: Heard }) {
         <Standings tournament={tournament} standings={shown} large />
         {parts > 1 && <p class="soft number">{words.wall.more(from + 1, from + shown.length)}</p>}
       </section>
-      <section class="wall-games" aria-label={knockout ? words.games.bracket : words.games.title}>
+      <section class="wall-games">
         {knockout ? (
-          <Bracket tournament={tournament} games={games} large />
+          <>
+            <h2 class="only-heard">{words.games.bracket}</h2>
+            <Bracket tournament={tournament} games={games} large />
+          </>
         ) : (
           <Rounds tournament={tournament} games={games} large />
         )}

@@ -6,6 +6,7 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { createInterface } from "node:readline";
 import { type Browser, type BrowserContextOptions, chromium, type Page } from "playwright-core";
+import { vi } from "vitest";
 
 const CHROMIUM = process.env.CHEFSHAT_CHROMIUM ?? "/usr/bin/chromium";
 const FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"];
@@ -62,6 +63,11 @@ export async function person(
     if (message.type() === "error") faults.push(message.text());
   });
   return { page, faults };
+}
+
+/** Waits until something holds, for as long as a page's own waiting lasts. */
+export async function until(holds: () => boolean | Promise<boolean>): Promise<void> {
+  await vi.waitUntil(holds, { timeout: 30_000 });
 }
 
 async function serve(dataDir: string, listen: string): Promise<{ child: ChildProcess; address: string }> {

@@ -135,14 +135,10 @@ impl Tournament {
 }
 
 fn readiness(course: &Course, floor: &Floor, game: &Game) -> Readiness {
-    // Those who did not come to the last call forfeit the game; nobody waits for them.
-    let is_decided = game.calls >= course.settings.max_calls;
     let mut out = Vec::new();
     let mut waits = false;
     for &participant in &game.seats {
-        let is_forfeited = game.forfeited.contains(&participant)
-            || is_decided && game.missing.contains(&participant);
-        if is_forfeited {
+        if course.forfeits(game, participant) {
             out.push(participant);
         } else if !course.has_place(participant) {
             return Readiness::Busy(participant);

@@ -103,6 +103,12 @@ impl Course {
         entrant.built_in.is_some() || self.busy[participant] < entrant.max_games
     }
 
+    /// Whether a participant forfeits a game that is due: it did not come to the last call, and is waited for no more.
+    pub(super) fn forfeits(&self, game: &Game, participant: usize) -> bool {
+        let is_decided = game.calls >= self.settings.max_calls;
+        game.forfeited.contains(&participant) || is_decided && game.missing.contains(&participant)
+    }
+
     pub(super) fn fold(&mut self, change: &Change) {
         match change {
             Change::Joined(entrant) => {

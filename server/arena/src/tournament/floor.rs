@@ -26,7 +26,7 @@ pub(super) struct Floor {
     waits: BTreeMap<usize, u64>,
     /// The same games by time, but for those whose time was up when it was last looked at.
     by_time: BTreeSet<(u64, usize)>,
-    /// The same games by participant.
+    /// The same games by the participants whom they need.
     waits_of: Vec<BTreeSet<usize>>,
     /// Whether as many games were being played as may be. Meanwhile nobody is waited for.
     full: bool,
@@ -171,8 +171,11 @@ impl Floor {
         }
         self.waits.insert(index, since);
         self.by_time.insert((since, index));
-        for &who in &course.games[index].seats {
-            self.waits_of[who].insert(index);
+        let game = &course.games[index];
+        for &who in &game.seats {
+            if !course.forfeits(game, who) {
+                self.waits_of[who].insert(index);
+            }
         }
         self.put_by(course, looked_at);
         false

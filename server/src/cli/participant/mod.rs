@@ -9,6 +9,7 @@ use std::process::ExitCode;
 
 use chefshat_proto::v1;
 use chefshat_records::jsonl;
+use clap::builder::NonEmptyStringValueParser;
 use clap::{Args, Subcommand};
 
 use super::{CommandError, data_dir};
@@ -32,7 +33,7 @@ enum Command {
 #[derive(Debug, Args)]
 struct Who {
     /// The name that the participant played under, exactly.
-    #[arg(value_name = "NAME")]
+    #[arg(value_name = "NAME", value_parser = NonEmptyStringValueParser::new())]
     name: String,
     /// Data folder of the server, which must be stopped. Standard: chefshat in the user's data folder.
     #[arg(long, env = "CHEFSHAT_DATA_DIR")]

@@ -1,7 +1,7 @@
 //! What `chefshat play` knows and does: keys and messages of the server go in, what is to be done comes out. No terminal, no connection, no
 //! clock of its own, so that a whole game can be played by data.
 
-use chefshat_client::v1::{self, seat_update::Update};
+use chefshat_client::v1::{self, game_event::Kind, seat_update::Update};
 use ratatui::crossterm::event::KeyCode;
 
 use super::super::terminal::screen::Key;
@@ -18,12 +18,15 @@ pub(super) const EXPRESSIONS: [(&str, f32, f32); 6] = [
     ("sadness", -0.7, -0.4),
 ];
 
+/// What a person is told whose decision was taken otherwise.
+const TOO_LATE: &str = "too late: this decision was taken without you";
+
 /// What happens to a game at the terminal.
 #[derive(Debug)]
 pub(super) enum Input {
     Key(Key),
     /// The server said something to the seat.
-    Update(Update),
+    Update(Box<Update>),
     /// The connection is lost, and why; it is being made again.
     Lost(String),
     /// Nothing more will come from the server; why, if that is not the end of the game.
@@ -107,7 +110,7 @@ impl App {
     pub(super) fn take(&mut self, input: Input, now_ms: u64) -> Option<Do> {
         match input {
             Input::Key(key) => self.key(key, now_ms),
-            Input::Update(update) => self.update(update, now_ms),
+            Input::Update(update) => self.update(*update, now_ms),
             Input::Lost(why) => {
                 self.link = Link::Lost(why);
                 self.open = None;
@@ -151,6 +154,7 @@ impl App {
             Update::Events(batch) => {
                 for event in &batch.events {
                     self.table.apply(event);
+                    self.close_by(event);
                 }
             }
             Update::Decision(request) => return self.asked(request, now_ms),
@@ -161,6 +165,27 @@ impl App {
             Update::Snapshot(_) | Update::Detached(_) | Update::Entered(_) => {}
         }
         None
+    }
+
+    /// Closes the open decision when the game has gone on: time ran out, or a substitute decided.
+    fn close_by(&mut self, event: &v1::GameEvent) {
+        let moved = matches!(
+            event.kind,
+            Some(
+                Kind::Play(_)
+                    | Kind::Pass(_)
+                    | Kind::CardsExchanged(_)
+                    | Kind::SpecialActionDeclared(_)
+                    | Kind::GameEnded(_)
+                    | Kind::GameAborted(_)
+            )
+        );
+        if moved
+            && let Some(open) = self.open.take()
+            && !open.sent
+        {
+            TOO_LATE.clone_into(&mut self.notice);
+        }
     }
 
     fn asked(&mut self, request: v1::DecisionRequest, now_ms: u64) -> Option<Do> {
@@ -213,7 +238,7 @@ impl App {
             }
             v1::AnswerStatus::Closed => {
                 self.open.take_if(ours);
-                "too late: this decision was taken without you".clone_into(&mut self.notice);
+                TOO_LATE.clone_into(&mut self.notice);
             }
             _ => {
                 self.open.take_if(ours);

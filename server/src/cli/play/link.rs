@@ -189,7 +189,7 @@ impl Seat {
             }
             _ => {}
         }
-        match inputs.send(Input::Update(update)).await {
+        match inputs.send(Input::Update(Box::new(update))).await {
             Ok(()) => None,
             Err(_) => Some(Stopped::Left),
         }

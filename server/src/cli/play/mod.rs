@@ -30,7 +30,7 @@ use super::terminal::screen::{Key, Screen, asked_to_end, missing};
 use super::terminal::table::{End, Table};
 use super::{CommandError, data_dir, say};
 use crate::ids::random_bytes;
-use app::{App, Do, EXPRESSIONS, Input};
+use app::{App, Do, EXPRESSIONS, Input, Link};
 
 /// Messages that may wait to be taken.
 const INPUTS: usize = 64;
@@ -332,6 +332,9 @@ fn told(app: &App, record: &str) -> Result<ExitCode, CommandError> {
             Ok(ExitCode::FAILURE)
         }
         None => {
+            if let Link::Over(Some(why)) = &app.link {
+                return Err(format!("the seat is lost: {why}").into());
+            }
             say("you left the table before the game ended")?;
             Ok(ExitCode::FAILURE)
         }

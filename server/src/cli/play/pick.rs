@@ -5,7 +5,7 @@ use chefshat_client::v1;
 use chefshat_engine::{Action, ActionSpace, Face, Mask, Move, Opening, RuleSet};
 
 use super::super::numbers::counted;
-use super::super::terminal::table::{Hand, Stack};
+use super::super::terminal::hand::{Hand, Stack};
 use super::super::terminal::view::play_words;
 
 /// A decision that is open, and what is picked for it.
@@ -247,12 +247,10 @@ impl Decision {
         let faces = u32::from(self.space.faces());
         if self.opens(&seen) && stack.face != faces {
             return match self.rules.opening() {
-                Opening::Golden => format!(
-                    "the Shift opens with the Golden {faces}: {faces}s alone, and jokers with them"
-                ),
-                Opening::AnyTopFace => {
-                    format!("the Shift opens with face {faces}: no other face")
+                Opening::Golden => {
+                    format!("the Shift opens with the Golden {faces}: only {faces}s, and jokers")
                 }
+                Opening::AnyTopFace => format!("the Shift opens with face {faces}: no other face"),
             };
         }
         if seen.board_face == 0 {
@@ -278,6 +276,18 @@ impl Decision {
         }
         let need = counted(u64::from(seen.board_size), "card");
         format!("{need} needed: more with ↑, a joker with j")
+    }
+
+    /// What the Shift's first turn is bound to, if this is it.
+    pub(super) fn opening(&self) -> Option<String> {
+        if self.kind() != v1::DecisionKind::Turn || !self.opens(&self.observation()) {
+            return None;
+        }
+        let face = self.space.faces();
+        Some(match self.rules.opening() {
+            Opening::Golden => format!("The Golden {face} opens the Shift."),
+            Opening::AnyTopFace => format!("Face {face} opens the Shift."),
+        })
     }
 
     /// Why passing is not legal; `None` when it is.

@@ -7,7 +7,7 @@ use ratatui::crossterm::event::KeyCode;
 use super::super::terminal::look::Look;
 use super::super::terminal::screen::Key;
 use super::super::terminal::table::Table;
-use super::super::terminal::testing::{Dealt, text};
+use super::super::terminal::testing::{Dealt, as_kept, text};
 use super::app::{App, Dialog, Do, Input, Link};
 use super::view;
 
@@ -34,7 +34,8 @@ impl Evening {
     }
 
     fn tell(&mut self, update: Update) -> Option<Do> {
-        self.app.take(Input::Update(update), self.now_ms)
+        let input = Input::Update(Box::new(update));
+        self.app.take(input, self.now_ms)
     }
 
     fn press(&mut self, code: KeyCode) -> Option<Do> {
@@ -203,40 +204,24 @@ fn the_screen_says_what_is_asked() {
     let mut evening = Evening::new(&shifts(2), 3);
     assert!(evening.until_asked());
     evening.now_ms += 12_500;
-    compare(
-        "first.txt",
-        &evening.screen(),
-        include_str!("screens/first.txt"),
-    );
+    let first = evening.screen();
     for _ in 0..5 {
         let what = evening.act();
         evening.answered(what);
         assert!(evening.until_asked());
     }
     evening.press(KeyCode::Left);
-    compare(
-        "later.txt",
-        &evening.screen(),
-        include_str!("screens/later.txt"),
-    );
+    let later = evening.screen();
     evening.press(KeyCode::Char('?'));
-    compare(
-        "help.txt",
-        &evening.screen(),
-        include_str!("screens/help.txt"),
-    );
-}
-
-/// Compares a screen with what is kept; where it differs, leaves it beside that for who wants to keep it.
-fn compare(name: &str, screen: &str, expected: &str) {
-    if screen != expected {
-        let new = std::env::temp_dir().join(format!("chefshat-{name}"));
-        std::fs::write(&new, screen).unwrap();
-        panic!(
-            "{name} differs; the screen is in {}:\n{screen}",
-            new.display()
-        );
-    }
+    as_kept(&[
+        ("first.txt", first, include_str!("screens/first.txt")),
+        ("later.txt", later, include_str!("screens/later.txt")),
+        (
+            "help.txt",
+            evening.screen(),
+            include_str!("screens/help.txt"),
+        ),
+    ]);
 }
 
 #[test]
@@ -327,6 +312,20 @@ fn the_servers_word_on_an_answer_is_shown() {
         let open = evening.app.open.as_ref().filter(|open| !open.sent);
         assert_eq!(open.is_some(), stays, "{status:?}");
     }
+}
+
+#[test]
+fn a_decision_taken_without_the_person_is_closed() {
+    let mut evening = Evening::new(&shifts(1), 3);
+    assert!(evening.until_asked());
+    let default = evening.dealt.game.default_action().unwrap();
+    evening.apply(default);
+    assert!(evening.app.open.is_none());
+    assert!(evening.screen().contains("too late"));
+    assert_eq!(evening.press(KeyCode::Enter), None);
+    // The next question takes the words away.
+    assert!(evening.until_asked());
+    assert!(!evening.screen().contains("too late"));
 }
 
 #[test]

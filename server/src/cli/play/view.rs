@@ -207,9 +207,11 @@ fn hint(open: &Open, faces: u32) -> String {
     let name = decision.stacks.get(decision.at);
     let name = name.and_then(|stack| ingredient(stack.face, faces));
     let name = name.map_or_else(String::new, |name| format!(" ({name})"));
-    match decision.pass_objection() {
-        None => format!(" Enter: {}{name}. p: pass.", decision.words()),
-        Some(_) => format!(" Enter: {}{name}.", decision.words()),
+    let words = decision.words();
+    match (decision.opening(), decision.pass_objection()) {
+        (Some(rule), _) => format!(" Enter: {words}{name}. {rule}"),
+        (None, None) => format!(" Enter: {words}{name}. p: pass."),
+        (None, Some(_)) => format!(" Enter: {words}{name}."),
     }
 }
 

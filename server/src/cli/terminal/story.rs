@@ -26,7 +26,7 @@ pub(super) fn of(table: &Table, kind: &Kind) -> Vec<Line> {
         }
         Kind::Pass(pass) => about(pass.seat, format!("passes{}", because(pass.source()))),
         Kind::PizzaDone(done) => heading(format!(
-            "pizza {} · {} leads",
+            "pizza {} · {}",
             done.pizza.saturating_add(1),
             table.name(done.next_leader)
         )),

@@ -30,6 +30,23 @@ pub(in crate::cli) fn text(
     text
 }
 
+/// Compares screens with what is kept of them, by name; those that differ are left in the folder for temporary files, for who wants to
+/// keep them instead.
+pub(in crate::cli) fn as_kept(screens: &[(&str, String, &str)]) {
+    let differ = screens.iter().filter(|(_, screen, kept)| screen != kept);
+    let left = differ.map(|(name, screen, _)| {
+        let new = std::env::temp_dir().join(format!("chefshat-{name}"));
+        std::fs::write(&new, screen).unwrap();
+        format!("{}:\n{screen}", new.display())
+    });
+    let left: Vec<String> = left.collect();
+    assert!(
+        left.is_empty(),
+        "other screens than those kept: {}",
+        left.join("\n")
+    );
+}
+
 /// The events of a game among the fixtures.
 pub(in crate::cli) fn recorded(name: &str) -> Vec<v1::GameEvent> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/fixtures/records");
@@ -85,7 +102,7 @@ impl Dealt {
             game_id: "5f0c6a4de2b14b7f8a3d9c1e7b60425d".into(),
             rules: Some(rules_to_proto(&rules)),
             seats: seats.collect(),
-            hand_size: u32::try_from(rules.hand_size()).unwrap(),
+            hand_size: rules.hand_size().into(),
             ..v1::GameStarted::default()
         }));
         let mut told = vec![dealt.numbered(start)];

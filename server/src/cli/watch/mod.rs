@@ -14,6 +14,7 @@ use chefshat_client::v1::{self, record_line};
 use chefshat_client::{Backoff, Client, Spectator};
 use chefshat_records::jsonl;
 use clap::Args;
+use tokio::sync::mpsc;
 use tokio::time::{Instant, MissedTickBehavior, interval};
 
 use super::CommandError;
@@ -23,6 +24,8 @@ use super::terminal::screen::{Key, Screen, asked_to_end, missing};
 use super::terminal::table::Table;
 use reel::Reel;
 
+/// Events that may wait to be shown.
+const EVENTS: usize = 256;
 /// How often the reel is looked at.
 const TICK: Duration = Duration::from_millis(50);
 
@@ -108,7 +111,7 @@ fn of_record(lines: Vec<v1::RecordLine>) -> Reel {
 }
 
 /// Shows the reel until the person has seen enough.
-async fn show(mut reel: Reel, mut live: Option<Spectator>) -> Result<ExitCode, CommandError> {
+async fn show(mut reel: Reel, live: Option<Spectator>) -> Result<ExitCode, CommandError> {
     let look = Look::of_environment();
     let begun = Instant::now();
     let now = || u64::try_from(begun.elapsed().as_millis()).unwrap_or(u64::MAX);
@@ -116,6 +119,7 @@ async fn show(mut reel: Reel, mut live: Option<Spectator>) -> Result<ExitCode, C
     ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
     let ended = asked_to_end();
     tokio::pin!(ended);
+    let mut following = live.map(follow);
     let mut screen = Screen::open()?;
     let mut dirty = true;
     while !reel.left {
@@ -127,13 +131,14 @@ async fn show(mut reel: Reel, mut live: Option<Spectator>) -> Result<ExitCode, C
                 reel.key(key.unwrap_or(Key::Interrupt), now());
                 dirty = true;
             }
-            event = next(&mut live) => {
+            event = next(&mut following) => {
                 dirty = true;
                 match event {
-                    Ok(Some(event)) => reel.push(event),
+                    Some(Ok(event)) => reel.push(event),
                     over => {
-                        reel.close(over.err().map(|error| error.message().to_owned()));
-                        live = None;
+                        let why = over.and_then(Result::err);
+                        reel.close(why.map(|error| error.message().to_owned()));
+                        following = None;
                     }
                 }
             }
@@ -144,12 +149,27 @@ async fn show(mut reel: Reel, mut live: Option<Spectator>) -> Result<ExitCode, C
     Ok(ExitCode::SUCCESS)
 }
 
+/// An event of a room, or why there are no more.
+type Heard = Result<v1::GameEvent, chefshat_client::Error>;
+
+/// Has a task of its own follow the room: keys and the clock would else interrupt its connecting and its waiting again and again.
+fn follow(mut spectator: Spectator) -> mpsc::Receiver<Heard> {
+    let (sender, heard) = mpsc::channel(EVENTS);
+    tokio::spawn(async move {
+        while let Some(event) = spectator.next().await.transpose() {
+            let over = event.is_err();
+            if sender.send(event).await.is_err() || over {
+                return;
+            }
+        }
+    });
+    heard
+}
+
 /// The next event of a room; of none, never.
-async fn next(
-    live: &mut Option<Spectator>,
-) -> Result<Option<v1::GameEvent>, chefshat_client::Error> {
-    match live {
-        Some(spectator) => spectator.next().await,
+async fn next(following: &mut Option<mpsc::Receiver<Heard>>) -> Option<Heard> {
+    match following {
+        Some(heard) => heard.recv().await,
         None => std::future::pending().await,
     }
 }

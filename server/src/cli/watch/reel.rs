@@ -37,8 +37,7 @@ pub(super) struct Reel {
 impl Reel {
     /// Of a game that is over: from its first deal, running.
     pub(super) fn recorded(start: Table, events: Vec<v1::GameEvent>) -> Self {
-        let dealt = |event: &v1::GameEvent| matches!(event.kind, Some(Kind::ShiftStarted(_)));
-        let first = events.iter().position(dealt).map_or(0, |at| at + 1);
+        let first = events.iter().position(is_deal).map_or(0, |at| at + 1);
         let mut reel = Self::new(start, events, false);
         reel.wind_to(first);
         reel
@@ -147,21 +146,14 @@ impl Reel {
 
     /// Where the last deal before the present event was.
     fn shift_before(&self) -> usize {
-        let before = self.events.iter().take(self.at.saturating_sub(1));
-        before
-            .enumerate()
-            .filter(|(_, event)| is_deal(event))
-            .last()
-            .map_or(0, |(index, _)| index + 1)
+        let before = &self.events[..self.at.saturating_sub(1)];
+        before.iter().rposition(is_deal).map_or(0, |at| at + 1)
     }
 
     /// Where the next deal is.
     fn shift_after(&self) -> usize {
-        let after = self.events.iter().enumerate().skip(self.at);
-        after
-            .into_iter()
-            .find(|(_, event)| is_deal(event))
-            .map_or(self.events.len(), |(index, _)| index + 1)
+        let after = self.events[self.at..].iter().position(is_deal);
+        after.map_or(self.events.len(), |at| self.at + at + 1)
     }
 
     /// Makes the table what it was after so many events.

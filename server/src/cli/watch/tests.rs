@@ -5,7 +5,7 @@ use ratatui::crossterm::event::KeyCode;
 use super::super::terminal::look::Look;
 use super::super::terminal::screen::Key;
 use super::super::terminal::table::Table;
-use super::super::terminal::testing::{recorded, text};
+use super::super::terminal::testing::{as_kept, recorded, text};
 use super::reel::Reel;
 use super::view;
 
@@ -96,27 +96,14 @@ fn the_screens_are_as_kept() {
     for _ in 0..30 {
         press(&mut reel, KeyCode::Right);
     }
-    compare(
-        "hands.txt",
-        &screen(&reel),
-        include_str!("screens/hands.txt"),
-    );
+    let hands = screen(&reel);
     press(&mut reel, KeyCode::End);
-    compare("end.txt", &screen(&reel), include_str!("screens/end.txt"));
+    as_kept(&[
+        ("hands.txt", hands, include_str!("screens/hands.txt")),
+        ("end.txt", screen(&reel), include_str!("screens/end.txt")),
+    ]);
     press(&mut reel, KeyCode::Char('h'));
     assert!(!screen(&reel).contains(" hands ─"));
     press(&mut reel, KeyCode::Char('?'));
     assert!(screen(&reel).contains("one event back"));
-}
-
-/// Compares a screen with what is kept; where it differs, leaves it beside that for who wants to keep it.
-fn compare(name: &str, screen: &str, expected: &str) {
-    if screen != expected {
-        let new = std::env::temp_dir().join(format!("chefshat-{name}"));
-        std::fs::write(&new, screen).unwrap();
-        panic!(
-            "{name} differs; the screen is in {}:\n{screen}",
-            new.display()
-        );
-    }
 }

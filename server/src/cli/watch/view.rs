@@ -6,13 +6,13 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
 use super::super::narrator::MAX_NAME;
+use super::super::terminal::hand::Hand;
 use super::super::terminal::look::Look;
-use super::super::terminal::table::{Hand, Table};
+use super::super::terminal::table::Table;
 use super::super::terminal::view::{boxed, draw as draw_table, end_lines, padded, popup};
 use super::reel::Reel;
 
-const KEYS: &str =
-    " space stop/run  ←→ step  ↑↓ speed  PgUp/PgDn Shift  Home End  h hands  ? help  q end";
+const KEYS: &str = " space stop  ←→ step  ↑↓ speed  PgUp/PgDn Shift  h hands  ? help  q end";
 
 const HELP: [&str; 9] = [
     "space        stops, and runs again",

@@ -157,7 +157,10 @@ async fn a_game_that_goes_on_is_found_as_it_was_left() {
     let header = Arc::new(header(1, Durability::Durable));
     let entries = entries();
     let store = opened(folder.path()).await;
-    let mut journal = store.create(Arc::clone(&header), Vec::new()).await.expect("kept");
+    let mut journal = store
+        .create(Arc::clone(&header), Vec::new())
+        .await
+        .expect("kept");
     // In parts, as a room hands them over.
     for part in entries.chunks(3) {
         let mut part = part.to_vec();
@@ -238,7 +241,10 @@ async fn an_ephemeral_game_is_kept_when_it_ends_and_not_before() {
     let folder = tempfile::tempdir().expect("a folder");
     let store = opened(folder.path()).await;
     let header = Arc::new(header(1, Durability::Ephemeral));
-    let mut journal = store.create(Arc::clone(&header), Vec::new()).await.expect("begun");
+    let mut journal = store
+        .create(Arc::clone(&header), Vec::new())
+        .await
+        .expect("begun");
     journal.append(&mut entries()).await.expect("in memory");
     assert!(store.left(u64::MAX).await.expect("readable").is_empty());
     journal.finish(Some(summary(&header))).await.expect("kept");
@@ -283,7 +289,10 @@ async fn lists_are_filtered_and_paged() {
         let mut header = header(game, Durability::Durable);
         header.created_at_ms = u64::from(game) * 1_000;
         let header = Arc::new(header);
-        let mut journal = store.create(Arc::clone(&header), Vec::new()).await.expect("kept");
+        let mut journal = store
+            .create(Arc::clone(&header), Vec::new())
+            .await
+            .expect("kept");
         journal.finish(Some(summary(&header))).await.expect("kept");
     }
     let unheard_of = {
@@ -483,7 +492,12 @@ async fn a_part_that_is_missing_of_a_finished_game_is_noticed() {
         let headers = [1, 2].map(|game| Arc::new(header(game, Durability::Durable)));
         let mut journals = Vec::new();
         for header in &headers {
-            journals.push(store.create(Arc::clone(header), Vec::new()).await.expect("kept"));
+            journals.push(
+                store
+                    .create(Arc::clone(header), Vec::new())
+                    .await
+                    .expect("kept"),
+            );
         }
         // The rows of the two lie among each other.
         for entry in entries() {

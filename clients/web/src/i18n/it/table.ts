@@ -33,7 +33,7 @@ export const table: Texts["table"] = {
   play: (quantity, face, golden, jokers) =>
     `${quantity} × ${face}${golden ? ", d’oro" : ""}${jokers === 0 ? "" : plural(jokers, { one: " + jolly", other: " + # jolly" })}`,
   jokers: (count) => plural(count, { one: "un jolly", other: "# jolly" }),
-  board: { label: "Piano", empty: "Il piano è vuoto", by: (cards, name) => `${cards} · ${name}` },
+  board: { label: "Piano di lavoro", empty: "Il piano di lavoro è vuoto", by: (cards, name) => `${cards} · ${name}` },
   hand: {
     label: "La tua mano",
     of: (name) => `Mano di ${name}`,
@@ -83,7 +83,7 @@ export const table: Texts["table"] = {
     cards: (count) => plural(count, { one: "carta", other: "carte" }),
     openingGolden: "con quello d’oro",
     openingFace: "e nessun altro",
-    anything: "Il piano è vuoto: va bene tutto.",
+    anything: "Il piano di lavoro è vuoto: va bene tutto.",
     beat: "Un valore più raro, non meno carte.",
     nothing: "Niente è più raro: si può solo passare.",
     opens: "Apre lo Shift e non può passare.",

@@ -18,7 +18,7 @@ export const tutorial: Texts["tutorial"] = {
     beating:
       "Gustav ha messo due 9. Per batterli serve un valore più raro, cioè un numero più basso, e almeno altrettante carte. I tuoi due 8 vanno bene.",
     leading:
-      "Tutti gli altri hanno passato: questa pizza è finita. Chi ha giocato per ultimo inizia la prossima, a piano vuoto, con quello che vuole. Liberati del tuo unico 10.",
+      "Tutti gli altri hanno passato: questa pizza è finita. Chi ha giocato per ultimo inizia la prossima, a piano di lavoro vuoto, con quello che vuole. Liberati del tuo unico 10.",
     passing:
       "Il 2 di Gustav è molto raro, e non hai nulla di più raro. Allora passi. Sei fuori finché questa pizza non è finita, e torni per la prossima.",
     again: "Una pizza nuova. Gustav inizia con due 6. Battili con i tuoi due 5.",

@@ -1,5 +1,6 @@
 // The middle of the table: the pizza that is being made, with everything that has gone onto it, and on it the cards that lie on the board.
 
+import type { ComponentChildren } from "preact";
 import { t } from "../../i18n";
 import { Card } from "../../parts/Card";
 import { Drawing, faceDrawing } from "../../parts/Drawing";
@@ -12,15 +13,10 @@ const MOST_TOPPINGS = 44;
 /** Turns from one topping to the next by the golden angle, so that they never lie in a row. */
 const GOLDEN_ANGLE = Math.PI * (3 - Math.sqrt(5));
 
-export function Board({ table }: { table: TableState }) {
+/** The board; `children` are said on it instead of what lies there. */
+export function Board({ table, children }: { table: TableState; children?: ComponentChildren }) {
   const words = t().table.board;
-  const { board, boardBy } = table;
-  const said =
-    board.length === 0
-      ? words.empty
-      : boardBy === undefined
-        ? playWords(board)
-        : words.by(playWords(board), distinctName(table, boardBy));
+  const { board } = table;
   return (
     <section class="board" aria-label={words.label}>
       <div class="pizza" aria-hidden="true">
@@ -36,9 +32,16 @@ export function Board({ table }: { table: TableState }) {
           <Card key={index} card={card} class="board-card" />
         ))}
       </div>
-      <p class={`board-words ${board.length === 0 ? "board-empty" : ""}`}>{said}</p>
+      <p class={`board-words ${board.length === 0 ? "board-empty" : ""}`}>{children ?? boardWords(table)}</p>
     </section>
   );
+}
+
+function boardWords(table: TableState): string {
+  const words = t().table.board;
+  const { board, boardBy } = table;
+  if (board.length === 0) return words.empty;
+  return boardBy === undefined ? playWords(board) : words.by(playWords(board), distinctName(table, boardBy));
 }
 
 /** An ingredient on the pizza, somewhere between the cards and the crust. */

@@ -1,11 +1,12 @@
 // What one seat shows: who sits there and what it is, its role, points and cards, what it did last, what it has expressed.
 
 import { DecisionKind } from "../../gen/chefshat/v1/decision_pb";
+import { ParticipantKind } from "../../gen/chefshat/v1/room_pb";
 import { Role } from "../../gen/chefshat/v1/rules_pb";
 import { t } from "../../i18n";
 import { Card } from "../../parts/Card";
 import { Drawing } from "../../parts/Drawing";
-import { KindBadge } from "../../parts/KindBadge";
+import { KindBadge, kindWord } from "../../parts/KindBadge";
 import { isLabel } from "../expressions";
 import { stacks } from "../model/cards";
 import { isTaken, type SeatState, type TableState } from "../model/state";
@@ -42,7 +43,16 @@ interface SeatPanelProps {
 
 export function SeatPanel({ table, seat, own = false, deciding, kind, cards = true }: SeatPanelProps) {
   const words = t().table;
-  const state = seat.place > 0 ? "placed" : deciding ? "deciding" : seat.passed ? "passed" : "";
+  const waiting = table.phase === "waiting";
+  const state = !isTaken(seat)
+    ? "free"
+    : seat.place > 0
+      ? "placed"
+      : deciding
+        ? "deciding"
+        : seat.passed
+          ? "passed"
+          : "";
   const presence = presenceWords(seat);
   const role = roleWord(seat.role);
   return (
@@ -52,31 +62,41 @@ export function SeatPanel({ table, seat, own = false, deciding, kind, cards = tr
       </span>
       <div class="seat-who">
         <h2 class="seat-name">
-          {isTaken(seat) ? nameOf(table, seat.seat) : words.freeSeat}
+          {isTaken(seat) ? nameOf(table, seat.seat) : freeWords(seat)}
           {own && <span class="soft"> ({words.you})</span>}
         </h2>
         <p class="seat-kind">
-          <KindBadge kind={seat.kind} builtIn={seat.builtIn} />
-          {presence && isTaken(seat) && <span class="seat-presence">{presence}</span>}
+          {isTaken(seat) && <KindBadge kind={seat.kind} builtIn={seat.builtIn} />}
+          {isTaken(seat) && presence && <span class="seat-presence">{presence}</span>}
         </p>
       </div>
-      <p class="seat-points">
-        <strong class="number">{seat.points}</strong> <span class="soft small">{words.pointsWord}</span>
-      </p>
-      <p class="seat-state">
-        {role && (
-          <span class="seat-role">
-            <Drawing name={ROLE_DRAWINGS[seat.role]} /> {role}
-          </span>
-        )}
-        <Chip table={table} seat={seat} state={state} kind={kind} />
-      </p>
-      {cards && table.phase !== "waiting" && <Cards seat={seat} />}
+      {!waiting && (
+        <p class="seat-points">
+          <strong class="number">{seat.points}</strong> <span class="soft small">{words.pointsWord}</span>
+        </p>
+      )}
+      {!waiting && (
+        <p class="seat-state">
+          {role && (
+            <span class="seat-role">
+              <Drawing name={ROLE_DRAWINGS[seat.role]} /> {role}
+            </span>
+          )}
+          <Chip table={table} seat={seat} state={state} kind={kind} />
+        </p>
+      )}
+      {cards && !waiting && <Cards seat={seat} />}
       {seat.expression && table.nextSequence - seat.expression.sequence <= FRESH && (
         <Bubble key={seat.expression.sequence} label={seat.expression.label} />
       )}
     </article>
   );
+}
+
+/** For whom a free seat is kept. */
+function freeWords({ reservedFor }: SeatState): string {
+  if (reservedFor === ParticipantKind.UNSPECIFIED) return t().table.freeSeat;
+  return t().lobby.seats.keptFor(kindWord(reservedFor));
 }
 
 interface ChipProps {

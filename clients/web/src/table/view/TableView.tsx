@@ -123,6 +123,7 @@ export function TableView(props: TableViewProps) {
         <section
           class={`own sheet ${decision ? "own-deciding" : ""} ${decision && !special ? "own-picking" : ""}`}
           aria-label={handLabel}
+          data-decision={decision && String(decision.id)}
         >
           <div class="own-head">
             <SeatPanel

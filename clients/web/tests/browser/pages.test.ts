@@ -1,0 +1,141 @@
+// Every page by itself: no serious fault for those who cannot see or who use the keyboard, by light and by dark; no scrolling sideways on a
+// phone; and what the first page loads.
+
+import { readFileSync } from "node:fs";
+import { createRequire } from "node:module";
+import type { AxeResults, RunOptions } from "axe-core";
+import type { Browser, Page } from "playwright-core";
+import { afterAll, beforeAll, expect, test } from "vitest";
+import { TournamentFormat } from "../../src/gen/chefshat/v1/tournament_pb";
+import { byClicks, nextDecision, sitDown } from "./play";
+import { agent, clientsOf, gameOf, newRoom } from "./rooms";
+import { person, Server, startBrowser } from "./stage";
+
+const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
+const PHONE = { width: 360, height: 740 };
+const COMPUTER = { width: 1280, height: 800 };
+const MOST_FIRST_PAGE_BYTES = 200_000;
+
+let server: Server;
+let browser: Browser;
+/** A page whose device holds a seat at a table; there it must decide. */
+let seated: Page;
+let gameId: string;
+let tournamentId: string;
+let rooms: { table: string; waiting: string };
+
+beforeAll(async () => {
+  server = await Server.start();
+  browser = await startBrowser();
+  const over = await newRoom(server, { seats: ["agent", "greedy", "random", "trained"], rated: true });
+  expect(await agent(server, "greedy", over.code, "Gustav")).toBe(0);
+  gameId = await gameOf(server, over.roomId);
+  const { tournament } = await clientsOf(server).tournaments.createTournament({
+    settings: {
+      name: "Spring cup",
+      format: TournamentFormat.KNOCKOUT,
+      rules: { preset: "paper", faces: 8, stop: { case: "targetShifts", value: 1 } },
+      builtInAgents: Array.from({ length: 8 }, (_, index) => (index % 2 === 0 ? "greedy" : "random")),
+      startWhenJoined: 8,
+    },
+  });
+  tournamentId = tournament?.tournamentId ?? "";
+  const table = await newRoom(server, { seats: ["person", "greedy", "random", "greedy"] });
+  const waiting = await newRoom(server, { seats: ["person", "agent", "random", "greedy"], name: "Sunday" });
+  rooms = { table: table.roomId, waiting: waiting.roomId };
+  seated = (await person(browser)).page;
+  await sitDown(seated, server, waiting.code, "Rosa");
+  await sitDown(seated, server, table.code, "Rosa");
+  // Some turns on, so that there is something on the board and in the log.
+  for (let turn = 0, id = await nextDecision(seated); turn < 2; turn += 1) {
+    await byClicks(seated);
+    id = await nextDecision(seated, id);
+  }
+});
+
+afterAll(async () => {
+  await browser?.close();
+  await server?.stop();
+});
+
+/** Every page: its address, and what is there once it has drawn itself. */
+const PAGES: Record<string, { path: () => string; ready: string; opened?: string }> = {
+  lobby: { path: () => "/", ready: ".lobby-rooms li" },
+  "new room": { path: () => "/new", ready: ".new-room-form", opened: ".new-room-form summary" },
+  join: { path: () => "/join", ready: "form" },
+  invitation: { path: () => "/join/ABCD2345", ready: "form" },
+  "waiting room": { path: () => `/rooms/${rooms.waiting}`, ready: ".seats li" },
+  table: { path: () => `/rooms/${rooms.table}`, ready: "[data-decision]" },
+  "look-up table": { path: () => `/rooms/${rooms.table}`, ready: "[data-decision]", opened: ".tool-lookup" },
+  watch: { path: () => `/watch/${rooms.table}`, ready: ".table-watched" },
+  replay: { path: () => `/replay/${gameId}`, ready: ".replay", opened: ".replay-decision summary" },
+  tournaments: { path: () => "/tournaments", ready: "main li a" },
+  tournament: { path: () => `/tournaments/${tournamentId}`, ready: ".standings tbody tr" },
+  wall: { path: () => `/tournaments/${tournamentId}?wall`, ready: ".standings tbody tr" },
+  leaderboard: { path: () => "/leaderboard", ready: "tbody tr" },
+  "a person": { path: () => "/people/Gustav", ready: "h1" },
+  tutorial: { path: () => "/tutorial", ready: ".lesson" },
+  "not found": { path: () => "/nowhere/at/all", ready: "h1" },
+};
+
+test.each(Object.keys(PAGES))("%s: accessible by light and by dark, and nothing wider than a phone", async (name) => {
+  const { path = () => "", ready = "", opened } = PAGES[name] ?? {};
+  const page = seated;
+  await page.emulateMedia({ colorScheme: "light", reducedMotion: "reduce" });
+  await page.setViewportSize(COMPUTER);
+  await page.goto(server.url + path());
+  await page.locator(ready).first().waitFor();
+  if (opened) await page.locator(opened).first().click();
+  await page.evaluate(AXE);
+  expect(await serious(page)).toEqual([]);
+  await page.emulateMedia({ colorScheme: "dark" });
+  expect(await serious(page, { runOnly: ["color-contrast"] })).toEqual([]);
+  await page.setViewportSize(PHONE);
+  expect(await tooWide(page)).toEqual([]);
+  // Italian words are longer.
+  await page.goto(`${server.url}${path()}${path().includes("?") ? "&" : "?"}lang=it`);
+  await page.locator(ready).first().waitFor();
+  expect(await page.locator("html").getAttribute("lang")).toBe("it");
+  expect(await tooWide(page)).toEqual([]);
+});
+
+test.each(["en-GB", "it-IT"])("the first page, in %s, loads less than 200 kB", async (locale) => {
+  const { page } = await person(browser, { locale });
+  const network = await page.context().newCDPSession(page);
+  let bytes = 0;
+  const kinds = new Set<string>();
+  await network.send("Network.enable");
+  network.on("Network.responseReceived", ({ type }) => kinds.add(type));
+  network.on("Network.loadingFinished", ({ encodedDataLength }) => {
+    bytes += encodedDataLength;
+  });
+  await page.goto(`${server.url}/`, { waitUntil: "networkidle" });
+  await page.locator(".lobby-rooms li").first().waitFor();
+  expect([...kinds]).toEqual(expect.arrayContaining(["Document", "Script", "Stylesheet", "Font", "Fetch"]));
+  expect(bytes).toBeGreaterThan(50_000);
+  expect(bytes).toBeLessThan(MOST_FIRST_PAGE_BYTES);
+});
+
+/** The faults that make a page hard or impossible to use for somebody. */
+async function serious(page: Page, options: RunOptions = {}): Promise<string[]> {
+  const found = await page.evaluate(async (options) => {
+    const { axe } = globalThis as unknown as { axe: { run(options: RunOptions): Promise<AxeResults> } };
+    return axe.run(options);
+  }, options);
+  expect(found.passes.length + found.incomplete.length).toBeGreaterThan(0);
+  return found.violations
+    .filter(({ impact }) => impact === "serious" || impact === "critical")
+    .flatMap(({ id, nodes }) => nodes.map(({ target, failureSummary }) => `${id}: ${target} ${failureSummary}`));
+}
+
+/** What makes the page scroll sideways. */
+async function tooWide(page: Page): Promise<string[]> {
+  return page.evaluate(() => {
+    const { scrollWidth, clientWidth } = document.documentElement;
+    if (scrollWidth <= clientWidth) return [];
+    const wide = [...document.querySelectorAll("body *")].filter(
+      (element) => element.getBoundingClientRect().right > clientWidth + 1,
+    );
+    return [`${scrollWidth} > ${clientWidth}`, ...wide.slice(0, 5).map((element) => element.outerHTML.slice(0, 120))];
+  });
+}

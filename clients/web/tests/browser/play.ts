@@ -1,0 +1,119 @@
+// What a person does at the table: sits down, waits for a decision, takes it with the mouse or with the keyboard alone. Which cards are
+// picked does not matter to the tests: the rarest face last, so that the Shift is not over at once.
+
+import type { Page } from "playwright-core";
+import { type Server, until } from "./stage";
+
+/** Most keys that are pressed to get from one place of a page to another. */
+const MOST_TABS = 60;
+
+/** Opens an invitation and takes a seat under a name. */
+export async function sitDown(page: Page, server: Server, code: string, name: string): Promise<void> {
+  await page.goto(`${server.url}/join/${code}`);
+  await page.getByLabel("Your name").fill(name);
+  await page.getByRole("button", { name: "Sit down" }).click();
+  await page.waitForURL(/\/rooms\//);
+}
+
+/** Waits for a decision that is not the one before; gives its number, or undefined once the game is over. */
+export async function nextDecision(page: Page, before?: string): Promise<string | undefined> {
+  const found = await page.waitForFunction((before) => {
+    if (document.querySelector('.result a[href^="/replay/"]')) return "over";
+    const id = document.querySelector<HTMLElement>("[data-decision]")?.dataset.decision;
+    return id !== before && id;
+  }, before);
+  const id = await found.jsonValue();
+  return id === "over" || id === false ? undefined : id;
+}
+
+/** A way to take the open decision. */
+export type Way = (page: Page) => Promise<void>;
+
+/** Plays to the end of the game; gives the number of decisions taken. `each` is done while a decision is open. */
+export async function playOn(page: Page, way: Way, each?: (taken: number) => Promise<void>): Promise<number> {
+  let taken = 0;
+  for (let id = await nextDecision(page); id !== undefined; id = await nextDecision(page, id)) {
+    await each?.(taken);
+    await way(page);
+    taken += 1;
+  }
+  return taken;
+}
+
+/** Takes the decision with the mouse. */
+export const byClicks: Way = async (page) => {
+  const decline = page.locator('[data-action="decline"]');
+  if (await decline.isVisible()) return decline.click();
+  const ready = page.locator(
+    '[data-action="play"][aria-disabled="false"], [data-action="give"][aria-disabled="false"]',
+  );
+  const picked = page.locator('.hand-card[aria-pressed="true"]');
+  const free = page.locator('.hand-card[aria-disabled="false"][aria-pressed="false"]');
+  while ((await ready.count()) === 0) {
+    const already = await picked.count();
+    const faces = free.and(page.locator(':not([data-card="J"])'));
+    const card = (await faces.count()) > 0 ? faces : free;
+    if ((await card.count()) === 0) return page.locator('[data-action="pass"][aria-disabled="false"]').click();
+    await card.last().click();
+    await until(async () => (await picked.count()) !== already);
+  }
+  await ready.click();
+};
+
+/** What has the keyboard's focus. */
+export interface Focus {
+  label: string;
+  action: string;
+  card: string;
+  disabled: boolean;
+  pressed: boolean;
+}
+
+/** What has the keyboard's focus now; nothing may lose it to the whole document. */
+export async function focus(page: Page): Promise<Focus> {
+  return page.evaluate(() => {
+    const on = document.activeElement;
+    const label = on instanceof HTMLInputElement ? on.labels?.[0]?.textContent : on?.textContent;
+    return {
+      label: on === document.body ? "" : (on?.getAttribute("aria-label") ?? label ?? "").trim(),
+      action: on?.getAttribute("data-action") ?? "",
+      card: on?.getAttribute("data-card") ?? "",
+      disabled: on?.getAttribute("aria-disabled") === "true",
+      pressed: on?.getAttribute("aria-pressed") === "true",
+    };
+  });
+}
+
+/** Presses Tab, or Shift and Tab, until what has the focus is what is looked for. */
+export async function tabTo(page: Page, wanted: (on: Focus) => boolean, key = "Tab"): Promise<void> {
+  for (let pressed = 0; pressed < MOST_TABS; pressed += 1) {
+    if (wanted(await focus(page))) return;
+    await page.keyboard.press(key);
+  }
+  throw new Error(`not to be reached with ${key}; the focus is on "${(await focus(page)).label}"`);
+}
+
+/** Takes the decision with the keyboard: along the hand with the arrow keys, a card with the space bar, Enter to play. */
+export const byKeys: Way = async (page) => {
+  if (await page.locator('[data-action="decline"]').isVisible()) {
+    await tabTo(page, (on) => on.action === "decline");
+    return page.keyboard.press("Enter");
+  }
+  const ready = page.locator(
+    '[data-action="play"][aria-disabled="false"], [data-action="give"][aria-disabled="false"]',
+  );
+  const onHand = (on: Focus) => on.card !== "";
+  if (!onHand(await focus(page))) await tabTo(page, onHand, (await focus(page)).action ? "Shift+Tab" : "Tab");
+  await page.keyboard.press("End");
+  const cards = await page.locator(".hand-card").count();
+  for (let at = cards; at > 0 && (await ready.count()) === 0; at -= 1) {
+    const on = await focus(page);
+    if (!on.disabled && !on.pressed) {
+      await page.keyboard.press("Space");
+      await until(async () => (await focus(page)).pressed);
+    }
+    if ((await ready.count()) === 0) await page.keyboard.press("ArrowLeft");
+  }
+  if ((await ready.count()) === 0) await tabTo(page, (on) => on.action === "pass" && !on.disabled);
+  await page.keyboard.press("Enter");
+};

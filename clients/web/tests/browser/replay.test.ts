@@ -1,0 +1,116 @@
+// A replay in a browser: at any decision it shows what the record says.
+
+import type { Browser, Page } from "playwright-core";
+import { afterAll, beforeAll, expect, test } from "vitest";
+import type { DecisionRecord, RecordLine } from "../../src/gen/chefshat/v1/record_pb";
+import { legalActions } from "../../src/table/model/actions";
+import { agent, gameOf, newRoom, recordOf } from "./rooms";
+import { person, Server, startBrowser } from "./stage";
+
+let server: Server;
+let browser: Browser;
+let gameId: string;
+let lines: RecordLine[];
+
+beforeAll(async () => {
+  server = await Server.start();
+  browser = await startBrowser();
+  const { roomId, code } = await newRoom(server, { seats: ["agent", "greedy", "random", "greedy"], shifts: 2 });
+  expect(await agent(server, "greedy", code, "Gustav")).toBe(0);
+  gameId = await gameOf(server, roomId);
+  lines = await recordOf(server, gameId);
+});
+
+afterAll(async () => {
+  await browser?.close();
+  await server?.stop();
+});
+
+test("scrubbing shows the hands and the choice that the record has at that decision", async () => {
+  const { page, faults } = await person(browser);
+  await page.goto(`${server.url}/replay/${gameId}`);
+  const slider = page.getByLabel("Moment of the game");
+  const all = lines.filter(({ line }) => line.case === "decision").length;
+  await expect.poll(() => slider.getAttribute("aria-valuetext")).toBe(`0 of ${all} decisions taken`);
+  const possible = page.locator(".replay-decision");
+  await possible.locator("summary").click();
+  const last = Number(await slider.getAttribute("max"));
+  for (const share of [0.1, 0.35, 0.6, 0.85]) {
+    await slider.fill(String(Math.round(share * last)));
+    // From the end of a pizza or a Shift on to where somebody decides.
+    while ((await possible.count()) === 0) await page.getByRole("button", { name: "One moment on" }).click();
+    const taken = Number((await slider.getAttribute("aria-valuetext"))?.split(" ")[0]);
+    const { hands, decision } = before(taken + 1);
+    expect(await shownHands(page)).toEqual(hands);
+    const name = ["Gustav", "greedy", "random", "greedy"][decision.seat] ?? "";
+    expect(await possible.locator("summary").textContent()).toContain(name);
+    if (decision.text.startsWith("C")) {
+      await possible.getByText(`${legalActions(decision.actionMask).length} legal action`).waitFor();
+    }
+  }
+  await page.getByLabel("Cards seen").selectOption({ label: "as spectators" });
+  await expect.poll(() => shownHands(page)).toEqual([[], [], [], []]);
+  await page.getByRole("button", { name: "To the end" }).click();
+  await page.getByRole("heading", { name: "The game is over", level: 1 }).waitFor();
+  expect(faults).toEqual([]);
+});
+
+test("an address names a decision, and playing goes on from there", async () => {
+  const { page } = await person(browser);
+  await page.goto(`${server.url}/replay/${gameId}?decision=12`);
+  const slider = page.getByLabel("Moment of the game");
+  await expect.poll(() => slider.getAttribute("aria-valuetext")).toMatch(/^11 of /);
+  await page.getByLabel("Speed").selectOption({ label: "× 8" });
+  await page.getByRole("button", { name: "Play", exact: true }).click();
+  await expect.poll(() => slider.getAttribute("aria-valuetext")).toMatch(/^14 of /);
+});
+
+/** The hands, faces ascending, when a decision is open, and the decision, from the record alone. */
+function before(number: number): { hands: number[][]; decision: DecisionRecord } {
+  let hands: number[][] = [];
+  let decisions = 0;
+  const take = (seat: number, face: number) => hands[seat]?.splice(hands[seat].indexOf(face), 1);
+  for (const { line } of lines) {
+    if (line.case === "decision") {
+      decisions += 1;
+      if (decisions === number) {
+        for (const hand of hands) hand.sort((a, b) => a - b);
+        return { hands, decision: line.value };
+      }
+    }
+    if (line.case !== "event") continue;
+    const { kind } = line.value;
+    if (kind.case === "shiftStarted") hands = kind.value.hands.map(({ cards }) => [...cards]);
+    if (kind.case === "cardsExchanged") {
+      const { giver, receiver, cards } = kind.value;
+      for (const face of cards) {
+        take(giver, face);
+        hands[receiver]?.push(face);
+      }
+    }
+    if (kind.case === "play") {
+      const { seat, face, quantity, jokers } = kind.value;
+      for (let card = 0; card < quantity; card += 1) take(seat, face);
+      for (let card = 0; card < jokers; card += 1) take(seat, JOKER);
+    }
+  }
+  throw new Error(`the record has no decision ${number}`);
+}
+
+/** How a record writes a joker: one more than the faces. */
+const JOKER = 12;
+
+/** The hands that the page shows open, by seat, as those hear them who do not see. */
+async function shownHands(page: Page): Promise<number[][]> {
+  const seats = page.locator("[data-seat]");
+  const shown: number[][] = [];
+  for (const seat of await seats.all()) {
+    const spoken = seat.locator(".seat-cards .only-heard");
+    const words = (await spoken.count()) > 0 ? ((await spoken.textContent()) ?? "") : "";
+    const faces = words.split("; ").filter((word) => word !== "");
+    shown[Number(await seat.getAttribute("data-seat"))] = faces.map((word) =>
+      word === "joker" ? JOKER : Number(/\d+/.exec(word)?.[0]),
+    );
+  }
+  return shown;
+}

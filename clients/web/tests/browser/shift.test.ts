@@ -1,0 +1,135 @@
+// People at a table: whole Shifts with the mouse and with the keyboard alone, through a reload and through the end of the server, and
+// two people with two agents in one room.
+
+import type { Browser, Page } from "playwright-core";
+import { afterAll, beforeAll, expect, test } from "vitest";
+import { byClicks, byKeys, focus, playOn, sitDown, tabTo } from "./play";
+import { agent, gameOf, newRoom, recordOf } from "./rooms";
+import { person, Server, startBrowser } from "./stage";
+
+const OPPONENTS = ["greedy", "random", "greedy"];
+
+let server: Server;
+let browser: Browser;
+
+beforeAll(async () => {
+  server = await Server.start();
+  browser = await startBrowser();
+});
+
+afterAll(async () => {
+  await browser?.close();
+  await server?.stop();
+});
+
+test("a person plays a whole Shift by clicking, reloads in the middle and goes on", async () => {
+  const { roomId, code } = await newRoom(server, { seats: ["person", ...OPPONENTS] });
+  const { page, faults } = await person(browser);
+  await sitDown(page, server, code, "Rosa");
+  let reloads = 0;
+  const taken = await playOn(page, byClicks, async (already) => {
+    if (already !== 3) return;
+    const before = await seen(page);
+    await page.reload();
+    await page.locator("[data-decision]").waitFor();
+    expect(await seen(page)).toEqual(before);
+    reloads += 1;
+  });
+  expect(reloads).toBe(1);
+  await expectEnd(page, roomId, taken);
+  expect(faults).toEqual([]);
+});
+
+test("a person plays a whole Shift with the keyboard alone, and hears every turn", async () => {
+  const { roomId, code } = await newRoom(server, { seats: ["person", ...OPPONENTS] });
+  const { page, faults } = await person(browser);
+  const heard: string[] = [];
+  await page.exposeFunction("hear", (text: string) => heard.push(text));
+  await page.addInitScript(listen);
+  await page.goto(`${server.url}/join/${code}`);
+  await page.getByLabel("Your name").waitFor();
+  await tabTo(page, (on) => on.label.startsWith("Your name"));
+  await page.keyboard.type("Rosa");
+  await page.keyboard.press("Enter");
+  const taken = await playOn(page, byKeys, async (already) => {
+    // From its second decision on a player is in the hand or at the buttons, never thrown back to the top of the page.
+    if (already > 0) expect((await focus(page)).label).not.toBe("");
+  });
+  await expectEnd(page, roomId, taken);
+  await expect.poll(() => heard.join(" ").match(/Your turn\./g)?.length).toBe(taken);
+  expect(heard.join(" ")).toContain("Rosa finishes");
+  await tabTo(page, (on) => on.label === "See the game again");
+  await page.keyboard.press("Enter");
+  await page.waitForURL(/\/replay\//);
+  expect(faults).toEqual([]);
+});
+
+test("a game goes on when the server is ended and started again in the middle", async () => {
+  const { roomId, code } = await newRoom(server, { seats: ["person", ...OPPONENTS], faces: 8 });
+  const { page } = await person(browser);
+  await sitDown(page, server, code, "Rosa");
+  let restarts = 0;
+  const taken = await playOn(page, byClicks, async (already) => {
+    if (already !== 2) return;
+    const before = await seen(page);
+    await server.restart();
+    await page.getByText("The server was restarted; the game goes on").waitFor();
+    await page.locator("[data-decision]").waitFor();
+    expect((await seen(page)).hand).toEqual(before.hand);
+    restarts += 1;
+  });
+  expect(restarts).toBe(1);
+  await expectEnd(page, roomId, taken);
+});
+
+test("two people in two browsers and two agents play in one room to its end", async () => {
+  const { roomId, code } = await newRoom(server, { seats: ["person", "agent", "person", "agent"], faces: 8 });
+  const other = await startBrowser();
+  try {
+    const rosa = await person(browser);
+    const karl = await person(other, { viewport: { width: 390, height: 844 } });
+    await sitDown(rosa.page, server, code, "Rosa");
+    await sitDown(karl.page, server, code, "Karl");
+    const agents = Promise.all([agent(server, "greedy", code, "Gustav"), agent(server, "random", code, "Rolf")]);
+    const taken = await Promise.all([playOn(rosa.page, byClicks), playOn(karl.page, byClicks)]);
+    expect(await agents).toEqual([0, 0]);
+    const standings = await rosa.page.locator(".result tbody tr").allInnerTexts();
+    expect(standings).toHaveLength(4);
+    expect(await karl.page.locator(".result tbody tr").allInnerTexts()).toEqual(standings);
+    await expectEnd(rosa.page, roomId, taken[0]);
+    expect([...rosa.faults, ...karl.faults]).toEqual([]);
+  } finally {
+    await other.close();
+  }
+});
+
+/** In the page: passes on everything that is said to those who listen. */
+function listen(): void {
+  const { hear } = globalThis as unknown as { hear(text: string): void };
+  new MutationObserver((changes) => {
+    const region = changes[0]?.target.parentElement?.closest("[role=status]") ?? changes[0]?.target;
+    if (region instanceof Element && region.matches("[role=status]")) hear(region.textContent);
+  }).observe(document, { subtree: true, childList: true, characterData: true });
+}
+
+/** What the page shows of the open decision and of what came before it. */
+async function seen(page: Page): Promise<Record<"decision" | "hand" | "heading" | "points", unknown>> {
+  return {
+    decision: await page.locator("[data-decision]").getAttribute("data-decision"),
+    hand: await page.locator(".hand-card").evaluateAll((cards) => cards.map((card) => card.getAttribute("aria-label"))),
+    heading: await page.getByRole("heading", { level: 1 }).textContent(),
+    points: await page.locator(".seat-points").allInnerTexts(),
+  };
+}
+
+/** The game is over and said to be so, and its record knows every decision as the person's own. */
+async function expectEnd(page: Page, roomId: string, taken: number): Promise<void> {
+  await page.getByRole("heading", { name: "The game is over", level: 1 }).waitFor();
+  const record = await recordOf(server, await gameOf(server, roomId));
+  const decisions = record.flatMap(({ line }) =>
+    line.case === "decision" && line.value.seat === 0 ? [line.value] : [],
+  );
+  expect(decisions).toHaveLength(taken);
+  expect(taken).toBeGreaterThan(3);
+  expect(decisions.every(({ source, invalidAttempts }) => source === 1 && invalidAttempts.length === 0)).toBe(true);
+}

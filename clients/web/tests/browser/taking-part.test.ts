@@ -1,0 +1,97 @@
+// A person in a tournament: joins on its page, is seated in each of its games there, through a reload and the end of the server, and is back
+// at the standings. And the same tournament as a wall shows it.
+
+import type { Browser } from "playwright-core";
+import { afterAll, beforeAll, expect, test } from "vitest";
+import { TournamentFormat } from "../../src/gen/chefshat/v1/tournament_pb";
+import { byClicks, playOn } from "./play";
+import { clientsOf } from "./rooms";
+import { person, Server, startBrowser } from "./stage";
+
+let server: Server;
+let browser: Browser;
+
+beforeAll(async () => {
+  server = await Server.start();
+  browser = await startBrowser();
+});
+
+afterAll(async () => {
+  await browser?.close();
+  await server?.stop();
+});
+
+/** A tournament of one Shift a game that begins when one person has joined; its id and join code. */
+async function newTournament(rounds: number): Promise<{ id: string; code: string }> {
+  const { tournament, joinCode } = await clientsOf(server).tournaments.createTournament({
+    settings: {
+      name: "Friday league",
+      format: TournamentFormat.SWISS,
+      rounds,
+      rules: { preset: "paper", stop: { case: "targetShifts", value: 1 } },
+      policy: { decisionTimeMs: 600_000, spectators: true },
+      builtInAgents: ["greedy", "random", "random"],
+      startWhenJoined: 4,
+    },
+  });
+  if (!tournament) throw new Error("the server did not say which tournament it made");
+  return { id: tournament.tournamentId, code: joinCode };
+}
+
+test("a person joins, plays every game of the tournament and sees the final standings", async () => {
+  const { id, code } = await newTournament(2);
+  const wall = await person(browser);
+  await wall.page.goto(`${server.url}/tournaments/${id}?wall`);
+  await wall.page.getByText("open to join").waitFor();
+  expect(await wall.page.locator(".header").isVisible()).toBe(false);
+
+  const { page, faults } = await person(browser);
+  await page.goto(`${server.url}/tournaments/${id}`);
+  await page.getByRole("button", { name: "Join the tournament" }).click();
+  await page.getByText("Type the code that the organiser gave you.").waitFor();
+  await page.getByLabel("Join code of the tournament").fill(code.toLowerCase());
+  await page.getByLabel("Your name").fill("Rosa");
+  await page.getByRole("button", { name: "Join the tournament" }).click();
+
+  // The first game begins here by itself, and comes back to the same decision after a reload and after the end of the server.
+  let interrupted = 0;
+  await playOn(page, byClicks, async (already) => {
+    if (already !== 1 && already !== 2) return;
+    const before = await page.locator("[data-decision]").getAttribute("data-decision");
+    if (already === 1) await page.reload();
+    else {
+      await server.restart();
+      await page.getByText("The server was restarted; the game goes on").waitFor();
+    }
+    await page.locator(`[data-decision="${before}"]`).waitFor();
+    interrupted += 1;
+  });
+  expect(interrupted).toBe(2);
+
+  // The second one takes the place of the first one's result, or is gone to from the standings.
+  const second = page.getByText("Friday league · round 2, table 1");
+  await second.waitFor();
+  await playOn(page, byClicks);
+  await page.getByRole("button", { name: "Back to the standings" }).click();
+  await page.getByText("The tournament is over. Thank you for playing.").waitFor();
+  const standings = page.getByRole("table", { name: "Final standings" });
+  await standings.getByRole("row", { name: /Rosa person/ }).waitFor();
+  expect(await standings.getByRole("row").count()).toBe(5);
+  expect(faults.filter((fault) => !/net::|Failed to load/.test(fault))).toEqual([]);
+
+  await wall.page.getByText("finished").waitFor();
+  await wall.page.getByRole("table").getByText("Rosa").waitFor();
+});
+
+test("a code that is wrong and a name that is taken are answered in words", async () => {
+  const { id, code } = await newTournament(1);
+  const { page } = await person(browser, { locale: "it-IT" });
+  await page.goto(`${server.url}/tournaments/${id}?code=22222222`);
+  await page.getByLabel("Il tuo nome").fill("greedy");
+  const join = page.getByRole("button", { name: "Iscriviti al torneo" });
+  await join.click();
+  await page.getByRole("alert").waitFor();
+  await page.getByLabel("Codice d’ingresso del torneo").fill(code);
+  await join.click();
+  await page.getByText("Qualcun altro ha già questo nome.").waitFor();
+});

@@ -1,0 +1,83 @@
+// What a page is told, byte by byte: a tap between a browser and the server that keeps every answer's body, and the messages in it.
+
+import { createServer, type Server as HttpServer, request } from "node:http";
+import type { AddressInfo } from "node:net";
+import type { DescMessage, MessageShape } from "@bufbuild/protobuf";
+import { fromBinary } from "@bufbuild/protobuf";
+import type { Server } from "./stage";
+
+/** The frames of gRPC-web begin with a byte of flags, of which this one marks the trailers, and four bytes of length. */
+const TRAILERS = 0x80;
+const HEAD_BYTES = 5;
+
+/** What came back for one request. */
+interface Answer {
+  readonly path: string;
+  readonly parts: Buffer[];
+}
+
+/** A tap in front of a server. */
+export class Tap {
+  /** All answers so far, those that are still coming too. */
+  readonly answers: Answer[] = [];
+
+  private constructor(private readonly http: HttpServer) {}
+
+  /** Begins to listen on a free port. */
+  static async before(server: Server): Promise<Tap> {
+    const [host, port] = server.address.split(":");
+    const http = createServer((asked, answered) => {
+      const { method, url: path = "", headers } = asked;
+      const answer: Answer = { path, parts: [] };
+      tap.answers.push(answer);
+      const on = request({ host, port, method, path, headers }, (answering) => {
+        answered.writeHead(answering.statusCode ?? 502, answering.headers);
+        answering.on("data", (part: Buffer) => {
+          answer.parts.push(part);
+        });
+        answering.pipe(answered);
+      });
+      on.on("error", () => answered.destroy());
+      answered.on("close", () => on.destroy());
+      asked.pipe(on);
+    });
+    const tap = new Tap(http);
+    await new Promise<void>((resolve) => http.listen(0, "127.0.0.1", resolve));
+    return tap;
+  }
+
+  /** Where a page finds the server through the tap. */
+  get url(): string {
+    return `http://127.0.0.1:${(this.http.address() as AddressInfo).port}`;
+  }
+
+  /** The services and methods that were called. */
+  get called(): Set<string> {
+    return new Set(this.answers.map(({ path }) => path).filter((path) => path.startsWith("/chefshat.v1.")));
+  }
+
+  /** The messages of all answers of a method, in order, whole ones only. */
+  messages<Desc extends DescMessage>(method: string, schema: Desc): MessageShape<Desc>[] {
+    return this.answers
+      .filter(({ path }) => path === method)
+      .flatMap(({ parts }) => framesOf(Buffer.concat(parts)))
+      .map((frame) => fromBinary(schema, frame));
+  }
+
+  async stop(): Promise<void> {
+    this.http.closeAllConnections();
+    await new Promise((resolve) => this.http.close(resolve));
+  }
+}
+
+function framesOf(body: Buffer): Buffer[] {
+  const frames: Buffer[] = [];
+  for (let at = 0; at + HEAD_BYTES <= body.length; ) {
+    const flags = body.readUInt8(at);
+    const end = at + HEAD_BYTES + body.readUInt32BE(at + 1);
+    if (end > body.length) break;
+    if ((flags & TRAILERS) === 0) frames.push(body.subarray(at + HEAD_BYTES, end));
+    at = end;
+  }
+  return frames;
+}

@@ -1,0 +1,87 @@
+// A spectator's page, and what reaches it: the bytes of every answer are looked through for cards that nobody may see before the end.
+
+import type { Browser } from "playwright-core";
+import { afterAll, beforeAll, expect, test } from "vitest";
+import type { GameEvent } from "../../src/gen/chefshat/v1/event_pb";
+import { SpectatorServiceWatchResponseSchema } from "../../src/gen/chefshat/v1/spectator_service_pb";
+import { agent, newRoom } from "./rooms";
+import { person, Server, startBrowser } from "./stage";
+import { Tap } from "./tap";
+
+const WATCH = "/chefshat.v1.SpectatorService/Watch";
+
+let server: Server;
+let browser: Browser;
+let tap: Tap;
+
+beforeAll(async () => {
+  server = await Server.start();
+  browser = await startBrowser();
+});
+
+afterAll(async () => {
+  await browser?.close();
+  await server?.stop();
+});
+
+/** A game of two Shifts, watched from before its first card to its end: what the page was sent, and whether it ever showed an open hand. */
+async function watched(policy: { spectatorsSeeHands?: boolean; spectatorDelayDecisions?: number }) {
+  tap = await Tap.before(server);
+  try {
+    const { roomId, code } = await newRoom(server, {
+      seats: ["agent", "greedy", "random", "greedy"],
+      shifts: 2,
+      faces: 8,
+      policy: { ...policy, paceMs: 20 },
+    });
+    const { page, faults } = await person(browser);
+    await page.addInitScript(() => {
+      const look = () => {
+        if (document.querySelector(".seat-open")) document.documentElement.dataset.openHand = "seen";
+      };
+      new MutationObserver(look).observe(document, { childList: true, subtree: true });
+    });
+    await page.goto(`${tap.url}/watch/${roomId}`);
+    await page.getByRole("heading", { name: "Friday evening" }).waitFor();
+    expect(await agent(server, "greedy", code, "Gustav")).toBe(0);
+    await page.getByRole("heading", { name: "The game is over", level: 1 }).waitFor();
+    const openHand = (await page.locator("html").getAttribute("data-open-hand")) !== null;
+    await page.context().close();
+    expect(faults).toEqual([]);
+    return { openHand, called: tap.called, messages: tap.messages(WATCH, SpectatorServiceWatchResponseSchema) };
+  } finally {
+    await tap.stop();
+  }
+}
+
+/** The events that tell of a card that lies hidden. */
+function tellingOfHidden(events: readonly GameEvent[]): GameEvent[] {
+  return events.filter(({ kind, rewards }) => {
+    if (rewards.length > 0) return true;
+    if (kind.case === "shiftStarted") return kind.value.hands.length > 0;
+    return kind.case === "cardsExchanged" && (kind.value.cards.length > 0 || kind.value.golden);
+  });
+}
+
+test("a spectator's page is sent no hidden card before the end of the game", async () => {
+  const { openHand, called, messages } = await watched({});
+  const events = messages.flatMap((message) => message.events);
+  const cases = events.map(({ kind }) => kind.case);
+  expect(cases.filter((kind) => kind === "shiftStarted")).toHaveLength(2);
+  expect(cases.filter((kind) => kind === "cardsExchanged")).toHaveLength(4);
+  expect(cases.filter((kind) => kind === "play").length).toBeGreaterThan(20);
+  expect(cases.at(-1)).toBe("gameEnded");
+  expect(tellingOfHidden(events)).toEqual([]);
+  expect(messages.filter(({ snapshot }) => snapshot?.observation)).toEqual([]);
+  // Nothing that this page's protocol does not know, and no other stream beside it.
+  expect(messages.filter((message) => message.$unknown || message.events.some((event) => event.$unknown))).toEqual([]);
+  expect([...called]).toEqual([WATCH]);
+  expect(openHand).toBe(false);
+});
+
+test("where a room shows hands, the same look finds them", async () => {
+  const { openHand, messages } = await watched({ spectatorsSeeHands: true, spectatorDelayDecisions: 1 });
+  const hands = messages.flatMap(({ events }) => tellingOfHidden(events));
+  expect(hands.map(({ kind }) => kind.case)).toContain("shiftStarted");
+  expect(openHand).toBe(true);
+});

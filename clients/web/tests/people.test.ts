@@ -1,0 +1,48 @@
+// What a participant did in its games, and what they add up to.
+
+import { create } from "@bufbuild/protobuf";
+import { expect, test } from "vitest";
+import { RecordSummarySchema } from "../src/gen/chefshat/v1/record_service_pb";
+import { ParticipantKind, RoomState } from "../src/gen/chefshat/v1/room_pb";
+import { ownGame, sum } from "../src/people/games";
+import { ratingRange, ratingWords } from "../src/people/rating";
+
+/** A game of Rosa, two built-in agents called greedy, and somebody who took the agent's name. */
+function record(state: RoomState, places: number[]) {
+  return create(RecordSummarySchema, {
+    state,
+    seats: [
+      { seat: 0, builtInAgent: "greedy", name: "greedy" },
+      { seat: 1, name: "Rosa", kind: ParticipantKind.HUMAN },
+      { seat: 2, builtInAgent: "greedy", name: "greedy" },
+      { seat: 3, name: "Ben", kind: ParticipantKind.HUMAN },
+    ],
+    standings: places.map((place, seat) => ({ seat, place, points: BigInt(20 - place) })),
+  });
+}
+
+const won = record(RoomState.FINISHED, [2, 1, 3, 4]);
+const lost = record(RoomState.FINISHED, [1, 4, 2, 3]);
+const aborted = record(RoomState.ABORTED, []);
+
+test("a game is seen from the participant's seat", () => {
+  const game = ownGame(won, "Rosa");
+  expect([game?.seat, game?.place, game?.points]).toEqual([1, 1, 19]);
+  expect(game?.others.map(({ seat }) => seat)).toEqual([0, 2, 3]);
+  expect(ownGame(won, "greedy")?.seat).toBe(0);
+  expect(ownGame(won, "Nobody")).toBeUndefined();
+  expect(ownGame(aborted, "Rosa")?.place).toBeUndefined();
+});
+
+test("games without a result do not count", () => {
+  const games = [won, lost, aborted].flatMap((one) => ownGame(one, "Rosa") ?? []);
+  expect(games.length).toBe(3);
+  expect(sum(games)).toEqual({ games: 2, wins: 1, meanPlace: 2.5 });
+  expect(sum([])).toEqual({ games: 0, wins: 0, meanPlace: 0 });
+});
+
+test("a rating is said with how far it may be off", () => {
+  const rating = { mean: 30, deviation: 2.5, games: 7 } as Parameters<typeof ratingWords>[0];
+  expect(ratingWords(rating)).toBe("30.0 ± 4.9");
+  expect(ratingRange(rating)).toEqual({ from: 25.1, to: 34.9 });
+});

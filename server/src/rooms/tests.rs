@@ -1,0 +1,46 @@
+//! What is kept of a room when it is made.
+
+use chefshat_engine::RuleSetSpec;
+
+use super::*;
+use crate::ids::SecretHash;
+use crate::store::FailingStore;
+use crate::store::journal::ParticipantKind;
+
+#[tokio::test]
+async fn who_is_seated_by_a_tournament_is_kept_with_the_room() {
+    // It takes rooms, but nothing that is added to them later.
+    let store = Arc::new(FailingStore::after(0));
+    let rooms = Rooms::new(&ServerConfig::default(), store, TaskTracker::new());
+    let fill = Fill::Open {
+        reserved_for: Some(ParticipantKind::Agent),
+    };
+    let seated = |name: &str| SeatedParticipant {
+        name: name.into(),
+        kind: ParticipantKind::Agent,
+        ticket: SecretHash::of(name.as_bytes()),
+    };
+    let made = rooms.create(NewRoom {
+        name: "a game of a tournament".into(),
+        rules: RuleSetSpec::default().validate().expect("the standard"),
+        policy: Policy::default(),
+        fills: vec![fill; 4],
+        recorded: BTreeMap::new(),
+        start: GameStart::default(),
+        game_seed: None,
+        seating: Some(Seating {
+            game: TournamentGame {
+                tournament: Id([1; 16]),
+                series: None,
+            },
+            room_id: Id([2; 16]),
+            game_id: Id([3; 16]),
+            participants: BTreeMap::from([(0, seated("Ada")), (2, seated("Bo"))]),
+            server_seed: None,
+        }),
+    });
+    let made = made.await.expect("nothing is added to the room");
+    let room = made.handle.describe().await.expect("it is there");
+    let names: Vec<&str> = room.seats.iter().map(|seat| seat.name.as_str()).collect();
+    assert_eq!(names, ["Ada", "", "Bo", ""]);
+}

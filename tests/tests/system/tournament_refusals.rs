@@ -1,0 +1,235 @@
+//! What a tournament cannot be and what nobody may do to it: refused by name, with the field at fault.
+
+use chefshat_proto::v1::{self, tournament_service_client::TournamentServiceClient};
+use chefshat_tests::TestServer;
+use tonic::Code;
+use tonic_types::StatusExt as _;
+
+use crate::tournaments::{create, id_of};
+
+#[tokio::test]
+async fn what_cannot_be_is_refused_by_name() {
+    let server = TestServer::start().await;
+    let mut service = TournamentServiceClient::new(server.channel().await);
+    let swiss = v1::TournamentFormat::Swiss.into();
+    let named = |format| v1::TournamentSettings {
+        name: "Coppa".into(),
+        format,
+        ..v1::TournamentSettings::default()
+    };
+    let cases = [
+        (named(0), "SETTINGS_REFUSED", "format"),
+        (
+            v1::TournamentSettings {
+                name: String::new(),
+                ..named(swiss)
+            },
+            "NAME_REFUSED",
+            "name",
+        ),
+        (
+            v1::TournamentSettings {
+                rules: Some(v1::RuleSet {
+                    players: Some(9),
+                    ..v1::RuleSet::default()
+                }),
+                ..named(swiss)
+            },
+            "RULE_SET_REFUSED",
+            "rules",
+        ),
+        (
+            v1::TournamentSettings {
+                policy: Some(v1::RoomPolicy {
+                    abort: v1::AbortPolicy::AnyLost.into(),
+                    ..v1::RoomPolicy::default()
+                }),
+                ..named(swiss)
+            },
+            "POLICY_REFUSED",
+            "policy",
+        ),
+        (
+            v1::TournamentSettings {
+                deals: v1::TournamentDeals::SameAtAllTables.into(),
+                policy: Some(v1::RoomPolicy {
+                    spectators: Some(true),
+                    ..v1::RoomPolicy::default()
+                }),
+                ..named(swiss)
+            },
+            "POLICY_REFUSED",
+            "policy",
+        ),
+        (
+            v1::TournamentSettings {
+                policy: Some(v1::RoomPolicy {
+                    durability: v1::Durability::Durable.into(),
+                    ..v1::RoomPolicy::default()
+                }),
+                ..named(swiss)
+            },
+            "POLICY_REFUSED",
+            "policy",
+        ),
+        (
+            v1::TournamentSettings {
+                rules: Some(v1::RuleSet {
+                    stop: Some(v1::rule_set::Stop::TargetShifts(1_001)),
+                    ..v1::RuleSet::default()
+                }),
+                ..named(swiss)
+            },
+            "RULE_SET_REFUSED",
+            "rules",
+        ),
+        (
+            v1::TournamentSettings {
+                built_in_agents: vec!["nobody".into()],
+                ..named(swiss)
+            },
+            "SETTINGS_REFUSED",
+            "built_in_agents",
+        ),
+        (
+            v1::TournamentSettings {
+                draw_seed: vec![1],
+                ..named(swiss)
+            },
+            "SETTINGS_REFUSED",
+            "draw_seed",
+        ),
+        (
+            v1::TournamentSettings {
+                max_calls: 99,
+                ..named(swiss)
+            },
+            "SETTINGS_REFUSED",
+            "max_calls",
+        ),
+    ];
+    for (settings, reason, field) in cases {
+        let request = v1::CreateTournamentRequest {
+            settings: Some(settings),
+        };
+        let refused = service.create_tournament(request).await;
+        let refused = refused.expect_err("it is refused");
+        assert_eq!(refused.code(), Code::InvalidArgument, "{refused:?}");
+        let info = refused.get_details_error_info().expect("it says why");
+        assert_eq!(info.reason, reason);
+        assert_eq!(info.metadata["field"], field);
+    }
+    let created = create(
+        &mut service,
+        v1::TournamentSettings {
+            deals: v1::TournamentDeals::Rotated.into(),
+            kinds: vec![v1::ParticipantKind::Agent.into()],
+            max_participants: 2,
+            ..named(swiss)
+        },
+    )
+    .await;
+    let ask = |name: &str| v1::JoinTournamentRequest {
+        join_code: created.join_code.clone(),
+        name: name.to_owned(),
+        stateless: true,
+        ..v1::JoinTournamentRequest::default()
+    };
+    let first = service.join_tournament(ask("Ada")).await;
+    let first = first.expect("there is a place").into_inner();
+    let described = first.tournament.expect("a tournament");
+    assert_eq!(described.participants.len(), 1);
+    let listed = service
+        .list_tournaments(v1::ListTournamentsRequest::default())
+        .await;
+    let mut listed = listed.expect("a page").into_inner().tournaments;
+    // Without its participants it is the same.
+    assert_eq!(listed[0].participants, []);
+    listed[0].participants.clone_from(&described.participants);
+    assert_eq!(listed, [described]);
+    let no_kind = v1::GetLeaderboardRequest {
+        kind: 77,
+        ..v1::GetLeaderboardRequest::default()
+    };
+    let refused = service.get_leaderboard(no_kind).await.expect_err("no kind");
+    let info = refused.get_details_error_info().expect("it says why");
+    assert_eq!(info.reason, "KIND_REFUSED");
+    let joins = [
+        (
+            v1::JoinTournamentRequest {
+                join_code: "WRONG".into(),
+                ..ask("Bo")
+            },
+            "JOIN_CODE_WRONG",
+        ),
+        (
+            v1::JoinTournamentRequest {
+                tournament_id: "0".repeat(32),
+                ..ask("Bo")
+            },
+            "TOURNAMENT_UNKNOWN",
+        ),
+        (
+            v1::JoinTournamentRequest {
+                kind: v1::ParticipantKind::Human.into(),
+                ..ask("Bo")
+            },
+            "KIND_NOT_ADMITTED",
+        ),
+        (
+            v1::JoinTournamentRequest {
+                stateless: false,
+                ..ask("Bo")
+            },
+            "NOT_STATELESS",
+        ),
+        (
+            v1::JoinTournamentRequest {
+                max_games: 65,
+                ..ask("Bo")
+            },
+            "MAX_GAMES_REFUSED",
+        ),
+        (ask(" Ada "), "NAME_TAKEN"),
+        (ask(""), "NAME_REFUSED"),
+    ];
+    for (request, reason) in joins {
+        let refused = service.join_tournament(request).await;
+        let refused = refused.expect_err("it is refused");
+        let info = refused.get_details_error_info().expect("it says why");
+        assert_eq!(info.reason, reason);
+    }
+    let early = v1::StartTournamentRequest {
+        tournament_id: id_of(&created),
+        owner_token: created.owner_token.clone(),
+    };
+    let stranger = v1::StartTournamentRequest {
+        owner_token: "00".repeat(48),
+        ..early.clone()
+    };
+    for (request, reason) in [
+        (stranger, "OWNER_TOKEN_WRONG"),
+        (early, "TOO_FEW_PARTICIPANTS"),
+    ] {
+        let refused = service.start_tournament(request).await;
+        let refused = refused.expect_err("it is refused");
+        let info = refused.get_details_error_info().expect("it says why");
+        assert_eq!(info.reason, reason);
+    }
+    // Closed, it takes nobody any more.
+    let close = v1::CloseTournamentRequest {
+        tournament_id: id_of(&created),
+        owner_token: created.owner_token.clone(),
+    };
+    let closed = service
+        .close_tournament(close)
+        .await
+        .expect("its owner may");
+    let closed = closed.into_inner().tournament.expect("a tournament");
+    assert_eq!(closed.state(), v1::TournamentState::Closed);
+    let refused = service.join_tournament(ask("Bo")).await;
+    assert_eq!(
+        refused.expect_err("it is over").code(),
+        Code::FailedPrecondition
+    );
+}
