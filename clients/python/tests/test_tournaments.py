@@ -309,7 +309,7 @@ def test_the_command_prints_a_table(fake: FakeServer, capsys: pytest.CaptureFixt
     assert command.main(["--address", fake.address, "--tournament", made.join_code, "--name", "Ada"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].split() == ["place", "score", "points", "games", "name"]
-    assert lines[1].split() == ["1", "30", "0", "6", "Ada", "<-", "this", "agent"]
+    assert lines[1].split() == ["1", "5.00", "0.00", "6", "Ada", "<-", "this", "agent"]
     assert len(lines) == 5
 
 

@@ -4,6 +4,7 @@
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::Duration;
 
 use tokio::net::TcpListener;
 use tokio::task::JoinHandle;
@@ -33,6 +34,8 @@ impl Host {
         let stop = CancellationToken::new();
         let config = ServerConfig {
             data_dir: Some(data_dir),
+            // When the command ends its game has ended, or nobody waits for it any more.
+            grace: Duration::ZERO,
             ..ServerConfig::default()
         };
         let stopped = stop.clone().cancelled_owned();

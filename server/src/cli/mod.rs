@@ -28,8 +28,8 @@ mod secret_file;
 mod serve;
 mod sheet;
 mod simulate;
-mod threads;
 mod terminal;
+mod threads;
 mod tournament;
 mod verify;
 mod watch;
@@ -170,8 +170,7 @@ fn start_logging(cli: &Cli) -> Result<(), CommandError> {
     } else {
         filter
     };
-    let colours =
-        terminal && std::env::var_os("NO_COLOR").is_none_or(|set| set.is_empty());
+    let colours = terminal && std::env::var_os("NO_COLOR").is_none_or(|set| set.is_empty());
     let logs = tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_ansi(colours)

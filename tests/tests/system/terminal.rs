@@ -31,7 +31,7 @@ impl Terminal {
             return None;
         }
         let terminal = Self {
-            folder: TempDir::new().unwrap(),
+            folder: TempDir::new().expect("a temporary folder"),
         };
         let words = arguments.iter().map(|word| format!("'{word}'"));
         let words = words.collect::<Vec<_>>().join(" ");
@@ -64,7 +64,7 @@ impl Terminal {
         }
         command.env("LC_ALL", "C.UTF-8").arg("-S");
         command.arg(self.folder.path().join("socket"));
-        command.args(arguments).output().unwrap()
+        command.args(arguments).output().expect("the program runs")
     }
 
     fn press(&self, key: &str) {
@@ -73,7 +73,7 @@ impl Terminal {
     }
 
     fn screen(&self) -> String {
-        String::from_utf8(self.tmux(&["capture-pane", "-p"]).stdout).unwrap()
+        String::from_utf8(self.tmux(&["capture-pane", "-p"]).stdout).expect("a screen is text")
     }
 
     /// Waits until the screen is as wanted.
@@ -131,8 +131,8 @@ impl Drop for Terminal {
 
 #[tokio::test]
 async fn a_person_plays_two_shifts_with_one_command() {
-    let data = TempDir::new().unwrap();
-    let folder = data.path().to_str().unwrap();
+    let data = TempDir::new().expect("a temporary folder");
+    let folder = data.path().to_str().expect("a path of text");
     let Some(terminal) = Terminal::start(
         "a_person_plays_two_shifts_with_one_command",
         &[
@@ -168,15 +168,19 @@ async fn a_person_plays_two_shifts_with_one_command() {
     assert!(said.contains("you have place"), "{said}");
 
     let record = only_record(data.path());
-    let record = record.to_str().unwrap();
+    let record = record.to_str().expect("a path of text");
     let mut verify = Command::new(set_up("CHEFSHAT_BIN"));
-    let verified = verify.args(["verify", record]).output().unwrap();
+    let verified = verify
+        .args(["verify", record])
+        .output()
+        .expect("the program runs");
     assert!(verified.status.success(), "{verified:?}");
-    let text = std::fs::read_to_string(record).unwrap();
+    let text = std::fs::read_to_string(record).expect("the record is there");
     // What the person's side measured stands with the decisions.
     assert!(text.contains("person_decision_time_ms"), "{text}");
 
-    let watched = Terminal::start("and watches the record", &["watch", record]).unwrap();
+    let watched =
+        Terminal::start("and watches the record", &["watch", record]).expect("tmux is there");
     watched.wait_for("hands").await;
     watched.press("End");
     watched.wait_for("wins the game").await;
@@ -188,18 +192,19 @@ async fn a_person_plays_two_shifts_with_one_command() {
 
 #[tokio::test]
 async fn a_game_goes_on_when_the_server_comes_back_and_is_watched() {
-    let data = TempDir::new().unwrap();
+    let data = TempDir::new().expect("a temporary folder");
     let mut launch = Launch::new(data.path());
-    let server = launch.start().await.unwrap();
+    let server = launch.start().await.expect("the server listens");
     let url = launch.url();
-    let client = Client::connect(&url).await.unwrap();
+    let client = Client::connect(&url).await.expect("the server listens");
     let (code, room_id) = room(&client).await;
     let test = "a_game_goes_on_when_the_server_comes_back_and_is_watched";
     let join = ["play", "--server", &url, "--code", &code, "--name", "Ada"];
     let Some(terminal) = Terminal::start(test, &join) else {
         return;
     };
-    let spectator = Terminal::start(test, &["watch", &room_id, "--server", &url]).unwrap();
+    let spectator =
+        Terminal::start(test, &["watch", &room_id, "--server", &url]).expect("tmux is there");
     terminal.wait_for("Your turn").await;
     spectator.wait_for("● live").await;
     let spectated = spectator.wait_for("Ada").await;
@@ -207,7 +212,7 @@ async fn a_game_goes_on_when_the_server_comes_back_and_is_watched() {
 
     server.kill().await;
     terminal.wait_for("connection lost").await;
-    let server = launch.start().await.unwrap();
+    let server = launch.start().await.expect("the server listens");
     terminal.wait_for("● connected").await;
     terminal.play("the game is over").await;
     terminal.press("Enter");
@@ -237,14 +242,17 @@ async fn room(client: &Client) -> (String, String) {
             ..v1::CreateRoomRequest::default()
         })
         .await
-        .unwrap();
-    (made.join_code, made.room.unwrap().room_id)
+        .expect("the room is made");
+    (
+        made.join_code,
+        made.room.expect("the server says which").room_id,
+    )
 }
 
 #[tokio::test]
 async fn leaving_gives_the_terminal_back() {
-    let data = TempDir::new().unwrap();
-    let folder = data.path().to_str().unwrap();
+    let data = TempDir::new().expect("a temporary folder");
+    let folder = data.path().to_str().expect("a path of text");
     let play = ["play", "--local", "--data-dir", folder];
     let Some(terminal) = Terminal::start("leaving_gives_the_terminal_back", &play) else {
         return;
@@ -260,8 +268,8 @@ async fn leaving_gives_the_terminal_back() {
 
 /// The one record in a data folder.
 fn only_record(data_dir: &Path) -> PathBuf {
-    let records = std::fs::read_dir(data_dir.join("records")).unwrap();
-    let mut records = records.map(|entry| entry.unwrap().path());
+    let records = std::fs::read_dir(data_dir.join("records")).expect("records were written");
+    let mut records = records.map(|entry| entry.expect("an entry").path());
     let record = records.next().expect("a record was written");
     assert_eq!(records.next(), None);
     record

@@ -169,12 +169,14 @@ def tournament_as_json(
 
 
 def tournament_as_table(results: pb.GetTournamentResultsResponse, participant: int) -> str:
-    """How a tournament ended, for people."""
+    """How a tournament ended, for people: scores and points are means of a game, by which the order goes."""
     lines = ["place  score  points  games  name"]
     names = [entrant.name for entrant in results.tournament.participants]
     for line in results.standings:
         mine = "  <- this agent" if line.participant == participant else ""
-        lines.append(f"{line.place:>5}  {line.score:>5}  {line.points:>6}  {line.games:>5}  {names[line.participant]}{mine}")
+        games = max(line.games, 1)
+        means = f"{line.score / games:>5.2f}  {line.points / games:>6.2f}"
+        lines.append(f"{line.place:>5}  {means}  {line.games:>5}  {names[line.participant]}{mine}")
     if results.tournament.state != pb.TOURNAMENT_STATE_FINISHED:
         lines.append("The tournament was closed before its end.")
     return "\n".join(lines)

@@ -47,10 +47,10 @@ function demandWords(table: TableState, decision: OpenDecision): string {
     case "anything":
       return words.anything;
     case "opening":
-      return `${demand.face} ${demand.golden ? words.openingGolden : words.openingFace}`;
+      return `${demand.face} ${demand.golden ? words.openingGolden : words.openingFace}.`;
     case "beat":
       return demand.face === 0
         ? words.nothing
-        : `${words.face} ≤ ${demand.face}, ${demand.size} ${words.cards(demand.size)}`;
+        : `${words.face} ≤ ${demand.face}, ${demand.size} ${words.cards(demand.size)}.`;
   }
 }

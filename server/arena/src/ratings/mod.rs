@@ -130,6 +130,9 @@ impl<Who: Ord + Clone> Ratings<Who> {
         if let Some((_, place)) = game.iter().find(|(_, place)| !fits(*place)) {
             return Err(GameProblem::Place(*place));
         }
+        // By place, so that the same games give the same numbers to the last digit, in whatever order their seats are told.
+        let mut game = game.to_vec();
+        game.sort_by_key(|(_, place)| *place);
         let before: Vec<(Rating, u32)> = game
             .iter()
             .map(|(who, place)| (self.rating(who), *place))

@@ -1,8 +1,9 @@
 //! How sure it is that of two participants the one with the higher mean score is the better one, and how many games would settle it. Which
 //! two are asked about, and which games count, is decided by the caller.
 //!
-//! What is independent of each other is not games but *occasions*: all games dealt from one deal, or, where no deal comes twice, the single
-//! game. On one occasion two participants may have been at the same table, where what one gains the other loses, or at different tables with the
+//! What is independent of each other is not games but *occasions*. Of two who always sat at the same tables these are all games dealt from one
+//! deal, or, where no deal comes twice, the single game. Of two who met others it is the round: in all its games each had the same
+//! opponents, better or worse ones than the other's. On one occasion two participants may have been at the same table, where what one gains the other loses, or at different tables with the
 //! same cards, where luck is shared and cancels out in the difference. Summing up each occasion before anything is said of chance
 //! does right by all of these: if both played once on every occasion it is the paired difference, if they never shared one it is
 //! Welch's.
@@ -28,9 +29,8 @@ pub struct OrderConfidence {
     pub difference: f64,
     /// Standard error of it; 0 with fewer than two occasions each, or if chance decided nothing.
     pub standard_error: f64,
-    /// How likely the difference is the right way round, 0..=1, of a normal distribution: 0.5 if nothing is known, below that if the scores
-    /// speak against the order (in a knockout, whoever got further may have scored less). Of fewer than a dozen games it promises a
-    /// little too much.
+    /// How likely the difference is the right way round, 0..=1, of Student's distribution: 0.5 if nothing is known, below that if the
+    /// scores speak against the order (in a knockout, whoever got further may have scored less).
     pub confidence: f64,
     /// How many more games of each would bring it to [`SURE`] if the difference and the share of common occasions stay. `None` if it is
     /// there, or cannot be said.
@@ -74,7 +74,7 @@ pub fn order_confidence(upper: &[Scored], lower: &[Scored]) -> OrderConfidence {
     }
     let standard_error = standard_error(upper, lower, means);
     let confidence = if standard_error > 0.0 {
-        below(difference / standard_error)
+        below(difference / standard_error, few - 1)
     } else {
         // All occasions told the same. Had the two been equal, each would have gone either way.
         let other_way = 0.5f64.powi(i32::try_from(few).unwrap_or(i32::MAX));
@@ -102,15 +102,18 @@ pub fn order_confidence(upper: &[Scored], lower: &[Scored]) -> OrderConfidence {
 }
 
 impl Tournament {
-    /// How sure the order of each two neighbours in the standings is, from the top, by the scores of all games that counted.
+    /// How sure the order of each two neighbours in the standings is, from the top, by the scores of all games that counted. Of two who always
+    /// sat at the same tables, every deal or game tells something. Others met others, who were better or worse, in all games of a
+    /// round: of them it is whole rounds that tell.
     pub fn order_confidence(&self) -> Vec<Neighbours> {
-        let mut scores: Vec<Vec<Scored>> = vec![Vec::new(); self.participants().len()];
+        let mut played: Vec<Vec<Played>> = vec![Vec::new(); self.participants().len()];
         for (number, game) in (0u64..).zip(self.games()) {
-            // Even numbers are deals, odd ones games.
-            let occasion = game.deal.map_or(2 * number + 1, |deal| 2 * u64::from(deal));
             for seat in game.result().iter().flat_map(|result| &result.seats) {
-                scores[seat.participant].push(Scored {
-                    occasion,
+                played[seat.participant].push(Played {
+                    game: number,
+                    // Even numbers are deals, odd ones games.
+                    deal: game.deal.map_or(2 * number + 1, |deal| 2 * u64::from(deal)),
+                    round: game.round,
                     score: f64::from(seat.score),
                 });
             }
@@ -120,7 +123,7 @@ impl Tournament {
             .windows(2)
             .map(|two| {
                 let (upper, lower) = (two[0].participant, two[1].participant);
-                let order = order_confidence(&scores[upper], &scores[lower]);
+                let order = confidence_of(&played[upper], &played[lower]);
                 Neighbours {
                     upper,
                     lower,
@@ -129,6 +132,28 @@ impl Tournament {
             })
             .collect()
     }
+}
+
+/// A game as one participant played it.
+#[derive(Debug, Clone, Copy)]
+struct Played {
+    game: u64,
+    deal: u64,
+    round: u32,
+    score: f64,
+}
+
+fn confidence_of(upper: &[Played], lower: &[Played]) -> OrderConfidence {
+    let games = |played: &[Played]| played.iter().map(|it| it.game).collect::<Vec<u64>>();
+    let always_met = games(upper) == games(lower);
+    let scored = |played: &[Played]| -> Vec<Scored> {
+        let scores = played.iter().map(|it| Scored {
+            occasion: if always_met { it.deal } else { it.round.into() },
+            score: it.score,
+        });
+        scores.collect()
+    };
+    order_confidence(&scored(upper), &scored(lower))
 }
 
 fn occasions(scores: &[Scored]) -> usize {
@@ -164,8 +189,14 @@ fn standard_error(upper: &[Scored], lower: &[Scored], means: [f64; 2]) -> f64 {
     if error < ROUNDING { 0.0 } else { error }
 }
 
-/// The share of a normal distribution below so many standard deviations.
-fn below(deviations: f64) -> f64 {
+/// The share of Student's distribution with so many degrees of freedom, at least one, below so many standard errors: with few occasions
+/// the error itself is not well known. By Wallace's approximation (1959), which is off by at most some thousandths.
+fn below(errors: f64, freedom: usize) -> f64 {
+    let freedom = freedom as f64;
+    let shrunk = (freedom * (errors * errors / freedom).ln_1p())
+        .sqrt()
+        .copysign(errors);
+    let deviations = shrunk * (8.0 * freedom + 1.0) / (8.0 * freedom + 3.0);
     libm::erfc(-deviations / std::f64::consts::SQRT_2) / 2.0
 }
 
@@ -193,8 +224,8 @@ mod tests {
         // The differences are 2, 2, 2, 1, 0: mean 1.4, variance 0.8.
         close(sure.difference, 1.4);
         close(sure.standard_error, (0.8f64 / 5.0).sqrt());
-        // 3.5 standard errors; from a table of the normal distribution.
-        close(sure.confidence, 0.999_767_370_920_964_5);
+        // 3.5 standard errors, 4 degrees of freedom; from a table of Student's distribution.
+        assert!((sure.confidence - 0.9876).abs() < 0.001, "{sure:?}");
         assert_eq!(sure.more_games, None);
     }
 

@@ -15,7 +15,7 @@ pub enum JoinProblem {
     #[error("the tournament is full")]
     Full,
     /// It has begun, or is over.
-    #[error("the tournament has begun")]
+    #[error("the tournament takes nobody any more: it has begun, or was closed")]
     Started,
     /// Another participant has the name.
     #[error("another participant has this name")]
@@ -134,6 +134,8 @@ impl Tournament {
 
     fn is_name_taken(&self, name: &str) -> bool {
         let mut participants = self.course.participants.iter();
-        participants.any(|entrant| entrant.name == name)
+        // Whoever reads the standings could not tell them apart.
+        let name = name.to_lowercase();
+        participants.any(|entrant| entrant.name.to_lowercase() == name)
     }
 }

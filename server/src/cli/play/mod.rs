@@ -23,11 +23,14 @@ use tokio::time::{Instant, MissedTickBehavior, interval};
 
 use super::connect::ServerArg;
 use super::host::Host;
+use super::narrator::{MAX_NAME, abort_reason, ordinal};
+use super::numbers::counted;
 use super::remote::agent_kind;
 use super::rules_args::{RulesArgs, rules_of};
 use super::terminal::look::Look;
 use super::terminal::screen::{Key, Screen, asked_to_end, missing};
 use super::terminal::table::{End, Table};
+use super::terminal::view::padded;
 use super::{CommandError, data_dir, say};
 use crate::ids::random_bytes;
 use app::{App, Do, EXPRESSIONS, Input, Link};
@@ -307,11 +310,11 @@ fn told(app: &App, record: &str) -> Result<ExitCode, CommandError> {
     match &app.table.end {
         Some(End::Finished(standings)) => {
             for line in standings {
+                let name = padded(&app.table.name(line.seat), MAX_NAME);
+                let points = counted(line.points, "point");
                 say(format_args!(
-                    "{:>3}  {}  {} points",
-                    super::narrator::ordinal(line.place),
-                    app.table.name(line.seat),
-                    line.points
+                    "{}  {name}  {points:>10}",
+                    ordinal(line.place)
                 ))?;
             }
             if let Some(line) = mine(standings) {
@@ -325,7 +328,7 @@ fn told(app: &App, record: &str) -> Result<ExitCode, CommandError> {
             Ok(ExitCode::SUCCESS)
         }
         Some(End::Aborted(reason)) => {
-            let why = super::narrator::abort_reason(*reason);
+            let why = abort_reason(*reason);
             say(format_args!(
                 "the game was aborted and has no result: {why}"
             ))?;

@@ -54,14 +54,18 @@ pub(in crate::cli) fn hand(
             format!("{left}{}{right}{space}", line.repeat(inner)),
             style,
         ));
-        rows[1].push(Span::styled(
-            format!("{side}{face:>inner$}{side}{space}"),
-            style,
-        ));
-        rows[2].push(Span::styled(
-            format!("{side}{count:<inner$}{side}{space}"),
-            style,
-        ));
+        // Faces and counts are to be read in any case: the frame alone is coloured or dimmed.
+        let ink = if shown.active || shown.picked.is_some() {
+            look.bold()
+        } else {
+            Style::new()
+        };
+        let words = [format!("{face:>inner$}"), format!("{count:<inner$}")];
+        for (row, words) in rows[1..3].iter_mut().zip(words) {
+            row.push(Span::styled(side, style));
+            row.push(Span::styled(words, ink));
+            row.push(Span::styled(format!("{side}{space}"), style));
+        }
         rows[3].push(Span::styled(
             format!("{low_left}{}{low_right}{space}", line.repeat(inner)),
             style,

@@ -109,7 +109,6 @@ export const table = {
     putBack: "Put back",
     pick: "Pick cards, or pass.",
     pickMust: "Pick the cards to play.",
-    pickGift: "Pick a card to give.",
     onlyPass: "None of your cards can be played here.",
     more: (count: number) => plural(count, { one: "Pick one card more.", other: "Pick # cards more." }),
     ready: "Ready to play.",

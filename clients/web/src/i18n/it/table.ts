@@ -109,7 +109,6 @@ export const table: Texts["table"] = {
     putBack: "Rimetti a posto",
     pick: "Scegli delle carte, o passa.",
     pickMust: "Scegli le carte da giocare.",
-    pickGift: "Scegli una carta da dare.",
     onlyPass: "Qui nessuna delle tue carte si può giocare.",
     more: (count) => plural(count, { one: "Scegli ancora una carta.", other: "Scegli ancora # carte." }),
     ready: "Si può giocare.",

@@ -11,6 +11,7 @@ import type { OpenDecision } from "../model/live";
 import { missing, type Picked } from "../model/picking";
 import type { TableState } from "../model/state";
 import { cardWord, moveWords } from "../words";
+import { giftWords } from "./Now";
 
 interface ActionBarProps {
   table: TableState;
@@ -85,13 +86,13 @@ function giftWord({ decision, picked }: ActionBarProps, move: Move): string {
   return card ? cardWord(card) : moveWords(move);
 }
 
-function hint({ table, decision, moves, picked, move, sending }: ActionBarProps): string {
+function hint({ table, own, decision, moves, picked, move, sending }: ActionBarProps): string {
   const words = t().table.actions;
   if (sending) return words.sending;
   if (!decision) return table.phase === "pizza" || table.phase === "dealt" ? words.notYourTurn : "";
   if (decision.kind === DecisionKind.SPECIAL_ACTION) return "";
   if (move) return words.ready;
-  if (decision.kind === DecisionKind.EXCHANGE) return words.pickGift;
+  if (decision.kind === DecisionKind.EXCHANGE) return giftWords(table, own);
   const mayPass = moves.some((legal) => legal.kind === "pass");
   if (picked.size > 0) {
     const more = missing(decision.hand, picked, moves);

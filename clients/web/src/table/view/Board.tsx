@@ -26,6 +26,7 @@ export function Board({ table, children }: { table: TableState; children?: Compo
       </div>
       <div
         class={`board-cards ${board.length > 6 ? "board-many" : ""}`}
+        style={{ "--cards": board.length }}
         key={`${table.shift}-${table.turn}-${board.length}`}
       >
         {board.map((card, index) => (

@@ -120,7 +120,8 @@ function Tile({ sign = "", number, text }: { sign?: string; number: number; text
   );
 }
 
-function giftWords(table: TableState, own: number | undefined): string {
+/** To whom a card is given, where there is a choice. */
+export function giftWords(table: TableState, own: number | undefined): string {
   const words = t().table.now;
   const role = own === undefined ? undefined : table.seats[own]?.role;
   const partner = role === Role.CHEF ? Role.DISHWASHER : role === Role.SOUS_CHEF ? Role.WAITER : undefined;

@@ -540,11 +540,13 @@ class OrderConfidence(_message.Message):
     lower: _builtins.int
     """The lower one."""
     difference: _builtins.float
-    """Mean difference of their scores of a game; over the same deals where there are such."""
+    """Mean difference of their scores of a game. Of two who always sat at the same tables every deal or game is an observation; of others,
+    whose opponents differed, every round is one.
+    """
     standard_error: _builtins.float
     """Standard error of it; 0 with fewer than two games each."""
     confidence: _builtins.float
-    """Confidence that the order is right, 0..=1, of a normal distribution: 0.5 if nothing is known, less if the scores speak against it (in a
+    """Confidence that the order is right, 0..=1, of Student's distribution: 0.5 if nothing is known, less if the scores speak against it (in a
     knockout who got further may have scored less).
     """
     more_games: _builtins.int
