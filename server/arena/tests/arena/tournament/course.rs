@@ -78,13 +78,17 @@ struct Run {
     tournament: Tournament,
     changes: Vec<Change>,
     present: BTreeMap<usize, bool>,
-    dice: std::iter::Cycle<std::vec::IntoIter<u8>>,
+    dice: Vec<u8>,
+    rolls: usize,
     now_ms: u64,
 }
 
 impl Run {
     fn die(&mut self, sides: u8) -> u8 {
-        self.dice.next().unwrap() % sides
+        // When they are used up they begin again, each one higher: a course of events that goes round in circles is no test of whether it ends.
+        let (turn, roll) = (self.rolls / self.dice.len(), self.rolls % self.dice.len());
+        self.rolls += 1;
+        self.dice[roll].wrapping_add(turn as u8) % sides
     }
 
     fn fold(&mut self, change: Change) {
@@ -183,7 +187,8 @@ fn run(plan: Plan) -> Run {
         tournament: Tournament::new(plan.settings).unwrap(),
         changes: Vec::new(),
         present: BTreeMap::new(),
-        dice: plan.dice.into_iter().cycle(),
+        dice: plan.dice,
+        rolls: 0,
         now_ms: 0,
     };
     for (number, entrant) in plan.entrants.into_iter().enumerate() {
