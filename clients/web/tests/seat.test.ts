@@ -15,7 +15,10 @@ test("a seat is known until it is given up", () => {
   expect(heldSeat("room1")).toEqual(HELD);
   expect(heldSeat("room2")).toBeNull();
   expect(roomOfCode("bcdf-2345")).toBe("room1");
+  remember("study.room1", "?name=Rosa");
+  remember("code.OTHER234", "room2");
   giveUpSeat("room1");
+  expect([...remembered().keys()]).toEqual(["code.OTHER234"]);
   expect(heldSeat("room1")).toBeNull();
   expect(roomOfCode("BCDF2345")).toBeNull();
 });

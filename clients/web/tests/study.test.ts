@@ -3,6 +3,7 @@
 import { expect, test } from "vitest";
 import {
   filledIn,
+  holderOf,
   languageOf,
   questionnaire,
   rememberStudy,
@@ -74,4 +75,13 @@ test("a study is kept with its room, and times are sent only where it asks for t
   expect([asksForTimes("one"), asksForTimes("two"), asksForTimes("three")]).toEqual([true, false, false]);
   forgetAll();
   expect(studyIn("one")).toBeNull();
+});
+
+test.each([
+  [null, "reader"],
+  [full, "reader"],
+  [{ ...full, name: "P08" }, "another"],
+  [{ ...full, name: "" }, "unclear"],
+] as const)("whose the seat is that P07 took on this device (%#)", (study, holder) => {
+  expect(holderOf(study, "P07")).toBe(holder);
 });

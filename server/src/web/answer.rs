@@ -26,12 +26,12 @@ const ABSENT: &[u8] = include_bytes!("absent.html");
 const KEEP: HeaderValue = HeaderValue::from_static("public, max-age=31536000, immutable");
 /// Kept, but asked for again each time whether it is still right.
 const ASK_AGAIN: HeaderValue = HeaderValue::from_static("no-cache");
-/// The page takes everything from its own server and sends nothing elsewhere.
+/// The page takes everything from its own server, sends nothing elsewhere, and is shown in no page of another.
 const RULES: [(HeaderName, HeaderValue); 3] = [
     (
         header::CONTENT_SECURITY_POLICY,
         HeaderValue::from_static(
-            "default-src 'self'; img-src 'self' data:; object-src 'none'; base-uri 'none'; form-action 'self'",
+            "default-src 'self'; img-src 'self' data:; object-src 'none'; base-uri 'none'; form-action 'self'; frame-ancestors 'none'",
         ),
     ),
     (
@@ -184,6 +184,16 @@ mod tests {
             for (name, value) in RULES {
                 assert_eq!(response.headers()[&name], value, "{path}");
             }
+        }
+    }
+
+    #[test]
+    fn no_other_page_may_show_ours_in_a_frame() {
+        for path in ["/", "/rooms/0123", "/assets/a-1.js", "/assets/a-2.js"] {
+            let response = get(path, &[]);
+            let rules = response.headers()["content-security-policy"].to_str();
+            let mut rules = rules.expect("text").split("; ");
+            assert!(rules.any(|rule| rule == "frame-ancestors 'none'"), "{path}");
         }
     }
 

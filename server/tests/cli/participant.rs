@@ -295,21 +295,70 @@ fn nobody_is_deleted_from_what_is_not_over() {
     assert_eq!(tournaments.participants[0].name, OTHER);
 }
 
-#[test]
-fn a_player_of_a_real_table_is_deleted_from_the_file_and_from_a_server_that_was_given_it() {
+/// The record of a real table with Ana in a data folder, as a file alone: the file, and the id of the game.
+fn real_table(data_dir: &Path) -> (String, String) {
     let folder = TempDir::new().unwrap();
-    let (data_dir, transcript) = (folder.path().join("data"), folder.path().join("table.csv"));
+    let transcript = folder.path().join("table.csv");
     std::fs::write(&transcript, TRANSCRIPT).unwrap();
     let import = ["import", transcript.to_str().unwrap(), "--json"];
     let told = chefshat(&[&import[..], &["--data-dir", data_dir.to_str().unwrap()]].concat());
     let told = told.well().json();
-    let (file, game_id) = (
-        told["file"].as_str().unwrap(),
-        told["game_id"].as_str().unwrap(),
+    let text = |key: &str| told[key].as_str().unwrap().to_owned();
+    (text("file"), text("game_id"))
+}
+
+#[test]
+fn a_damaged_file_stops_nothing_and_is_named_where_the_name_stands_in_it() {
+    let folder = TempDir::new().unwrap();
+    let data_dir = folder.path().join("data");
+    let (file, _) = real_table(&data_dir);
+    let records = data_dir.join("records");
+    // Nobody knows whose this is: names may be written by the numbers of their letters.
+    std::fs::write(records.join("0-foreign.jsonl"), "{\"broken\": \"\\u0041").unwrap();
+    let out = folder.path().join("ana.jsonl");
+    let export = ["export", "Ana", "--out", out.to_str().unwrap(), "--force"];
+    let exported = participant(&export, &data_dir).well();
+    assert!(
+        exported.stderr.contains("0-foreign.jsonl"),
+        "{}",
+        exported.stderr
     );
+
+    let damaged = records.join("1-damaged.jsonl");
+    std::fs::write(&damaged, "{\"name\": \"Ana\"").unwrap();
+    std::fs::remove_file(&out).unwrap();
+    let delete = ["delete", "Ana", "--yes", "--json"];
+    for command in [&export[..], &delete[..]] {
+        let ended = participant(command, &data_dir);
+        assert_eq!(ended.code, Some(1), "{ended:?}");
+        assert!(
+            ended.stderr.contains("everything else is done"),
+            "{ended:?}"
+        );
+        assert!(ended.stderr.contains("1-damaged.jsonl"), "{ended:?}");
+        assert!(!ended.stdout.is_empty(), "{ended:?}");
+    }
+    let exported = values(&std::fs::read_to_string(&out).unwrap());
+    assert_eq!(exported[0]["participant"]["name"], "Ana");
+    assert!(exported.len() > 2);
+    let rewritten = std::fs::read_to_string(&file).unwrap();
+    assert!(!rewritten.contains("\"Ana\"") && rewritten.contains("deleted participant"));
+
+    std::fs::remove_file(&damaged).unwrap();
+    let again = participant(&delete[..3], &data_dir);
+    assert_eq!(again.code, Some(1));
+    assert!(again.stderr.contains("nothing is kept"), "{}", again.stderr);
+}
+
+#[test]
+fn a_player_of_a_real_table_is_deleted_from_the_file_and_from_a_server_that_was_given_it() {
+    let folder = TempDir::new().unwrap();
+    let data_dir = folder.path().join("data");
+    let (file, game_id) = real_table(&data_dir);
     let (server, url) = serve_with(&data_dir, &["--allow-import"]);
-    assert!(run(&url, &["records", "import", file]).status.success());
+    assert!(run(&url, &["records", "import", &file]).status.success());
     drop(server);
+    let before = std::fs::read(&file).unwrap();
 
     let deleted = participant(&["delete", "Ana", "--yes", "--json"], &data_dir);
     let deleted = deleted.well().json();
@@ -325,9 +374,17 @@ fn a_player_of_a_real_table_is_deleted_from_the_file_and_from_a_server_that_was_
         seats.iter().map(|seat| seat["name"].clone()).collect()
     };
     let expected = [deleted["pseudonym"].clone(), json!("Pepper")];
-    assert_eq!(names(&std::fs::read_to_string(file).unwrap()), expected);
+    let rewritten = std::fs::read_to_string(&file).unwrap();
+    assert_eq!(names(&rewritten), expected);
+
+    // As a run leaves it that ends between the database and the files: the next one takes the pseudonym that the database has.
+    std::fs::write(&file, before).unwrap();
+    let again = participant(&["delete", "Ana", "--yes", "--json"], &data_dir);
+    let again = again.well().json();
+    assert_eq!(again["pseudonym"], deleted["pseudonym"]);
+    assert_eq!(std::fs::read_to_string(&file).unwrap(), rewritten);
     let (_server, url) = serve(&data_dir);
-    let got = run(&url, &["records", "get", game_id]);
+    let got = run(&url, &["records", "get", &game_id]);
     assert_eq!(names(std::str::from_utf8(&got.stdout).unwrap()), expected);
 }
 

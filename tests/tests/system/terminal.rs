@@ -72,6 +72,16 @@ impl Terminal {
         assert!(pressed.status.success(), "{pressed:?}");
     }
 
+    /// Interrupts the program from outside, as no key does: the terminal gives keys to it as they are.
+    fn interrupt(&self) {
+        let shell = self.tmux(&["display-message", "-p", "#{pane_pid}"]).stdout;
+        let shell = String::from_utf8(shell).expect("a number is text");
+        let told = Command::new("pkill")
+            .args(["-INT", "-P", shell.trim()])
+            .status();
+        assert!(told.is_ok_and(|status| status.success()), "{shell}");
+    }
+
     fn screen(&self) -> String {
         String::from_utf8(self.tmux(&["capture-pane", "-p"]).stdout).expect("a screen is text")
     }
@@ -144,6 +154,7 @@ async fn a_person_plays_two_shifts_with_one_command() {
             "2",
             "--pace-ms",
             "0",
+            "--times",
             "--data-dir",
             folder,
         ],
@@ -186,8 +197,9 @@ async fn a_person_plays_two_shifts_with_one_command() {
     watched.wait_for("wins the game").await;
     watched.press("Home");
     watched.wait_for(" 0/").await;
-    watched.press("q");
-    watched.wait_for("ended with 0").await;
+    watched.interrupt();
+    let left = watched.wait_for("ended with 0").await;
+    assert!(!left.contains("the pizza"), "{left}");
 }
 
 #[tokio::test]

@@ -3,6 +3,7 @@
 import { useEffect } from "preact/hooks";
 import { t } from "../i18n";
 import { Notice } from "../parts/Notice";
+import { setHidden } from "./hiding";
 import { QuestionnaireLink } from "./QuestionnaireLink";
 import { hostOf, studyIn } from "./study";
 import "./experiment.css";
@@ -18,11 +19,8 @@ export function AtTable({ roomId, over }: AtTableProps) {
   const study = studyIn(roomId);
   const hide = study?.hide.join(" ") ?? "";
   useEffect(() => {
-    const { dataset } = document.documentElement;
-    if (hide !== "") dataset.hide = hide;
-    return () => {
-      delete dataset.hide;
-    };
+    setHidden(study?.hide ?? []);
+    return () => setHidden([]);
   }, [hide]);
   if (!study || !over) return null;
   const words = t().experiment.after;

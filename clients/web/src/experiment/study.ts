@@ -85,6 +85,13 @@ export function hostOf(address: string): string {
   return new URL(address).host;
 }
 
+/** Whose the seat is that this device has already, under a name, when it opens an invitation: a device may be used by one participant after the other. */
+export function holderOf(study: Study | null, name: string): "reader" | "another" | "unclear" {
+  if (!study) return "reader";
+  if (study.name === "") return "unclear";
+  return study.name === name ? "reader" : "another";
+}
+
 /** Keeps a study with the seat that was taken for it. */
 export function rememberStudy(roomId: string, study: Study): void {
   remember(`study.${roomId}`, searchOf(study, ""));

@@ -37,7 +37,7 @@ export function HostInvite({ roomId }: { roomId: string }) {
     hosted && (
       <section class="sheet host-invite">
         <Invite code={hosted.joinCode} />
-        <StudyLinks code={hosted.joinCode} />
+        <StudyLinks roomId={roomId} code={hosted.joinCode} />
       </section>
     )
   );

@@ -4,7 +4,7 @@ import { useEffect, useState } from "preact/hooks";
 import { faultOf, wordsOf } from "../api/faults";
 import type { PageProps } from "../app";
 import { StudyJoin } from "../experiment/StudyJoin";
-import { languageOf, studyOf } from "../experiment/study";
+import { holderOf, languageOf, studyOf } from "../experiment/study";
 import { t } from "../i18n";
 import { Button } from "../parts/Button";
 import { TextField } from "../parts/Field";
@@ -21,12 +21,28 @@ export function Join({ route }: PageProps<"join">) {
   const code = canonical(route.code);
   const study = studyOf(location.search);
   const held = code === "" ? null : roomOfCode(code);
-  // At a device that several take part in a study with, the seat may be that of the one before.
-  const seated = held !== null && study?.name && heldSeat(held)?.name !== study.name ? null : held;
+  const [another, setAnother] = useState(false);
+  const before = held === null ? "" : (heldSeat(held)?.name ?? "");
+  const holder = another ? "another" : holderOf(study, before);
+  const seated = holder === "reader" ? held : null;
+  const goOn = (roomId: string) =>
+    navigate({ page: "room", roomId }, { replace: true, search: languageOf(location.search) });
   useEffect(() => {
-    if (seated) navigate({ page: "room", roomId: seated }, { replace: true, search: languageOf(location.search) });
+    if (seated) goOn(seated);
   }, [seated]);
   if (seated) return null;
+  if (held && holder === "unclear") {
+    return (
+      <section class="sheet join-page">
+        <h1>{t().experiment.join.title}</h1>
+        <p>{t().experiment.join.taken(before)}</p>
+        <Button look="main" onClick={() => goOn(held)}>
+          {t().experiment.join.goOn(before)}
+        </Button>
+        <Button onClick={() => setAnother(true)}>{t().experiment.join.another}</Button>
+      </section>
+    );
+  }
   if (study && code !== "") return <StudyJoin code={code} study={study} />;
   return (
     <section class="sheet join-page">

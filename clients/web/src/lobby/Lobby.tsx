@@ -11,17 +11,20 @@ import { Notice } from "../parts/Notice";
 import { JoinForm } from "./JoinForm";
 import { QuickGame } from "./QuickGame";
 import { RoomCard } from "./RoomCard";
-import { listRooms, SHOWN_ROOMS } from "./rooms";
+import { listFinishedRooms, listOpenRooms, SHOWN_ROOMS } from "./rooms";
 import { TournamentStrip } from "./TournamentStrip";
 import "./lobby.css";
 
 /** How often the lists are asked for, milliseconds. */
 const EVERY_MS = 3000;
+/** And the rooms that are over, milliseconds: there are many, and nobody waits for them. */
+const OVER_EVERY_MS = 20_000;
 
 /** The page. */
 export function Lobby() {
   const words = t().lobby;
-  const { value: rooms, fault } = usePolled(listRooms, EVERY_MS, "rooms");
+  const { value: rooms, fault } = usePolled(listOpenRooms, EVERY_MS, "rooms");
+  const { value: over } = usePolled(listFinishedRooms, OVER_EVERY_MS, "over");
   return (
     <div class="lobby">
       <h1 class="only-heard">{words.title}</h1>
@@ -45,7 +48,7 @@ export function Lobby() {
         {words.rooms.nonePlaying}
       </RoomSection>
       <TournamentStrip />
-      {rooms && rooms.over.length > 0 && <RoomSection title={words.rooms.over} rooms={rooms.over} />}
+      {over && over.length > 0 && <RoomSection title={words.rooms.over} rooms={over} />}
     </div>
   );
 }

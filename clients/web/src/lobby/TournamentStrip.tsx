@@ -1,16 +1,14 @@
 // The tournaments that one can join or follow, in the lobby: a line each. Their own pages are in tournaments/.
 
-import { CALL_LIMIT_MS, tournamentApi } from "../api/client";
 import { usePolled } from "../api/poll";
 import { type Tournament, TournamentState } from "../gen/chefshat/v1/tournament_pb";
 import { t } from "../i18n";
 import { pathOf } from "../router";
+import { listTournaments } from "../tournaments/list";
 import "./tournament-strip.css";
 
 /** How often the list is asked for, milliseconds. */
 const EVERY_MS = 6000;
-const PAGE_SIZE = 100;
-const MAX_PAGES = 5;
 /** Tournaments shown. */
 const SHOWN = 6;
 
@@ -38,14 +36,6 @@ export function TournamentStrip() {
 }
 
 async function listOpen(signal: AbortSignal): Promise<Tournament[]> {
-  const found: Tournament[] = [];
-  let pageToken = "";
-  for (let page = 0; page < MAX_PAGES; page += 1) {
-    const request = { pageSize: PAGE_SIZE, pageToken };
-    const answer = await tournamentApi.listTournaments(request, { signal, timeoutMs: CALL_LIMIT_MS });
-    found.push(...answer.tournaments);
-    pageToken = answer.nextPageToken;
-    if (pageToken === "") break;
-  }
-  return found.filter(({ state }) => state === TournamentState.OPEN || state === TournamentState.PLAYING).reverse();
+  const found = await listTournaments(signal);
+  return found.filter(({ state }) => state === TournamentState.OPEN || state === TournamentState.PLAYING);
 }

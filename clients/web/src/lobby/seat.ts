@@ -5,7 +5,7 @@ import type { MessageInitShape } from "@bufbuild/protobuf";
 import { CALL_LIMIT_MS, roomApi } from "../api/client";
 import { ParticipantKind, type Room } from "../gen/chefshat/v1/room_pb";
 import type { CreateRoomRequestSchema } from "../gen/chefshat/v1/room_service_pb";
-import { recall, remember } from "../store";
+import { recall, remember, remembered } from "../store";
 
 /** A seat that this device has taken. */
 export interface HeldSeat {
@@ -29,9 +29,10 @@ export function heldSeat(roomId: string): HeldSeat | null {
   );
 }
 
-/** Forgets a seat: its room is gone, or it was given up. */
+/** Forgets a seat and all that was kept with it: its room is gone or its game over, or it was given up. */
 export function giveUpSeat(roomId: string): void {
-  remember(`seat.${roomId}`, null);
+  for (const kept of ["seat", "study", "timed"]) remember(`${kept}.${roomId}`, null);
+  for (const [name, value] of remembered()) if (name.startsWith("code.") && value === roomId) remember(name, null);
 }
 
 /** The secrets of a room if this device made it. */

@@ -2,6 +2,7 @@
 
 import type { ComponentChildren } from "preact";
 import { useEffect, useRef, useState } from "preact/hooks";
+import { hidden } from "../experiment/hiding";
 import { t } from "../i18n";
 import type { Route } from "../router";
 import { Announcer } from "./Announcer";
@@ -25,6 +26,12 @@ export function Layout({ here, children }: LayoutProps) {
     else content.current?.focus({ preventScroll: true });
   }, [here]);
   const words = t().common;
+  const home = (
+    <>
+      <Drawing name="joker" />
+      <span>{words.name}</span>
+    </>
+  );
   const title = `${pageName(here)} · ${words.name}`;
   useEffect(() => {
     document.title = title;
@@ -35,10 +42,13 @@ export function Layout({ here, children }: LayoutProps) {
         {words.skipToContent}
       </a>
       <header class="header">
-        <a class="header-name" href="/">
-          <Drawing name="joker" />
-          <span>{words.name}</span>
-        </a>
+        {hidden.value.includes("pages") ? (
+          <span class="header-name">{home}</span>
+        ) : (
+          <a class="header-name" href="/">
+            {home}
+          </a>
+        )}
         <nav class="header-nav" aria-label={words.nav.label}>
           {links().map(({ href, label, pages }) => (
             <a key={href} href={href} aria-current={pages.includes(here.page) ? "page" : undefined}>

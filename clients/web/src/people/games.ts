@@ -1,6 +1,7 @@
 // The games of one participant, from the server's records: found by name, newest first, with what they add up to.
 
 import { CALL_LIMIT_MS, recordApi, tournamentApi } from "../api/client";
+import { allPages } from "../api/pages";
 import type { RecordSummary } from "../gen/chefshat/v1/record_service_pb";
 import { type Participant, RoomState } from "../gen/chefshat/v1/room_pb";
 import type { Rated } from "../gen/chefshat/v1/tournament_pb";
@@ -42,14 +43,11 @@ export interface Person {
 export async function askPerson(name: string, signal: AbortSignal): Promise<Person> {
   const call = { signal, timeoutMs: CALL_LIMIT_MS };
   const board = tournamentApi.getLeaderboard({ limit: MAX_LINES }, call);
-  const games: OwnGame[] = [];
-  let pageToken = "";
-  for (let page = 0; page < MAX_PAGES; page += 1) {
+  const records = await allPages(async (pageToken) => {
     const answer = await recordApi.listRecords({ filter: { participant: name }, pageSize: PAGE_SIZE, pageToken }, call);
-    games.push(...answer.records.flatMap((record) => ownGame(record, name) ?? []));
-    pageToken = answer.nextPageToken;
-    if (pageToken === "") break;
-  }
+    return { items: answer.records, nextPageToken: answer.nextPageToken };
+  }, MAX_PAGES);
+  const games = records.flatMap((record) => ownGame(record, name) ?? []);
   const rated = (await board).rated.filter((line) => line.name === name);
   return { rated, games: games.reverse() };
 }

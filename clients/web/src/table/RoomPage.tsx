@@ -2,13 +2,13 @@
 
 import { useEffect, useState } from "preact/hooks";
 import { CALL_LIMIT_MS, roomApi } from "../api/client";
-import { inWords, wordsOf } from "../api/faults";
+import { faultOf, wordsOf } from "../api/faults";
 import type { PageProps } from "../app";
 import { AtTable } from "../experiment/AtTable";
 import { t } from "../i18n";
 import { Doorway } from "../lobby/Doorway";
 import { HostInvite } from "../lobby/Invite";
-import { heldSeat } from "../lobby/seat";
+import { giveUpSeat, heldSeat } from "../lobby/seat";
 import { Button } from "../parts/Button";
 import { Faulty } from "../parts/Faulty";
 import { Notice } from "../parts/Notice";
@@ -36,7 +36,9 @@ export function RoomPage({ route }: PageProps<"room">) {
         setTable(table);
         setSession(started);
       } catch (thrown) {
-        if (!left) setFault(inWords(thrown));
+        const fault = faultOf(thrown);
+        if (fault.reason === "ROOM_UNKNOWN") giveUpSeat(roomId);
+        if (!left) setFault(wordsOf(fault));
       }
     };
     setFault("");
@@ -44,8 +46,20 @@ export function RoomPage({ route }: PageProps<"room">) {
     return () => {
       left = true;
       started?.stop();
+      // A reload goes on with the last page of a study; who leaves it is done, and the next at this device finds nothing.
+      if (started && isOver(started.live.peek().table)) giveUpSeat(roomId);
     };
   }, [roomId]);
+
+  const attachment = session?.live.value.attachment;
+  const vacated = attachment?.kind === "refused" && attachment.reason === "TICKET_UNKNOWN";
+  useEffect(() => {
+    if (!vacated) return;
+    // The seat was given to others while this page was away: from here on the room is one to come into.
+    giveUpSeat(roomId);
+    session?.stop();
+    setSession(undefined);
+  }, [vacated]);
 
   if (fault) return <Faulty title={t().table.title} words={fault} />;
   if (!table) return <p class="soft">{t().common.loading}</p>;
@@ -54,14 +68,19 @@ export function RoomPage({ route }: PageProps<"room">) {
 
 /** The table from the seat that this device holds. */
 function Held({ session }: { session: Session }) {
-  const { roomId, phase } = session.live.value.table;
+  const { table } = session.live.value;
+  const { roomId } = table;
   const banner = (
     <>
       <Banner session={session} />
-      <AtTable roomId={roomId} over={phase === "gameOver" || phase === "aborted"} />
+      <AtTable roomId={roomId} over={isOver(table)} />
     </>
   );
   return <Seated acting={session} banner={banner} below={<HostInvite roomId={roomId} />} />;
+}
+
+function isOver({ phase }: TableState): boolean {
+  return phase === "gameOver" || phase === "aborted";
 }
 
 /** What is to be said about the connection, if anything. */

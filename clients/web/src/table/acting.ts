@@ -9,6 +9,7 @@ import { recall } from "../store";
 import type { Gesture } from "./expressions";
 import { applyUpdate, type LiveState, startLive } from "./model/live";
 import type { TableState } from "./model/state";
+import { answerWords } from "./words";
 
 /** Name of the annotation that holds how long the person took, in whole milliseconds by the person's own clock. */
 export const PERSON_TIME_KEY = "person_decision_time_ms";
@@ -76,7 +77,7 @@ export function startActing(ticket: string, table: TableState, seat: number): Ac
           const { result } = reply;
           if (result) {
             hear([{ $typeName: "chefshat.v1.SeatUpdate", handle: 0, update: { case: "result", value: result } }]);
-            trouble.value = result.detail;
+            trouble.value = answerWords(result);
           }
           return;
         } catch (thrown) {

@@ -2,11 +2,13 @@
 // told all of it again.
 
 import { useEffect, useRef } from "preact/hooks";
+import { hidden } from "../experiment/hiding";
 import { DecisionKind } from "../gen/chefshat/v1/decision_pb";
 import { t } from "../i18n";
 import { announce } from "../parts/Announcer";
 import { demandOf } from "./model/demand";
 import type { OpenDecision } from "./model/live";
+import { worthSaying } from "./model/log";
 import type { TableState } from "./model/state";
 import { play, soundOf } from "./sounds";
 import { nowHeading } from "./view/Now";
@@ -25,8 +27,9 @@ export function useAnnounced(table: TableState, own: number | undefined, decisio
     if (before === undefined) return;
     const fresh = table.log.filter(({ sequence }) => sequence > before);
     if (fresh.length > MOST_AT_ONCE) return;
-    for (const line of fresh) announce(spokenLine(table, line));
-    const sounds = fresh.flatMap((line) => soundOf(line) ?? []);
+    const said = worthSaying(fresh, !hidden.peek().includes("expressions"));
+    for (const line of said) announce(spokenLine(table, line));
+    const sounds = said.flatMap((line) => soundOf(line) ?? []);
     // Together they would be a noise: the last is heard, and it is the most telling.
     const sound = sounds.at(-1);
     if (sound) play(sound);

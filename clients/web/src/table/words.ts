@@ -1,6 +1,7 @@
 // What the table says in words: cards, what happened, what the open turn asks for. The words themselves are in the texts; here they are put
 // together from the model's values.
 
+import { type AnswerResult, AnswerStatus } from "../gen/chefshat/v1/decision_pb";
 import { Role, SpecialAction } from "../gen/chefshat/v1/rules_pb";
 import { t } from "../i18n";
 import { isLabel } from "./expressions";
@@ -184,4 +185,19 @@ export function presenceWords(seat: SeatState): string {
   const words = t().table.presence;
   if (seat.substitute) return words.substituted(seat.substitute);
   return seat.connected || seat.builtIn ? "" : words.away;
+}
+
+/** What has become of an answer, where it was not simply taken. */
+export function answerWords({ status, invalidAttemptsLeft }: AnswerResult): string {
+  const words = t().table.answers;
+  switch (status) {
+    case AnswerStatus.INVALID:
+      return invalidAttemptsLeft === undefined ? words.notLegal : words.notLegalLeft(invalidAttemptsLeft);
+    case AnswerStatus.CLOSED:
+      return words.closed;
+    case AnswerStatus.UNKNOWN_DECISION:
+      return words.unknownDecision;
+    default:
+      return "";
+  }
 }

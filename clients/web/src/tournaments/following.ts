@@ -2,9 +2,10 @@
 // is, which are asked for when the stream says that something has changed.
 
 import { type Signal, signal } from "@preact/signals";
-import { useEffect, useState } from "preact/hooks";
+import { useEffect, useRef, useState } from "preact/hooks";
 import { CALL_LIMIT_MS, tournamentApi } from "../api/client";
 import { type Following, follow } from "../api/follow";
+import { allPages } from "../api/pages";
 import { usePolled } from "../api/poll";
 import type { OrderConfidence, Tournament, TournamentGame, TournamentStanding } from "../gen/chefshat/v1/tournament_pb";
 import { isEnded, mergedGames } from "./course";
@@ -45,43 +46,59 @@ export function useTournament(tournamentId: string): FollowedTournament | undefi
 const PAGE_SIZE = 500;
 /** Most pages of games that are asked for. */
 const MAX_PAGES = 6;
-/** How often games and confidence are asked for while a tournament goes on, milliseconds. */
-const EVERY_MS = 4_000;
-/** And when it is over: what does not change needs no asking. */
-const SELDOM_MS = 3_600_000;
+/** Games and confidence are not asked for again sooner than this, milliseconds: in a large tournament something changes all the time. */
+const SOONEST_MS = 4_000;
+/** How often they are asked for although the stream says nothing new, milliseconds. */
+const SELDOM_MS = 60_000;
+/** And when the tournament is over: what does not change needs no asking. */
+const HARDLY_MS = 3_600_000;
 
 /** Most games that a page shows. */
 export const MAX_GAMES = PAGE_SIZE * MAX_PAGES;
 
 /** All games of a tournament, with what the stream has said of them since. */
 export function useGames({ tournament, games }: Heard): TournamentGame[] {
-  const { tournamentId, round, state } = tournament;
-  const everyMs = isEnded(tournament) ? SELDOM_MS : EVERY_MS;
-  const listed = usePolled((abort) => listGames(tournamentId, abort), everyMs, `${tournamentId} ${round} ${state}`);
+  const { tournamentId } = tournament;
+  const listed = usePolled((abort) => listGames(tournamentId, abort), quietMs(tournament), useChanges(tournament));
   return mergedGames(listed.value ?? [], games);
 }
 
 /** For each two who follow one another in the standings, how sure their order is. */
 export function useConfidence({ tournament }: Heard): readonly OrderConfidence[] {
-  const { tournamentId, state, gamesOver } = tournament;
+  const { tournamentId, gamesOver } = tournament;
   const ask = async (abort: AbortSignal) => {
     if (gamesOver === 0) return [];
     const call = { signal: abort, timeoutMs: CALL_LIMIT_MS };
     return (await tournamentApi.getTournamentResults({ tournamentId }, call)).confidence;
   };
-  const everyMs = isEnded(tournament) ? SELDOM_MS : EVERY_MS;
-  return usePolled(ask, everyMs, `${tournamentId} ${state} ${gamesOver > 0}`).value ?? [];
+  return usePolled(ask, quietMs(tournament), useChanges(tournament)).value ?? [];
 }
 
-async function listGames(tournamentId: string, abort: AbortSignal): Promise<TournamentGame[]> {
-  const found: TournamentGame[] = [];
-  let pageToken = "";
-  for (let page = 0; page < MAX_PAGES; page += 1) {
-    const request = { tournamentId, pageSize: PAGE_SIZE, pageToken };
-    const answer = await tournamentApi.listTournamentGames(request, { signal: abort, timeoutMs: CALL_LIMIT_MS });
-    found.push(...answer.games);
-    pageToken = answer.nextPageToken;
-    if (pageToken === "") break;
-  }
-  return found;
+function quietMs(tournament: Tournament): number {
+  return isEnded(tournament) ? HARDLY_MS : SELDOM_MS;
+}
+
+/** Another text whenever something has changed that only the server's lists tell, but not sooner than `SOONEST_MS` after the one before. */
+function useChanges({ tournamentId, state, round, gamesOver }: Tournament): string {
+  const now = `${tournamentId} ${state} ${round} ${gamesOver}`;
+  const [told, setTold] = useState(now);
+  const toldAtMs = useRef(performance.now());
+  useEffect(() => {
+    if (now === told) return;
+    const tell = () => {
+      toldAtMs.current = performance.now();
+      setTold(now);
+    };
+    const timer = setTimeout(tell, toldAtMs.current + SOONEST_MS - performance.now());
+    return () => clearTimeout(timer);
+  }, [now, told]);
+  return told;
+}
+
+function listGames(tournamentId: string, abort: AbortSignal): Promise<TournamentGame[]> {
+  const call = { signal: abort, timeoutMs: CALL_LIMIT_MS };
+  return allPages(async (pageToken) => {
+    const answer = await tournamentApi.listTournamentGames({ tournamentId, pageSize: PAGE_SIZE, pageToken }, call);
+    return { items: answer.games, nextPageToken: answer.nextPageToken };
+  }, MAX_PAGES);
 }

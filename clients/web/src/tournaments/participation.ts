@@ -3,16 +3,19 @@
 
 import { batch, type Signal, signal } from "@preact/signals";
 import { CALL_LIMIT_MS, playApi, roomApi } from "../api/client";
+import { faultOf, isPassing } from "../api/faults";
 import { type Following, follow } from "../api/follow";
 import { type Attached, DetachReason, type SeatUpdate } from "../gen/chefshat/v1/play_service_pb";
+import type { Room } from "../gen/chefshat/v1/room_pb";
 import { type Acting, startActing } from "../table/acting";
 import { tableFromRoom } from "../table/model/state";
 
 /** Seats that the server attaches by itself are numbered from here. */
 const FIRST_SEATED = 2 ** 31;
 
-/** How long to wait after a room could not be asked for. */
-const RETRY_MS = 1_000;
+/** How long to wait after a room could not be asked for: at first, and at most, doubled each time. */
+const SHORTEST_WAIT_MS = 500;
+const LONGEST_WAIT_MS = 16_000;
 
 /** How the participant is attached. */
 export type Presence = "coming" | "here" | "superseded" | "over" | "refused";
@@ -41,14 +44,33 @@ export function startParticipation(ticket: string): Participation {
   /** By room: after a lost connection a seat has another handle, but it is the same table. */
   const rooms = new Map<string, Seated>();
 
+  const isPresent = () => !stopped && (presence.peek() === "coming" || presence.peek() === "here");
+
+  /** The room of a game, without which its table cannot be drawn; undefined if it is gone or the place is not this page's any more. */
+  const askRoom = async (roomId: string): Promise<Room | undefined> => {
+    for (let waitMs = SHORTEST_WAIT_MS; isPresent(); waitMs = Math.min(LONGEST_WAIT_MS, 2 * waitMs)) {
+      try {
+        return (await roomApi.getRoom({ roomId }, { timeoutMs: CALL_LIMIT_MS })).room;
+      } catch (thrown) {
+        if (!isPassing(faultOf(thrown))) return undefined;
+        await new Promise((resolve) => setTimeout(resolve, waitMs));
+      }
+    }
+    return undefined;
+  };
+
   const seat = (attached: Attached): Seated => {
     const known = rooms.get(attached.roomId);
     if (known) return known;
     const seated: Seated = { acting: undefined, waiting: [] };
     rooms.set(attached.roomId, seated);
     const load = async () => {
-      const { room } = await roomApi.getRoom({ roomId: attached.roomId }, { timeoutMs: CALL_LIMIT_MS });
-      if (!room) return;
+      const room = await askRoom(attached.roomId);
+      if (!room) {
+        // Should the seat be announced again, it is asked for anew.
+        rooms.delete(attached.roomId);
+        return;
+      }
       const acting = startActing(attached.ticket, tableFromRoom(room), attached.seat);
       batch(() => {
         acting.hear(seated.waiting);
@@ -56,12 +78,10 @@ export function startParticipation(ticket: string): Participation {
       });
       seated.acting = acting;
       seated.waiting = [];
+      // Only the newest game is shown: one that has ended is done with.
+      for (const [roomId, other] of rooms) if (other.acting && hasEnded(other.acting)) rooms.delete(roomId);
     };
-    // Without its room a table cannot be drawn: the stream is opened again, and with it the seat is announced again.
-    load().catch(() => {
-      rooms.delete(attached.roomId);
-      setTimeout(() => !stopped && reattach(), RETRY_MS);
-    });
+    void load();
     return seated;
   };
 
@@ -76,12 +96,13 @@ export function startParticipation(ticket: string): Participation {
       const seated = handles.get(update.handle);
       if (seated?.acting) seated.acting.hear([update]);
       else seated?.waiting.push(update);
+      if (update.update.case === "detached") handles.delete(update.handle);
     };
     return follow(
       (abort) => playApi.watch({ seats: [{ ticket }] }, { signal: abort }),
       ({ updates }) => {
         batch(() => updates.forEach(hear));
-        return presence.peek() === "coming" || presence.peek() === "here";
+        return isPresent();
       },
     );
   };
@@ -97,6 +118,11 @@ export function startParticipation(ticket: string): Participation {
     following.peek().stop();
   };
   return { presence, following, game, takeBack: reattach, stop };
+}
+
+function hasEnded({ live }: Acting): boolean {
+  const { table } = live.peek();
+  return table.phase === "gameOver" || table.phase === "aborted";
 }
 
 function presenceAfter({ update }: SeatUpdate, before: Presence): Presence {

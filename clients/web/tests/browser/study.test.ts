@@ -106,3 +106,31 @@ test("the host of a room makes links for its participants", async () => {
   expect(new URL(link ?? "").searchParams.get("after")).toBe("https://forms.example/{name}");
   expect(faults).toEqual([]);
 });
+
+test("a link without a name asks whose the seat is that this device has, and a seat that was vacated keeps nobody from the room", async () => {
+  const { code } = await newRoom(server, { seats: ["greedy", "person", "person", "random"] });
+  const { page, faults } = await person(browser);
+  const link = `${server.url}/join/${code}?times=1`;
+  await page.goto(link);
+  await page.getByLabel("Your name").fill("Ada");
+  await page.getByRole("button", { name: "Sit down at the table" }).click();
+  await page.getByText("(you)").waitFor();
+  await page.goto(link);
+  await page.getByRole("button", { name: "Take another seat" }).click();
+  await page.getByRole("button", { name: "Sit down at the table" }).waitFor();
+  await page.goto(link);
+  await page.getByRole("button", { name: "Go on as Ada" }).click();
+  await page.getByText("(you)").waitFor();
+  // To the page a ticket that the server does not know any more is the same as one that it has never known.
+  await page.evaluate(() => {
+    for (const [name, kept] of Object.entries(localStorage)) {
+      if (!name.startsWith("chefshat.seat.")) continue;
+      const held = JSON.parse(kept);
+      localStorage.setItem(name, JSON.stringify({ ...held, ticket: "A".repeat(held.ticket.length) }));
+    }
+  });
+  await page.reload();
+  await page.getByRole("heading", { name: "Sit down" }).waitFor();
+  expect(await page.evaluate(() => Object.keys(localStorage))).toEqual([]);
+  expect(faults).toEqual([]);
+});

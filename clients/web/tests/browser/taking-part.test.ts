@@ -61,7 +61,7 @@ test("a person joins, plays every game of the tournament and sees the final stan
     if (already === 1) await page.reload();
     else {
       await server.restart();
-      await page.getByText("The server was restarted; the game goes on").waitFor();
+      await page.getByText("The server was restarted; the game goes on").first().waitFor();
     }
     await page.locator(`[data-decision="${before}"]`).waitFor();
     interrupted += 1;

@@ -4,6 +4,7 @@ use std::io::{self, BufRead as _, IsTerminal as _, Write as _};
 use std::path::Path;
 use std::process::ExitCode;
 
+use chefshat_proto::v1::{self, record_line::Line};
 use chefshat_records::jsonl;
 use chefshat_records::pseudonym::{Pseudonym, TakenOut};
 use clap::Args;
@@ -11,11 +12,12 @@ use serde_json::json;
 
 use super::super::numbers::counted;
 use super::super::{CommandError, say};
-use super::{Who, read, records_with};
+use super::{Left, Who, records_with};
+use crate::ids::Id;
 use crate::store::Forgetting;
 
 const HELP: &str = "\
-The name gives way to a pseudonym, \"deleted participant\" and six digits, in the database and in records/*.jsonl; expressions of the \
+The name gives way to a pseudonym, \"deleted participant\" and six letters and digits, in the database and in records/*.jsonl; expressions of the \
 participant and annotations of its decisions (times measured at its side among them) are dropped. What was played stays, so that the \
 games of the others can still be replayed and checked. Copies elsewhere (datasets, backups, other servers) are not touched, nor is what \
 others wrote in theirs. The server must be stopped; while a game or tournament with the name is not over, nothing is changed.
@@ -26,6 +28,8 @@ Examples:
   chefshat participant delete P07 --data-dir ./chefshat-data
   chefshat participant delete \"Rosa L.\" --yes --json";
 
+/// What a pseudonym begins with.
+const PSEUDONYM: &str = "deleted participant ";
 /// Random bytes of a pseudonym.
 const PSEUDONYM_BYTES: usize = 3;
 
@@ -48,6 +52,9 @@ pub(super) struct Delete {
 struct Files {
     changed: u64,
     taken_out: TakenOut,
+    /// The pseudonym that a run before this one, which did not come to its end, had put into the database.
+    earlier: Option<String>,
+    left: Left,
 }
 
 impl Delete {
@@ -58,14 +65,16 @@ impl Delete {
         let who = Pseudonym {
             name: self.who.name.clone(),
             pseudonym: format!(
-                "deleted participant {}",
+                "{PSEUDONYM}{}",
                 hex::encode(rand::random::<[u8; PSEUDONYM_BYTES]>())
             ),
         };
         let forgotten = database.forget(&who).await?;
-        let files = rewrite(&data_dir, &who).map_err(|error| {
-            format!("{error}; not all records were rewritten: run the command again")
-        })?;
+        let files = rewrite(&mut database, &data_dir, &who)
+            .await
+            .map_err(|error| {
+                format!("{error}; not all records were rewritten: run the command again")
+            })?;
         database.finish(&forgotten).await?;
         let taken_out = TakenOut {
             names: forgotten.taken_out.names.max(files.taken_out.names),
@@ -73,22 +82,25 @@ impl Delete {
             annotations: (forgotten.taken_out.annotations).max(files.taken_out.annotations),
         };
         let games = forgotten.games.max(files.changed);
+        let found = games + forgotten.tournaments > 0;
+        let pseudonym = match files.earlier {
+            Some(earlier) if forgotten.games + forgotten.tournaments == 0 => earlier,
+            _ => who.pseudonym,
+        };
         if self.json {
             say(json!({
-                "pseudonym": who.pseudonym,
+                "pseudonym": pseudonym,
                 "games": games,
                 "tournaments": forgotten.tournaments,
                 "files": files.changed,
                 "expressions": taken_out.expressions,
                 "annotations": taken_out.annotations,
             }))?;
-        } else if games + forgotten.tournaments == 0 {
-            anstream::eprintln!("nothing is kept of {:?}", who.name);
-        } else {
+        } else if found {
             say(format_args!(
                 "{:?} is now {:?} in {}, {} and {}; dropped: {}, {}",
                 who.name,
-                who.pseudonym,
+                pseudonym,
                 counted(games, "game"),
                 counted(forgotten.tournaments, "tournament"),
                 counted(files.changed, "record file"),
@@ -96,7 +108,10 @@ impl Delete {
                 counted(taken_out.annotations, "annotation"),
             ))?;
         }
-        let found = games + forgotten.tournaments > 0;
+        files.left.check(&who.name)?;
+        if !found && !self.json {
+            anstream::eprintln!("nothing is kept of {:?}", who.name);
+        }
         Ok(if found {
             ExitCode::SUCCESS
         } else {
@@ -130,17 +145,58 @@ impl Delete {
 }
 
 /// Rewrites the files of the records in which the name stands, each whole or not at all.
-fn rewrite(data_dir: &Path, who: &Pseudonym) -> Result<Files, CommandError> {
+async fn rewrite(
+    database: &mut Forgetting,
+    data_dir: &Path,
+    who: &Pseudonym,
+) -> Result<Files, CommandError> {
     let mut files = Files::default();
-    for path in records_with(data_dir, &who.name)? {
-        let mut lines = read(&path)?;
+    for candidate in records_with(data_dir, &who.name)? {
+        let Some(mut lines) = files.left.read(&candidate) else {
+            continue;
+        };
+        let mut who = who.clone();
+        if let Some(held) = held(database, &lines, &who.name).await?
+            && held != who.pseudonym
+        {
+            who.pseudonym.clone_from(&held);
+            files.earlier = Some(held);
+        }
         let taken_out = who.take_out(&mut lines);
         if taken_out == TakenOut::default() {
             continue;
         }
-        jsonl::write(&path, &lines)?;
+        if let Err(error) = jsonl::write(&candidate.path, &lines) {
+            files.left.0.push(error.to_string());
+            continue;
+        }
         files.changed += 1;
         files.taken_out += taken_out;
     }
     Ok(files)
+}
+
+/// The pseudonym that the database has in the place of a name in a record, so that the file says what the database says.
+async fn held(
+    database: &mut Forgetting,
+    lines: &[v1::RecordLine],
+    name: &str,
+) -> Result<Option<String>, CommandError> {
+    let header = lines.iter().find_map(|line| match &line.line {
+        Some(Line::Header(header)) => Some(header),
+        _ => None,
+    });
+    let Some((game, header)) = header.and_then(|it| Some((Id::parse(&it.game_id)?, it))) else {
+        return Ok(None);
+    };
+    for seat in &header.seats {
+        if seat.name == name
+            && seat.built_in_agent.is_empty()
+            && let Some(held) = database.name_at(game, seat.seat).await?
+            && held.starts_with(PSEUDONYM)
+        {
+            return Ok(Some(held));
+        }
+    }
+    Ok(None)
 }

@@ -15,7 +15,7 @@ use serde_json::{Value, json};
 
 use super::super::numbers::counted;
 use super::super::{CommandError, say};
-use super::{Who, read, records_with};
+use super::{Left, Who, records_with};
 use crate::convert;
 use crate::ids::Id;
 use crate::store::tournaments::TournamentEntry;
@@ -58,6 +58,7 @@ struct Sheet {
     tournaments: u64,
     decisions: u64,
     expressions: u64,
+    left: Left,
 }
 
 impl Export {
@@ -72,6 +73,7 @@ impl Export {
         store.close().await;
         let sheet = gathered?;
         if sheet.games + sheet.tournaments == 0 {
+            sheet.left.check(&self.who.name)?;
             let name = &self.who.name;
             return Err(format!(
                 "nothing is kept of {name:?} in {}: write the name exactly as it was played under",
@@ -104,6 +106,7 @@ impl Export {
                 counted(sheet.tournaments, "tournament"),
             ))?;
         }
+        sheet.left.check(&self.who.name)?;
         Ok(ExitCode::SUCCESS)
     }
 }
@@ -131,9 +134,18 @@ async fn gather(store: &SqliteStore, data_dir: &Path, name: &str) -> Result<Shee
         }
     }
     // Records of other servers, and of real tables, may lie there as files alone.
-    for path in records_with(data_dir, name)? {
-        let lines = read(&path)?;
-        let replayed = replay(&lines).map_err(|error| format!("{}: {error}", path.display()))?;
+    for candidate in records_with(data_dir, name)? {
+        let Some(lines) = sheet.left.read(&candidate) else {
+            continue;
+        };
+        let replayed = match replay(&lines) {
+            Ok(replayed) => replayed,
+            Err(error) => {
+                let why = format!("{}: {error}", candidate.path.display());
+                sheet.left.note(&candidate, why);
+                continue;
+            }
+        };
         if let Some(summary) = summary(&lines, &replayed)
             && known.insert(summary.game_id.clone())
         {

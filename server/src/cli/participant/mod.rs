@@ -62,8 +62,19 @@ impl Who {
     }
 }
 
+/// A file in which the name may stand.
+struct Candidate {
+    path: PathBuf,
+    /// It does, or the file cannot even be looked into; otherwise it may be written by the numbers of its letters.
+    named: bool,
+}
+
+/// Why files with the name were left as they are. The others are done first: the command fails when it has.
+#[derive(Default)]
+struct Left(Vec<String>);
+
 /// The records in a data folder in which a name may stand, by the letters in the file: reading each as a record would take long.
-fn records_with(data_dir: &Path, name: &str) -> Result<Vec<PathBuf>, CommandError> {
+fn records_with(data_dir: &Path, name: &str) -> Result<Vec<Candidate>, CommandError> {
     let folder = data_dir.join("records");
     if !folder.is_dir() {
         return Ok(Vec::new());
@@ -73,16 +84,17 @@ fn records_with(data_dir: &Path, name: &str) -> Result<Vec<PathBuf>, CommandErro
     let mut found = Vec::new();
     for entry in std::fs::read_dir(&folder).map_err(unreadable)? {
         let path = entry.map_err(unreadable)?.path();
-        if path.extension().is_none_or(|ending| ending != "jsonl") {
+        if path.extension().is_none_or(|ending| ending != "jsonl") || path.is_dir() {
             continue;
         }
-        let text = std::fs::read(&path).map_err(|error| format!("{}: {error}", path.display()))?;
+        let text = std::fs::read(&path);
+        let named = (text.as_ref()).map_or(true, |text| contains(text, quoted.as_bytes()));
         // Other programs write some letters by their numbers.
-        if contains(&text, quoted.as_bytes()) || contains(&text, b"\\u") {
-            found.push(path);
+        if named || text.is_ok_and(|text| contains(&text, b"\\u")) {
+            found.push(Candidate { path, named });
         }
     }
-    found.sort();
+    found.sort_by(|a, b| a.path.cmp(&b.path));
     Ok(found)
 }
 
@@ -90,10 +102,34 @@ fn contains(text: &[u8], wanted: &[u8]) -> bool {
     text.windows(wanted.len()).any(|part| part == wanted)
 }
 
-/// A record of a data folder.
-fn read(path: &Path) -> Result<Vec<v1::RecordLine>, CommandError> {
-    jsonl::read(path).map_err(|error| {
-        format!("{error}; `chefshat verify` says more, and without this file the rest can be done")
-            .into()
-    })
+impl Left {
+    /// The record of a candidate; one that cannot be read is left, and need not be this participant's.
+    fn read(&mut self, candidate: &Candidate) -> Option<Vec<v1::RecordLine>> {
+        let lines = jsonl::read(&candidate.path);
+        lines
+            .map_err(|error| self.note(candidate, error.to_string()))
+            .ok()
+    }
+
+    /// Notes why a candidate is left as it is.
+    fn note(&mut self, candidate: &Candidate, why: String) {
+        if candidate.named {
+            self.0.push(why);
+        } else {
+            anstream::eprintln!("chefshat: warning: left out, it cannot be read: {why}");
+        }
+    }
+
+    /// Fails if the name stands in what was left.
+    fn check(&self, name: &str) -> Result<(), CommandError> {
+        if self.0.is_empty() {
+            return Ok(());
+        }
+        Err(format!(
+            "everything else is done, but {name:?} also stands in what could not be read or written: {}; `chefshat verify` says more: \
+             mend or remove this and run the command again",
+            self.0.join("; ")
+        )
+        .into())
+    }
 }

@@ -31,7 +31,16 @@ enum Stopped {
     Left,
     /// The game is over, or the seat is another's; why, if the game has not ended.
     Over(Option<String>),
-    Broken(Status),
+    /// It broke; whether the seat had been at the table through it, and for long.
+    Broken { status: Status, held: bool },
+}
+
+/// A stream that broke; since when the seat had been at the table through it.
+fn broken(attached: Option<Instant>, status: Status) -> Stopped {
+    Stopped::Broken {
+        status,
+        held: attached.is_some_and(|since| since.elapsed() >= MAX_DELAY),
+    }
 }
 
 /// A seat's connection.
@@ -69,12 +78,13 @@ impl Seat {
             let why = match self.converse(&mut commands, &inputs).await {
                 Stopped::Left => return,
                 Stopped::Over(why) => Some(why),
-                Stopped::Broken(_) if self.ended => Some(None),
-                Stopped::Broken(status) if !may_retry(status.code()) => {
+                Stopped::Broken { .. } if self.ended => Some(None),
+                Stopped::Broken { status, .. } if !may_retry(status.code()) => {
                     Some(Some(status.message().to_owned()))
                 }
-                Stopped::Broken(status) => {
-                    if self.next_event > seen {
+                Stopped::Broken { status, held } => {
+                    // A long wait for others brings no events, and is no outage either.
+                    if held || self.next_event > seen {
                         (outage, delay) = (None, FIRST_DELAY);
                     }
                     let since = *outage.get_or_insert_with(Instant::now);
@@ -124,21 +134,25 @@ impl Seat {
         let opening = timeout(OPEN_TIMEOUT, service.play(ReceiverStream::new(queue)));
         let mut responses = match opening.await {
             Ok(Ok(opened)) => opened.into_inner(),
-            Ok(Err(status)) => return Stopped::Broken(status),
-            Err(_) => return Stopped::Broken(Status::unavailable("no answer in time")),
+            Ok(Err(status)) => return broken(None, status),
+            Err(_) => return broken(None, Status::unavailable("no answer in time")),
         };
+        let mut attached: Option<Instant> = None;
         loop {
             tokio::select! {
                 response = responses.message() => match response {
                     Ok(Some(response)) => {
                         for update in response.updates {
+                            if matches!(update.update, Some(Update::Attached(_))) {
+                                attached.get_or_insert_with(Instant::now);
+                            }
                             if let Some(over) = self.hear(update, inputs).await {
                                 return over;
                             }
                         }
                     }
-                    Ok(None) => return Stopped::Broken(Status::unavailable("the server ended the stream")),
-                    Err(status) => return Stopped::Broken(status),
+                    Ok(None) => return broken(attached, Status::unavailable("the server ended the stream")),
+                    Err(status) => return broken(attached, status),
                 },
                 command = commands.recv() => {
                     let Some(command) = command else {

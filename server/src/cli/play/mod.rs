@@ -78,6 +78,9 @@ pub(super) struct Play {
     /// With --local: folder for the record (records/GAME-ID.jsonl). Standard: chefshat in the user's data folder.
     #[arg(long, env = "CHEFSHAT_DATA_DIR")]
     data_dir: Option<PathBuf>,
+    /// Record with each decision how long it was before your eyes, as the annotation person_decision_time_ms.
+    #[arg(long)]
+    times: bool,
     #[command(flatten)]
     rules: RulesArgs,
 }
@@ -122,7 +125,7 @@ impl Play {
             .transpose()?
         else {
             let taken = self.take().await?;
-            let app = play(taken).await?;
+            let app = play(taken, self.times).await?;
             let hint = format!(
                 "chefshat records get {} --server {}",
                 app.table.game_id,
@@ -131,7 +134,7 @@ impl Play {
             return told(&app, &hint);
         };
         let host = Host::start(data_dir.clone()).await?;
-        let played = async { play(self.take_local(&host).await?).await }.await;
+        let played = async { play(self.take_local(&host).await?, self.times).await }.await;
         // The record is written when the server has ended.
         host.stop().await?;
         let app = played?;
@@ -204,8 +207,8 @@ async fn join(client: Client, join_code: String, name: String) -> Result<Taken, 
     })
 }
 
-/// Plays until the person has seen the end or leaves.
-async fn play(taken: Taken) -> Result<App, CommandError> {
+/// Plays until the person has seen the end or leaves; with `times`, the person's own times are recorded.
+async fn play(taken: Taken, times: bool) -> Result<App, CommandError> {
     let Taken {
         client,
         ticket,
@@ -224,7 +227,7 @@ async fn play(taken: Taken) -> Result<App, CommandError> {
     let now = || u64::try_from(begun.elapsed().as_millis()).unwrap_or(u64::MAX);
     let mut ticks = interval(TICK);
     ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
-    let ended = asked_to_end();
+    let ended = asked_to_end()?;
     tokio::pin!(ended);
     let mut screen = Screen::open()?;
     let mut listening = true;
@@ -250,7 +253,7 @@ async fn play(taken: Taken) -> Result<App, CommandError> {
             Do::Express(index) => express(&client, &ticket, index),
             what => {
                 // One that finds no connection is not needed: the decision is put anew.
-                if let Some(command) = command(what) {
+                if let Some(command) = command(what, times) {
                     let _ = commands.try_send(command);
                 }
             }
@@ -263,7 +266,8 @@ async fn play(taken: Taken) -> Result<App, CommandError> {
     Ok(app)
 }
 
-fn command(what: Do) -> Option<Command> {
+/// What the server is told. How long a person took is told only where that was asked for.
+fn command(what: Do, times: bool) -> Option<Command> {
     match what {
         Do::Answer {
             decision_id,
@@ -272,7 +276,7 @@ fn command(what: Do) -> Option<Command> {
         } => Some(Command::Answer(v1::Answer {
             decision_id,
             action,
-            annotations: (took_ms > 0).then(|| v1::Annotations {
+            annotations: (times && took_ms > 0).then(|| v1::Annotations {
                 extra: BTreeMap::from([(PERSON_TIME_KEY.to_owned(), took_ms.to_string())])
                     .into_iter()
                     .collect(),

@@ -153,7 +153,7 @@ impl Decision {
         self.at = at;
         let smallest = self
             .legal_with(at)
-            .min_by_key(|(quantity, jokers)| (quantity + jokers, *jokers));
+            .min_by_key(|(quantity, jokers)| (quantity.saturating_add(*jokers), *jokers));
         (self.quantity, self.jokers) = smallest.unwrap_or((1, 0));
     }
 
@@ -201,7 +201,11 @@ impl Decision {
     /// One joker more with the cards; none after as many as there are.
     pub(super) fn next_joker(&mut self) {
         if self.kind() == v1::DecisionKind::Turn && self.stack().is_some_and(|it| !it.joker) {
-            self.jokers = (self.jokers + 1) % (self.jokers_held + 1);
+            self.jokers = if self.jokers < self.jokers_held {
+                self.jokers + 1
+            } else {
+                0
+            };
         }
     }
 

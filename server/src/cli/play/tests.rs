@@ -1,6 +1,6 @@
 //! Games played by keys alone, and what the screen shows of them.
 
-use chefshat_client::v1::{self, seat_update::Update};
+use chefshat_client::v1::{self, seat_command::Command, seat_update::Update};
 use chefshat_engine::{Action, DecisionKind, RuleSetSpec, Seat, Stop, Viewer};
 use ratatui::crossterm::event::KeyCode;
 
@@ -281,6 +281,26 @@ fn an_answer_that_was_lost_is_given_again() {
     assert!(
         matches!(answer, Some(Do::Answer { decision_id: id, action: same, .. }) if (id, same) == (decision_id, action))
     );
+}
+
+/// How long a person takes is recorded only where that was asked for.
+#[test]
+fn times_go_with_answers_only_when_asked_for() {
+    let annotations = |took_ms, times| {
+        let what = Do::Answer {
+            decision_id: 1,
+            action: 2,
+            took_ms,
+        };
+        match super::command(what, times) {
+            Some(Command::Answer(answer)) => answer.annotations,
+            other => panic!("{other:?}"),
+        }
+    };
+    assert_eq!(annotations(4_000, false), None);
+    assert_eq!(annotations(0, true), None);
+    let noted = annotations(4_000, true).unwrap().extra;
+    assert_eq!(noted["person_decision_time_ms"], "4000");
 }
 
 #[test]

@@ -35,7 +35,7 @@ const HELP: [&str; 15] = [
     "d, n      declare a special action, or do not",
     "e         show a feeling to the table",
     "r         play on yourself after a substitute has played for you",
-    "q         leave; a substitute will play for you",
+    "q         leave; the room's rules say who plays on",
     "",
 ];
 
@@ -273,7 +273,7 @@ fn draw_over(frame: &mut Frame<'_>, look: Look, app: &App) {
             look,
             "leave",
             vec![
-                plain("Leave the table? A substitute will play for you."),
+                plain("Leave the table? The room's rules say who plays on."),
                 plain(""),
                 plain("y leaves, any other key stays"),
             ],

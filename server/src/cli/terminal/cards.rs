@@ -12,6 +12,9 @@ const STACK_COLUMNS: usize = 6;
 /// Columns of the narrowest stack that can be read.
 const MIN_STACK_COLUMNS: usize = 4;
 
+/// Most cards of a kind that are drawn in a fan: more than any deck has.
+const MAX_FAN: usize = 64;
+
 /// How a stack of a hand is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::cli) struct Shown {
@@ -100,8 +103,10 @@ fn style_of(look: Look, faces: u32, shown: &Shown) -> Style {
 
 /// A play as a fan of cards, three lines high; one behind the other, so that twelve fit into 37 columns.
 pub(in crate::cli) fn fan(look: Look, faces: u32, play: OnBoard) -> [Line<'static>; 3] {
-    let plain = usize::try_from(play.quantity).unwrap_or(0);
-    let jokers = usize::try_from(play.jokers).unwrap_or(0);
+    let plain = usize::try_from(play.quantity)
+        .unwrap_or(MAX_FAN)
+        .min(MAX_FAN);
+    let jokers = usize::try_from(play.jokers).unwrap_or(MAX_FAN).min(MAX_FAN);
     let cards = std::iter::repeat_n(false, plain).chain(std::iter::repeat_n(true, jokers));
     let mut rows: [Vec<Span<'static>>; 3] = Default::default();
     let mut last = Style::new();

@@ -73,19 +73,23 @@ pub(in crate::cli) fn missing(instead: &str) -> Option<ExitCode> {
     Some(ExitCode::from(NO_TERMINAL))
 }
 
-/// Waits until somebody wants this process to end.
+/// Waits until somebody wants this process to end. The signals are caught from the call on: one that comes before the wait does not leave the
+/// terminal as it is. Ctrl-C is a key here; an interrupt comes from outside.
 ///
 /// # Errors
 /// The operating system does not tell.
-pub(in crate::cli) async fn asked_to_end() -> io::Result<()> {
+pub(in crate::cli) fn asked_to_end() -> io::Result<impl Future<Output = ()>> {
     use tokio::signal::unix::{SignalKind, signal};
+    let mut interrupt = signal(SignalKind::interrupt())?;
     let mut terminate = signal(SignalKind::terminate())?;
     let mut hang_up = signal(SignalKind::hangup())?;
-    tokio::select! {
-        _ = terminate.recv() => {}
-        _ = hang_up.recv() => {}
-    }
-    Ok(())
+    Ok(async move {
+        tokio::select! {
+            _ = interrupt.recv() => {}
+            _ = terminate.recv() => {}
+            _ = hang_up.recv() => {}
+        }
+    })
 }
 
 /// Reads keys until nobody wants them any more.

@@ -174,7 +174,7 @@ impl Table {
             Kind::CardsExchanged(cards) => self.exchanged(cards),
             Kind::Play(play) => self.played(play),
             Kind::Pass(pass) => {
-                self.turns += 1;
+                self.turns = self.turns.saturating_add(1);
                 self.with(pass.seat, |place| place.passed = true);
                 self.turn = self.next_after(pass.seat);
             }
@@ -292,7 +292,7 @@ impl Table {
 
     fn played(&mut self, play: &v1::Play) {
         let golden = self.plays_golden(play);
-        self.turns += 1;
+        self.turns = self.turns.saturating_add(1);
         if self.rules.map(|rules| rules.pass_scope()) == Some(PassScope::Turn) {
             self.forget_passes();
         }
@@ -337,9 +337,11 @@ impl Table {
     /// The next seat to the left that holds cards and has not passed.
     fn next_after(&self, seat: u32) -> Option<u32> {
         let seats = u32::try_from(self.seats.len()).ok()?;
-        (1..=seats).map(|step| (seat + step) % seats).find(|seat| {
-            self.seat(*seat)
-                .is_some_and(|place| place.cards > 0 && !place.passed)
-        })
+        (1..=seats)
+            .map(|step| seat.saturating_add(step) % seats)
+            .find(|seat| {
+                self.seat(*seat)
+                    .is_some_and(|place| place.cards > 0 && !place.passed)
+            })
     }
 }

@@ -47,11 +47,15 @@ pub(in crate::cli) fn as_kept(screens: &[(&str, String, &str)]) {
     );
 }
 
-/// The events of a game among the fixtures.
-pub(in crate::cli) fn recorded(name: &str) -> Vec<v1::GameEvent> {
+/// The record of a game among the fixtures.
+pub(in crate::cli) fn lines(name: &str) -> Vec<v1::RecordLine> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/fixtures/records");
-    let lines = chefshat_records::jsonl::read(&folder.join(name)).unwrap();
-    let events = lines.into_iter().filter_map(|line| match line.line {
+    chefshat_records::jsonl::read(&folder.join(name)).unwrap()
+}
+
+/// Its events.
+pub(in crate::cli) fn recorded(name: &str) -> Vec<v1::GameEvent> {
+    let events = lines(name).into_iter().filter_map(|line| match line.line {
         Some(record_line::Line::Event(event)) => Some(event),
         _ => None,
     });

@@ -242,14 +242,16 @@ fn draw_pizza(frame: &mut Frame<'_>, look: Look, table: &Table, me: Option<u32>,
     };
     let faces = table.faces();
     let [first, second, third] = fan(look, faces, play);
-    let width = u16::try_from(first.width()).unwrap_or(u16::MAX) + 1;
+    let width = u16::try_from(first.width())
+        .unwrap_or(u16::MAX)
+        .saturating_add(1);
     let [left, right] = Layout::horizontal([
         Constraint::Length(width.min(inner.width)),
         Constraint::Min(0),
     ])
     .areas(inner);
     frame.render_widget(Paragraph::new(vec![first, second, third]), left);
-    let size = play.quantity + play.jokers;
+    let size = play.quantity.saturating_add(play.jokers);
     let name = if me == Some(play.seat) {
         "you".to_owned()
     } else {

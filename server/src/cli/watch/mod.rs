@@ -13,6 +13,7 @@ use std::time::Duration;
 use chefshat_client::v1::{self, record_line};
 use chefshat_client::{Backoff, Client, Spectator};
 use chefshat_records::jsonl;
+use chefshat_records::replay::{ReplayError, replay};
 use clap::Args;
 use tokio::sync::mpsc;
 use tokio::time::{Instant, MissedTickBehavior, interval};
@@ -54,7 +55,11 @@ impl Watch {
         let path = Path::new(&self.what);
         let is_file = path.extension().is_some_and(|it| it == "jsonl") || path.is_file();
         let (reel, live) = if is_file {
-            (of_record(jsonl::read(path)?), None)
+            let reel = of_record(jsonl::read(path)?);
+            let reel = reel.map_err(|error| {
+                format!("{}: {error}; `chefshat verify` says more", path.display())
+            })?;
+            (reel, None)
         } else {
             let client = self.server.connect().await?;
             self.of_server(&client).await?
@@ -70,14 +75,14 @@ impl Watch {
                 let lines = client.record(self.what.as_str()).await.map_err(|error| {
                     format!("{error}; neither a room nor a game has this id, `chefshat room list` and `chefshat records list` say which there are")
                 })?;
-                return Ok((of_record(lines), None));
+                return Ok((of_record(lines)?, None));
             }
             Err(error) => return Err(error.into()),
         };
         if room.state() == v1::RoomState::Finished
             && let Ok(lines) = client.record(room.game_id.as_str()).await
         {
-            return Ok((of_record(lines), None));
+            return Ok((of_record(lines)?, None));
         }
         let spectator = client
             .spectate(room.room_id.as_str(), 1)
@@ -89,8 +94,12 @@ impl Watch {
     }
 }
 
-/// The reel of a record.
-fn of_record(lines: Vec<v1::RecordLine>) -> Reel {
+/// The reel of a record. A file can say anything: only what replays is shown.
+///
+/// # Errors
+/// The first line that does not fit.
+fn of_record(lines: Vec<v1::RecordLine>) -> Result<Reel, ReplayError> {
+    replay(&lines)?;
     let mut table = Table::default();
     let mut events = Vec::new();
     for line in lines {
@@ -107,7 +116,7 @@ fn of_record(lines: Vec<v1::RecordLine>) -> Reel {
             _ => {}
         }
     }
-    Reel::recorded(table, events)
+    Ok(Reel::recorded(table, events))
 }
 
 /// Shows the reel until the person has seen enough.
@@ -117,7 +126,7 @@ async fn show(mut reel: Reel, live: Option<Spectator>) -> Result<ExitCode, Comma
     let now = || u64::try_from(begun.elapsed().as_millis()).unwrap_or(u64::MAX);
     let mut ticks = interval(TICK);
     ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
-    let ended = asked_to_end();
+    let ended = asked_to_end()?;
     tokio::pin!(ended);
     let mut following = live.map(follow);
     let mut screen = Screen::open()?;

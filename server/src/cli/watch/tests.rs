@@ -1,13 +1,14 @@
 //! A reel is wound by keys over a recorded game.
 
+use chefshat_client::v1::{self, game_event::Kind, record_line};
 use ratatui::crossterm::event::KeyCode;
 
 use super::super::terminal::look::Look;
 use super::super::terminal::screen::Key;
 use super::super::terminal::table::Table;
-use super::super::terminal::testing::{as_kept, recorded, text};
+use super::super::terminal::testing::{as_kept, lines, recorded, text};
 use super::reel::Reel;
-use super::view;
+use super::{of_record, view};
 
 fn reel() -> Reel {
     Reel::recorded(Table::default(), recorded("fixed.jsonl"))
@@ -65,6 +66,43 @@ fn the_reel_runs_stops_and_jumps() {
     assert!(reel.table.end.is_some());
     press(&mut reel, KeyCode::Char('q'));
     assert!(reel.left);
+}
+
+#[test]
+fn a_record_that_does_not_replay_is_refused_and_none_is_drawn_without_bounds() {
+    let lines = lines("fixed.jsonl");
+    assert!(of_record(lines.clone()).is_ok());
+    let plays = |line: &v1::RecordLine| match &line.line {
+        Some(record_line::Line::Event(event)) => matches!(event.kind, Some(Kind::Play(_))),
+        _ => false,
+    };
+    let at = lines.iter().position(plays).expect("somebody plays");
+    let spoils: [fn(&mut v1::Play); 3] = [
+        |play| (play.quantity, play.jokers) = (u32::MAX, u32::MAX),
+        |play| play.seat = u32::MAX,
+        |play| play.face = u32::MAX,
+    ];
+    for spoil in spoils {
+        let mut bad = lines.clone();
+        let Some(record_line::Line::Event(event)) = &mut bad[at].line else {
+            panic!("an event");
+        };
+        let Some(Kind::Play(play)) = &mut event.kind else {
+            panic!("a play");
+        };
+        spoil(play);
+        // A live game is drawn as it comes, whatever the server says.
+        let mut reel = Reel::live(Table::default());
+        for line in &bad[..=at] {
+            if let Some(record_line::Line::Event(event)) = &line.line {
+                reel.push(event.clone());
+            }
+        }
+        assert!(reel.table.board.is_some());
+        assert!(screen(&reel).contains("the pizza"));
+        let refused = of_record(bad).unwrap_err().to_string();
+        assert!(refused.contains("line"), "{refused}");
+    }
 }
 
 #[test]

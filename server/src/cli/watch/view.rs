@@ -30,9 +30,13 @@ const HELP: [&str; 9] = [
 pub(super) fn draw(frame: &mut Frame<'_>, look: Look, reel: &Reel) {
     let table = &reel.table;
     let seats = u16::try_from(table.seats.len()).unwrap_or(0);
-    let hands = if reel.hands { seats + 2 } else { 0 };
+    let hands = if reel.hands {
+        seats.saturating_add(2)
+    } else {
+        0
+    };
     // The pizza and the story need the rest; six hands at the least height leave the keys out, which ? tells too.
-    let rows = hands + 2;
+    let rows = hands.saturating_add(2);
     let status = match (reel.live, reel.running) {
         (true, _) if reel.at < reel.len() => "● live, behind",
         (true, true) => "● live",

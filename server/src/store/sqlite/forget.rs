@@ -14,6 +14,7 @@ use sqlx::{Connection as _, Row as _};
 use super::errors::explain;
 use super::form::{self, Unreadable};
 use super::open::{self, Opened};
+use crate::ids::Id;
 use crate::store::StoreError;
 use crate::store::journal::{Change, Entry};
 use crate::store::tournaments::TournamentEntry;
@@ -105,6 +106,21 @@ impl Forgetting {
         forgotten.tournaments = forget_tournaments(&mut transaction, who).await?;
         transaction.commit().await?;
         Ok(forgotten)
+    }
+
+    /// The name at a seat of a game that is over; none of a built-in agent, or of a game that is not here.
+    ///
+    /// # Errors
+    /// The database failed.
+    pub async fn name_at(&mut self, game: Id, seat: u32) -> Result<Option<String>, ForgetError> {
+        let name = sqlx::query_scalar(
+            "SELECT name FROM participants JOIN games ON number = game WHERE game_id = $1 AND seat = $2 AND agent = ''",
+        )
+        .bind(game.0.as_slice())
+        .bind(seat)
+        .fetch_optional(&mut self.0.writer)
+        .await?;
+        Ok(name)
     }
 
     /// Notes that the records have been written anew, and writes the database anew, so that nothing of what was there before is left in parts

@@ -19,6 +19,10 @@ export const common = {
     language: "Language",
     look: "Look",
     looks: { system: "As the system", light: "Light", dark: "Dark" },
+    forget: "Forget everything on this device",
+    forgetSure:
+      "Your seats, places in tournaments, the rooms you made, your name and settings? You cannot come back to them.",
+    forgetDo: "Forget it",
   },
   kinds: { agent: "agent", human: "person", robot: "robot", builtIn: "built-in agent", open: "free" },
   roles: { chef: "Chef", sousChef: "Sous-Chef", cook: "Cook", waiter: "Waiter", dishwasher: "Dishwasher" },

@@ -1,5 +1,9 @@
 // English texts of experiment/.
 
+import { plurals } from "../plural";
+
+const plural = plurals("en");
+
 export const experiment = {
   join: {
     title: "You are invited to a study",
@@ -14,6 +18,9 @@ export const experiment = {
     beforeText: (host: string) => `It opens in a window of its own, at ${host}. Come back here afterwards.`,
     open: "Open the questionnaire",
     done: "I have filled it in",
+    taken: (name: string) => `Somebody has sat down with this link on this device already, as ${name}.`,
+    goOn: (name: string) => `Go on as ${name}`,
+    another: "Take another seat",
     sitDown: "Sit down at the table",
     recorded:
       "The game is recorded: the name above, your decisions and how long they take, and the expressions you show. Nothing else is.",
@@ -49,6 +56,11 @@ export const experiment = {
     beforeHint: "https://…; {name} is filled in if it is fixed.",
     afterHint: "https://…; {name} and {room} are filled in.",
     notAnAddress: "This is no address that begins with https:// or http://.",
+    tooMany: (seats: number) =>
+      plural(seats, {
+        one: "There are more names than seats: # seat is there for them.",
+        other: "There are more names than seats: # seats are there for them.",
+      }),
     result: "Links",
     everybody: "everybody",
   },

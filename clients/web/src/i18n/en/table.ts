@@ -189,6 +189,18 @@ export const table = {
     youWon: "You have won!",
     wins: (name: string) => `${name} has won`,
   },
+  answers: {
+    notLegal: "This is not legal. Choose again.",
+    notLegalLeft: (attempts: number) =>
+      attempts === 0
+        ? "This is not legal. It was decided for you."
+        : plural(attempts, {
+            one: "This is not legal. Choose again: # attempt is left.",
+            other: "This is not legal. Choose again: # attempts are left.",
+          }),
+    closed: "Too late: this has been decided already.",
+    unknownDecision: "The table has gone on. Load the page again if it does not.",
+  },
   link: {
     connecting: "Connecting…",
     lost: "The connection is lost; trying again…",

@@ -1,6 +1,9 @@
 // Italian texts of experiment/.
 
 import type { Texts } from "../en";
+import { plurals } from "../plural";
+
+const plural = plurals("it");
 
 export const experiment: Texts["experiment"] = {
   join: {
@@ -16,6 +19,9 @@ export const experiment: Texts["experiment"] = {
     beforeText: (host) => `Si apre in una finestra a parte, su ${host}. Poi torna qui.`,
     open: "Apri il questionario",
     done: "L’ho compilato",
+    taken: (name) => `Con questo link qualcuno si è già seduto su questo dispositivo, come ${name}.`,
+    goOn: (name) => `Continua come ${name}`,
+    another: "Prendi un altro posto",
     sitDown: "Siediti al tavolo",
     recorded:
       "La partita viene registrata: il nome qui sopra, le tue decisioni e quanto tempo richiedono, e le espressioni che mostri. Nient’altro.",
@@ -51,6 +57,11 @@ export const experiment: Texts["experiment"] = {
     beforeHint: "https://…; {name} viene compilato se è fissato.",
     afterHint: "https://…; {name} e {room} vengono compilati.",
     notAnAddress: "Questo non è un indirizzo che comincia con https:// o http://.",
+    tooMany: (seats) =>
+      plural(seats, {
+        one: "Ci sono più nomi che posti: per loro c’è # posto.",
+        other: "Ci sono più nomi che posti: per loro ci sono # posti.",
+      }),
     result: "Link",
     everybody: "tutti",
   },

@@ -189,6 +189,18 @@ export const table: Texts["table"] = {
     youWon: "Hai vinto!",
     wins: (name) => `Ha vinto ${name}`,
   },
+  answers: {
+    notLegal: "Non è permesso. Scegli di nuovo.",
+    notLegalLeft: (attempts) =>
+      attempts === 0
+        ? "Non è permesso. È stato deciso per te."
+        : plural(attempts, {
+            one: "Non è permesso. Scegli di nuovo: resta # tentativo.",
+            other: "Non è permesso. Scegli di nuovo: restano # tentativi.",
+          }),
+    closed: "Troppo tardi: è già stato deciso.",
+    unknownDecision: "Il tavolo è andato avanti. Se non va, ricarica la pagina.",
+  },
   link: {
     connecting: "Connessione…",
     lost: "La connessione è caduta; nuovo tentativo…",

@@ -1,8 +1,10 @@
 // What happened at the table, the newest at the end. It is read out line by line by the announcer, not by this list.
 
 import { useEffect, useRef } from "preact/hooks";
+import { hidden } from "../../experiment/hiding";
 import { t } from "../../i18n";
-import type { LogLine, TableState } from "../model/state";
+import { worthSaying } from "../model/log";
+import type { TableState } from "../model/state";
 import { happeningWords, nameOf } from "../words";
 
 export function Log({ table }: { table: TableState }) {
@@ -16,7 +18,7 @@ export function Log({ table }: { table: TableState }) {
       <h2>{t().table.log.title}</h2>
       {/* biome-ignore lint/a11y/noNoninteractiveTabindex: what scrolls must be reached with the keyboard */}
       <ol ref={list} tabIndex={0}>
-        {table.log.filter(isLastOfRun).map((line) => {
+        {worthSaying(table.log, !hidden.value.includes("expressions")).map((line) => {
           const { seat, text } = happeningWords(table, line.happening);
           return (
             <li key={line.sequence} class={seat === undefined ? "log-aside" : ""}>
@@ -35,16 +37,4 @@ export function Log({ table }: { table: TableState }) {
       </ol>
     </section>
   );
-}
-
-/** A seat that is lost and comes back, perhaps again and again, takes one line as long as nothing else happens: how it ended. */
-function isLastOfRun(line: LogLine, index: number, lines: readonly LogLine[]): boolean {
-  const seat = comingOrGoing(line);
-  return seat === undefined || comingOrGoing(lines[index + 1]) !== seat;
-}
-
-/** The seat whose connection a line is about. */
-function comingOrGoing(line: LogLine | undefined): number | undefined {
-  const kind = line?.happening.kind;
-  return kind === "lost" || kind === "back" ? line?.happening.seat : undefined;
 }

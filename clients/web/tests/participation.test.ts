@@ -1,0 +1,90 @@
+// Taking part in a tournament: a game whose room cannot be asked for is asked for again, ever more slowly, and only while the place is this page's.
+
+import { create, type MessageInitShape } from "@bufbuild/protobuf";
+import { Code, ConnectError } from "@connectrpc/connect";
+import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { playApi, roomApi } from "../src/api/client";
+import {
+  DetachReason,
+  PlayServiceWatchResponseSchema,
+  type SeatUpdateSchema,
+} from "../src/gen/chefshat/v1/play_service_pb";
+import { GetRoomResponseSchema } from "../src/gen/chefshat/v1/room_service_pb";
+import { startParticipation } from "../src/tournaments/participation";
+
+const SEATED = 2 ** 31;
+type Told = MessageInitShape<typeof SeatUpdateSchema>;
+const entered: Told = { handle: 0, update: { case: "entered", value: {} } };
+const superseded: Told = { handle: 0, update: { case: "detached", value: { reason: DetachReason.SUPERSEDED } } };
+const seated: Told = { handle: SEATED, update: { case: "attached", value: { roomId: "room1", ticket: "t", seat: 0 } } };
+
+beforeEach(() => {
+  vi.useFakeTimers();
+});
+afterEach(() => {
+  vi.useRealTimers();
+  vi.restoreAllMocks();
+});
+
+/** A stream that says these things at these times, milliseconds from its beginning, and stays open. */
+function streaming(said: readonly (readonly [atMs: number, update: Told])[]) {
+  return vi.spyOn(playApi, "watch").mockImplementation(async function* () {
+    let nowMs = 0;
+    for (const [atMs, update] of said) {
+      if (atMs > nowMs) await new Promise((resolve) => setTimeout(resolve, atMs - nowMs));
+      nowMs = atMs;
+      yield create(PlayServiceWatchResponseSchema, { updates: [update] });
+    }
+    await new Promise(() => {});
+  });
+}
+
+const away = new ConnectError("away", Code.Unavailable);
+
+test("a room is asked for until it is there, over the one stream", async () => {
+  const watch = streaming([
+    [0, entered],
+    [0, seated],
+  ]);
+  const room = create(GetRoomResponseSchema, { room: { roomId: "room1" } });
+  const ask = vi.spyOn(roomApi, "getRoom").mockRejectedValueOnce(away).mockRejectedValueOnce(away);
+  ask.mockResolvedValue(room);
+  const part = startParticipation("ticket");
+  await vi.advanceTimersByTimeAsync(10_000);
+  expect(ask).toHaveBeenCalledTimes(3);
+  expect(watch).toHaveBeenCalledTimes(1);
+  expect(part.game.value?.live.value.table.roomId).toBe("room1");
+  part.stop();
+});
+
+test("who has been superseded asks no more and does not take the place back", async () => {
+  const watch = streaming([
+    [0, entered],
+    [0, seated],
+    [5_000, superseded],
+  ]);
+  const ask = vi.spyOn(roomApi, "getRoom").mockRejectedValue(away);
+  const part = startParticipation("ticket");
+  await vi.advanceTimersByTimeAsync(5_000);
+  expect(part.presence.value).toBe("superseded");
+  const asked = ask.mock.calls.length;
+  // At 0, 0.5, 1.5 and 3.5 seconds.
+  expect(asked).toBe(4);
+  await vi.advanceTimersByTimeAsync(120_000);
+  expect(ask).toHaveBeenCalledTimes(asked);
+  expect(watch).toHaveBeenCalledTimes(1);
+  part.stop();
+});
+
+test("a room that is gone is not asked for again", async () => {
+  streaming([
+    [0, entered],
+    [0, seated],
+  ]);
+  const ask = vi.spyOn(roomApi, "getRoom").mockRejectedValue(new ConnectError("gone", Code.NotFound));
+  const part = startParticipation("ticket");
+  await vi.advanceTimersByTimeAsync(10_000);
+  expect(ask).toHaveBeenCalledTimes(1);
+  expect(part.game.value).toBeUndefined();
+  part.stop();
+});
