@@ -3,6 +3,7 @@
 import { useEffect, useRef } from "preact/hooks";
 import { hidden } from "../../experiment/hiding";
 import { t } from "../../i18n";
+import { SeatNumber } from "../../parts/SeatNumber";
 import { worthSaying } from "../model/log";
 import type { TableState } from "../model/state";
 import { happeningWords, nameOf } from "../words";
@@ -24,9 +25,7 @@ export function Log({ table }: { table: TableState }) {
             <li key={line.sequence} class={seat === undefined ? "log-aside" : ""}>
               {seat !== undefined && (
                 <>
-                  <span class={`seat-number seat-color-${seat % 6}`} aria-hidden="true">
-                    {seat}
-                  </span>
+                  <SeatNumber seat={seat} />
                   <strong>{nameOf(table, seat)}</strong>{" "}
                 </>
               )}

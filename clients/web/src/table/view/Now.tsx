@@ -7,6 +7,7 @@ import { demandOf } from "../model/demand";
 import type { TableState } from "../model/state";
 import { distinctName, headingWords } from "../words";
 import "./now.css";
+import { SeatNumber } from "../../parts/SeatNumber";
 
 /** On a phone what was played is folded away at first. */
 const PHONE = "(max-width: 44rem)";
@@ -33,11 +34,7 @@ export function Now(props: NowProps) {
   return (
     <section class="now sheet" aria-label={nowHeading(props)}>
       <h2 class="now-heading">
-        {next !== undefined && next !== own && (
-          <span class={`seat-number seat-color-${next % 6}`} aria-hidden="true">
-            {next}
-          </span>
-        )}
+        {next !== undefined && next !== own && <SeatNumber seat={next} />}
         {nowHeading(props)}
       </h2>
       {turn && <Demands table={table} mayPass={props.mayPass ?? false} />}

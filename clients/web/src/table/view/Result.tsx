@@ -2,6 +2,7 @@
 
 import { t } from "../../i18n";
 import { ButtonLink } from "../../parts/Button";
+import { SeatNumber } from "../../parts/SeatNumber";
 import type { ShiftResult, TableState } from "../model/state";
 import { nameOf } from "../words";
 import "./result.css";
@@ -115,10 +116,7 @@ function Row({ table, seat, place, children }: RowProps) {
     <tr>
       <td>{t().common.place(place)}</td>
       <th scope="row">
-        <span class={`seat-number seat-color-${seat % 6}`} aria-hidden="true">
-          {seat}
-        </span>{" "}
-        {nameOf(table, seat)}
+        <SeatNumber seat={seat} /> {nameOf(table, seat)}
       </th>
       {children}
     </tr>

@@ -7,6 +7,7 @@ import { t } from "../../i18n";
 import { Card } from "../../parts/Card";
 import { Drawing } from "../../parts/Drawing";
 import { KindBadge, kindWord } from "../../parts/KindBadge";
+import { SeatNumber } from "../../parts/SeatNumber";
 import { isLabel } from "../expressions";
 import { stacks } from "../model/cards";
 import { isTaken, type SeatState, type TableState } from "../model/state";
@@ -57,9 +58,7 @@ export function SeatPanel({ table, seat, own = false, deciding, kind, cards = tr
   const role = roleWord(seat.role);
   return (
     <article class={`seat ${state ? `seat-${state}` : ""} ${own ? "seat-own" : ""}`} data-seat={seat.seat}>
-      <span class={`seat-number seat-color-${seat.seat % 6}`} aria-hidden="true">
-        {seat.seat}
-      </span>
+      <SeatNumber seat={seat.seat} />
       <div class="seat-who">
         <h2 class="seat-name">
           {isTaken(seat) ? nameOf(table, seat.seat) : freeWords(seat)}
