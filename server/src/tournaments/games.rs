@@ -38,6 +38,7 @@ impl Task {
             game_id,
         });
     }
+
     /// Takes in what came of games that have ended.
     pub(super) async fn look_at_games(&mut self) -> Result<(), StoreError> {
         let playing: Vec<usize> = self.hosted.look(|core| core.playing().collect());

@@ -263,7 +263,7 @@ impl Hosted {
         look(&self.moving().core)
     }
 
-    /// Closes the rooms of games that go on although the tournament is over: the server ended between the one and the other.
+    /// Closes the rooms of games that go on although the tournament is over: it was closed, perhaps just before the server ended.
     pub(super) fn close_rooms(&self, rooms: &Rooms) {
         let placed: Vec<Id> = (self.moving().placed.values())
             .map(|(room, _)| *room)

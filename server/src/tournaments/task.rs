@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_arena::tournament::{BeginProblem, Change, Entrant, JoinProblem, State, Tournament};
+use chefshat_arena::tournament::{Change, Entrant, JoinProblem, State, Tournament};
 use tokio::sync::mpsc;
 use tokio::time::{Instant, sleep_until};
 use tracing::{error, info};
@@ -28,7 +28,7 @@ pub(super) struct Task {
     pub(super) hosted: Arc<Hosted>,
     pub(super) rooms: Arc<Rooms>,
     /// Rows that have been kept.
-    pub(super) rows: u64,
+    rows: u64,
     /// What is to be kept next.
     pub(super) unkept: Vec<TournamentEntry>,
     /// Streams of participants, with the numbers of the connections.
@@ -37,19 +37,17 @@ pub(super) struct Task {
     pub(super) unmade: BTreeSet<usize>,
     /// Games whose rooms were there since the server was started.
     pub(super) seen: BTreeSet<usize>,
-    /// Rooms that are to be closed, once it is kept that the tournament is.
-    pub(super) to_close: Vec<Id>,
     /// Deals of which it is to be looked whether they are still to be played.
     deals: BTreeSet<u32>,
     /// Whether something was seen to change that is not kept.
     pub(super) has_changed: bool,
     /// When somebody last joined, or the server was started.
-    pub(super) joined_at: Instant,
+    joined_at: Instant,
     /// When rooms that could not be made are tried again.
     pub(super) retry: Option<Instant>,
     /// Answers that wait for what they promise to be kept.
-    pub(super) replies: Vec<Box<dyn FnOnce() + Send + Sync>>,
-    pub(super) began: Instant,
+    replies: Vec<Box<dyn FnOnce() + Send + Sync>>,
+    began: Instant,
 }
 
 impl Task {
@@ -63,7 +61,6 @@ impl Task {
             connections: BTreeMap::new(),
             unmade: BTreeSet::new(),
             seen: BTreeSet::new(),
-            to_close: Vec::new(),
             deals: BTreeSet::new(),
             has_changed: false,
             joined_at: Instant::now(),
@@ -87,11 +84,7 @@ impl Task {
                 return;
             }
             if self.hosted.is_over() {
-                // Whoever comes later is answered by what can be seen.
-                inbox.close();
-                while let Some(message) = inbox.recv().await {
-                    self.answer_late(message);
-                }
+                self.conclude(inbox).await;
                 return;
             }
             let wake = self
@@ -138,15 +131,18 @@ impl Task {
         }
     }
 
-    /// Answers somebody who came when the tournament was over.
-    fn answer_late(&mut self, message: Message) {
-        // Who asked may be gone.
-        match message {
-            Message::Join(_, reply) => drop(reply.send(Err(JoinProblem::Started))),
-            Message::Begin(reply) => drop(reply.send(Err(BeginProblem::Started))),
-            Message::Close(reply) => drop(reply.send(())),
-            Message::Enter(_, _, connection) => drop(connection.call(Call::Over)),
-            Message::Left(..) => {}
+    /// The tournament is over, and that is kept: rooms are closed that go on, and all participants are told. What else is asked is answered
+    /// by what can be seen of the tournament.
+    async fn conclude(&mut self, mut inbox: mpsc::Receiver<Message>) {
+        self.hosted.close_rooms(&self.rooms);
+        for (_, connection) in std::mem::take(&mut self.connections).into_values() {
+            connection.call(Call::Over);
+        }
+        inbox.close();
+        while let Some(message) = inbox.recv().await {
+            if let Message::Enter(_, _, connection) = message {
+                connection.call(Call::Over);
+            }
         }
     }
 
@@ -208,18 +204,12 @@ impl Task {
         Ok((participant, token))
     }
 
-    /// Closes the tournament and the rooms of its games.
+    /// Closes the tournament; the rooms of its games follow when that is kept.
     fn close(&mut self) {
-        let Some(change) = self.hosted.look(|core| core.close()) else {
-            return;
-        };
-        let playing: Vec<usize> = self.hosted.look(|core| core.playing().collect());
-        self.fold(change);
-        for game in playing {
-            let placed = self.hosted.moving().placed.get(&game).copied();
-            self.to_close.extend(placed.map(|(room, _)| room));
+        if let Some(change) = self.hosted.look(|core| core.close()) {
+            self.fold(change);
+            self.unmade.clear();
         }
-        self.unmade.clear();
     }
 
     fn enter(&mut self, participant: usize, number: u64, connection: Connection) {
@@ -317,13 +307,6 @@ impl Task {
             for reply in self.replies.drain(..) {
                 reply();
             }
-            for room in self
-                .to_close
-                .drain(..)
-                .filter_map(|room| self.rooms.get(room))
-            {
-                tokio::spawn(async move { room.give_up().await });
-            }
             if moved {
                 let deals = std::mem::take(&mut self.deals);
                 self.hosted.withhold(&deals, &self.rooms);
@@ -333,11 +316,6 @@ impl Task {
             }
             if std::mem::take(&mut self.has_changed) || moved {
                 self.hosted.changes.send_modify(|count| *count += 1);
-            }
-            if self.hosted.is_over() {
-                for (_, connection) in std::mem::take(&mut self.connections).into_values() {
-                    connection.call(Call::Over);
-                }
             }
             if !moved {
                 return Ok(());
