@@ -124,7 +124,7 @@ impl Client {
         response.room.ok_or_else(|| Error::incomplete("room"))
     }
 
-    /// A page of the server's rooms.
+    /// A page of the server's rooms, newest first.
     ///
     /// # Errors
     /// A failed connection, or a page token that the server does not know.

@@ -46,7 +46,7 @@ impl Client {
         one(response.tournament)
     }
 
-    /// A page of the server's tournaments, newest last, without their participants.
+    /// A page of the server's tournaments, newest first, without their participants.
     ///
     /// # Errors
     /// A failed connection, or a page token that the server does not know.

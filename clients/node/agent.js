@@ -1,7 +1,8 @@
 // One agent, without an SDK: it reads the .proto files, takes a seat with a join code and plays a random legal action at every
 // decision, in one game or in all of its games of a tournament. It knows no rules of the game. A lost connection is made again and
-// resumes where it broke off.
+// resumes where it broke off; with its ticket another process goes on in its place.
 import { randomInt } from "node:crypto";
+import { existsSync, readFileSync, renameSync, rmSync, writeFileSync } from "node:fs";
 import { setTimeout as sleep } from "node:timers/promises";
 import { fileURLToPath, pathToFileURL } from "node:url";
 import { parseArgs, promisify } from "node:util";
@@ -13,6 +14,7 @@ const FILES = ["room", "play", "tournament"].map((name) => `chefshat/v1/${name}_
 const FORM = { includeDirs: [PROTO], keepCase: true, longs: Number, enums: String, oneofs: true, defaults: true };
 export const protocol = grpc.loadPackageDefinition(loader.loadSync(FILES, FORM)).chefshat.v1;
 
+const NO_RESULT = "the game has no result";
 const MAX_FAILURES = 9; // Connections in a row that may bring nothing before the agent gives up.
 const connect = (Service, address) => new Service(address, grpc.credentials.createInsecure());
 
@@ -24,16 +26,17 @@ export function legalActions(mask) {
 function join(Service, method, address, request) {
   const service = connect(Service, address);
   const asked = { kind: "PARTICIPANT_KIND_AGENT", ...request };
-  return promisify(service[method]).call(service, asked, { deadline: Date.now() + 10_000 }).finally(() => service.close());
+  return promisify(service[method]).call(service, asked, { deadline: Date.now() + 30_000 }).finally(() => service.close());
 }
 
 /** One seat: what it makes of each update it is told. `say` sends a command for it. What is returned is the outcome of its game. */
-function takeSeat(ticket, seat, about = {}) {
-  let [end, open] = [{}, {}];
+function takeSeat(ticket, about = {}) {
+  let [seat, end, open] = [undefined, {}, {}];
   const failed = (error) => ({ ...about, seat, error });
   const self = {
     ticket,
     next: 0, // The first event it has not seen.
+    attached: (attached) => { seat = attached.seat; },
     events: ({ events }, say) => events.filter(({ sequence }) => sequence >= self.next).forEach((event) => {
       self.next = event.sequence + 1;
       if (event.game_ended || event.game_aborted) end = event;
@@ -51,16 +54,17 @@ function takeSeat(ticket, seat, about = {}) {
     refused: ({ message, reason }) => failed(`refused: ${message} (${reason})`),
     detached: ({ reason }) => {
       if (reason !== "DETACH_REASON_GAME_OVER") return failed(`the seat is lost (${reason})`);
-      if (!end.game_ended) return failed(`the game has no result (${end.game_aborted?.reason})`);
+      if (!end.game_ended) return failed(`${NO_RESULT} (${end.game_aborted?.reason})`);
       return { ...about, seat, standings: end.game_ended.standings };
     },
   };
   return self;
 }
 
-/** Plays these seats, and with a tournament's ticket all that the server gives it; gives their outcomes when all is over. */
-async function playSeats(address, seats, tournament) {
+/** Plays the seat that the ticket is of or, if it is of a participant in a tournament, all that the server gives it, until all is over. */
+async function playPlace(address, ticket) {
   const client = connect(protocol.PlayService, address);
+  let [seats, tournament, participant] = [[takeSeat(ticket)]];
   let [outcomes, lost] = [[], new Error("the server ended the stream")];
   try {
     for (let failures = 0; failures < MAX_FAILURES; failures += 1) {
@@ -70,15 +74,19 @@ async function playSeats(address, seats, tournament) {
       if (tournament) commands.push({ attach: { ticket: tournament } }); // Last, so that it is not given the seats it has already.
       stream.write({ commands });
       const byHandle = new Map(seats.entries()); // A handle is the number of an attachment, until the server makes its own.
-      const entered = tournament ? seats.length : -1;
+      let entered = tournament ? seats.length : -1;
       try {
         for await (const { updates } of stream) {
           failures = 0;
           for (const { handle, update, [update]: content } of updates) {
             if (update === "attached" && content.ticket) {
               const known = seats.find(({ ticket }) => ticket === content.ticket);
-              byHandle.set(handle, known ?? takeSeat(content.ticket, content.seat, { game_id: content.game_id }));
+              byHandle.set(handle, known ?? takeSeat(content.ticket, { game_id: content.game_id }));
+              byHandle.get(handle).attached(content);
               if (!known) seats.push(byHandle.get(handle));
+            } else if (update === "entered") { // The ticket is no seat's.
+              [tournament, participant, entered] = [ticket, content.participant, handle];
+              seats = seats.filter((seat) => seat.ticket !== ticket);
             } else if (handle === entered && (update === "refused" || update === "detached")) {
               if (content.reason !== "DETACH_REASON_TOURNAMENT_OVER") throw new Error(`the tournament is lost (${content.reason})`);
               tournament = undefined;
@@ -90,7 +98,7 @@ async function playSeats(address, seats, tournament) {
               seats = seats.filter((other) => other !== seat);
               byHandle.delete(handle);
             }
-            if (!tournament && !seats.length) return outcomes;
+            if (!tournament && !seats.length) return { participant, outcomes };
           }
         }
       } catch (error) { if (error !== lost) throw error; } finally { stream.cancel(); }
@@ -99,27 +107,68 @@ async function playSeats(address, seats, tournament) {
   } finally { client.close(); }
 }
 
-/** Plays one game to its end; gives the seat and the standings, or throws an error that says why there are none. */
-export async function play({ address, code, name }) {
-  const { ticket, seat } = await join(protocol.RoomService, "JoinRoom", address, { join_code: code, name });
-  const [{ error, ...outcome }] = await playSeats(address, [takeSeat(ticket, seat)]);
-  if (error) throw new Error(error);
+/** Takes a place in a room or a tournament; gives its ticket. */
+async function takePlace({ address, code, tournament, name, games }) {
+  if (!tournament) return (await join(protocol.RoomService, "JoinRoom", address, { join_code: code, name })).ticket;
+  const request = { join_code: tournament, name, max_games: Number(games) };
+  return (await join(protocol.TournamentService, "JoinTournament", address, request)).ticket;
+}
+
+/**
+ * Takes a place, or goes on in the one whose `ticket` is given, and plays to the end. Gives the seat and the standings; of a tournament
+ * the participant's number and what came of each of its games. Throws an error that says why there is no such thing.
+ */
+export async function play({ ticket, ...way }) {
+  const { participant, outcomes } = await playPlace(way.address, ticket ?? (await takePlace(way)));
+  if (participant !== undefined) return { participant, games: outcomes };
+  const [{ error, ...outcome }] = outcomes;
+  if (error) throw Object.assign(new Error(error), { over: error.startsWith(NO_RESULT) });
   return outcome;
 }
 
-/** Takes part in a tournament to its end; gives the participant's number and what came of each of its games. */
-export async function playTournament({ address, tournament, name, games }) {
-  const request = { join_code: tournament, name, max_games: Number(games) };
-  const { ticket, participant } = await join(protocol.TournamentService, "JoinTournament", address, request);
-  return { participant, games: await playSeats(address, [], ticket) };
+/** The ticket of the place to play in: that in the file, or of one that is taken now and then kept there, or at least told. */
+async function ticketOf(file, way) {
+  const kept = file && existsSync(file) ? readFileSync(file, "utf8").trim() : "";
+  if (kept) {
+    console.error(`goes on in the place whose ticket is in ${file}`);
+    return kept;
+  }
+  if (!way.code && !way.tournament) throw new Error("give --code, --tournament or the --ticket of a place that was taken before");
+  const part = `${file}.${process.pid}`;
+  if (file) {
+    rmSync(part, { force: true });
+    writeFileSync(part, "", { flag: "wx", mode: 0o600 }); // Before the place is taken, and for its owner alone.
+  }
+  try {
+    const ticket = await takePlace(way);
+    if (file) writeFileSync(part, `${ticket}\n`);
+    if (file) renameSync(part, file);
+    const how = file ? `it goes on in its place when it is started again: ${file} has its ticket` : `another goes on with --ticket ${ticket}`;
+    console.error(`should this agent end before its ${way.tournament ? "tournament" : "game"}, ${how}`);
+    return ticket;
+  } finally {
+    if (file) rmSync(part, { force: true });
+  }
 }
 
 if (import.meta.url === pathToFileURL(process.argv[1] ?? "").href) {
   const option = (value) => ({ type: "string", default: value });
-  const where = { address: option("127.0.0.1:50051"), code: option(process.env.CHEFSHAT_CODE), tournament: option() };
+  const own = { ticket: option(process.env.CHEFSHAT_TICKET), "ticket-file": option() };
+  const where = { address: option("127.0.0.1:50051"), code: option(), tournament: option() };
   try {
-    const { values } = parseArgs({ options: { ...where, name: option("Node"), games: option("1") } });
-    console.log(JSON.stringify(await (values.tournament ? playTournament : play)(values)));
+    const { values } = parseArgs({ options: { ...where, ...own, name: option("Node"), games: option("1") } });
+    const { ticket, "ticket-file": file, ...way } = values;
+    if ([way.code, way.tournament, ticket].filter(Boolean).length > 1 || (ticket && file)) {
+      throw new Error("give one of --code, --tournament and --ticket (or CHEFSHAT_TICKET); --ticket-file is for the first two");
+    }
+    way.code ??= way.tournament ? undefined : process.env.CHEFSHAT_CODE;
+    const forget = () => { if (file) rmSync(file, { force: true }); }; // All is over.
+    const outcome = await play({ ...way, ticket: ticket || (await ticketOf(file, way)) }).catch((error) => {
+      if (error.over) forget();
+      throw error;
+    });
+    console.log(JSON.stringify(outcome));
+    forget();
   } catch (error) {
     console.error(`agent: ${error.details ?? error.message}`);
     process.exitCode = 1;

@@ -9,6 +9,7 @@ pub mod convert;
 pub mod examiner;
 pub mod filing;
 pub mod grpc;
+pub mod host;
 pub mod ids;
 pub mod outbox;
 pub mod room;

@@ -136,6 +136,7 @@ impl Room {
             seats: (0..4)
                 .map(|seat| v1::SeatConfig {
                     filled_by: (seat >= open).then(|| FilledBy::BuiltInAgent("random".to_owned())),
+                    ..v1::SeatConfig::default()
                 })
                 .collect(),
             ..v1::CreateRoomRequest::default()

@@ -8,12 +8,10 @@ use std::time::Duration;
 use chefshat_client::{Client, RandomAgent};
 use chefshat_proto::v1::{self, spectator_service_client::SpectatorServiceClient};
 use chefshat_server::config::ServerConfig;
-use chefshat_server::serve::{ServeError, serve};
+use chefshat_server::host::{Host, HostError};
+use chefshat_server::serve::ServeError;
 use chefshat_server::store::{MemoryStore, Store};
 use tempfile::TempDir;
-use tokio::net::TcpListener;
-use tokio::sync::oneshot;
-use tokio::task::JoinHandle;
 use tonic::Streaming;
 use tonic::transport::Channel;
 
@@ -23,8 +21,7 @@ pub struct TestServer {
     /// Where it listens.
     pub address: SocketAddr,
     data: TempDir,
-    stop: Option<oneshot::Sender<()>>,
-    serving: JoinHandle<Result<(), ServeError>>,
+    host: Host,
 }
 
 impl TestServer {
@@ -36,34 +33,23 @@ impl TestServer {
     /// A server configured by `configure`, with a store of the test's choice.
     pub async fn with(configure: impl FnOnce(&mut ServerConfig), store: Arc<dyn Store>) -> Self {
         let data = tempfile::tempdir().expect("a temporary folder");
-        let listener = TcpListener::bind("127.0.0.1:0").await.expect("a free port");
-        let address = listener
-            .local_addr()
-            .expect("a bound socket has an address");
         let mut config = ServerConfig {
             data_dir: Some(data.path().to_path_buf()),
             grace: Duration::ZERO,
             ..ServerConfig::default()
         };
         configure(&mut config);
-        let (stop, stopped) = oneshot::channel::<()>();
-        let serving = tokio::spawn(async move {
-            serve(listener, config, store, async {
-                let _ = stopped.await;
-            })
-            .await
-        });
+        let host = Host::start(config, store).await.expect("a free port");
         Self {
-            address,
+            address: host.address(),
             data,
-            stop: Some(stop),
-            serving,
+            host,
         }
     }
 
     /// Its URL.
     pub fn url(&self) -> String {
-        format!("http://{}", self.address)
+        self.host.url()
     }
 
     /// Its data folder.
@@ -88,10 +74,8 @@ impl TestServer {
     }
 
     /// Asks the server to stop.
-    pub fn ask_to_stop(&mut self) {
-        if let Some(stop) = self.stop.take() {
-            stop.send(()).expect("the server is running");
-        }
+    pub fn ask_to_stop(&self) {
+        self.host.ask_to_stop();
     }
 
     /// Waits until the server has ended by itself.
@@ -99,15 +83,17 @@ impl TestServer {
     /// # Errors
     /// Why it did.
     pub async fn ended(self) -> Result<(), ServeError> {
-        self.serving.await.expect("the server does not panic")
+        match self.host.ended().await {
+            Ok(()) => Ok(()),
+            Err(HostError::Serve(error)) => Err(error),
+            Err(HostError::BrokenOff(error)) => panic!("the server does not panic: {error}"),
+        }
     }
 
     /// Stops the server and waits until it has ended; gives the folder it leaves behind.
-    pub async fn stop(mut self) -> TempDir {
-        self.ask_to_stop();
-        crate::patiently("the server to stop", self.serving)
+    pub async fn stop(self) -> TempDir {
+        crate::patiently("the server to stop", self.host.stop())
             .await
-            .expect("the server does not panic")
             .expect("the server ends well");
         self.data
     }

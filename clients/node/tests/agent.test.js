@@ -3,10 +3,13 @@
 import assert from "node:assert/strict";
 import { spawn } from "node:child_process";
 import { once } from "node:events";
+import { mkdtemp, readFile, readdir, rm, stat } from "node:fs/promises";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
 import { fileURLToPath } from "node:url";
 import { after, test } from "node:test";
 import grpc from "@grpc/grpc-js";
-import { legalActions, play, playTournament, protocol } from "../agent.js";
+import { legalActions, play, protocol } from "../agent.js";
 
 const AGENT = fileURLToPath(new URL("../agent.js", import.meta.url));
 const STANDINGS = [{ seat: 2, points: 15, place: 1 }, { seat: 0, points: 9, place: 2 }];
@@ -48,6 +51,7 @@ async function serve(...connections) {
 const ask = (decision_id, ...bytes) => ({ handle: 0, decision: { decision_id, action_mask: Buffer.from(bytes) } });
 const events = (...list) => ({ handle: 0, events: { events: list } });
 const ended = (sequence) => ({ sequence, game_ended: { standings: STANDINGS } });
+const attached = { handle: 0, attached: { seat: 2, next_sequence: 1 } };
 const detached = (reason) => ({ handle: 0, detached: { reason: `DETACH_REASON_${reason}` } });
 
 for (const [bytes, actions] of [
@@ -67,7 +71,7 @@ test("a game: attach, answer with a set bit, tell the standings", async () => {
     const [{ attach }] = await read();
     assert.equal(attach.ticket, "a ticket");
     assert.equal(attach.from_sequence, 0);
-    stream.write({ updates: [{ handle: 0, attached: { seat: 2, next_sequence: 1 } }] });
+    stream.write({ updates: [attached] });
     for (let id = 1; id <= 20; id += 1) {
       stream.write({ updates: [events({ sequence: id }), ask(id, 0, 0b0010_0100)] });
       const [{ handle, answer }] = await read();
@@ -90,7 +94,7 @@ test("lost connections are made again and resume after the last event seen", asy
   const server = await serve(
     async (stream, read) => {
       await attach(read);
-      stream.write({ updates: [events({ sequence: 1 }, { sequence: 2 }), ask(1, 1)] });
+      stream.write({ updates: [attached, events({ sequence: 1 }, { sequence: 2 }), ask(1, 1)] });
       await read();
       stream.emit("error", { code: grpc.status.UNAVAILABLE, details: "cut" });
     },
@@ -100,11 +104,11 @@ test("lost connections are made again and resume after the last event seen", asy
     },
     async (stream, read) => {
       await attach(read);
-      stream.write({ updates: [events({ sequence: 3 }, ended(4)), detached("GAME_OVER")] });
+      stream.write({ updates: [attached, events({ sequence: 3 }, ended(4)), detached("GAME_OVER")] });
     },
   );
-  const { standings } = await play({ address: server.address, code: "TABLE", name: "Ada" });
-  assert.deepEqual(standings, STANDINGS);
+  const outcome = await play({ address: server.address, code: "TABLE", name: "Ada" });
+  assert.deepEqual(outcome, { seat: 2, standings: STANDINGS });
   assert.deepEqual(from, [0, 3, 3]);
   assert.equal(server.left.length, 0);
 });
@@ -113,7 +117,7 @@ test("a refused answer is given anew, a seat is taken over from its substitute",
   const heard = [];
   const server = await serve(async (stream, read) => {
     await read();
-    stream.write({ updates: [ask(1, 0b0011_0000)] });
+    stream.write({ updates: [attached, ask(1, 0b0011_0000)] });
     const hear = async () => { const [{ handle, answer, resume }] = await read(); heard.push([handle, answer?.decision_id, resume]); };
     await hear();
     for (const status of ["CLOSED", "INVALID"]) {
@@ -180,7 +184,7 @@ test("a tournament: several games at a time, over connections that break, to its
       stream.write({ updates: [events(ended(1)), detached("GAME_OVER")] });
     },
   );
-  const played = await playTournament({ address: server.address, tournament: "CUP", name: "Ada", games: "2" });
+  const played = await play({ address: server.address, tournament: "CUP", name: "Ada", games: "2" });
   assert.deepEqual([server.joins[0].join_code, server.joins[0].name, server.joins[0].max_games], ["CUP", "Ada", 2]);
   assert.deepEqual(attaches, [[["cup", 0]], [["ticket of b", 0], ["ticket of c", 0], ["cup", 0]]]);
   assert.deepEqual(answers, [[2 ** 31 + 1, 7], [2 ** 31 + 2, 8], [0, 7]]);
@@ -197,14 +201,15 @@ test("a newer connection in a tournament is an error, and no reason to connect a
     await read();
     stream.write({ updates: [{ handle: 0, entered: { participant: 5 } }, detached("SUPERSEDED")] });
   });
-  const playing = playTournament({ address: server.address, tournament: "CUP", name: "Ada", games: "1" });
+  const playing = play({ address: server.address, tournament: "CUP", name: "Ada", games: "1" });
   await assert.rejects(playing, /the tournament is lost \(DETACH_REASON_SUPERSEDED\)/);
   assert.equal(server.left.length, 0);
 });
 
-/** Runs the agent as a process of its own. */
-async function run(args, env = {}) {
-  const agent = spawn(process.execPath, [AGENT, ...args], { env: { ...process.env, ...env } });
+/** Runs the agent as a process of its own; `started` is given it. */
+async function run(args, env = {}, started = () => {}) {
+  const agent = spawn(process.execPath, [AGENT, ...args], { env: { ...process.env, CHEFSHAT_TICKET: "", ...env } });
+  started(agent);
   let [out, err] = ["", ""];
   agent.stdout.on("data", (part) => { out += part; });
   agent.stderr.on("data", (part) => { err += part; });
@@ -215,10 +220,10 @@ async function run(args, env = {}) {
 test("the process prints the standings as one line of JSON and exits with 0", async () => {
   const server = await serve(async (stream, read) => {
     await read();
-    stream.write({ updates: [events(ended(1)), detached("GAME_OVER")] });
+    stream.write({ updates: [attached, events(ended(1)), detached("GAME_OVER")] });
   });
   const { status, out, err } = await run(["--address", server.address], { CHEFSHAT_CODE: "TABLE" });
-  assert.equal(err, "");
+  assert.equal(err, "should this agent end before its game, another goes on with --ticket a ticket\n");
   assert.equal(status, 0);
   assert.match(out, /^[^\n]+\n$/);
   assert.deepEqual(JSON.parse(out), { seat: 2, standings: STANDINGS });
@@ -227,13 +232,64 @@ test("the process prints the standings as one line of JSON and exits with 0", as
 test("the process takes part in a tournament and prints its games as one line of JSON", async () => {
   const server = await serve(async (stream, read) => {
     await read();
-    stream.write({ updates: [seated(0, "a"), called(0, events(ended(1))), called(0, detached("GAME_OVER")), over(0)] });
+    stream.write({ updates: [{ handle: 0, entered: { participant: 5 } }, seated(0, "a")] });
+    stream.write({ updates: [called(0, events(ended(1))), called(0, detached("GAME_OVER")), over(0)] });
   });
   const { status, out, err } = await run(["--address", server.address, "--tournament", "CUP", "--games", "3"]);
-  assert.deepEqual([status, err], [0, ""]);
+  assert.deepEqual([status, err], [0, "should this agent end before its tournament, another goes on with --ticket cup\n"]);
   assert.match(out, /^[^\n]+\n$/);
   assert.deepEqual(JSON.parse(out), { participant: 5, games: [{ game_id: "a", seat: 2, standings: STANDINGS }] });
   assert.equal(server.joins[0].max_games, 3);
+});
+
+/** Meets a connection: notes the ticket it brings, and ends the game. */
+const ending = (tickets) => async (stream, read) => {
+  tickets.push((await read())[0].attach.ticket);
+  stream.write({ updates: [attached, events(ended(1)), detached("GAME_OVER")] });
+};
+
+for (const [how, args, env] of [["an argument", ["--ticket", "kept"], {}], ["the environment", [], { CHEFSHAT_TICKET: "kept" }]]) {
+  test(`the process goes on with a ticket from ${how}, and joins nothing`, async () => {
+    const tickets = [];
+    const server = await serve(ending(tickets));
+    const { status, out, err } = await run(["--address", server.address, ...args], { CHEFSHAT_CODE: "TABLE", ...env });
+    assert.deepEqual([status, err], [0, ""]);
+    assert.deepEqual(JSON.parse(out), { seat: 2, standings: STANDINGS });
+    assert.deepEqual([tickets, server.joins], [["kept"], []]);
+  });
+}
+
+test("a ticket is kept in a file while the place lasts: a process that was killed goes on when it is started again", async (context) => {
+  const folder = await mkdtemp(join(tmpdir(), "chefshat-node-"));
+  context.after(() => rm(folder, { recursive: true }));
+  const file = join(folder, "ticket");
+  const tickets = [];
+  let agent;
+  const killing = async (stream, read) => {
+    tickets.push((await read())[0].attach.ticket);
+    agent.kill("SIGKILL");
+  };
+  const server = await serve(killing, ending(tickets));
+  const args = ["--address", server.address, "--code", "TABLE", "--ticket-file", file];
+  const killed = await run(args, {}, (started) => { agent = started; });
+  assert.equal(killed.out, "");
+  assert.match(killed.err, /^should this agent end before its game, it goes on .*ticket has its ticket\n$/);
+  assert.equal(await readFile(file, "utf8"), "a ticket\n");
+  assert.equal((await stat(file)).mode & 0o777, 0o600);
+
+  const { status, out, err } = await run(args);
+  assert.deepEqual([status, err], [0, `goes on in the place whose ticket is in ${file}\n`]);
+  assert.deepEqual(JSON.parse(out), { seat: 2, standings: STANDINGS });
+  assert.deepEqual([tickets, server.joins.length], [["a ticket", "a ticket"], 1]);
+  assert.deepEqual(await readdir(folder), []);
+
+  const aborted = [attached, events({ sequence: 1, game_aborted: { reason: "ABORT_REASON_CLOSED" } }), detached("GAME_OVER")];
+  const lost = [attached, detached("SUPERSEDED")];
+  for (const [updates, left] of [[aborted, []], [lost, ["ticket"]]]) {
+    server.left.push(async (stream, read) => { await read(); stream.write({ updates }); });
+    assert.equal((await run(args)).status, 1);
+    assert.deepEqual(await readdir(folder), left);
+  }
 });
 
 test("the process says what is wrong and exits with 1", async () => {
@@ -245,6 +301,15 @@ test("the process says what is wrong and exits with 1", async () => {
   const nobodyThere = await run(["--address", address, "--code", "TABLE"]);
   assert.equal(nobodyThere.status, 1);
   assert.match(nobodyThere.err, /^agent: .*ECONNREFUSED/);
+
+  for (const two of [["--code", "TABLE", "--ticket", "kept"], ["--code", "TABLE", "--tournament", "CUP"], ["--ticket", "T", "--ticket-file", "F"]]) {
+    const { status, err } = await run(["--address", address, ...two]);
+    assert.equal(status, 1);
+    assert.match(err, /^agent: give one of --code, --tournament and --ticket/);
+  }
+  const nothing = await run(["--address", address], { CHEFSHAT_CODE: "" });
+  assert.deepEqual([nothing.status, nothing.out], [1, ""]);
+  assert.match(nothing.err, /^agent: give --code, --tournament or the --ticket/);
 
   const misspelt = await run(["--adress", address]);
   assert.equal(misspelt.status, 1);

@@ -6,12 +6,14 @@ import { once } from "node:events";
 import { mkdtemp, rm } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
+import { fileURLToPath } from "node:url";
 import { createInterface } from "node:readline";
 import { test } from "node:test";
 import { promisify } from "node:util";
 import grpc from "@grpc/grpc-js";
-import { play, playTournament, protocol } from "../agent.js";
+import { legalActions, play, protocol } from "../agent.js";
 
+const AGENT = fileURLToPath(new URL("../agent.js", import.meta.url));
 const SERVER = process.env.CHEFSHAT_BIN;
 
 /** The address a server says it listens on, in its first line that says so. */
@@ -48,6 +50,48 @@ async function call(Service, method, address, request) {
   }
 }
 
+/**
+ * Attaches to the place with this ticket and answers so many of its decisions with the first legal action, then none until it is let. Gives
+ * the moment when it holds the game up, and what lets it.
+ */
+function holdUp(address, ticket, decisions) {
+  const service = new protocol.PlayService(address, grpc.credentials.createInsecure());
+  const stream = service.Play().on("error", () => {}); // It is cancelled in the end.
+  const held = [];
+  let [left, holds] = [decisions, undefined];
+  const holding = new Promise((resolve) => { holds = resolve; });
+  const answer = ({ handle, decision: { decision_id, action_mask } }) => {
+    stream.write({ commands: [{ handle, answer: { decision_id, action: legalActions(action_mask)[0] } }] });
+  };
+  stream.on("data", ({ updates }) => updates.filter(({ update }) => update === "decision").forEach((update) => {
+    left -= 1;
+    if (left >= 0) return answer(update);
+    held.push(update);
+    return holds();
+  }));
+  stream.write({ commands: [{ attach: { ticket } }] });
+  const letGo = () => { left = Infinity; held.splice(0).forEach(answer); };
+  return { holding, letGo, end: () => { stream.cancel(); service.close(); } };
+}
+
+/** Runs the agent as a process until it is killed, which it is when `holding` says so; then again in the same place. Gives what it says. */
+async function killAndGoOn(way, holding, letGo) {
+  const start = (args, env = {}) => spawn(process.execPath, [AGENT, ...args], { env: { ...process.env, ...env } });
+  const first = start(way);
+  const [[line], ended] = [await once(createInterface({ input: first.stderr }), "line"), once(first, "close")];
+  await holding;
+  first.kill("SIGKILL");
+  assert.deepEqual(await ended, [null, "SIGKILL"]);
+  const [, ticket] = /--ticket (\S+)$/.exec(line);
+  const second = start(way.slice(0, 2), { CHEFSHAT_TICKET: ticket });
+  letGo();
+  let out = "";
+  second.stdout.on("data", (part) => { out += part; });
+  second.stderr.pipe(process.stderr);
+  assert.deepEqual(await once(second, "close"), [0, null]);
+  return JSON.parse(out);
+}
+
 const skip = SERVER ? false : "CHEFSHAT_BIN names no server";
 
 test("a Shift on the real server", { skip }, () => withServer(async (address) => {
@@ -79,7 +123,7 @@ test("a tournament on the real server", { skip }, () => withServer(async (addres
   };
   const made = await call(protocol.TournamentService, "CreateTournament", address, { settings });
 
-  const played = await playTournament({ address, tournament: made.join_code, name: "Node", games: "2" });
+  const played = await play({ address, tournament: made.join_code, name: "Node", games: "2" });
 
   const { tournament_id } = made.tournament;
   const { games } = await call(protocol.TournamentService, "ListTournamentGames", address, { tournament_id });
@@ -90,5 +134,54 @@ test("a tournament on the real server", { skip }, () => withServer(async (addres
     const mine = standings.find((line) => line.seat === seat);
     assert.equal(counted.participant, played.participant);
     assert.deepEqual([counted.place, counted.points], [mine.place, mine.points]);
+  }
+}));
+
+// Far longer than a test: who is killed comes back in time, however slow the machine is.
+const patient = { decision_time_ms: 600_000 };
+
+test("an agent that was killed in mid-game goes on in its seat", { skip }, () => withServer(async (address) => {
+  const request = { name: "kill", policy: patient, seats: [{}, {}, { built_in_agent: "random" }, { built_in_agent: "random" }] };
+  const { room, join_code: code } = await call(protocol.RoomService, "CreateRoom", address, request);
+  const other = await call(protocol.RoomService, "JoinRoom", address, { join_code: code, name: "other", kind: "PARTICIPANT_KIND_AGENT" });
+  const holder = holdUp(address, other.ticket, 3);
+
+  const { seat, standings } = await killAndGoOn(["--address", address, "--code", code], holder.holding, holder.letGo);
+
+  holder.end();
+  const seats = (await call(protocol.RoomService, "GetRoom", address, { room_id: room.room_id })).room.seats;
+  assert.equal(seats[seat].name, "Node");
+  assert.deepEqual(standings.map(({ place }) => place), [1, 2, 3, 4]);
+}));
+
+test("an agent that was killed in mid-game goes on in its tournament", { skip }, () => withServer(async (address) => {
+  const settings = {
+    name: "killed",
+    format: "TOURNAMENT_FORMAT_ROUND_ROBIN",
+    rules: { target_shifts: 1 },
+    policy: patient,
+    rounds: 2,
+    games_per_pairing: 2,
+    built_in_agents: ["random", "random"],
+    start_when_joined: 4,
+  };
+  const made = await call(protocol.TournamentService, "CreateTournament", address, { settings });
+  const asked = { join_code: made.join_code, name: "other", kind: "PARTICIPANT_KIND_AGENT", max_games: 2 };
+  const other = await call(protocol.TournamentService, "JoinTournament", address, asked);
+  const holder = holdUp(address, other.ticket, 2);
+
+  const way = ["--address", address, "--tournament", made.join_code, "--games", "2"];
+  const played = await killAndGoOn(way, holder.holding, holder.letGo);
+
+  holder.end();
+  const { tournament_id } = made.tournament;
+  const { games } = await call(protocol.TournamentService, "ListTournamentGames", address, { tournament_id });
+  assert.equal(games.length, 4);
+  assert.deepEqual(played.games.map(({ game_id }) => game_id).sort(), games.map(({ game_id }) => game_id).sort());
+  for (const { game_id, seat, standings } of played.games) {
+    const counted = games.find((game) => game.game_id === game_id);
+    assert.equal(counted.seats[seat].participant, played.participant);
+    assert.equal(counted.seats[seat].place, standings.find((line) => line.seat === seat).place);
+    assert.ok(counted.rated, "nobody forfeited or was substituted");
   }
 }));

@@ -172,6 +172,26 @@ class Hanging(Largest):
         time.sleep(3600)
 
 
+class Stalling(Largest):
+    """Says in a file that it has come to its fifth action, and thinks about it for as long as its command lives."""
+
+    def __init__(self, name: str, file: str) -> None:
+        super().__init__(name)
+        self.file = file
+        self.actions = 0
+
+    def get_action(self, observations: Any) -> Any:
+        self.actions += 1
+        if self.actions == 5:
+            command = os.getppid()
+            with open(self.file, "w", encoding="utf-8") as opened:
+                opened.write(str(os.getpid()))
+            while os.getppid() == command:
+                time.sleep(0.01)
+            os._exit(0)
+        return super().get_action(observations)
+
+
 class Answering(Largest):
     """Answers an action with whatever it was made with."""
 

@@ -84,9 +84,9 @@ class FakeServer(
         return pb.GetRoomResponse(room=self.game(request.room_id, context).room)
 
     def ListRooms(self, request: pb.ListRoomsRequest, context: Context) -> pb.ListRoomsResponse:
-        """Rooms, two a page."""
+        """Rooms, newest first, two a page."""
         at = int(request.page_token or "0")
-        page = [game.room for game in self.games[at : at + 2]]
+        page = [game.room for game in self.games[::-1][at : at + 2]]
         return pb.ListRoomsResponse(rooms=page, next_page_token=str(at + 2) if at + 2 < len(self.games) else "")
 
     def JoinRoom(self, request: pb.JoinRoomRequest, context: Context) -> pb.JoinRoomResponse:
@@ -133,6 +133,8 @@ class FakeServer(
         """The games of rooms with the name that is wanted, whether over or not, two a page."""
         wanted = request.filter.room_name
         games = [game for game in self.games if not wanted or game.room.name == wanted]
+        if request.newest_first:
+            games.reverse()
         at = int(request.page_token or "0")
         page = [pb.RecordSummary(game_id=game.room.game_id, room_name=game.room.name) for game in games[at : at + 2]]
         return pb.ListRecordsResponse(records=page, next_page_token=str(at + 2) if at + 2 < len(games) else "")

@@ -66,10 +66,12 @@ class FakeTournaments(tournament_grpc.TournamentServiceServicer):
         return pb.GetTournamentResponse(tournament=self._find(request.tournament_id, context).shown)
 
     def ListTournaments(self, request: pb.ListTournamentsRequest, context: Context) -> pb.ListTournamentsResponse:
-        """Tournaments, two a page."""
+        """Tournaments, newest first, those in one state alone if it is given, two a page."""
         at = int(request.page_token or "0")
-        page = [tournament.shown for tournament in self._all[at : at + 2]]
-        return pb.ListTournamentsResponse(tournaments=page, next_page_token=str(at + 2) if at + 2 < len(self._all) else "")
+        found = [made.shown for made in reversed(self._all) if request.state in (0, made.shown.state)]
+        return pb.ListTournamentsResponse(
+            tournaments=found[at : at + 2], next_page_token=str(at + 2) if at + 2 < len(found) else ""
+        )
 
     def JoinTournament(self, request: pb.JoinTournamentRequest, context: Context) -> pb.JoinTournamentResponse:
         """Takes part."""
@@ -134,7 +136,9 @@ class FakeTournaments(tournament_grpc.TournamentServiceServicer):
             for tournament in self._all:
                 for number, entrant in enumerate(tournament.entrants):
                     if entrant.ticket == attach.ticket:
-                        entered = pb.Entered(request_id=attach.request_id, participant=number)
+                        entered = pb.Entered(
+                            request_id=attach.request_id, tournament_id=tournament.shown.tournament_id, participant=number
+                        )
                         stream.tell(handle, entered=entered)
                         tournament.enter(entrant, stream, handle)
                         return True

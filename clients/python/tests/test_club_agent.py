@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from test_decision import HAND, decision
 
-from chefshat import Decision, pb
+from chefshat import Decision, SeatResult, pb
 from chefshat.players_club import AgentError, AgentProcess, AgentSpec, PlayersClubAgent, RulesDoNotFit
+from chefshat.players_club.players import Players
 from chefshat.players_club.process import AgentLost, AgentRaised
 
 T = 200
@@ -143,9 +144,11 @@ def test_a_player_that_fails_always_is_told_of_a_few_times(caplog: pytest.LogCap
     assert len(caplog.messages) == 4
 
 
-def gift(*cards: int, number: int = 9, seat: int = CHEF) -> Decision:
-    """An exchange with these cards as legal gifts; the hand is that of `test_decision`."""
-    return asked(*[T - 1 + card for card in cards], number=number, kind=pb.DECISION_KIND_EXCHANGE, seat=seat)
+def gift(*cards: int, number: int = 9, seat: int = CHEF, given: int = 0) -> Decision:
+    """An exchange with these cards as legal gifts; the hand is that of `test_decision`. Of the face 1 some were given already."""
+    request = asked(*[T - 1 + card for card in cards], number=number, kind=pb.DECISION_KIND_EXCHANGE, seat=seat)
+    request.request.observation.gave = bytes([given] + [0] * 11) if given else b""
+    return request
 
 
 HELD = (2, 4, 11, 12)
@@ -154,9 +157,15 @@ CARDS = [2, 4, 4, 11, 11, 11, 12]
 
 def test_the_chef_is_asked_for_both_cards_at_once() -> None:
     agent = seated([11, 12.0], seat=CHEF)
-    assert decide_all(agent, [gift(*HELD), gift(*HELD, number=10)]) == [T - 1 + 11, T - 1 + 12]
+    assert decide_all(agent, [gift(*HELD), gift(*HELD, number=10, given=1)]) == [T - 1 + 11, T - 1 + 12]
     assert puppet(agent).asked == [("get_exhanged_cards", CARDS, 2)]
     assert [card for card, count in enumerate(HAND, 1) for _ in range(count)] == CARDS
+
+
+def test_a_chef_that_has_given_one_card_before_its_process_was_there_is_asked_for_the_other() -> None:
+    agent = seated([11], seat=CHEF)
+    assert agent.decide(gift(*HELD, number=10, given=1)) == T - 1 + 11
+    assert puppet(agent).asked == [("get_exhanged_cards", CARDS, 1)]
 
 
 def test_the_sous_chef_is_asked_for_one_card() -> None:
@@ -170,12 +179,12 @@ def test_each_exchange_is_asked_for_anew() -> None:
     assert agent.decide(gift(*HELD)) == T - 1 + 2
     # The second card was never asked for: its partner was short of cards.
     agent.on_event(pb.GameEvent(shift_started=pb.ShiftStarted(shift=2)))
-    assert decide_all(agent, [gift(*HELD, number=20), gift(*HELD, number=21)]) == [T - 1 + 12, T - 1 + 11]
+    assert decide_all(agent, [gift(*HELD, number=20), gift(*HELD, number=21, given=1)]) == [T - 1 + 12, T - 1 + 11]
 
 
 def test_a_card_that_is_not_held_is_sent_and_asked_for_again() -> None:
     agent = seated([2, 3], [5], [6], [11], seat=CHEF, attempts=2)
-    first, second = gift(*HELD), gift(*HELD, number=10)
+    first, second = gift(*HELD), gift(*HELD, number=10, given=1)
     assert decide_all(agent, [first, second, second]) == [T - 1 + 2, T - 1 + 3, T - 1 + 5]
     assert agent.decide(second) == T - 1 + 11
     assert [question[2] for question in puppet(agent).asked] == [2, 1, 1]
@@ -208,3 +217,16 @@ def test_games_of_other_sizes_are_refused() -> None:
     rules = pb.RuleSet(players=5, faces=11, jokers=2)
     with pytest.raises(RulesDoNotFit, match="this one has 5, 11 and 2"):
         agent.on_event(pb.GameEvent(game_started=pb.GameStarted(rules=rules)))
+
+
+def test_every_game_at_a_time_has_a_process_and_each_goes_from_game_to_game() -> None:
+    players = Players(AgentSpec("club_players:Largest", "Ada"), 2, attempts=5)
+    one, other = players.processes
+    seat = asked(0).seat_info
+    first, second = players.seat(seat), players.seat(seat)
+    assert (first._process, second._process) == (one, other)
+    second.on_game_over(SeatResult("room", "game", 0))
+    assert players.seat(seat)._process is other
+    # One too many: it is the first game of which nobody has said yet that it is over.
+    assert players.seat(seat)._process is one
+    assert len(players.agents) == 4

@@ -134,12 +134,27 @@ def test_an_agent_is_trained_goes_on_and_plays_in_a_room(
         tickets = {client.join_room(room.join_code, f"random {seat}").ticket: RandomAgent(seat) for seat in range(3)}
         others = threading.Thread(target=client.play_many, args=[tickets])
         others.start()
-        code = main(["play", str(out), "--address", real_address, "--code", room.join_code, "--name", "Deep", "--json"])
+        ticket = tmp_path / "ticket"
+        play = ["play", str(out), "--address", real_address, "--name", "Deep", "--ticket-file", str(ticket), "--json"]
+        code = main([*play, "--code", room.join_code])
         others.join()
+        told = json.loads(capsys.readouterr().out)
+        assert (code, told["event"], told["invalid"], told["late"]) == (0, "finished", 0, 0)
+        # Two Shifts, with an exchange and perhaps a special action before the second.
+        assert told["decisions"] > 2
+        cup = pb.TournamentSettings(
+            name="Coppa",
+            format=pb.TOURNAMENT_FORMAT_ROUND_ROBIN,
+            rules=pb.RuleSet(target_shifts=1),
+            rounds=2,
+            built_in_agents=["random"] * 3,
+            start_when_joined=4,
+        )
+        made = client.create_tournament(cup)
+        assert main([*play, "--tournament", made.join_code, "--games", "2"]) == 0
     told = json.loads(capsys.readouterr().out)
-    assert (code, told["event"], told["invalid"], told["late"]) == (0, "finished", 0, 0)
-    # Two Shifts, with an exchange and perhaps a special action before the second.
-    assert told["decisions"] > 2
+    assert [(game["event"], game["invalid"], game["late"]) for game in told["games"]] == [("finished", 0, 0)] * 2
+    assert not ticket.exists()
 
 
 @pytest.mark.server

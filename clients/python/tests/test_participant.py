@@ -179,6 +179,52 @@ def test_strange_updates_stop_no_participant() -> None:
     assert not cup.session.done
 
 
+def test_the_ticket_of_a_seat_plays_this_seat_alone() -> None:
+    entries: list[pb.Entered] = []
+    scribe = Scribe()
+    session = PlaySession.of_participant("seat", lambda seat: scribe, PlayOptions(entropy=b"mine"), entries.append)
+    session.connected()
+    session.take_requests()
+    (ask,) = session.receive(pb.PlayResponse(updates=[seated(0, "a", request_id=REQUEST_ID, seat=2), events(1), decision(4)]))
+    session.answer(ask, 1)
+    session.lost()
+    session.connected()
+    (attach,) = [command.attach for request in session.take_requests() for command in request.commands]
+    assert (attach.ticket, attach.from_sequence, attach.entropy) == ("seat", 2, b"mine")
+    session.receive(
+        pb.PlayResponse(updates=[seated(0, "a", request_id=attach.request_id, seat=2), ended(2), detached("GAME_OVER")])
+    )
+    assert session.done
+    (result,) = session.played()
+    assert (result.game_id, result.seat, result.reconnects, entries) == ("a", 2, 1, [])
+
+
+def test_who_takes_part_is_told_where_on_each_connection() -> None:
+    entries: list[pb.Entered] = []
+    session = PlaySession.of_participant("cup", lambda seat: Scribe(), on_entered=entries.append)
+    for connections in (1, 2):
+        session.connected()
+        session.receive(pb.PlayResponse(updates=[entered()]))
+        session.lost()
+        assert [(entry.tournament_id, entry.participant) for entry in entries] == [("tournament", 3)] * connections
+
+
+def test_the_ticket_of_a_participant_is_no_seat() -> None:
+    session = PlaySession({"cup": Scribe(), "t": Scribe()})
+    session.connected()
+    session.take_requests()
+    told = pb.Entered(request_id=1, tournament_id="tournament", participant=3)
+    session.receive(
+        pb.PlayResponse(updates=[pb.SeatUpdate(handle=0, entered=told), seated(CALLED, "a"), seated(1, "b", request_id=2)])
+    )
+    (detach,) = [command for request in session.take_requests() for command in request.commands]
+    assert (detach.handle, detach.WhichOneof("command")) == (0, "detach")
+    assert not session.done, "the other plays on"
+    error = session.results()["cup"].error
+    assert error is not None
+    assert error.reason == "TICKET_OF_PARTICIPANT"
+
+
 def test_nobody_is_seated_by_the_server_without_taking_part() -> None:
     session = PlaySession({"t": Scribe()})
     session.connected()

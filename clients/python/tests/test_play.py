@@ -266,7 +266,7 @@ def test_a_closed_room_is_an_aborted_game(fake: FakeServer, play: Player) -> Non
 def test_the_rest_of_the_blocking_client(fake: FakeServer) -> None:
     with chefshat.Client(fake.address) as client:
         made = [client.create_room(f"room {number}").room.room_id for number in range(5)]
-        assert [room.room_id for room in client.list_rooms()] == made
+        assert [room.room_id for room in client.list_rooms()] == made[::-1]
         assert client.get_room(made[2]).name == "room 2"
         assert client.server_info().server_version == "fake"
         assert client.action_table().action_space.size == 214
@@ -280,7 +280,9 @@ def test_the_rest_of_the_blocking_client(fake: FakeServer) -> None:
         lines = list(client.record(room.room.game_id))
         assert len(lines) == len(watched) + 2
         assert lines[1].event.HasField("expression_shown")
-        assert [summary.room_name for summary in client.records()] == [f"room {number}" for number in range(5)] + [""]
+        names = [summary.room_name for summary in client.records()]
+        assert names == [f"room {number}" for number in range(5)] + [""]
+        assert [summary.room_name for summary in client.records(newest_first=True)] == names[::-1]
         (summary,) = client.records(pb.RecordFilter(room_name="room 3"))
         assert summary.game_id == client.get_room(made[3]).game_id
 
@@ -289,7 +291,7 @@ def test_the_rest_of_the_asyncio_client(fake: FakeServer) -> None:
     async def run() -> None:
         async with aio.Client(fake.address) as client:
             made = [(await client.create_room(f"room {number}")).room.room_id for number in range(5)]
-            assert [room.room_id async for room in client.list_rooms()] == made
+            assert [room.room_id async for room in client.list_rooms()] == made[::-1]
             assert (await client.get_room(made[2])).name == "room 2"
             assert (await client.server_info()).server_version == "fake"
             assert (await client.action_table()).action_space.size == 214
@@ -303,6 +305,7 @@ def test_the_rest_of_the_asyncio_client(fake: FakeServer) -> None:
             assert len([line async for line in client.record(room.room.game_id)]) == len(watched) + 2
             names = [summary.room_name async for summary in client.records()]
             assert names == [f"room {number}" for number in range(5)] + [""]
+            assert [summary.room_name async for summary in client.records(newest_first=True)] == names[::-1]
             wanted = pb.RecordFilter(room_name="room 3")
             assert [summary.room_name async for summary in client.records(wanted)] == ["room 3"]
 

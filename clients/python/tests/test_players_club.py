@@ -214,7 +214,7 @@ def test_a_command_that_is_interrupted_leaves_nobody_behind(
             time.sleep(0.01)
     process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=LIMIT_S)
-    assert said == "interrupted; the seat is the server's to fill\n"
+    assert said.endswith("interrupted; the place is the server's to fill until its ticket is used again\n")
     assert process.returncode == 130
     with pytest.raises(ProcessLookupError):
         os.kill(int((tmp_path / "pid").read_text()), 0)
@@ -253,3 +253,107 @@ def test_arguments_are_checked(options: list[str], said: str, capsys: pytest.Cap
         main(["--server", "127.0.0.1:1", "--code", "CODE", "--agent", "a:B", *options])
     assert ended.value.code == 2
     assert said in capsys.readouterr().err
+
+
+def cup(client: chefshat.Client, rules: pb.RuleSet) -> pb.CreateTournamentResponse:
+    """A tournament of three rounds of two games, for one participant and three built-in agents."""
+    settings = pb.TournamentSettings(
+        name="Coppa",
+        format=pb.TOURNAMENT_FORMAT_ROUND_ROBIN,
+        rules=rules,
+        # Far longer than a test: who is killed comes back in time, however slow the machine is.
+        policy=pb.RoomPolicy(decision_time_ms=600_000),
+        rounds=3,
+        games_per_pairing=2,
+        built_in_agents=["random"] * (rules.players - 1),
+        start_when_joined=rules.players,
+    )
+    return client.create_tournament(settings)
+
+
+def in_cup(address: str, code: str, player: str, *options: str) -> list[str]:
+    named = ["--server", address, "--tournament", code, "--agent", f"club_players:{player}"]
+    return [*named, "--path", TESTS, "--json", *options]
+
+
+def test_a_player_takes_part_in_a_tournament_with_two_processes(
+    real_address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = tmp_path / "log"
+    given = json.dumps({"log_file": str(log)})
+    with chefshat.Client(real_address) as client:
+        made = cup(client, pb.RuleSet(players=4, target_shifts=2))
+        assert main(in_cup(real_address, made.join_code, "Scribe", "--games", "2", "--arguments", given)) == 0
+        said = one_line(capsys)
+        games = list(client.tournament_games(made.tournament.tournament_id))
+        results = client.tournament_results(made.tournament.tournament_id)
+    assert (said["event"], said["tournament_id"]) == ("finished", made.tournament.tournament_id)
+    assert (said["failures"], said["replaced"], said["restarts"]) == (0, 0, 0)
+    assert results.tournament.participants[said["participant"]].max_games == 2
+    assert sorted(game["game_id"] for game in said["games"]) == sorted(game.game_id for game in games)
+    for game in said["games"]:
+        assert (game["event"], game["invalid"], game["late"]) == ("finished", 0, 0)
+        assert game["decisions"] > 0
+    assert log.read_text().count('["update_game_over"]') == len(games) == 6
+    assert all(game.rated for game in games)
+
+
+def test_a_tournament_that_such_players_do_not_know_is_refused(real_address: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with chefshat.Client(real_address) as client:
+        made = cup(client, pb.RuleSet(players=3))
+        assert main(in_cup(real_address, made.join_code, "Largest")) == 1
+        client.close_tournament(made.tournament.tournament_id, made.owner_token)
+    said = one_line(capsys)
+    assert "this one has 3, 11 and 2; its games in the tournament will be played without it" in said["message"]
+
+
+@pytest.mark.parametrize("where", ["room", "tournament"])
+def test_a_command_that_was_killed_goes_on_in_its_place(
+    real_address: str, where: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], processes: list["subprocess.Popen[str]"]
+) -> None:
+    stalls, log, ticket = tmp_path / "stalls", tmp_path / "log", tmp_path / "ticket"
+    kept = ["--ticket-file", str(ticket)]
+    with chefshat.Client(real_address) as client:
+        if where == "room":
+            policy = pb.RoomPolicy(decision_time_ms=600_000)
+            code = room(real_address, ["random", None, "random", "random"], policy=policy, rules=pb.RuleSet(target_shifts=3))
+            way = command(real_address, code, "Stalling", "--json", *kept)
+        else:
+            made = cup(client, pb.RuleSet(players=4, target_shifts=2))
+            way = in_cup(real_address, made.join_code, "Stalling", *kept)
+        process = subprocess.Popen(
+            [sys.executable, "-m", "chefshat.players_club", *way, "--arguments", json.dumps({"file": str(stalls)})],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        processes.append(process)
+        while process.poll() is None and not stalls.exists():
+            time.sleep(0.01)
+        process.kill()
+        process.wait(LIMIT_S)
+        assert stalls.exists()
+
+        again = [*way, "--arguments", json.dumps({"log_file": str(log)})]
+        again[again.index("club_players:Stalling")] = "club_players:Scribe"
+        assert main(again) == 0
+        said = one_line(capsys)
+        games = said.get("games", [said])
+        records = [list(client.record(game["game_id"])) for game in games]
+    assert not ticket.exists()
+    assert (said["failures"], said["replaced"]) == (0, 0)
+    assert len(games) == (1 if where == "room" else 6)
+    own = 0
+    for game, lines in zip(games, records, strict=True):
+        assert game["event"] == "finished"
+        decisions = [line.decision for line in lines if line.HasField("decision") and line.decision.seat == game["seat"]]
+        assert all(decision.source == pb.DECISION_SOURCE_AGENT for decision in decisions)
+        own += len(decisions) - game["decisions"]
+    # What was decided before the command was killed.
+    assert own >= 4
+    if where == "room":
+        assert games[0]["seat"] == 1
+        # The player of the second process was told the game from the beginning.
+        check_order(
+            [call[0] for line in log.read_text().splitlines() if not (call := json.loads(line))[0].startswith(("get", "do"))]
+        )

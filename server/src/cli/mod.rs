@@ -10,7 +10,6 @@ mod data_dir;
 mod demo;
 mod experiment;
 mod export;
-mod host;
 mod import;
 mod leaderboard;
 mod narrator;

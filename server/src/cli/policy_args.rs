@@ -16,10 +16,10 @@ const REWARDS: [&str; 5] = ["validity", "paper", "paper_intended", "winning", "p
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Times and limits")]
 pub(super) struct PolicyArgs {
-    /// Milliseconds for a decision; standard 10000.
+    /// Milliseconds for a decision; standard 10000, for people 60000.
     #[arg(long, value_name = "MS")]
     decision_time_ms: Option<u32>,
-    /// Milliseconds each seat may use beyond that over the whole game; standard 60000.
+    /// Milliseconds each seat may use beyond that over the whole game; standard 60000, for people 300000.
     #[arg(long, value_name = "MS")]
     bank_ms: Option<u32>,
     /// Other times for participants of a kind: milliseconds for a decision and, after another colon, beyond that, for instance human:60000
@@ -32,7 +32,7 @@ pub(super) struct PolicyArgs {
     /// Decisions in a row lost to the clock before a seat is substituted; standard 3.
     #[arg(long, value_name = "N")]
     max_timeouts: Option<u32>,
-    /// Milliseconds that the server's own agents wait before they decide; standard 0.
+    /// Milliseconds that the server's own agents wait before they decide; standard 1000 where a person plays, else 0.
     #[arg(long, value_name = "MS")]
     pace_ms: Option<u32>,
     /// Rewards told to the seats.

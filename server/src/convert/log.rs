@@ -10,7 +10,7 @@ use chefshat_records::seeds::SeedPlan;
 use prost::Message as _;
 
 use super::decision::source_to_proto;
-use super::policy::policy_to_proto;
+use super::policy::policy_of;
 use super::room::{kind_to_proto, participants};
 use crate::room::core::Core;
 use crate::room::log::{ByWhom, Happening, LogEntry};
@@ -154,7 +154,7 @@ pub fn game_started(core: &Core) -> v1::GameStarted {
         game_id: header.game_id.to_string(),
         rules: Some(rules_to_proto(&header.rules)),
         rules_version: header.rules_version,
-        policy: Some(policy_to_proto(&header.policy)),
+        policy: Some(policy_of(core)),
         seats: participants(core),
         action_space: Some(action_space(&header.rules.actions())),
         hand_size: header.rules.hand_size().into(),

@@ -3,6 +3,7 @@
 
 mod decision;
 mod log;
+mod name;
 mod played;
 mod players;
 mod policy;
@@ -19,20 +20,21 @@ pub use decision::{
     observation_from_proto, observation_to_proto,
 };
 pub use log::{game_started, view};
+pub use name::check_name;
 pub use played::{MAX_RECORDED_ATTEMPTS, Played};
 pub use players::recorded_player;
 pub use policy::{millis, policy_from_proto, policy_to_proto};
 pub use ratings::{leaderboard, rating_to_proto};
 pub use record::{lines_of, record_lines, summary};
 pub use room::{
-    describe, fill_to_proto, fills_from_proto, kind_from_proto, kind_to_proto, participants,
-    tournament_id,
+    called_from_proto, describe, fills_from_proto, kind_from_proto, kind_to_proto, participants,
+    seats_to_proto, tournament_id,
 };
 pub use standings::{confidence_to_proto, standings_to_proto};
 pub use start::{start_from_proto, start_to_proto};
 pub use tournament::{
     TournamentPlan, entrant_kind, is_rated, participant_kind, settings_to_proto, tournament_game,
-    tournament_participants, tournament_plan, tournament_state,
+    tournament_participants, tournament_plan, tournament_state, tournament_state_from_proto,
 };
 pub use vector::{
     Reset, batch_to_proto, reset_from_proto, setup_from_proto, setup_seeds, started_to_proto,

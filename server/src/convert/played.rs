@@ -2,6 +2,8 @@
 //! decisions are taken again and written down with the events that follow from them. There is no clock in it: all times are zero, and so is
 //! that of its making.
 
+use std::time::Duration;
+
 use chefshat_arena::PlayedDecision;
 use chefshat_engine::{BySeat, Event, Game, RULES_VERSION, RewardScheme, RuleSet, Seed};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
@@ -90,6 +92,9 @@ impl Played<'_> {
         let policy = Policy {
             max_invalid_attempts: self.max_invalid_attempts,
             reward_scheme: self.scheme,
+            // No person plays here.
+            pace: Some(Duration::ZERO),
+            clocks: Vec::new(),
             ..Policy::default()
         };
         let seats = self

@@ -8,6 +8,7 @@ use chefshat_proto::v1;
 use chefshat_records::convert::{FieldProblem, reward_scheme_from_proto, reward_scheme_to_proto};
 
 use super::room::{kind_from_proto, kind_to_proto};
+use crate::room::core::Core;
 use crate::room::policy::{AbortPolicy, Durability, KindClock, Policy};
 
 /// A day, the longest time a policy may name, milliseconds.
@@ -50,7 +51,7 @@ pub fn policy_from_proto(message: &v1::RoomPolicy) -> Result<Policy, FieldProble
         reward_scheme: v1::RewardScheme::try_from(message.reward_scheme)
             .map(reward_scheme_from_proto)
             .map_err(|_| unknown("reward_scheme", message.reward_scheme))?,
-        pace: time("pace_ms", message.pace_ms, 0..=60_000)?.unwrap_or(standard.pace),
+        pace: time("pace_ms", message.pace_ms, 0..=60_000)?,
         waiting_time: time("waiting_time_ms", message.waiting_time_ms, 1_000..=DAY_MS)?
             .unwrap_or(standard.waiting_time),
         spectators: message.spectators.unwrap_or(standard.spectators),
@@ -63,7 +64,16 @@ pub fn policy_from_proto(message: &v1::RoomPolicy) -> Result<Policy, FieldProble
             Ok(v1::Durability::Ephemeral) => Durability::Ephemeral,
             Err(_) => return Err(unknown("durability", message.durability)),
         },
-        clocks: clocks(&message.clocks)?,
+        clocks: match message {
+            // Times that were chosen are everybody's.
+            v1::RoomPolicy {
+                clocks,
+                decision_time_ms: None,
+                bank_ms: None,
+                ..
+            } if clocks.is_empty() => standard.clocks,
+            _ => clocks(&message.clocks)?,
+        },
     };
     if policy.spectators_see_hands && policy.spectator_delay_decisions == 0 {
         return Err(FieldProblem::new(
@@ -74,7 +84,15 @@ pub fn policy_from_proto(message: &v1::RoomPolicy) -> Result<Policy, FieldProble
     Ok(policy)
 }
 
-/// A policy with every field set.
+/// The policy of a room with every field set.
+pub(super) fn policy_of(core: &Core) -> v1::RoomPolicy {
+    v1::RoomPolicy {
+        pace_ms: Some(millis(core.pace())),
+        ..policy_to_proto(&core.header().policy)
+    }
+}
+
+/// A policy with every field set, but for a pace that depends on who plays.
 pub fn policy_to_proto(policy: &Policy) -> v1::RoomPolicy {
     v1::RoomPolicy {
         decision_time_ms: Some(millis(policy.decision_time)),
@@ -89,7 +107,7 @@ pub fn policy_to_proto(policy: &Policy) -> v1::RoomPolicy {
         }
         .into(),
         reward_scheme: reward_scheme_to_proto(policy.reward_scheme).into(),
-        pace_ms: Some(millis(policy.pace)),
+        pace_ms: policy.pace.map(millis),
         waiting_time_ms: Some(millis(policy.waiting_time)),
         spectators: Some(policy.spectators),
         spectator_delay_decisions: Some(

@@ -11,7 +11,7 @@ use prost::Message as _;
 
 use super::decision::{decision_kind, mask_bytes, source_to_proto};
 use super::log::{standings, view};
-use super::policy::policy_to_proto;
+use super::policy::policy_of;
 use super::room::{aborted_because, participants, series_id, state_to_proto, tournament_id};
 use super::start::{origin, start_to_proto};
 use crate::room::core::Core;
@@ -74,7 +74,7 @@ fn record_header(core: &Core) -> v1::RecordHeader {
         origin: origin(header).into(),
         rules: Some(rules_to_proto(&header.rules)),
         rules_version: header.rules_version,
-        policy: Some(policy_to_proto(&header.policy)),
+        policy: Some(policy_of(core)),
         seats: participants(core),
         seed_commitment: commitment.map_or_else(Vec::new, |hash| hash.to_vec()),
         created_at_ms: header.created_at_ms,

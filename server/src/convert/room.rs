@@ -1,12 +1,15 @@
 //! A room and its seats as messages.
 
+use std::collections::BTreeMap;
+
 use chefshat_arena::BuiltInAgent;
 use chefshat_engine::{MAX_SEATS, RuleSet, Seat};
 use chefshat_proto::v1::{self, seat_config::FilledBy};
 use chefshat_records::convert::{FieldProblem, rules_to_proto, seat_number};
 
 use super::log::abort_reason;
-use super::policy::{agent, policy_to_proto};
+use super::name::check_name;
+use super::policy::{agent, policy_of};
 use super::start::{branch_point, origin};
 use crate::ids::Id;
 use crate::room::core::{Core, State};
@@ -48,9 +51,44 @@ pub fn fills_from_proto(
         .collect()
 }
 
+/// The names of the built-in agents that go by others than their own, by seat.
+///
+/// # Errors
+/// An open seat with a name, or a name that cannot be shown.
+pub fn called_from_proto(
+    seats: &[v1::SeatConfig],
+) -> Result<BTreeMap<usize, String>, FieldProblem> {
+    let named = seats
+        .iter()
+        .enumerate()
+        .filter(|(_, it)| !it.name.is_empty());
+    named
+        .map(|(seat, config)| {
+            if matches!(config.filled_by, None | Some(FilledBy::ReservedFor(_))) {
+                let problem = "a name is for a built-in agent; whoever joins brings their own";
+                return Err(FieldProblem::new("seats", problem));
+            }
+            check_name("seats", &config.name, 1)?;
+            Ok((seat, config.name.clone()))
+        })
+        .collect()
+}
+
+/// How the seats of a room were asked to be filled.
+pub fn seats_to_proto(header: &GameHeader) -> Vec<v1::SeatConfig> {
+    let seats = header.fills.iter().enumerate();
+    seats
+        .map(|(seat, fill)| v1::SeatConfig {
+            name: header.called.get(&seat).cloned().unwrap_or_default(),
+            ..fill_to_proto(fill)
+        })
+        .collect()
+}
+
 /// What fills a seat, as it was asked for.
-pub fn fill_to_proto(fill: &Fill) -> v1::SeatConfig {
+fn fill_to_proto(fill: &Fill) -> v1::SeatConfig {
     v1::SeatConfig {
+        name: String::new(),
         filled_by: Some(match fill {
             Fill::Open { reserved_for } => FilledBy::ReservedFor(kind_to_proto(*reserved_for)),
             Fill::BuiltIn(kind) => FilledBy::BuiltInAgent(kind.name().into()),
@@ -119,7 +157,7 @@ pub fn describe(core: &Core) -> v1::Room {
         name: header.name.clone(),
         state: state_to_proto(core.state()).into(),
         rules: Some(rules_to_proto(&header.rules)),
-        policy: Some(policy_to_proto(&header.policy)),
+        policy: Some(policy_of(core)),
         seats: participants(core),
         seed_commitment: commitment.map_or_else(Vec::new, |hash| hash.to_vec()),
         seed_fixed: commitment.is_none(),
@@ -162,8 +200,10 @@ pub(super) fn state_to_proto(state: State) -> v1::RoomState {
 
 /// The seats of a room.
 pub fn participants(core: &Core) -> Vec<v1::Participant> {
+    let called = &core.header().called;
     core.all_seats()
         .map(|seat| {
+            let called = called.get(&seat.index());
             let standing = core.standing(seat);
             let (reserved_for, built_in) = match standing.fill {
                 Fill::Open { reserved_for } => (reserved_for, None),
@@ -175,6 +215,7 @@ pub fn participants(core: &Core) -> Vec<v1::Participant> {
                 seat: seat_number(seat),
                 name: match (participant, standing.fill) {
                     (Some(participant), _) => participant.name.clone(),
+                    _ if let Some(name) = called => name.clone(),
                     // Told apart by whom they play as, which is what whoever reads their games wants to know.
                     (None, Fill::Replay(player)) => {
                         let game = player.game.to_string();

@@ -233,6 +233,24 @@ pub fn tournament_state(state: State) -> v1::TournamentState {
     }
 }
 
+/// A state from the protocol; `None` if it is not set.
+///
+/// # Errors
+/// A number that stands for no state.
+pub fn tournament_state_from_proto(
+    field: &'static str,
+    state: i32,
+) -> Result<Option<State>, FieldProblem> {
+    match v1::TournamentState::try_from(state) {
+        Ok(v1::TournamentState::Unspecified) => Ok(None),
+        Ok(v1::TournamentState::Open) => Ok(Some(State::Open)),
+        Ok(v1::TournamentState::Playing) => Ok(Some(State::Playing)),
+        Ok(v1::TournamentState::Finished) => Ok(Some(State::Finished)),
+        Ok(v1::TournamentState::Closed) => Ok(Some(State::Closed)),
+        Err(_) => Err(unknown(field, state)),
+    }
+}
+
 /// The participants of a tournament.
 pub fn tournament_participants(tournament: &Tournament) -> Vec<v1::TournamentParticipant> {
     let entrants = tournament.participants().iter().enumerate();
@@ -264,16 +282,16 @@ pub fn tournament_game(
             .map(|seat| v1::TournamentGameSeat {
                 participant: number(seat.participant),
                 forfeited: seat.forfeited,
-                substituted: seat.substituted,
-                place: number(seat.place),
+                substituted: seat.did.substituted,
+                place: number(seat.did.place),
                 score: seat.score,
-                points: seat.points,
-                decisions: seat.decisions,
-                wrong_actions: seat.wrong_actions,
-                timeouts: seat.timeouts,
-                decision_time_us: seat.decision_time_us,
-                timed_decisions: seat.timed_decisions,
-                performance_score: seat.performance_score,
+                points: seat.did.points,
+                decisions: seat.did.decisions,
+                wrong_actions: seat.did.wrong_actions,
+                timeouts: seat.did.timeouts,
+                decision_time_us: seat.did.decision_time_us,
+                timed_decisions: seat.did.timed_decisions,
+                performance_score: seat.did.performance_score,
             })
             .collect(),
         _ => (game.seats.iter())

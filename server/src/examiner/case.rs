@@ -203,6 +203,7 @@ fn room(players: u32, seat: u32, stop: Stop, decision_time_ms: u32) -> v1::Creat
         } else {
             FilledBy::BuiltInAgent(["greedy", "random"][other as usize % 2].into())
         }),
+        ..v1::SeatConfig::default()
     });
     v1::CreateRoomRequest {
         rules: Some(v1::RuleSet {

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
+use chefshat_client::Client;
 use chefshat_proto::v1::{self, tournament_service_client::TournamentServiceClient};
 use tokio::net::TcpListener;
 use tokio::time::sleep_until;
@@ -13,10 +14,9 @@ use tokio::time::sleep_until;
 use super::case::{Case, Patience, Place};
 use super::exam::{Exam, Venue};
 use super::fault::{Fault, Finding};
-use super::host::Host;
 use super::process::{AgentCommand, AgentProcess, Places};
 use super::relay::{self, Desk};
-use crate::serve::ServeError;
+use crate::host::{Host, HostError};
 
 /// Name of the agent on the seat.
 const NAME: &str = "examined";
@@ -32,12 +32,9 @@ pub enum ExaminationError {
     /// The server did not do as it was asked.
     #[error("the examiner's own server: {0}")]
     Server(#[from] chefshat_client::Error),
-    /// It ended with an error.
-    #[error(transparent)]
-    Serve(#[from] ServeError),
     /// It did not end well.
-    #[error("the examiner's own server stopped: {0}")]
-    Stopped(#[from] tokio::task::JoinError),
+    #[error(transparent)]
+    Stopped(#[from] HostError),
     /// It left something out.
     #[error("the examiner's own server did not say which room it made")]
     NoRoom,
@@ -84,6 +81,7 @@ impl Outcome {
 #[derive(Debug)]
 pub struct Examination {
     host: Host,
+    client: Client,
     listen: SocketAddr,
     patience: Patience,
     logs: Option<PathBuf>,
@@ -99,8 +97,10 @@ impl Examination {
         patience: Patience,
         logs: Option<PathBuf>,
     ) -> Result<Self, ExaminationError> {
+        let host = Host::in_memory(None).await?;
         Ok(Self {
-            host: Host::start().await?,
+            client: Client::connect(host.url()).await?,
+            host,
             listen: listen.unwrap_or(SocketAddr::from((Ipv4Addr::LOCALHOST, 0))),
             patience,
             logs,
@@ -117,7 +117,7 @@ impl Examination {
         command: Option<&AgentCommand>,
         waiting: impl FnOnce(&Waiting),
     ) -> Result<Outcome, ExaminationError> {
-        let channel = self.host.client.channel();
+        let channel = self.client.channel();
         let Opened {
             venue,
             code,
@@ -169,7 +169,7 @@ impl Examination {
 
     /// Makes what a case is played in.
     async fn open(&self, case: &Case) -> Result<Opened, ExaminationError> {
-        let client = &self.host.client;
+        let client = &self.client;
         match case.place {
             Place::Room(room) => {
                 let mut request = room(&self.patience);
@@ -206,7 +206,7 @@ impl Examination {
 
     /// Closes it. What has ended by itself is closed already, as it were.
     async fn close(&self, venue: Venue, owner_token: String) {
-        let client = &self.host.client;
+        let client = &self.client;
         match venue {
             Venue::Room { room_id, .. } => {
                 let _closed = client.close_room(room_id, owner_token).await;
@@ -227,7 +227,8 @@ impl Examination {
     /// # Errors
     /// When it did not end well.
     pub async fn stop(self) -> Result<(), ExaminationError> {
-        self.host.stop().await
+        drop(self.client);
+        Ok(self.host.stop().await?)
     }
 }
 

@@ -6,7 +6,6 @@ pub mod case;
 pub mod exam;
 mod examination;
 pub mod fault;
-mod host;
 mod process;
 mod relay;
 

@@ -12,7 +12,7 @@ use tonic::{Code, Status};
 
 use super::recorded::Recorded;
 use super::status::{field, status};
-use crate::config::{MAX_HOSTED_SHIFTS, MAX_NAME_CHARS};
+use crate::config::MAX_HOSTED_SHIFTS;
 use crate::convert;
 use crate::ids::Id;
 use crate::room::policy::{Durability, Policy};
@@ -32,7 +32,7 @@ pub(super) async fn new_room(
     request: v1::CreateRoomRequest,
 ) -> Result<NewRoom, Status> {
     let name = request.name.trim().to_owned();
-    check_name(&name, 0).map_err(|problem| field("NAME_REFUSED", &problem))?;
+    convert::check_name("name", &name, 0).map_err(|problem| field("NAME_REFUSED", &problem))?;
     let policy = kept_policy(recorded, &request.policy.unwrap_or_default())
         .map_err(|problem| field("POLICY_REFUSED", &problem))?;
     let game_seed = game_seed(&request.game_seed)?;
@@ -59,14 +59,15 @@ pub(super) async fn new_room(
             }
         }
     };
-    let fills = convert::fills_from_proto(&request.seats, &beginning.rules)
-        .map_err(|problem| field("SEATS_REFUSED", &problem))?;
+    let refused = |problem: FieldProblem| field("SEATS_REFUSED", &problem);
+    let fills = convert::fills_from_proto(&request.seats, &beginning.rules).map_err(refused)?;
     Ok(NewRoom {
         name,
         recorded: recorded_players(recorded, &fills).await?,
         rules: beginning.rules,
         policy,
         fills,
+        called: convert::called_from_proto(&request.seats).map_err(refused)?,
         start: beginning.start,
         game_seed: beginning.game_seed,
         seating: None,
@@ -215,33 +216,4 @@ async fn recorded_players(
         players.insert(index, player);
     }
     Ok(players)
-}
-
-/// Checks a name of at least so many characters.
-pub(super) fn check_name(name: &str, least: usize) -> Result<(), FieldProblem> {
-    let length = name.chars().count();
-    if !(least..=MAX_NAME_CHARS).contains(&length) {
-        return Err(FieldProblem::new(
-            "name",
-            format!("{length} characters are not in {least}..={MAX_NAME_CHARS}"),
-        ));
-    }
-    if name
-        .chars()
-        .any(|letter| letter.is_control() || is_unseen(letter))
-    {
-        return Err(FieldProblem::new(
-            "name",
-            "characters that cannot be seen, or turn the direction of writing, would make it look like another name",
-        ));
-    }
-    Ok(())
-}
-
-/// Whether a character shows nothing of itself: joiners, marks of direction, fillers, tags (Unicode's category Cf and the Hangul fillers).
-fn is_unseen(letter: char) -> bool {
-    matches!(letter,
-        '\u{ad}' | '\u{61c}' | '\u{115f}' | '\u{1160}' | '\u{180e}' | '\u{200b}'..='\u{200f}'
-        | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{3164}' | '\u{feff}' | '\u{ffa0}'
-        | '\u{fff9}'..='\u{fffb}' | '\u{e0000}'..='\u{e0fff}')
 }

@@ -20,7 +20,7 @@ pub(super) fn page_size(asked: u32) -> usize {
 }
 
 /// The number of the last entry of the page before; `None` for the first page.
-pub(super) fn after(page_token: &str) -> Result<Option<u64>, Status> {
+pub(super) fn last_shown(page_token: &str) -> Result<Option<u64>, Status> {
     if page_token.is_empty() {
         return Ok(None);
     }

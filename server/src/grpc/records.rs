@@ -24,6 +24,7 @@ use crate::config::{
     RECORD_SEND_TIMEOUT,
 };
 use crate::ids::Id;
+use crate::store::Part;
 
 /// Lines in one message, and bytes, but for a single line of more: well below what gRPC clients accept.
 const LINES_PER_MESSAGE: usize = 512;
@@ -55,11 +56,11 @@ impl Records {
     async fn page(
         &self,
         filter: &v1::RecordFilter,
-        after: u64,
+        part: Part,
         count: usize,
     ) -> Result<Vec<(u64, v1::RecordSummary)>, Status> {
         let store = self.recorded.rooms().store();
-        store.list(filter, after, count).await.map_err(not_read)
+        store.list(filter, part, count).await.map_err(not_read)
     }
 
     /// Sends all records that a filter lets through, page by page: nothing is read before the client has taken what was read before.
@@ -70,7 +71,7 @@ impl Records {
     ) -> Result<(), Status> {
         let mut after = 0;
         loop {
-            let page = self.page(filter, after, STREAM_PAGE).await?;
+            let page = self.page(filter, Part::After(after), STREAM_PAGE).await?;
             let Some((last, _)) = page.last() else {
                 return Ok(());
             };
@@ -103,10 +104,14 @@ impl RecordService for Records {
     ) -> Result<Response<v1::ListRecordsResponse>, Status> {
         let request = request.into_inner();
         let filter = checked(request.filter)?;
-        let after = pages::after(&request.page_token)?.unwrap_or(0);
+        let last = pages::last_shown(&request.page_token)?;
+        let part = match request.newest_first {
+            false => last.map_or(Part::FROM_OLDEST, Part::After),
+            true => last.map_or(Part::FROM_NEWEST, Part::Before),
+        };
         let size = pages::page_size(request.page_size);
         // One more than asked for tells whether there is another page.
-        let mut found = self.page(&filter, after, size + 1).await?;
+        let mut found = self.page(&filter, part, size + 1).await?;
         let more = found.len() > size;
         found.truncate(size);
         let next_page_token = match found.last() {

@@ -6,7 +6,7 @@ use chefshat_proto::v1::{self, room_service_server::RoomService};
 use chefshat_records::convert::{FieldProblem, seat_number};
 use tonic::{Code, Request, Response, Status};
 
-use super::new_room::{check_name, new_room};
+use super::new_room::new_room;
 use super::pages;
 use super::recorded::Recorded;
 use super::status::{self, Refusal, field, room_unknown};
@@ -75,16 +75,16 @@ impl RoomService for RoomCalls {
     ) -> Result<Response<v1::ListRoomsResponse>, Status> {
         let request = request.into_inner();
         let page_size = pages::page_size(request.page_size);
-        let after = pages::after(&request.page_token)?;
+        let before = pages::last_shown(&request.page_token)?;
         if v1::RoomState::try_from(request.state).is_err() {
             let problem = FieldProblem::new("state", "not a value of this enum");
             return Err(field("STATE_REFUSED", &problem));
         }
         let mut response = v1::ListRoomsResponse::default();
         // Rooms in other states are passed over, but only so many for one page.
-        let looked_at = self.rooms.list(after, ROOMS_LOOKED_AT);
+        let looked_at = self.rooms.newest(before, ROOMS_LOOKED_AT);
         let mut rest = looked_at.len() == ROOMS_LOOKED_AT;
-        let mut last = after;
+        let mut last = before;
         for (number, handle) in looked_at {
             if response.rooms.len() == page_size {
                 rest = true;
@@ -127,7 +127,7 @@ impl RoomService for RoomCalls {
             .map_err(|problem| field("KIND_REFUSED", &problem))?
             .unwrap_or(ParticipantKind::Agent);
         let name = request.name.trim().to_owned();
-        check_name(&name, 1).map_err(|problem| field("NAME_REFUSED", &problem))?;
+        convert::check_name("name", &name, 1).map_err(|problem| field("NAME_REFUSED", &problem))?;
         let joined = handle
             .join(JoinRequest {
                 name,

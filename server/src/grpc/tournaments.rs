@@ -13,7 +13,7 @@ use tokio_util::sync::CancellationToken;
 use tonic::{Code, Request, Response, Status};
 
 use super::follow::{end, follow, not_worked_out};
-use super::new_room::{check_name, kept_policy, too_long};
+use super::new_room::{kept_policy, too_long};
 use super::pages;
 use super::recorded::Recorded;
 use super::status::{disk_nearly_full, field, shutting_down, status, store_failed};
@@ -88,7 +88,7 @@ impl TournamentService for TournamentCalls {
     ) -> Result<Response<v1::CreateTournamentResponse>, Status> {
         let settings = request.into_inner().settings.unwrap_or_default();
         let name = settings.name.trim().to_owned();
-        check_name(&name, 1).map_err(|problem| field("NAME_REFUSED", &problem))?;
+        convert::check_name("name", &name, 1).map_err(|problem| field("NAME_REFUSED", &problem))?;
         let mut plan = convert::tournament_plan(&settings, random_bytes())
             .map_err(|problem| refused(&problem))?;
         if let Some(problem) = too_long(&plan.rules) {
@@ -124,9 +124,11 @@ impl TournamentService for TournamentCalls {
         request: Request<v1::ListTournamentsRequest>,
     ) -> Result<Response<v1::ListTournamentsResponse>, Status> {
         let request = request.into_inner();
-        let after = pages::after(&request.page_token)?;
+        let before = pages::last_shown(&request.page_token)?;
         let size = pages::page_size(request.page_size);
-        let mut found = self.tournaments.list(after, size + 1);
+        let state = convert::tournament_state_from_proto("state", request.state)
+            .map_err(|problem| field("STATE_REFUSED", &problem))?;
+        let mut found = self.tournaments.newest(before, state, size + 1);
         let more = found.len() > size;
         found.truncate(size);
         let next_page_token = match found.last() {
@@ -148,7 +150,7 @@ impl TournamentService for TournamentCalls {
     ) -> Result<Response<v1::JoinTournamentResponse>, Status> {
         let request = request.into_inner();
         let name = request.name.trim().to_owned();
-        check_name(&name, 1).map_err(|problem| field("NAME_REFUSED", &problem))?;
+        convert::check_name("name", &name, 1).map_err(|problem| field("NAME_REFUSED", &problem))?;
         let kind = convert::kind_from_proto("kind", request.kind)
             .map_err(|problem| field("KIND_REFUSED", &problem))?
             .unwrap_or(ParticipantKind::Agent);
@@ -262,7 +264,7 @@ impl TournamentService for TournamentCalls {
     ) -> Result<Response<v1::ListTournamentGamesResponse>, Status> {
         let request = request.into_inner();
         let hosted = self.find(&request.tournament_id)?;
-        let after = pages::after(&request.page_token)?;
+        let after = pages::last_shown(&request.page_token)?;
         let from = after.map_or(0, |after| usize::try_from(after).unwrap_or(usize::MAX));
         let size = match request.page_size {
             0 => STANDARD_LINES,

@@ -38,6 +38,18 @@ pub struct KindClock {
     pub bank: Option<Duration>,
 }
 
+impl KindClock {
+    /// The standard times of people.
+    pub const PEOPLE: Self = Self {
+        kind: ParticipantKind::Human,
+        decision_time: Some(Duration::from_secs(60)),
+        bank: Some(Duration::from_secs(300)),
+    };
+}
+
+/// What a built-in agent or substitute waits before it decides where a person plays and nobody says otherwise.
+const PACE_WITH_PEOPLE: Duration = Duration::from_secs(1);
+
 /// A room's policy. Made by `convert::policy`, which checks the ranges stated in `room.proto`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Policy {
@@ -55,8 +67,8 @@ pub struct Policy {
     pub abort: AbortPolicy,
     /// Rewards told to seats.
     pub reward_scheme: Option<RewardScheme>,
-    /// How long a built-in agent or substitute waits before it decides.
-    pub pace: Duration,
+    /// How long a built-in agent or substitute waits before it decides; `None`: as suits who plays.
+    pub pace: Option<Duration>,
     /// How long the room waits for its seats.
     pub waiting_time: Duration,
     /// Whether spectators may watch.
@@ -82,6 +94,15 @@ impl Policy {
         (self.clock_of(kind).and_then(|clock| clock.bank)).unwrap_or(self.bank)
     }
 
+    /// How long a built-in agent or substitute waits before it decides, in a game that a person plays in or not.
+    pub fn pace_of(&self, with_people: bool) -> Duration {
+        let standard = match with_people {
+            true => PACE_WITH_PEOPLE,
+            false => Duration::ZERO,
+        };
+        self.pace.unwrap_or(standard)
+    }
+
     fn clock_of(&self, kind: Option<ParticipantKind>) -> Option<&KindClock> {
         self.clocks.iter().find(|clock| Some(clock.kind) == kind)
     }
@@ -97,13 +118,13 @@ impl Default for Policy {
             substitute: AgentKind::Random,
             abort: AbortPolicy::AllLost,
             reward_scheme: None,
-            pace: Duration::ZERO,
+            pace: None,
             waiting_time: Duration::from_secs(3600),
             spectators: true,
             spectator_delay_decisions: 0,
             spectators_see_hands: false,
             durability: Durability::Durable,
-            clocks: Vec::new(),
+            clocks: vec![KindClock::PEOPLE],
         }
     }
 }

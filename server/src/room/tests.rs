@@ -46,6 +46,7 @@ async fn room(policy: Policy, shifts: u32) -> Handle {
         .expect("the rule set makes sense"),
         rules_version: RULES_VERSION,
         policy,
+        called: BTreeMap::new(),
         recorded: BTreeMap::new(),
         start: GameStart::default(),
         fills: vec![Fill::Open { reserved_for: None }; 4],

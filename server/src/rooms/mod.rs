@@ -38,6 +38,8 @@ pub struct NewRoom {
     pub policy: Policy,
     /// What fills each seat.
     pub fills: Vec<Fill>,
+    /// Names of built-in agents that go by others than their own, by seat.
+    pub called: BTreeMap<usize, String>,
     /// The recorded players of the seats that are filled by one, by seat.
     pub recorded: BTreeMap<usize, Arc<RecordedPlayer>>,
     /// How its game begins.
@@ -165,12 +167,12 @@ impl Rooms {
         self.by_code(code).is_some_and(|handle| handle.id() == id)
     }
 
-    /// At most `count` rooms made after the one numbered `after`, with their numbers.
-    pub fn list(&self, after: Option<u64>, count: usize) -> Vec<(u64, Handle)> {
-        let first = after.map_or(0, |number| number.saturating_add(1));
+    /// The newest `count` rooms, or of those made before the one numbered `before`, with their numbers, newest first.
+    pub fn newest(&self, before: Option<u64>, count: usize) -> Vec<(u64, Handle)> {
         self.lock()
             .by_number
-            .range(first..)
+            .range(..before.unwrap_or(u64::MAX))
+            .rev()
             .take(count)
             .map(|(number, entry)| (*number, entry.handle.clone()))
             .collect()
@@ -335,6 +337,7 @@ impl Place {
             policy: new.policy,
             rules_version: RULES_VERSION,
             fills: new.fills,
+            called: new.called,
             recorded: new.recorded,
             start: new.start,
             seed: match new.game_seed {

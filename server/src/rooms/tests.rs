@@ -25,6 +25,7 @@ async fn who_is_seated_by_a_tournament_is_kept_with_the_room() {
         rules: RuleSetSpec::default().validate().expect("the standard"),
         policy: Policy::default(),
         fills: vec![fill; 4],
+        called: BTreeMap::new(),
         recorded: BTreeMap::new(),
         start: GameStart::default(),
         game_seed: None,

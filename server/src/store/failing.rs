@@ -10,7 +10,7 @@ use tokio::sync::watch;
 
 use super::journal::{Entry, GameHeader};
 use super::tournaments::{KeptTournament, TournamentEntry, TournamentHeader};
-use super::{Journal, KeptGame, LeftGame, MemoryStore, Store, StoreError};
+use super::{Journal, KeptGame, LeftGame, MemoryStore, Part, Store, StoreError};
 use crate::ids::Id;
 
 /// A memory store whose appends fail from a certain one on.
@@ -71,10 +71,10 @@ impl Store for FailingStore {
     fn list<'a>(
         &'a self,
         filter: &'a v1::RecordFilter,
-        after: u64,
+        part: Part,
         count: usize,
     ) -> BoxFuture<'a, Result<Vec<(u64, v1::RecordSummary)>, StoreError>> {
-        self.inner.list(filter, after, count)
+        self.inner.list(filter, part, count)
     }
 
     fn import(

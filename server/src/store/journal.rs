@@ -100,6 +100,8 @@ pub struct GameHeader {
     pub policy: Policy,
     /// What fills each seat.
     pub fills: Vec<Fill>,
+    /// Names of built-in agents that go by others than their own, by seat.
+    pub called: BTreeMap<usize, String>,
     /// The recorded players of the seats that are filled by one, by seat.
     pub recorded: BTreeMap<usize, Arc<RecordedPlayer>>,
     /// How the game begins.

@@ -9,7 +9,7 @@ use futures::future::{BoxFuture, pending, ready};
 
 use super::journal::{Entry, GameHeader};
 use super::tournaments::{KeptTournament, TournamentEntry, TournamentHeader};
-use super::{Journal, KeptGame, LeftGame, Store, StoreError, lets_through};
+use super::{Journal, KeptGame, LeftGame, Part, Store, StoreError, lets_through};
 use crate::ids::Id;
 
 /// Finished games that are kept; older ones are forgotten.
@@ -99,16 +99,15 @@ impl Store for MemoryStore {
     fn list<'a>(
         &'a self,
         filter: &'a v1::RecordFilter,
-        after: u64,
+        part: Part,
         count: usize,
     ) -> BoxFuture<'a, Result<Vec<(u64, v1::RecordSummary)>, StoreError>> {
-        let listed = lock(&self.finished)
-            .games
-            .range(after.saturating_add(1)..)
-            .filter(|(_, game)| lets_through(filter, &game.summary))
-            .take(count)
-            .map(|(number, game)| (*number, game.summary.clone()))
-            .collect();
+        let finished = lock(&self.finished);
+        let games = &finished.games;
+        let listed = match part {
+            Part::After(number) => listed(games.range(number.saturating_add(1)..), filter, count),
+            Part::Before(number) => listed(games.range(..number).rev(), filter, count),
+        };
         ready(Ok(listed)).boxed()
     }
 
@@ -201,6 +200,19 @@ impl Journal for MemoryJournal {
         }
         ready(Ok(())).boxed()
     }
+}
+
+/// The first `count` of these games that a filter lets through.
+fn listed<'a>(
+    games: impl Iterator<Item = (&'a u64, &'a FinishedGame)>,
+    filter: &v1::RecordFilter,
+    count: usize,
+) -> Vec<(u64, v1::RecordSummary)> {
+    games
+        .filter(|(_, game)| lets_through(filter, &game.summary))
+        .take(count)
+        .map(|(number, game)| (*number, game.summary.clone()))
+        .collect()
 }
 
 fn lock(finished: &Mutex<Finished>) -> MutexGuard<'_, Finished> {

@@ -44,6 +44,22 @@ impl KeptGame {
     }
 }
 
+/// A part of the list of finished games, which are numbered from 1, older ones before newer ones; and the way in which it is read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// Those after the one of this number, oldest first.
+    After(u64),
+    /// Those before the one of this number, newest first.
+    Before(u64),
+}
+
+impl Part {
+    /// All, oldest first.
+    pub const FROM_OLDEST: Self = Self::After(0);
+    /// All, newest first.
+    pub const FROM_NEWEST: Self = Self::Before(u64::MAX);
+}
+
 /// A game whose room is to be there again after the server ended.
 pub struct LeftGame {
     /// Its header; the recorded players of its seats are left for the caller to fill in.
@@ -75,11 +91,11 @@ pub trait Store: Send + Sync + 'static {
     fn left(&self, ended_since_ms: u64) -> BoxFuture<'_, Result<Vec<LeftGame>, StoreError>>;
     /// A finished game, or `None`.
     fn finished(&self, game: Id) -> BoxFuture<'_, Result<Option<KeptGame>, StoreError>>;
-    /// At most `count` finished games that a filter lets through, oldest first, from after the one numbered `after`, with their numbers.
+    /// At most `count` finished games that a filter lets through, of a part of the list and in its order, with their numbers.
     fn list<'a>(
         &'a self,
         filter: &'a v1::RecordFilter,
-        after: u64,
+        part: Part,
         count: usize,
     ) -> BoxFuture<'a, Result<Vec<(u64, v1::RecordSummary)>, StoreError>>;
     /// Keeps the record of a game that was played elsewhere. `false` if there is a game of this id.

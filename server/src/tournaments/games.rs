@@ -170,7 +170,7 @@ impl Task {
         let game = &moving.core.games()[number];
         let plan = &self.hosted.plan;
         let entrants = moving.core.participants();
-        let mut participants = BTreeMap::new();
+        let (mut participants, mut called) = (BTreeMap::new(), BTreeMap::new());
         let fills = game.seats.iter().enumerate();
         let fills = fills
             .map(|(seat, participant)| {
@@ -179,6 +179,7 @@ impl Task {
                     return Fill::BuiltIn(plan.core.filler);
                 }
                 if let Some(kind) = entrant.built_in {
+                    called.insert(seat, entrant.name.clone());
                     return Fill::BuiltIn(kind);
                 }
                 let kind = convert::participant_kind(entrant.kind);
@@ -210,6 +211,7 @@ impl Task {
             rules: plan.rules,
             policy: plan.policy.clone(),
             fills,
+            called,
             recorded: BTreeMap::new(),
             start: GameStart::default(),
             game_seed: self.hosted.game_seed(number, game.deal),

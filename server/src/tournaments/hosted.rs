@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard};
 
-use chefshat_arena::tournament::{BeginProblem, JoinProblem, State, Tournament};
+use chefshat_arena::tournament::{BeginProblem, JoinProblem, Tournament};
 use chefshat_proto::v1;
 use sha2::{Digest as _, Sha256};
 use tokio::sync::{mpsc, oneshot, watch};
@@ -195,7 +195,7 @@ impl Hosted {
 
     /// Whether it has ended, one way or the other.
     pub fn is_over(&self) -> bool {
-        matches!(self.moving().core.state(), State::Finished | State::Closed)
+        self.moving().core.state().is_over()
     }
 
     /// The tournament as everybody sees it.
@@ -219,7 +219,7 @@ impl Hosted {
     fn outlined(&self, core: &Tournament) -> v1::Tournament {
         let state = core.state();
         let mut settings = self.header.settings.clone();
-        if matches!(state, State::Open | State::Playing) {
+        if !state.is_over() {
             // Who knows it could work out the draws to come.
             settings.draw_seed.clear();
             settings.deal_seed.clear();
@@ -287,7 +287,7 @@ impl Hosted {
     /// Of some deals, withholds what could tell those that are still to be played, and gives free the others.
     pub(super) fn withhold(&self, deals: &BTreeSet<u32>, rooms: &Rooms) {
         let moving = self.moving();
-        let over = matches!(moving.core.state(), State::Finished | State::Closed);
+        let over = moving.core.state().is_over();
         for &deal in deals {
             let withheld = !over && !moving.core.is_deal_open(deal);
             rooms.withhold(self.series(deal), withheld);

@@ -15,7 +15,7 @@ use tokio::time::Instant;
 use super::shared::{NotWorkedOut, Shared};
 use crate::config::{LEADERBOARD_AGE, LEADERBOARD_PART};
 use crate::rooms::Rooms;
-use crate::store::{Store, StoreError};
+use crate::store::{Part, Store, StoreError};
 
 /// Summaries read at a time.
 const PAGE: usize = 1_000;
@@ -92,7 +92,7 @@ async fn rated_games(store: &dyn Store) -> Result<Vec<RatedGame>, StoreError> {
     let mut games = Vec::new();
     let mut after = 0;
     loop {
-        let page = store.list(&filter, after, PAGE).await?;
+        let page = store.list(&filter, Part::After(after), PAGE).await?;
         let Some((last, _)) = page.last() else {
             return Ok(games);
         };

@@ -6,7 +6,10 @@ mod hosted;
 mod leaderboard;
 mod shared;
 mod shown;
+mod table;
 mod task;
+#[cfg(test)]
+mod tests;
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard};
@@ -33,6 +36,7 @@ use crate::store::StoreError;
 use crate::store::tournaments::{KeptTournament, TournamentEntry, TournamentHeader};
 use hosted::Moving;
 use shown::Shown;
+use table::Table;
 use task::Task;
 
 /// Why no tournament was made.
@@ -73,15 +77,6 @@ struct Stop {
     end: CancellationToken,
 }
 
-#[derive(Debug, Default)]
-struct Table {
-    next_number: u64,
-    /// In the order in which they were made.
-    by_number: BTreeMap<u64, Arc<Hosted>>,
-    /// Places taken for tournaments that are being made.
-    being_made: usize,
-}
-
 impl Tournaments {
     /// No tournaments yet. A shutdown waits for what `tracker` tracks.
     pub fn new(rooms: Arc<Rooms>, tracker: TaskTracker) -> Arc<Self> {
@@ -98,44 +93,23 @@ impl Tournaments {
     /// # Errors
     /// See [`CreateProblem`].
     pub async fn create(
-        &self,
+        self: &Arc<Self>,
         name: &str,
         plan: TournamentPlan,
     ) -> Result<(Arc<Hosted>, Token), CreateProblem> {
-        let mut core = Tournament::new(plan.core.clone())?;
+        let core = Tournament::new(plan.core.clone())?;
         if self.stop.no_more_games.is_cancelled() || self.rooms.is_shutting_down() {
             return Err(CreateProblem::ShuttingDown);
         }
         if !self.rooms.store().has_space() {
             return Err(CreateProblem::DiskNearlyFull);
         }
-        let _place = Place::reserve(self)?;
-        let id = Id::random();
-        let owner = Token::random(id);
-        let header = TournamentHeader {
-            id,
-            settings: convert::settings_to_proto(name, &plan),
-            created_at_ms: since_epoch_ms(),
-            join_code: join_code(),
-            owner: owner.hash(),
-            deal_secret: random_bytes(),
-        };
-        let mut entries = Vec::new();
-        for entrant in built_in(&plan) {
-            let change = Change::Joined(entrant);
-            core.fold(&change);
-            entries.push(TournamentEntry::Change(change));
-        }
-        let store = self.rooms.store();
-        store
-            .create_tournament(Arc::new(header.clone()), entries.clone())
-            .await?;
-        let kept = KeptTournament {
-            header,
-            rows: 1,
-            entries,
-        };
-        Ok((self.take_up(kept, plan, core), owner))
+        let place = Place::reserve(self)?;
+        // Made to the end even if whoever asked for it goes away: what is half made would be kept, and be there when the server is back.
+        let making = self.tracker.spawn(place.make(name.to_owned(), plan, core));
+        making
+            .await
+            .map_err(|error| StoreError(format!("a tournament was not made: {error}")))?
     }
 
     /// Goes on with the tournaments of the store, and says how many were not over. The rooms must be there already.
@@ -176,28 +150,29 @@ impl Tournaments {
 
     /// A tournament by its id.
     pub fn get(&self, id: Id) -> Option<Arc<Hosted>> {
-        self.find(|hosted| hosted.id() == id)
+        self.lock().get(id).cloned()
     }
 
     /// A tournament by its join code.
     pub fn by_code(&self, code: &str) -> Option<Arc<Hosted>> {
-        let code = normal_code(code);
-        self.find(|hosted| hosted.join_code() == code)
+        self.lock().by_code(&normal_code(code)).cloned()
     }
 
-    /// At most `count` tournaments made after the one numbered `after`, with their numbers.
-    pub fn list(&self, after: Option<u64>, count: usize) -> Vec<(u64, Arc<Hosted>)> {
-        let first = after.map_or(0, |number| number.saturating_add(1));
-        let table = self.lock();
-        let from = table.by_number.range(first..).take(count);
-        from.map(|(number, hosted)| (*number, Arc::clone(hosted)))
+    /// The newest `count` tournaments in this state, or in any; or of those made before the one numbered `before`. With their numbers, newest
+    /// first.
+    pub fn newest(
+        &self,
+        before: Option<u64>,
+        state: Option<State>,
+        count: usize,
+    ) -> Vec<(u64, Arc<Hosted>)> {
+        let is_wanted =
+            |hosted: &Hosted| state.is_none_or(|state| hosted.look(Tournament::state) == state);
+        (self.lock().earlier(before))
+            .filter(|(_, hosted)| is_wanted(hosted))
+            .take(count)
+            .map(|(number, hosted)| (number, Arc::clone(hosted)))
             .collect()
-    }
-
-    fn find(&self, wanted: impl Fn(&Hosted) -> bool) -> Option<Arc<Hosted>> {
-        let table = self.lock();
-        let found = table.by_number.values().find(|hosted| wanted(hosted));
-        found.cloned()
     }
 
     /// Enters a tournament into the table and lets it move.
@@ -231,18 +206,7 @@ impl Tournaments {
             changes: watch::Sender::new(0),
             shown: Shown::default(),
         });
-        let mut table = self.lock();
-        while table.by_number.len() >= MAX_TOURNAMENTS
-            && let Some(number) = (table.by_number.iter())
-                .find(|(_, hosted)| hosted.is_over())
-                .map(|(number, _)| *number)
-        {
-            table.by_number.remove(&number);
-        }
-        let number = table.next_number;
-        table.next_number += 1;
-        table.by_number.insert(number, Arc::clone(&hosted));
-        drop(table);
+        self.lock().enter(Arc::clone(&hosted));
         // Before anybody can ask for a record.
         hosted.withhold(&hosted.deals(), &self.rooms);
         if hosted.is_over() {
@@ -259,24 +223,56 @@ impl Tournaments {
     }
 }
 
-/// A place for a tournament that is being made.
-struct Place<'a>(&'a Tournaments);
+/// A place in the table for a tournament that is being made.
+struct Place(Arc<Tournaments>);
 
-impl<'a> Place<'a> {
-    fn reserve(tournaments: &'a Tournaments) -> Result<Self, CreateProblem> {
-        let mut table = tournaments.lock();
-        let open = table.by_number.values().filter(|hosted| !hosted.is_over());
-        if open.count() + table.being_made >= MAX_TOURNAMENTS {
+impl Place {
+    fn reserve(tournaments: &Arc<Tournaments>) -> Result<Self, CreateProblem> {
+        if !tournaments.lock().reserve() {
             return Err(CreateProblem::TooMany(MAX_TOURNAMENTS));
         }
-        table.being_made += 1;
-        Ok(Self(tournaments))
+        Ok(Self(Arc::clone(tournaments)))
+    }
+
+    async fn make(
+        self,
+        name: String,
+        plan: TournamentPlan,
+        mut core: Tournament,
+    ) -> Result<(Arc<Hosted>, Token), CreateProblem> {
+        let tournaments = &self.0;
+        let id = Id::random();
+        let owner = Token::random(id);
+        let header = TournamentHeader {
+            id,
+            settings: convert::settings_to_proto(&name, &plan),
+            created_at_ms: since_epoch_ms(),
+            join_code: join_code(),
+            owner: owner.hash(),
+            deal_secret: random_bytes(),
+        };
+        let mut entries = Vec::new();
+        for entrant in built_in(&plan) {
+            let change = Change::Joined(entrant);
+            core.fold(&change);
+            entries.push(TournamentEntry::Change(change));
+        }
+        let store = tournaments.rooms.store();
+        store
+            .create_tournament(Arc::new(header.clone()), entries.clone())
+            .await?;
+        let kept = KeptTournament {
+            header,
+            rows: 1,
+            entries,
+        };
+        Ok((tournaments.take_up(kept, plan, core), owner))
     }
 }
 
-impl Drop for Place<'_> {
+impl Drop for Place {
     fn drop(&mut self) {
-        self.0.lock().being_made -= 1;
+        self.0.lock().give_back();
     }
 }
 

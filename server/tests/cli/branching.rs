@@ -105,6 +105,10 @@ fn a_recorded_game_is_branched_and_its_players_play_again() {
             .collect::<Vec<_>>()
     };
     assert_eq!(listed(&[]), [first.as_str(), second.as_str()]);
+    assert_eq!(
+        listed(&["--newest-first"]),
+        [second.as_str(), first.as_str()]
+    );
     assert_eq!(listed(&["--origin", "branched"]), [second.as_str()]);
     assert_eq!(listed(&["--room-name", "first"]), [first.as_str()]);
     assert_eq!(listed(&["--participant", "replay"]), [second.as_str()]);

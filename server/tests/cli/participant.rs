@@ -57,6 +57,7 @@ fn expression(label: &str, record_only: bool) -> v1::Expression {
 async fn play_game(client: &Client) -> String {
     let built_in = || v1::SeatConfig {
         filled_by: Some(v1::seat_config::FilledBy::BuiltInAgent("random".into())),
+        ..v1::SeatConfig::default()
     };
     let made = client
         .create_room(v1::CreateRoomRequest {

@@ -264,6 +264,13 @@ fn only_its_owner_begins_and_closes_a_tournament() {
         .unwrap()
         .strip_prefix("tournament   ")
         .unwrap();
+    let told = |arguments: &[&str]| {
+        let told = run(&url, &[&["tournament"], arguments].concat());
+        String::from_utf8(told.stdout).unwrap()
+    };
+    let before = told(&["results", id]);
+    assert!(before.contains("nothing has been played yet"), "{before}");
+    assert!(before.contains("Who takes part"), "{before}");
 
     let wrong = run(
         &url,
@@ -307,6 +314,10 @@ fn only_its_owner_begins_and_closes_a_tournament() {
         Some(1),
         "a closed tournament did not finish: {lines:?}"
     );
+    let after = told(&["results", id]);
+    assert!(after.contains("no game was counted"), "{after}");
+    assert!(told(&["list", "--state", "closed"]).starts_with(id));
+    assert_eq!(told(&["list", "--state", "open"]), "no tournaments\n");
 }
 
 #[test]

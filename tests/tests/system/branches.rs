@@ -116,6 +116,7 @@ async fn who_joins_a_branch_is_told_what_was_before_and_goes_on() {
     let mut seats = all_recorded(first.game_id());
     seats[2] = v1::SeatConfig {
         filled_by: Some(FilledBy::ReservedFor(0)),
+        ..v1::SeatConfig::default()
     };
     let created = client
         .create_room(v1::CreateRoomRequest {

@@ -12,6 +12,7 @@ use chefshat_tests::patiently;
 pub(crate) fn built_in(name: &str) -> v1::SeatConfig {
     v1::SeatConfig {
         filled_by: Some(FilledBy::BuiltInAgent(name.into())),
+        ..v1::SeatConfig::default()
     }
 }
 
@@ -21,6 +22,7 @@ pub(crate) fn recorded(game_id: &str, seat: u32) -> v1::SeatConfig {
             game_id: game_id.into(),
             seat,
         })),
+        ..v1::SeatConfig::default()
     }
 }
 

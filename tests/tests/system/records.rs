@@ -95,29 +95,41 @@ fn reason(status: &Status) -> String {
         .unwrap_or_default()
 }
 
+/// All records, page by page.
+async fn listed(
+    service: &mut RecordServiceClient<Channel>,
+    newest_first: bool,
+) -> Vec<v1::RecordSummary> {
+    let mut listed = Vec::new();
+    let mut page_token = String::new();
+    loop {
+        let request = v1::ListRecordsRequest {
+            page_size: 2,
+            page_token,
+            newest_first,
+            ..v1::ListRecordsRequest::default()
+        };
+        let page = service.list_records(request).await.expect("a page");
+        let page = page.into_inner();
+        assert!(page.records.len() <= 2);
+        listed.extend(page.records);
+        page_token = page.next_page_token;
+        if page_token.is_empty() {
+            return listed;
+        }
+    }
+}
+
 #[tokio::test]
 async fn records_are_listed_in_pages_and_streamed_whole() {
     for (store, _folder) in stores().await {
         let (server, games) = server_with_games(store).await;
         let mut service = service(&server).await;
-        let mut listed = Vec::new();
-        let mut page_token = String::new();
-        loop {
-            let request = v1::ListRecordsRequest {
-                page_size: 2,
-                page_token,
-                ..v1::ListRecordsRequest::default()
-            };
-            let page = service.list_records(request).await.expect("a page");
-            let page = page.into_inner();
-            assert!(page.records.len() <= 2);
-            listed.extend(page.records);
-            page_token = page.next_page_token;
-            if page_token.is_empty() {
-                break;
-            }
-        }
-        let mut ids: Vec<String> = listed.iter().map(|it| it.game_id.clone()).collect();
+        let oldest_first = listed(&mut service, false).await;
+        let mut newest_first = listed(&mut service, true).await;
+        newest_first.reverse();
+        assert_eq!(newest_first, oldest_first);
+        let mut ids: Vec<String> = oldest_first.iter().map(|it| it.game_id.clone()).collect();
         let mut expected = games.clone();
         ids.sort();
         expected.sort();
@@ -136,7 +148,7 @@ async fn records_are_listed_in_pages_and_streamed_whole() {
             .flat_map(|part: v1::StreamRecordsResponse| part.lines)
             .collect();
         let mut apart = Vec::new();
-        for summary in &listed {
+        for summary in &oldest_first {
             let lines = record(&mut service, &summary.game_id).await.expect("held");
             let replayed = chefshat_records::replay::replay(&lines).expect("it replays");
             assert_eq!(replayed.standings, summary.standings);

@@ -2,17 +2,13 @@
 
 use chefshat_client::Client;
 use chefshat_engine::RuleSetSpec;
-use chefshat_proto::v1::{self, game_event::Kind, record_line::Line, seat_config::FilledBy};
+use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 use chefshat_records::{jsonl, replay};
 use chefshat_tests::{
     TestServer, attach_all, one_shift, patiently, play_on, random_agents, room_of_four,
 };
 
-fn built_in(name: &str) -> v1::SeatConfig {
-    v1::SeatConfig {
-        filled_by: Some(FilledBy::BuiltInAgent(name.into())),
-    }
-}
+use crate::played::built_in;
 
 async fn until_over(client: &Client, room_id: &str) -> v1::Room {
     let mut watching = client.spectate(room_id, 0);
@@ -129,50 +125,6 @@ async fn what_makes_no_sense_is_refused_with_the_field() {
     let info = client.server_info().await.expect("the server answers");
     assert_eq!(info.open_rooms, 0, "nothing was made");
     assert_eq!(info.presets.len(), RuleSetSpec::PRESETS.len());
-}
-
-#[tokio::test]
-async fn rooms_are_listed_by_pages_and_states() {
-    let server = TestServer::start().await;
-    let client = server.client().await;
-    let mut made = Vec::new();
-    for number in 0..5 {
-        let created = client
-            .create_room(v1::CreateRoomRequest {
-                name: format!("room {number}"),
-                ..v1::CreateRoomRequest::default()
-            })
-            .await
-            .expect("the room is made");
-        made.push(created.room.expect("a room").room_id);
-    }
-    let mut listed = Vec::new();
-    let mut page_token = String::new();
-    loop {
-        let page = client
-            .list_rooms(v1::ListRoomsRequest {
-                page_size: 2,
-                page_token,
-                ..v1::ListRoomsRequest::default()
-            })
-            .await
-            .expect("a page");
-        assert!(page.rooms.len() <= 2);
-        listed.extend(page.rooms.into_iter().map(|room| room.room_id));
-        page_token = page.next_page_token;
-        if page_token.is_empty() {
-            break;
-        }
-    }
-    assert_eq!(listed, made);
-    let playing = client
-        .list_rooms(v1::ListRoomsRequest {
-            state: v1::RoomState::Playing.into(),
-            ..v1::ListRoomsRequest::default()
-        })
-        .await
-        .expect("a page");
-    assert!(playing.rooms.is_empty());
 }
 
 #[tokio::test]

@@ -16,7 +16,7 @@ use tonic_types::StatusExt as _;
 
 #[tokio::test]
 async fn a_shutdown_in_mid_game_aborts_it_as_such() {
-    let mut server = TestServer::start().await;
+    let server = TestServer::start().await;
     let client = server.client().await;
     let (created, tickets) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
     let game_id = created.room.expect("a room").game_id;
@@ -52,7 +52,7 @@ async fn a_shutdown_in_mid_game_aborts_it_as_such() {
 
 #[tokio::test]
 async fn a_running_game_gets_its_grace_and_no_new_rooms_are_made() {
-    let mut server = TestServer::with(
+    let server = TestServer::with(
         |config| config.grace = Duration::from_secs(3600),
         Arc::new(MemoryStore::default()),
     )
@@ -105,7 +105,7 @@ async fn a_running_game_gets_its_grace_and_no_new_rooms_are_made() {
 
 #[tokio::test]
 async fn a_client_that_does_not_read_cannot_hold_up_a_shutdown() {
-    let mut server = TestServer::start().await;
+    let server = TestServer::start().await;
     let client = server.client().await;
     let rules = v1::RuleSet {
         stop: Some(v1::rule_set::Stop::TargetShifts(200)),

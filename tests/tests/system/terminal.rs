@@ -1,143 +1,13 @@
-//! `chefshat play` and `chefshat watch` in a real terminal: tmux, whose keys a test presses and whose screen it reads. What the screens say in
-//! detail is tested beside their code.
+//! `chefshat play` and `chefshat watch` in a real terminal (see `tmux`). What the screens say in detail is tested beside their code.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
-use std::time::{Duration, Instant};
+use std::process::Command;
 
 use chefshat_client::{Client, v1};
-use chefshat_tests::{Launch, PATIENCE, one_shift, set_up, skip};
+use chefshat_tests::{Launch, one_shift, set_up};
 use tempfile::TempDir;
-use tokio::time::sleep;
 
-/// Time between two looks at the screen.
-const PAUSE: Duration = Duration::from_millis(50);
-
-/// A terminal; gone when dropped.
-struct Terminal {
-    /// tmux's socket, in a folder of its own.
-    folder: TempDir,
-}
-
-impl Terminal {
-    /// Starts the program in a terminal of 80 columns and 24 rows; `None`, said, where there is no tmux.
-    fn start(test: &str, arguments: &[&str]) -> Option<Self> {
-        let there = Command::new("tmux")
-            .arg("-V")
-            .stdout(Stdio::null())
-            .status();
-        if !there.is_ok_and(|status| status.success()) {
-            skip(test, "there is no tmux; `apt-get install tmux` brings it");
-            return None;
-        }
-        let terminal = Self {
-            folder: TempDir::new().expect("a temporary folder"),
-        };
-        let words = arguments.iter().map(|word| format!("'{word}'"));
-        let words = words.collect::<Vec<_>>().join(" ");
-        let binary = set_up("CHEFSHAT_BIN");
-        let binary = binary.display();
-        // What the program says after its screen, and its end, stay to be read.
-        let line = format!("'{binary}' {words}; echo \"ended with $?\"; exec cat");
-        let started = terminal.tmux(&[
-            "-f",
-            "/dev/null",
-            "new-session",
-            "-d",
-            "-x",
-            "80",
-            "-y",
-            "24",
-            &line,
-        ]);
-        assert!(started.status.success(), "{started:?}");
-        Some(terminal)
-    }
-
-    fn tmux(&self, arguments: &[&str]) -> Output {
-        let mut command = Command::new("tmux");
-        for (name, _) in std::env::vars_os() {
-            let name = name.to_string_lossy().into_owned();
-            if name.starts_with("CHEFSHAT_") || name.starts_with("TMUX") {
-                command.env_remove(name);
-            }
-        }
-        command.env("LC_ALL", "C.UTF-8").arg("-S");
-        command.arg(self.folder.path().join("socket"));
-        command.args(arguments).output().expect("the program runs")
-    }
-
-    fn press(&self, key: &str) {
-        let pressed = self.tmux(&["send-keys", key]);
-        assert!(pressed.status.success(), "{pressed:?}");
-    }
-
-    /// Interrupts the program from outside, as no key does: the terminal gives keys to it as they are.
-    fn interrupt(&self) {
-        let shell = self.tmux(&["display-message", "-p", "#{pane_pid}"]).stdout;
-        let shell = String::from_utf8(shell).expect("a number is text");
-        let told = Command::new("pkill")
-            .args(["-INT", "-P", shell.trim()])
-            .status();
-        assert!(told.is_ok_and(|status| status.success()), "{shell}");
-    }
-
-    fn screen(&self) -> String {
-        String::from_utf8(self.tmux(&["capture-pane", "-p"]).stdout).expect("a screen is text")
-    }
-
-    /// Waits until the screen is as wanted.
-    async fn wait(&self, what: &str, wanted: impl Fn(&str) -> bool) -> String {
-        let begun = Instant::now();
-        loop {
-            let screen = self.screen();
-            if wanted(&screen) {
-                return screen;
-            }
-            assert!(begun.elapsed() < PATIENCE, "no {what}:\n{screen}");
-            sleep(PAUSE).await;
-        }
-    }
-
-    async fn wait_for(&self, words: &str) -> String {
-        self.wait(words, |screen| screen.contains(words)).await
-    }
-
-    /// Plays as a person would, by what the screen says, until it says `until`; gives the number of decisions.
-    async fn play(&self, until: &str) -> usize {
-        let begun = Instant::now();
-        let mut decisions = 0;
-        loop {
-            let screen = self.screen();
-            if screen.contains(until) {
-                return decisions;
-            }
-            let key = if screen.contains("nothing can be played") {
-                Some("p")
-            } else if screen.contains("Your turn: play") || screen.contains("Give a card") {
-                Some("Enter")
-            } else if screen.contains("Two jokers!") {
-                Some("d")
-            } else {
-                None
-            };
-            if let Some(key) = key {
-                decisions += 1;
-                self.press(key);
-                // The next look is for what came of it.
-                self.wait("answer", |now| now != screen).await;
-            }
-            assert!(begun.elapsed() < PATIENCE, "no end:\n{screen}");
-            sleep(PAUSE).await;
-        }
-    }
-}
-
-impl Drop for Terminal {
-    fn drop(&mut self) {
-        self.tmux(&["kill-server"]);
-    }
-}
+use crate::tmux::Terminal;
 
 #[tokio::test]
 async fn a_person_plays_two_shifts_with_one_command() {
@@ -174,8 +44,7 @@ async fn a_person_plays_two_shifts_with_one_command() {
     let decisions = terminal.play("the game is over").await;
     assert!(decisions > 5, "{decisions} decisions only");
     terminal.press("Enter");
-    let said = terminal.wait_for("ended with").await;
-    assert!(said.contains("ended with 0"), "{said}");
+    let said = terminal.ended(0).await;
     assert!(said.contains("you have place"), "{said}");
 
     let record = only_record(data.path());
@@ -197,8 +66,8 @@ async fn a_person_plays_two_shifts_with_one_command() {
     watched.wait_for("wins the game").await;
     watched.press("Home");
     watched.wait_for(" 0/").await;
-    watched.interrupt();
-    let left = watched.wait_for("ended with 0").await;
+    watched.signal("-INT");
+    let left = watched.ended(0).await;
     assert!(!left.contains("the pizza"), "{left}");
 }
 
@@ -249,6 +118,7 @@ async fn room(client: &Client) -> (String, String) {
             seats: seats
                 .map(|filled_by| v1::SeatConfig {
                     filled_by: Some(filled_by),
+                    ..v1::SeatConfig::default()
                 })
                 .collect(),
             ..v1::CreateRoomRequest::default()
@@ -273,9 +143,127 @@ async fn leaving_gives_the_terminal_back() {
     terminal.press("q");
     terminal.wait_for("Leave the table?").await;
     terminal.press("y");
-    let said = terminal.wait_for("ended with").await;
-    assert!(said.contains("ended with 1"), "{said}");
+    let said = terminal.ended(1).await;
     assert!(said.contains("you left"), "{said}");
+
+    let terminated = Terminal::start("and so does being ended", &play).expect("tmux is there");
+    terminated.wait_for("your hand").await;
+    terminated.signal("-TERM");
+    terminated.ended(1).await;
+}
+
+/// Joins a tournament of built-in agents by its code, leaves in the middle, goes on with the ticket, through a restart of the server, to the
+/// end.
+#[tokio::test]
+async fn a_person_plays_a_tournament_of_built_in_agents_to_its_end() {
+    let data = TempDir::new().expect("a temporary folder");
+    let mut launch = Launch::new(data.path());
+    let server = launch.start().await.expect("the server listens");
+    let url = launch.url();
+    let client = Client::connect(&url).await.expect("the server listens");
+    let (code, tournament_id) = tournament(&client).await;
+    let test = "a_person_plays_a_tournament_of_built_in_agents_to_its_end";
+    let join = ["play", "--server", &url, "--code", &code, "--name", "Ada"];
+    let Some(terminal) = Terminal::start(test, &join) else {
+        return;
+    };
+    // A game that nobody else is awaited for begins by itself, and its result is shown.
+    terminal.wait_for("your hand").await;
+    terminal.play("the game is over").await;
+    terminal.press("q");
+    terminal.wait_for("Leave the tournament?").await;
+    terminal.press("y");
+    let said = terminal.ended(1).await;
+    let (_, ticket) = said.split_once("--ticket ").expect("how one comes back");
+    let ticket = ticket.split_whitespace().next().expect("a ticket");
+
+    let back = ["play", "--server", &url, "--ticket", ticket];
+    let terminal = Terminal::start(test, &back).expect("tmux is there");
+    terminal.wait_for("your hand").await;
+    server.kill().await;
+    terminal.wait_for("connection is lost").await;
+    let server = launch.start().await.expect("the server listens");
+    terminal.wait_for("● connected").await;
+    let decisions = terminal.play("final standings").await;
+    assert!(decisions > 3, "{decisions} decisions only");
+    let end = terminal.wait_for("Enter ends").await;
+    assert!(end.contains("Ada (you)"), "{end}");
+    terminal.press("Enter");
+    let said = terminal.ended(0).await;
+    assert!(said.contains("the tournament is over: you are"), "{said}");
+
+    let client = Client::connect(&url).await.expect("the server listens");
+    let results = client.tournament_results(tournament_id).await;
+    let results = results.expect("there are some");
+    let games: Vec<u32> = results.standings.iter().map(|line| line.games).collect();
+    let forfeited: u32 = results.standings.iter().map(|line| line.forfeited).sum();
+    assert_eq!((games, forfeited), (vec![3; 4], 0));
+    server.stop().await;
+}
+
+/// A tournament of three rounds for one person and three built-in agents, without hurry: its join code and its id.
+async fn tournament(client: &Client) -> (String, String) {
+    let made = client
+        .create_tournament(v1::TournamentSettings {
+            name: "friday".into(),
+            format: v1::TournamentFormat::Swiss.into(),
+            rounds: 3,
+            rules: Some(one_shift()),
+            policy: Some(v1::RoomPolicy {
+                decision_time_ms: Some(3_600_000),
+                ..v1::RoomPolicy::default()
+            }),
+            built_in_agents: ["greedy", "random", "greedy"].map(Into::into).into(),
+            start_when_joined: 4,
+            no_show_time_ms: 3_600_000,
+            ..v1::TournamentSettings::default()
+        })
+        .await
+        .expect("the tournament is made");
+    let tournament = made.tournament.expect("the server says which");
+    (made.join_code, tournament.tournament_id)
+}
+
+/// What is refused ends with a sentence that says what to do.
+#[tokio::test]
+async fn what_is_refused_says_what_to_do() {
+    let data = TempDir::new().expect("a temporary folder");
+    let mut launch = Launch::new(data.path());
+    let server = launch.start().await.expect("the server listens");
+    let url = launch.url();
+    let client = Client::connect(&url).await.expect("the server listens");
+    let (code, _) = room(&client).await;
+    let taken = client.join(v1::JoinRoomRequest {
+        join_code: code.clone(),
+        name: "Ben".into(),
+        kind: v1::ParticipantKind::Human.into(),
+        ..v1::JoinRoomRequest::default()
+    });
+    taken.await.expect("there is a seat");
+    let long = "x".repeat(65);
+    let table: [(&[&str], &str); 5] = [
+        (&["--code", "ZZZZZZZZ"], "see that it is typed"),
+        (&["--code", &code], "chefshat watch"),
+        (&["--code", &code, "--name", &long], "another --name"),
+        (&["--ticket", "00"], "join again"),
+        (
+            &["--code", &code, "--server", "http://127.0.0.1:9"],
+            "chefshat serve",
+        ),
+    ];
+    for (arguments, todo) in table {
+        let play = [&["play"], arguments].concat();
+        let play = match arguments.contains(&"--server") {
+            true => play,
+            false => [play.as_slice(), &["--server", &url]].concat(),
+        };
+        let Some(terminal) = Terminal::start("what_is_refused_says_what_to_do", &play) else {
+            return;
+        };
+        let said = terminal.ended(1).await;
+        assert!(said.contains(todo), "{arguments:?}: {said}");
+    }
+    server.stop().await;
 }
 
 /// The one record in a data folder.

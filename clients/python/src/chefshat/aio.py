@@ -21,7 +21,7 @@ from chefshat._gen.chefshat.v1.tournament_service_pb2_grpc import TournamentServ
 from chefshat.agents import Agent
 from chefshat.backoff import Backoff
 from chefshat.errors import ChefsHatError, connection_lost, from_rpc_error
-from chefshat.participant import MakeAgent
+from chefshat.participant import MakeAgent, OnEntered
 from chefshat.place import Ask
 from chefshat.requests import awaited
 from chefshat.result import SeatResult
@@ -102,7 +102,7 @@ class Client(AsyncTournamentCalls):
         return (await awaited(self._rooms.GetRoom(pb.GetRoomRequest(room_id=room_id)))).room
 
     async def list_rooms(self, state: pb.RoomState.ValueType = pb.ROOM_STATE_UNSPECIFIED) -> AsyncIterator[pb.Room]:
-        """The server's rooms, newest last; those in one state alone if it is given. Pages are fetched as they are needed."""
+        """The server's rooms, newest first; those in one state alone if it is given. Pages are fetched as they are needed."""
         token = ""
         while True:
             page = await awaited(self._rooms.ListRooms(pb.ListRoomsRequest(state=state, page_token=token)))
@@ -125,11 +125,17 @@ class Client(AsyncTournamentCalls):
         """The text of every action for decks of so many faces (0: the standard 11)."""
         return await awaited(self._server.GetActionTable(pb.GetActionTableRequest(faces=faces)))
 
-    async def records(self, wanted: pb.RecordFilter | None = None) -> AsyncIterator[pb.RecordSummary]:
-        """The records the server holds, oldest first; those a filter lets through if one is given. Pages are fetched as needed."""
+    async def records(
+        self, wanted: pb.RecordFilter | None = None, *, newest_first: bool = False
+    ) -> AsyncIterator[pb.RecordSummary]:
+        """The records the server holds, oldest first unless asked otherwise; those a filter lets through if one is given.
+
+        Pages are fetched as they are needed.
+        """
         token = ""
         while True:
-            page = await awaited(self._records.ListRecords(pb.ListRecordsRequest(filter=wanted, page_token=token)))
+            request = pb.ListRecordsRequest(filter=wanted, page_token=token, newest_first=newest_first)
+            page = await awaited(self._records.ListRecords(request))
             for summary in page.records:
                 yield summary
             token = page.next_page_token
@@ -204,14 +210,16 @@ class Client(AsyncTournamentCalls):
         await self._play_session(session)
         return session.results()
 
-    async def play_tournament(self, ticket: str, make_agent: MakeAgent, *, options: PlayOptions | None = None) -> list[SeatResult]:
+    async def play_tournament(
+        self, ticket: str, make_agent: MakeAgent, *, options: PlayOptions | None = None, on_entered: OnEntered | None = None
+    ) -> list[SeatResult]:
         """Takes part in a tournament until it is over, in as many games at a time as the participant said it can play.
 
         The server seats the participant in its games; all are played over one stream. A lost connection is made again, and the
         agents go on with their games. Those whose `decide` is a coroutine think at the same time. The arguments, the results and
         what is raised are those of the blocking client.
         """
-        session = PlaySession.of_participant(ticket, make_agent, options)
+        session = PlaySession.of_participant(ticket, make_agent, options, on_entered)
         await self._play_session(session)
         return session.played()
 

@@ -22,7 +22,7 @@ from chefshat._gen.chefshat.v1.tournament_service_pb2_grpc import TournamentServ
 from chefshat.agents import Agent
 from chefshat.backoff import Backoff
 from chefshat.errors import ChefsHatError, connection_lost, from_rpc_error
-from chefshat.participant import MakeAgent
+from chefshat.participant import MakeAgent, OnEntered
 from chefshat.place import Ask
 from chefshat.requests import called
 from chefshat.result import SeatResult
@@ -119,7 +119,7 @@ class Client(TournamentCalls):
         return called(lambda: self._rooms.GetRoom(pb.GetRoomRequest(room_id=room_id))).room
 
     def list_rooms(self, state: pb.RoomState.ValueType = pb.ROOM_STATE_UNSPECIFIED) -> Iterator[pb.Room]:
-        """The server's rooms, newest last; those in one state alone if it is given. Pages are fetched as they are needed."""
+        """The server's rooms, newest first; those in one state alone if it is given. Pages are fetched as they are needed."""
         token = ""
         while True:
             page = self._rooms_page(pb.ListRoomsRequest(state=state, page_token=token))
@@ -144,11 +144,15 @@ class Client(TournamentCalls):
         """The text of every action for decks of so many faces (0: the standard 11)."""
         return called(lambda: self._server.GetActionTable(pb.GetActionTableRequest(faces=faces)))
 
-    def records(self, wanted: pb.RecordFilter | None = None) -> Iterator[pb.RecordSummary]:
-        """The records the server holds, oldest first; those a filter lets through if one is given. Pages are fetched as needed."""
+    def records(self, wanted: pb.RecordFilter | None = None, *, newest_first: bool = False) -> Iterator[pb.RecordSummary]:
+        """The records the server holds, oldest first unless asked otherwise; those a filter lets through if one is given.
+
+        Pages are fetched as they are needed.
+        """
         token = ""
         while True:
-            page = self._records_page(pb.ListRecordsRequest(filter=wanted, page_token=token))
+            request = pb.ListRecordsRequest(filter=wanted, page_token=token, newest_first=newest_first)
+            page = self._records_page(request)
             yield from page.records
             token = page.next_page_token
             if not token:
@@ -224,16 +228,19 @@ class Client(TournamentCalls):
         self._play_session(session)
         return session.results()
 
-    def play_tournament(self, ticket: str, make_agent: MakeAgent, *, options: PlayOptions | None = None) -> list[SeatResult]:
+    def play_tournament(
+        self, ticket: str, make_agent: MakeAgent, *, options: PlayOptions | None = None, on_entered: OnEntered | None = None
+    ) -> list[SeatResult]:
         """Takes part in a tournament until it is over, in as many games at a time as the participant said it can play.
 
         The server seats the participant in its games; all are played over one stream. A lost connection is made again, and the
         agents go on with their games. They decide one after the other, as in `play_many`.
 
         Args:
-            ticket: the participant's, from `join_tournament`.
+            ticket: the participant's, from `join_tournament`. With that of a seat, this seat's game alone is played.
             make_agent: called with the seat for every game the participant is seated in; gives the game's agent.
             options: how the seats attach.
+            on_entered: told of the tournament and the participant's number, on each connection; not where the ticket is a seat's.
 
         Returns:
             What came of each game, in the order in which the participant was seated. One that was aborted, or that could not be
@@ -243,7 +250,7 @@ class Client(TournamentCalls):
             ChefsHatError: the ticket was refused, a newer connection takes part in this one's place ("SUPERSEDED"), or the server
                 stayed unreachable. What had come of games by then their agents were told (`on_game_over`).
         """
-        session = PlaySession.of_participant(ticket, make_agent, options)
+        session = PlaySession.of_participant(ticket, make_agent, options, on_entered)
         self._play_session(session)
         return session.played()
 

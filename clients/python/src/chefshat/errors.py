@@ -104,7 +104,10 @@ def _error_info(trailers: Iterable[tuple[str, str | bytes]]) -> tuple[str, dict[
 def failed(error: Exception, *, as_json: bool) -> int:
     """What a command says of an error: a line of JSON on standard output, or words on standard error. Returns its exit code."""
     if as_json:
-        print(json.dumps({"event": "error", "reason": getattr(error, "reason", "REFUSED"), "message": str(error)}))
+        said: dict[str, object] = {"event": "error", "reason": "REFUSED", "message": str(error)}
+        if isinstance(error, ChefsHatError):
+            said.update(reason=error.reason, message=error.message, metadata=error.metadata)
+        print(json.dumps(said))
     else:
         print(f"error: {error}", file=sys.stderr)
     return 1

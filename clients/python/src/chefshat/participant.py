@@ -17,13 +17,17 @@ REQUEST_ID = 2**32 - 1
 MakeAgent: TypeAlias = Callable[[SeatInfo], Agent]
 """Gives the agent of a game that the participant is seated in. A subclass of `Agent` whose constructor takes the seat is one."""
 
+OnEntered: TypeAlias = Callable[[pb.Entered], None]
+"""Is told, on each connection, of the tournament that a participant takes part in, and of its number there."""
+
 
 class Participant:
     """One participant's part of a session; it outlives connections."""
 
-    def __init__(self, ticket: str, make_agent: MakeAgent, entropy: bytes) -> None:
+    def __init__(self, ticket: str, make_agent: MakeAgent, entropy: bytes, on_entered: OnEntered | None = None) -> None:
         self.ticket = ticket
         self.make_agent = make_agent
+        self._on_entered = on_entered
         # One for all games of the participant, as the protocol has it.
         self.entropy = entropy
         # Handle on the present connection; None while not attached.
@@ -31,6 +35,12 @@ class Participant:
         # Whether it will be seated no more, and why if not because the tournament is over.
         self.over = False
         self.error: ChefsHatError | None = None
+
+    def enter(self, handle: int, entered: pb.Entered) -> None:
+        """The stream is attached to it."""
+        self.handle = handle
+        if self._on_entered is not None:
+            self._on_entered(entered)
 
     def end(self, error: ChefsHatError | None = None) -> None:
         """It will be seated no more."""

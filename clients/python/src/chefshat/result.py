@@ -32,7 +32,8 @@ class SeatResult:
         late: answers that came when the decision was closed already.
         annotations_dropped: annotations that were not recorded, being too large or not finite.
         reconnects: how often the seat was attached anew after its connection was lost.
-        entropy: the seat's own part of the game seed, as it was sent.
+        entropy: the seat's own part of the game seed, as it was sent. Where the game had begun before this session, what another
+            sent then counts.
         error: why the seat left before its game was over (reason "SUPERSEDED": a newer connection took it); None otherwise.
     """
 

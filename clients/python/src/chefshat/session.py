@@ -19,7 +19,7 @@ from chefshat.agents import Agent
 from chefshat.decision import Decision, SeatInfo
 from chefshat.errors import ChefsHatError, from_refused
 from chefshat.limits import MAX_ENTROPY_BYTES, pack, why_not_recorded
-from chefshat.participant import REQUEST_ID, MakeAgent, Participant
+from chefshat.participant import REQUEST_ID, MakeAgent, OnEntered, Participant
 from chefshat.place import Ask, SeatPlace
 from chefshat.requests import attach
 from chefshat.result import SeatResult, abort_reason_of, standings_of
@@ -78,10 +78,15 @@ class PlaySession:
             self._add(ticket, agent, self._options.draw_entropy())
 
     @classmethod
-    def of_participant(cls, ticket: str, make_agent: MakeAgent, options: PlayOptions | None = None) -> Self:
-        """Begins a session of the seats that a participant of a tournament will be given, each with an agent of its own."""
+    def of_participant(
+        cls, ticket: str, make_agent: MakeAgent, options: PlayOptions | None = None, on_entered: OnEntered | None = None
+    ) -> Self:
+        """Begins a session of the seats that a participant of a tournament will be given, each with an agent of its own.
+
+        Whose ticket it is only the server knows: if it is that of a seat, the session is of this seat alone.
+        """
         session = cls({}, options)
-        session._participant = Participant(ticket, make_agent, session._options.draw_entropy())
+        session._participant = Participant(ticket, make_agent, session._options.draw_entropy(), on_entered)
         return session
 
     def _add(self, ticket: str, agent: Agent, entropy: bytes) -> SeatPlace:
@@ -181,8 +186,7 @@ class PlaySession:
                 continue
             place = by_handle.get(update.handle)
             if place is None:
-                if self._participant is not None:
-                    self._participant_told(self._participant, update)
+                self._told_no_seat(update)
                 continue
             if what == "decision":
                 self._decision(place, update.decision, asks)
@@ -241,10 +245,17 @@ class PlaySession:
         if place.handle is not None and place.unacknowledged is not None:
             self._outbox.append(pb.SeatCommand(handle=place.handle, answer=place.unacknowledged))
 
-    def _participant_told(self, participant: Participant, update: pb.SeatUpdate) -> None:
-        """What a participant is told on the handle of its own."""
-        if update.HasField("entered"):
-            participant.handle = update.handle
+    def _told_no_seat(self, update: pb.SeatUpdate) -> None:
+        """What is told on a handle that is no seat's: a participant's own, or one that is of no interest any more."""
+        participant = self._participant
+        if participant is None:
+            place = self._places.get(update.entered.request_id)
+            if place is not None:
+                self._outbox.append(pb.SeatCommand(handle=update.handle, detach=pb.Detach()))
+                message = "it is the ticket of a participant in a tournament, not of a seat: `play_tournament` plays with it"
+                self._finish(place, ChefsHatError("TICKET_OF_PARTICIPANT", message))
+        elif update.HasField("entered"):
+            participant.enter(update.handle, update.entered)
         elif update.HasField("detached") and update.handle == participant.handle:
             participant.detached(update.detached.reason)
 
@@ -256,13 +267,21 @@ class PlaySession:
                 if place.handle is not None:
                     self._by_handle.pop(place.handle, None)
                 return place
+        return self._add_seat(participant, attached, attached.ticket)
+
+    def _add_seat(self, participant: Participant, attached: pb.Attached, ticket: str) -> SeatPlace:
         agent = participant.make_agent(SeatInfo(attached.room_id, attached.game_id, attached.seat))
-        return self._add(attached.ticket, agent, participant.entropy)
+        return self._add(ticket, agent, participant.entropy)
 
     def _attached(self, handle: int, attached: pb.Attached) -> None:
         place = self._places.get(attached.request_id)
-        if attached.request_id == 0 and self._participant is not None:
-            place = self._seated(self._participant, attached)
+        participant = self._participant
+        if participant is not None and attached.request_id == 0:
+            place = self._seated(participant, attached)
+        elif participant is not None and attached.request_id == REQUEST_ID:
+            # The ticket is a seat's: there is no participant.
+            place = self._add_seat(participant, attached, participant.ticket)
+            participant.end()
         if place is None:
             return
         place.handle = handle

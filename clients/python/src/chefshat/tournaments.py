@@ -83,11 +83,14 @@ class TournamentCalls(ABC):
         request = pb.GetTournamentRequest(tournament_id=tournament_id)
         return called(lambda: self._tournaments.GetTournament(request)).tournament
 
-    def list_tournaments(self) -> Iterator[pb.Tournament]:
-        """The server's tournaments, newest last, without their participants. Pages are fetched as they are needed."""
+    def list_tournaments(self, state: pb.TournamentState.ValueType = pb.TOURNAMENT_STATE_UNSPECIFIED) -> Iterator[pb.Tournament]:
+        """The server's tournaments, newest first, without their participants; those in one state alone if it is given.
+
+        Pages are fetched as they are needed.
+        """
         token = ""
         while True:
-            page = self._tournaments_page(pb.ListTournamentsRequest(page_token=token))
+            page = self._tournaments_page(pb.ListTournamentsRequest(state=state, page_token=token))
             yield from page.tournaments
             token = page.next_page_token
             if not token:
@@ -195,11 +198,17 @@ class AsyncTournamentCalls(ABC):
         request = pb.GetTournamentRequest(tournament_id=tournament_id)
         return (await awaited(self._tournaments.GetTournament(request))).tournament
 
-    async def list_tournaments(self) -> AsyncIterator[pb.Tournament]:
-        """The server's tournaments, newest last, without their participants. Pages are fetched as they are needed."""
+    async def list_tournaments(
+        self, state: pb.TournamentState.ValueType = pb.TOURNAMENT_STATE_UNSPECIFIED
+    ) -> AsyncIterator[pb.Tournament]:
+        """The server's tournaments, newest first, without their participants; those in one state alone if it is given.
+
+        Pages are fetched as they are needed.
+        """
         token = ""
         while True:
-            page = await awaited(self._tournaments.ListTournaments(pb.ListTournamentsRequest(page_token=token)))
+            request = pb.ListTournamentsRequest(state=state, page_token=token)
+            page = await awaited(self._tournaments.ListTournaments(request))
             for tournament in page.tournaments:
                 yield tournament
             token = page.next_page_token

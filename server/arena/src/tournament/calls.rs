@@ -98,10 +98,7 @@ impl Tournament {
 
     /// The change that closes it; `None` if it is over.
     pub fn close(&self) -> Option<Change> {
-        match self.course.state {
-            State::Open | State::Playing => Some(Change::Closed),
-            State::Finished | State::Closed => None,
-        }
+        (!self.course.state.is_over()).then_some(Change::Closed)
     }
 
     /// Looks at the games that may have to change, in order, until one of them has to.
@@ -177,30 +174,24 @@ fn result(course: &Course, game: &Game, shifts: u32, played: &[SeatPlayed]) -> G
         let behind = order.iter().position(|&other| other == seat);
         let behind = behind.expect("every seat is in the order");
         let forfeited = has_forfeited(seat);
-        // What the filler did in its place is nothing of its own.
-        let did = if forfeited {
-            SeatPlayed::default()
-        } else {
-            played[seat]
-        };
         SeatResult {
             participant,
             forfeited,
-            substituted: did.substituted,
-            place: behind + 1,
             score: if forfeited {
                 0
             } else {
                 let points = course.settings.points.get(behind);
                 points.copied().unwrap_or_default()
             },
-            points: did.points,
-            decisions: did.decisions,
-            wrong_actions: did.wrong_actions,
-            timeouts: did.timeouts,
-            decision_time_us: did.decision_time_us,
-            timed_decisions: did.timed_decisions,
-            performance_score: did.performance_score,
+            did: SeatPlayed {
+                place: behind + 1,
+                // What the filler did in its place is nothing of its own.
+                ..if forfeited {
+                    SeatPlayed::default()
+                } else {
+                    played[seat]
+                }
+            },
         }
     });
     GameResult {

@@ -91,45 +91,29 @@ pub struct GameResult {
     pub seats: Vec<SeatResult>,
 }
 
-/// What came of a game for the participant of one seat. Who forfeited did nothing in it: all counts are 0.
+/// What came of a game for the participant of one seat.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SeatResult {
     /// Who.
     pub participant: usize,
     /// Did not come.
     pub forfeited: bool,
-    /// A substitute took decisions for it.
-    pub substituted: bool,
-    /// Place in the game, from 1; those who forfeited are behind those who played.
-    pub place: usize,
     /// What the game is worth to it; 0 if it forfeited.
     pub score: u32,
-    /// Its points in the game.
-    pub points: u64,
-    /// Decisions it took itself or lost.
-    pub decisions: u64,
-    /// Invalid actions it answered.
-    pub wrong_actions: u64,
-    /// Decisions it lost to the clock.
-    pub timeouts: u64,
-    /// Measured time of its decisions, microseconds, in all.
-    pub decision_time_us: u64,
-    /// How many decisions were measured.
-    pub timed_decisions: u64,
-    /// Mean over the game's Shifts of 10 * points / pizzas.
-    pub performance_score: f64,
+    /// What it did. Who forfeited did nothing, and has a place behind those who played.
+    pub did: SeatPlayed,
 }
 
-/// One seat of a game as its record tells it. Fields as in [`SeatResult`].
+/// What was done on one seat of a game.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SeatPlayed {
-    /// Place, from 1, whoever played.
+    /// Place in the game, from 1.
     pub place: usize,
     /// Points in the game.
     pub points: u64,
     /// A substitute took decisions.
     pub substituted: bool,
-    /// Decisions taken by itself or lost.
+    /// Decisions taken by the participant itself, or lost.
     pub decisions: u64,
     /// Invalid actions.
     pub wrong_actions: u64,
@@ -150,7 +134,7 @@ pub enum Ended {
     Played {
         /// Shifts played.
         shifts: u32,
-        /// By seat.
+        /// By seat, whoever played there.
         seats: Vec<SeatPlayed>,
     },
     /// Not a card was dealt.

@@ -102,7 +102,7 @@ pub fn order_confidence(upper: &[Scored], lower: &[Scored]) -> OrderConfidence {
 }
 
 impl Tournament {
-    /// How sure the order of each two neighbours in the standings is, from the top, by the scores of all games that counted. Of two who always
+    /// How sure the order of each two neighbours in the standings is (none before a game has counted), from the top, by the scores of all games that counted. Of two who always
     /// sat at the same tables, every deal or game tells something. Others met others, who were better or worse, in all games of a
     /// round: of them it is whole rounds that tell.
     pub fn order_confidence(&self) -> Vec<Neighbours> {
@@ -118,7 +118,9 @@ impl Tournament {
                 });
             }
         }
-        let standings = self.standings();
+        // Before, they stand in no order that could be right or wrong.
+        let ordered = (self.has_counted()).then(|| self.standings());
+        let standings = ordered.unwrap_or_default();
         standings
             .windows(2)
             .map(|two| {

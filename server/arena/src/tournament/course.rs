@@ -20,6 +20,16 @@ pub enum State {
     Closed,
 }
 
+impl State {
+    /// Whether nothing more happens, one way or the other.
+    pub fn is_over(self) -> bool {
+        match self {
+            State::Open | State::Playing => false,
+            State::Finished | State::Closed => true,
+        }
+    }
+}
+
 /// A table of participants of one round and the games they play.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Pairing {
@@ -264,17 +274,18 @@ impl Course {
             let sums = &mut self.sums[seat.participant];
             sums.games += 1;
             sums.score += u64::from(seat.score);
-            sums.points += seat.points;
-            if let Some(times) = sums.places.get_mut(seat.place.wrapping_sub(1)) {
+            let did = &seat.did;
+            sums.points += did.points;
+            if let Some(times) = sums.places.get_mut(did.place.wrapping_sub(1)) {
                 *times += 1;
             }
             sums.forfeited += u32::from(seat.forfeited);
-            sums.substituted += u32::from(seat.substituted);
-            sums.wrong_actions += seat.wrong_actions;
-            sums.timeouts += seat.timeouts;
-            sums.decision_time_us += seat.decision_time_us;
-            sums.timed_decisions += seat.timed_decisions;
-            sums.performance += seat.performance_score;
+            sums.substituted += u32::from(did.substituted);
+            sums.wrong_actions += did.wrong_actions;
+            sums.timeouts += did.timeouts;
+            sums.decision_time_us += did.decision_time_us;
+            sums.timed_decisions += did.timed_decisions;
+            sums.performance += did.performance_score;
         }
         self.end(index, GameState::Counted(result.clone()));
     }

@@ -8,7 +8,7 @@ impl Game {
     pub fn is_rated(&self) -> bool {
         self.result().is_some_and(|result| {
             let mut seats = result.seats.iter();
-            seats.all(|seat| !seat.forfeited && !seat.substituted)
+            seats.all(|seat| !seat.forfeited && !seat.did.substituted)
         })
     }
 }
@@ -27,7 +27,7 @@ impl Tournament {
                 .map(|seat| {
                     (
                         seat.participant,
-                        u32::try_from(seat.place).unwrap_or(u32::MAX),
+                        u32::try_from(seat.did.place).unwrap_or(u32::MAX),
                     )
                 })
                 .collect();

@@ -11,7 +11,7 @@ use super::settings::Format;
 /// How a participant stands. Games it forfeited count, with a score of 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Standing {
-    /// Place in the tournament, from 1. The mean score of a game decides, then the mean of points, then, among those who are level, who was
+    /// Place in the tournament, from 1; 0 for all as long as no game has counted: they stand in the order of joining then. The mean score of a game decides, then the mean of points, then, among those who are level, who was
     /// more often placed better when they met, then the draw. In a knockout those who got further come first: in later rounds, then in a better
     /// place at their last table, once its round is over.
     pub place: u32,
@@ -82,16 +82,25 @@ fn ratio(sum: f64, count: u64) -> f64 {
 }
 
 impl Tournament {
+    /// Whether a game has counted: before, nobody is better than anybody else.
+    pub fn has_counted(&self) -> bool {
+        self.course.sums.iter().any(|sums| sums.games > 0)
+    }
+
     /// How all stand, best first; fillers are among them.
     pub fn standings(&self) -> Vec<Standing> {
         let course = &self.course;
         let format = course.settings.format;
+        let standing = |who: usize| Standing::new(who, &course.sums[who], format);
+        if !self.has_counted() {
+            return (0..course.participants.len()).map(standing).collect();
+        }
         let ordered = order(course).into_iter().zip(1..);
-        let standing = |(who, place): (usize, u32)| Standing {
+        let placed = |(who, place)| Standing {
             place,
-            ..Standing::new(who, &course.sums[who], format)
+            ..standing(who)
         };
-        ordered.map(standing).collect()
+        ordered.map(placed).collect()
     }
 }
 
@@ -133,8 +142,8 @@ pub(super) fn order_of_pairing(course: &Course, pairing: &Pairing) -> Vec<usize>
         for seat in results.flat_map(|result| &result.seats) {
             if seat.participant == *who {
                 score += u64::from(seat.score);
-                points += seat.points;
-                places += seat.place;
+                points += seat.did.points;
+                places += seat.did.place;
             }
         }
         let lot = Chance::lot(course.settings.draw_seed, *who);
@@ -175,7 +184,7 @@ fn balances(course: &Course, group: &[usize]) -> Vec<i64> {
         for one in &result.seats {
             for other in &result.seats {
                 if group[one.participant] == group[other.participant] {
-                    balance[one.participant] += match one.place.cmp(&other.place) {
+                    balance[one.participant] += match one.did.place.cmp(&other.did.place) {
                         Ordering::Less => 1,
                         Ordering::Equal => 0,
                         Ordering::Greater => -1,

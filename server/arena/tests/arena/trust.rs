@@ -3,8 +3,8 @@
 
 use chefshat_arena::AgentKind;
 use chefshat_arena::tournament::{
-    Change, Deals, Entrant, EntrantKind, Format, GameResult, SURE, Scored, SeatResult, Settings,
-    Tournament, order_confidence, play_offline,
+    Change, Deals, Entrant, EntrantKind, Format, GameResult, SURE, Scored, SeatPlayed, SeatResult,
+    Settings, Tournament, order_confidence, play_offline,
 };
 use chefshat_engine::{RuleSet, RuleSetSpec, Stop};
 
@@ -213,16 +213,12 @@ fn games_that_somebody_did_not_play_are_not_rated() {
         let seat = |participant: usize| SeatResult {
             participant,
             forfeited: forfeited && participant == 3,
-            substituted: substituted && participant == 2,
-            place: participant + 1,
             score: [5, 3, 1, 0][participant],
-            points: 0,
-            decisions: 0,
-            wrong_actions: 0,
-            timeouts: 0,
-            decision_time_us: 0,
-            timed_decisions: 0,
-            performance_score: 0.0,
+            did: SeatPlayed {
+                place: participant + 1,
+                substituted: substituted && participant == 2,
+                ..SeatPlayed::default()
+            },
         };
         (0..4).map(seat).collect()
     };

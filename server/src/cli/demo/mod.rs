@@ -16,11 +16,11 @@ use chefshat_client::v1::{self, game_event::Kind};
 use chefshat_records::jsonl;
 use clap::Args;
 
-use super::host::Host;
 use super::narrator::{Narrator, abort_reason, clean, heading, legend, row};
 use super::remote::{MAX_PACE_MS, agent_kind};
 use super::rules_args::{RulesArgs, rules_of};
 use super::{CommandError, data_dir};
+use crate::host::Host;
 use table::Table;
 
 /// Most agents that can be named: the engine's limit of seats.
@@ -59,15 +59,15 @@ impl Demo {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
         let (agents, rules) = self.agents_and_rules()?;
         let data_dir = data_dir::prepare(self.data_dir.clone())?;
-        let host = Host::start(data_dir.clone()).await?;
+        let host = Host::in_memory(Some(data_dir.clone())).await?;
         let mut out = anstream::stdout();
         if self.json {
-            let address = host.address.to_string();
+            let address = host.address().to_string();
             let line = serde_json::json!({"event": "listening", "address": address});
             writeln!(out, "{line}")?;
         }
         let pace = Duration::from_millis(self.pace_ms);
-        let table = Table::set(host.address, agents, rules, self.seed, pace).await?;
+        let table = Table::set(host.address(), agents, rules, self.seed, pace).await?;
         if !self.json {
             self.introduce(&mut out, &host, &table)?;
         }

@@ -4,7 +4,7 @@ use std::io::{self, BufRead as _, IsTerminal as _, Write as _};
 use std::path::Path;
 use std::process::ExitCode;
 
-use chefshat_proto::v1::{self, record_line::Line};
+use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 use chefshat_records::jsonl;
 use chefshat_records::pseudonym::{Pseudonym, TakenOut};
 use clap::Args;
@@ -198,5 +198,65 @@ async fn held(
             return Ok(Some(held));
         }
     }
-    Ok(None)
+    // Who left before the game has no seat in it, but sat down.
+    let names = sat_down(lines);
+    if !names.contains(&name) {
+        return Ok(None);
+    }
+    let kept = database.sat_down(game).await?;
+    Ok(pseudonym_of(name, &names, &kept).cloned())
+}
+
+/// The names of those who sat down in the game of a record, in order.
+fn sat_down(lines: &[v1::RecordLine]) -> Vec<&str> {
+    let events = lines.iter().filter_map(|line| match &line.line {
+        Some(Line::Event(event)) => event.kind.as_ref(),
+        _ => None,
+    });
+    let names = events.filter_map(|kind| match kind {
+        Kind::Seated(seated) => Some(seated.name.as_str()),
+        _ => None,
+    });
+    names.collect()
+}
+
+/// The pseudonym that is kept where a record has a name, of those who sat down in the same game.
+fn pseudonym_of<'k>(name: &str, recorded: &[&str], kept: &'k [String]) -> Option<&'k String> {
+    let mut both = recorded.iter().zip(kept);
+    let found = both.find(|(recorded, kept)| **recorded == name && kept.starts_with(PSEUDONYM));
+    found.map(|(_, kept)| kept)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_left_before_the_game_is_found_among_those_who_sat_down() {
+        let seated = |name: &str| v1::RecordLine {
+            line: Some(Line::Event(v1::GameEvent {
+                kind: Some(Kind::Seated(Box::new(v1::Seated {
+                    name: name.into(),
+                    ..v1::Seated::default()
+                }))),
+                ..v1::GameEvent::default()
+            })),
+        };
+        let lines = ["Ana", "Bo", "Ana"].map(seated);
+        let recorded = sat_down(&lines);
+        assert_eq!(recorded, ["Ana", "Bo", "Ana"]);
+        let kept = |names: [&str; 3]| names.map(str::to_owned);
+        let held = |names| pseudonym_of("Ana", &recorded, &kept(names)).cloned();
+        let pseudonym = format!("{PSEUDONYM}a1b2c3");
+        assert_eq!(
+            held([&pseudonym, "Bo", &pseudonym]),
+            Some(pseudonym.clone())
+        );
+        assert_eq!(held(["Ana", "Bo", "Ana"]), None);
+        assert_eq!(
+            held(["Ana", &pseudonym, "Ana"]),
+            None,
+            "another was deleted"
+        );
+    }
 }

@@ -19,7 +19,7 @@ use super::{Left, Who, records_with};
 use crate::convert;
 use crate::ids::Id;
 use crate::store::tournaments::TournamentEntry;
-use crate::store::{SqliteStore, Store};
+use crate::store::{Part, SqliteStore, Store};
 
 const HELP: &str = "\
 The first line says whose data these are. Then, for each game that is over: a line `game` (when, the room, its rules, the seat, the \
@@ -121,7 +121,7 @@ async fn gather(store: &SqliteStore, data_dir: &Path, name: &str) -> Result<Shee
     };
     let mut after = 0;
     loop {
-        let found = store.list(&filter, after, AT_A_TIME).await?;
+        let found = store.list(&filter, Part::After(after), AT_A_TIME).await?;
         let Some((last, _)) = found.last() else { break };
         after = *last;
         for (_, summary) in found {

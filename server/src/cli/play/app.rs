@@ -4,8 +4,10 @@
 use chefshat_client::v1::{self, game_event::Kind, seat_update::Update};
 use ratatui::crossterm::event::KeyCode;
 
+use super::super::terminal::log::Scroll;
 use super::super::terminal::screen::Key;
 use super::super::terminal::table::Table;
+use super::keys::{key_of, names_cards, not_held};
 use super::pick::Decision;
 
 /// What a person can show with one key: a label, valence and arousal, as the page for browsers has them.
@@ -86,9 +88,27 @@ pub(super) struct App {
     pub(super) link: Link,
     /// What the person should know: an objection, the server's word.
     pub(super) notice: String,
+    /// How far back the person looks at what happened.
+    pub(super) scroll: Scroll,
+    /// What Enter does when the game is over.
+    pub(super) then: &'static str,
+    /// How the person stands in the tournament, to be shown with the result.
+    pub(super) standing: Option<String>,
     /// The answer not yet acknowledged.
     unacknowledged: Option<(u64, u32)>,
     pub(super) left: bool,
+}
+
+impl Link {
+    /// The state of the connection in a symbol and words.
+    pub(super) fn words(&self) -> &'static str {
+        match self {
+            Self::Connecting => "○ connecting",
+            Self::Live => "● connected",
+            Self::Lost(_) => "✕ connection lost",
+            Self::Over(_) => "○ over",
+        }
+    }
 }
 
 impl App {
@@ -101,6 +121,9 @@ impl App {
             dialog: None,
             link: Link::Connecting,
             notice: String::new(),
+            scroll: Scroll::default(),
+            then: "Enter ends",
+            standing: None,
             unacknowledged: None,
             left: false,
         }
@@ -135,6 +158,11 @@ impl App {
         );
         let beyond = gone.saturating_sub(time);
         Some((time.saturating_sub(gone), bank.saturating_sub(beyond)))
+    }
+
+    /// Whether a key means what it means at the table: nothing stands over that.
+    pub(super) fn takes_keys(&self) -> bool {
+        self.dialog.is_none() && !self.scroll.is_open()
     }
 
     /// Whether a substitute plays for this seat.
@@ -252,6 +280,9 @@ impl App {
             Key::Interrupt => return self.leave(),
             Key::Code(code) => code,
         };
+        if self.dialog.is_none() && self.scroll.key(code, &self.table) {
+            return None;
+        }
         if self.table.end.is_some() || matches!(self.link, Link::Over(_)) {
             let done = matches!(code, KeyCode::Enter | KeyCode::Esc | KeyCode::Char('q'));
             return done.then(|| self.leave()).flatten();
@@ -299,10 +330,19 @@ impl App {
             KeyCode::BackTab => return done(|| decision.step_active(false)),
             KeyCode::Up | KeyCode::Char('+') => return done(|| decision.more(true)),
             KeyCode::Down | KeyCode::Char('-') => return done(|| decision.more(false)),
-            KeyCode::Char('j') => return done(|| decision.next_joker()),
-            KeyCode::Char(digit @ '0'..='9') => {
-                let number = usize::try_from(digit.to_digit(10)?).ok()?;
-                return done(|| decision.pick((number + 9) % 10));
+            KeyCode::Char('j') => {
+                if !decision.next_joker() {
+                    "no joker can go with it".clone_into(&mut self.notice);
+                }
+                return None;
+            }
+            KeyCode::Char(key) if !special && names_cards(key) => {
+                let mut stacks = decision.stacks.iter();
+                match stacks.position(|stack| key_of(*stack) == Some(key)) {
+                    Some(at) => decision.press(at),
+                    None => self.notice = not_held(key),
+                }
+                return None;
             }
             KeyCode::Char('p') => match decision.pass_objection() {
                 None => decision.pass(),

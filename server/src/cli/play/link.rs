@@ -1,7 +1,9 @@
-//! The connection of a person's seat: opened, opened again when it breaks, given up in the end. An agent of the SDK decides on the task that
-//! serves its connection, which suits programs; a person thinks for long and meanwhile wants to see what happens, so that here messages and
-//! answers each go their way. What the messages mean is in `app`.
+//! The connection of a person's ticket: opened, opened again when it breaks, given up in the end. The ticket is of a seat, or of a place in a
+//! tournament, whose games then bring seats of their own. An agent of the SDK decides on the task that serves its connection, which suits
+//! programs; a person thinks for long and meanwhile wants to see what happens, so that here messages and answers each go their way. What
+//! the messages mean is in `part` and `app`.
 
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 use chefshat_client::v1::{
@@ -13,85 +15,116 @@ use tokio::time::{Instant, sleep, timeout};
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Code, Status};
 
-use super::app::Input;
+use super::part::Heard;
 
 /// Commands that may wait for the transport.
 const COMMANDS: usize = 16;
 /// The largest message that is taken: a game's whole history.
 const MAX_RESPONSE_BYTES: usize = 16 << 20;
-/// Time for the server to accept a stream, and to end one in good order.
+/// Time for the server to accept a stream, to describe a room, and to end a stream in good order.
 const OPEN_TIMEOUT: Duration = Duration::from_secs(10);
+const ROOM_TIMEOUT: Duration = Duration::from_secs(2);
 const LEAVE_TIMEOUT: Duration = Duration::from_secs(1);
-/// Number of the one attachment of a stream.
+/// Number of the ticket's own attachment of a stream; those of games of a tournament come after it.
 const ATTACHMENT: u32 = 1;
+
+/// Something a person does in a game.
+pub(super) type Order = (String, Command);
 
 /// How a stream ended.
 enum Stopped {
     /// The person has left.
     Left,
-    /// The game is over, or the seat is another's; why, if the game has not ended.
+    /// The game or the tournament is over, or the ticket is another's; why, if it has not ended.
     Over(Option<String>),
-    /// It broke; whether the seat had been at the table through it, and for long.
+    /// It broke; whether the ticket had been attached through it, and for long.
     Broken { status: Status, held: bool },
 }
 
-/// A stream that broke; since when the seat had been at the table through it.
-fn broken(attached: Option<Instant>, status: Status) -> Stopped {
-    Stopped::Broken {
-        status,
-        held: attached.is_some_and(|since| since.elapsed() >= MAX_DELAY),
-    }
-}
-
-/// A seat's connection.
-pub(super) struct Seat {
-    pub(super) client: Client,
-    pub(super) ticket: String,
-    /// The seat's part of the game seed.
-    pub(super) entropy: Vec<u8>,
+/// A game that the ticket has a seat in.
+struct Game {
+    /// The ticket of that seat.
+    ticket: String,
     /// Number of the first event not yet seen.
     next_event: u64,
     ended: bool,
 }
 
-impl Seat {
+/// One stream.
+struct Stream {
+    /// The games that were attached with it, by id, in order.
+    asked: Vec<String>,
+    /// The game behind each handle.
+    games: BTreeMap<u32, String>,
+    /// The handle of the place in a tournament.
+    place: Option<u32>,
+    /// Since when the ticket is attached.
+    attached: Option<Instant>,
+}
+
+impl Stream {
+    /// The game that an attachment was for.
+    fn asked_for(&self, request_id: u32) -> Option<String> {
+        let nth = usize::try_from(request_id.checked_sub(ATTACHMENT + 1)?).ok()?;
+        self.asked.get(nth).cloned()
+    }
+
+    fn broken(&self, status: Status) -> Stopped {
+        let held = self.attached.is_some_and(|it| it.elapsed() >= MAX_DELAY);
+        Stopped::Broken { status, held }
+    }
+}
+
+/// A ticket's connection.
+pub(super) struct Connection {
+    client: Client,
+    ticket: String,
+    /// The person's part of the game seed.
+    entropy: Vec<u8>,
+    /// Games by id, as long as something of them is to come.
+    games: BTreeMap<String, Game>,
+    /// Whether anything new has come since the last outage.
+    progress: bool,
+}
+
+impl Connection {
     pub(super) fn new(client: Client, ticket: String, entropy: Vec<u8>) -> Self {
         Self {
             client,
             ticket,
             entropy,
-            next_event: 1,
-            ended: false,
+            games: BTreeMap::new(),
+            progress: false,
         }
     }
 
-    /// Serves the connection until the seat has nothing more to hear or `commands` is closed.
+    /// Serves the connection until there is nothing more to hear or `orders` is closed.
     pub(super) async fn serve(
         mut self,
-        mut commands: mpsc::Receiver<Command>,
-        inputs: mpsc::Sender<Input>,
+        mut orders: mpsc::Receiver<Order>,
+        heard: mpsc::Sender<Heard>,
     ) {
         let mut outage: Option<Instant> = None;
         let mut delay = FIRST_DELAY;
         loop {
-            let seen = self.next_event;
-            let why = match self.converse(&mut commands, &inputs).await {
+            self.progress = false;
+            let why = match self.converse(&mut orders, &heard).await {
                 Stopped::Left => return,
                 Stopped::Over(why) => Some(why),
-                Stopped::Broken { .. } if self.ended => Some(None),
+                Stopped::Broken { .. } if self.own_game_ended() => Some(None),
                 Stopped::Broken { status, .. } if !may_retry(status.code()) => {
                     Some(Some(status.message().to_owned()))
                 }
                 Stopped::Broken { status, held } => {
                     // A long wait for others brings no events, and is no outage either.
-                    if held || self.next_event > seen {
+                    if held || self.progress {
                         (outage, delay) = (None, FIRST_DELAY);
                     }
                     let since = *outage.get_or_insert_with(Instant::now);
                     let words = status.message().to_owned();
                     if since.elapsed() > GIVE_UP_AFTER {
                         Some(Some(format!("the server did not come back: {words}")))
-                    } else if inputs.send(Input::Lost(words)).await.is_err() {
+                    } else if heard.send(Heard::Lost(words)).await.is_err() {
                         return;
                     } else {
                         None
@@ -100,70 +133,104 @@ impl Seat {
             };
             if let Some(why) = why {
                 // Whoever does not listen any more need not know.
-                let _ = inputs.send(Input::Over(why)).await;
+                let _ = heard.send(Heard::Over(why)).await;
                 return;
             }
             tokio::select! {
                 () = sleep(delay) => {}
-                () = closed(&mut commands) => return,
+                () = closed(&mut orders) => return,
             }
             delay = (delay * 2).min(MAX_DELAY);
         }
     }
 
+    /// Whether the ticket is a seat's, and its game is over.
+    fn own_game_ended(&self) -> bool {
+        let mut games = self.games.values();
+        games.any(|game| game.ended && game.ticket == self.ticket)
+    }
+
+    /// What to say first: the seats in games of a tournament come before the place in it, each with its own ticket. So only what has not
+    /// been seen is told of them, and how a game ended meanwhile.
+    fn attachments(&self, stream: &mut Stream) -> Vec<Command> {
+        let attach = |ticket: &str, request_id, from_sequence| {
+            Command::Attach(v1::Attach {
+                ticket: ticket.to_owned(),
+                request_id,
+                from_sequence,
+                delivery: v1::EventDelivery::AtOnce.into(),
+                entropy: self.entropy.clone(),
+                ..v1::Attach::default()
+            })
+        };
+        let own = |game: &&Game| game.ticket == self.ticket;
+        let mut all = Vec::new();
+        let games = self.games.iter().filter(|(_, game)| !own(game));
+        for (request_id, (id, game)) in (ATTACHMENT + 1..).zip(games) {
+            stream.asked.push(id.clone());
+            all.push(attach(&game.ticket, request_id, game.next_event));
+        }
+        let from = self.games.values().find(own);
+        let from = from.map_or(1, |game| game.next_event);
+        all.push(attach(&self.ticket, ATTACHMENT, from));
+        all
+    }
+
     /// One stream, until it ends.
     async fn converse(
         &mut self,
-        commands: &mut mpsc::Receiver<Command>,
-        inputs: &mpsc::Sender<Input>,
+        orders: &mut mpsc::Receiver<Order>,
+        heard: &mpsc::Sender<Heard>,
     ) -> Stopped {
+        let mut stream = Stream {
+            asked: Vec::new(),
+            games: BTreeMap::new(),
+            place: None,
+            attached: None,
+        };
+        self.games
+            .retain(|_, game| !game.ended || game.ticket == self.ticket);
         let (requests, queue) = mpsc::channel(COMMANDS);
-        let attach = Command::Attach(v1::Attach {
-            ticket: self.ticket.clone(),
-            request_id: ATTACHMENT,
-            from_sequence: self.next_event,
-            delivery: v1::EventDelivery::AtOnce.into(),
-            entropy: self.entropy.clone(),
-            ..v1::Attach::default()
-        });
+        let commands = self.attachments(&mut stream).into_iter();
+        let commands = commands.map(|command| seat_command(0, command)).collect();
         requests
-            .try_send(request(attach))
+            .try_send(v1::PlayRequest { commands })
             .expect("an empty queue has room");
         let mut service = PlayServiceClient::new(self.client.channel())
             .max_decoding_message_size(MAX_RESPONSE_BYTES);
         let opening = timeout(OPEN_TIMEOUT, service.play(ReceiverStream::new(queue)));
         let mut responses = match opening.await {
             Ok(Ok(opened)) => opened.into_inner(),
-            Ok(Err(status)) => return broken(None, status),
-            Err(_) => return broken(None, Status::unavailable("no answer in time")),
+            Ok(Err(status)) => return stream.broken(status),
+            Err(_) => return stream.broken(Status::unavailable("no answer in time")),
         };
-        let mut attached: Option<Instant> = None;
         loop {
             tokio::select! {
                 response = responses.message() => match response {
                     Ok(Some(response)) => {
                         for update in response.updates {
-                            if matches!(update.update, Some(Update::Attached(_))) {
-                                attached.get_or_insert_with(Instant::now);
-                            }
-                            if let Some(over) = self.hear(update, inputs).await {
+                            if let Some(over) = self.hear(&mut stream, update, heard).await {
                                 return over;
                             }
                         }
                     }
-                    Ok(None) => return broken(attached, Status::unavailable("the server ended the stream")),
-                    Err(status) => return broken(attached, status),
+                    Ok(None) => return stream.broken(Status::unavailable("the server ended the stream")),
+                    Err(status) => return stream.broken(status),
                 },
-                command = commands.recv() => {
-                    let Some(command) = command else {
+                order = orders.recv() => {
+                    let Some((game, command)) = order else {
                         // Half-closing leaves; what the server still says does not matter.
                         drop(requests);
                         let end = async { while let Ok(Some(_)) = responses.message().await {} };
                         let _ = timeout(LEAVE_TIMEOUT, end).await;
                         return Stopped::Left;
                     };
-                    // A transport that takes no more says why where it is read.
-                    let _ = requests.send(request(command)).await;
+                    let handle = stream.games.iter().find(|(_, id)| **id == game);
+                    if let Some((&handle, _)) = handle {
+                        let commands = vec![seat_command(handle, command)];
+                        // A transport that takes no more says why where it is read.
+                        let _ = requests.send(v1::PlayRequest { commands }).await;
+                    }
                 }
             }
         }
@@ -172,56 +239,124 @@ impl Seat {
     /// Passes on one update; says when it was the last.
     async fn hear(
         &mut self,
+        stream: &mut Stream,
         update: v1::SeatUpdate,
-        inputs: &mpsc::Sender<Input>,
+        heard: &mpsc::Sender<Heard>,
     ) -> Option<Stopped> {
-        let mut update = update.update?;
-        match &mut update {
-            Update::Events(batch) => {
-                let next = self.next_event;
-                batch.events.retain(|event| event.sequence >= next);
-                if let Some(last) = batch.events.last() {
-                    self.next_event = last.sequence.saturating_add(1);
-                }
-                self.ended |= batch.events.iter().any(|event| {
-                    use v1::game_event::Kind::{GameAborted, GameEnded};
-                    matches!(event.kind, Some(GameEnded(_) | GameAborted(_)))
-                });
+        let (handle, mut update) = (update.handle, update.update?);
+        let game = stream.games.get(&handle).cloned();
+        let what = match &mut update {
+            Update::Attached(attached) => {
+                stream.attached.get_or_insert_with(Instant::now);
+                self.seated(stream, handle, attached).await
+            }
+            Update::Entered(entered) => {
+                stream.attached.get_or_insert_with(Instant::now);
+                stream.place = Some(handle);
+                Heard::Entered(entered.clone())
+            }
+            Update::Detached(detached) if stream.place == Some(handle) => {
+                return Some(Stopped::Over(match detached.reason() {
+                    v1::DetachReason::TournamentOver => None,
+                    v1::DetachReason::Superseded => {
+                        Some("another connection has taken your place in the tournament".to_owned())
+                    }
+                    _ => Some("the server has ended your place's connection".to_owned()),
+                }));
             }
             Update::Detached(detached) => {
-                let why = match detached.reason() {
-                    _ if self.ended => None,
-                    v1::DetachReason::Superseded => {
-                        Some("another connection has taken this seat".to_owned())
-                    }
-                    _ => Some("the server has ended the seat's connection".to_owned()),
-                };
-                return Some(Stopped::Over(why));
+                stream.games.remove(&handle);
+                let id = game?;
+                let why = why_detached(detached.reason());
+                let game = self.games.remove(&id)?;
+                if game.ticket == self.ticket {
+                    return Some(Stopped::Over((!game.ended).then(|| why.to_owned())));
+                }
+                if game.ended {
+                    return None;
+                }
+                Heard::Gone(id, why.to_owned())
             }
             Update::Refused(refused) if refused.request_id == ATTACHMENT => {
                 return Some(Stopped::Over(Some(refused.message.clone())));
             }
-            _ => {}
-        }
-        match inputs.send(Input::Update(Box::new(update))).await {
+            Update::Refused(refused) if refused.request_id > ATTACHMENT => {
+                // Its room went while there was no connection.
+                let id = stream.asked_for(refused.request_id)?;
+                self.games.remove(&id);
+                Heard::Gone(id, refused.message.clone())
+            }
+            Update::Events(batch) => {
+                let id = game?;
+                let game = self.games.get_mut(&id)?;
+                self.progress |= game.events(batch);
+                Heard::Told(id, Box::new(update))
+            }
+            _ => Heard::Told(game?, Box::new(update)),
+        };
+        match heard.send(what).await {
             Ok(()) => None,
             Err(_) => Some(Stopped::Left),
         }
     }
+
+    /// A seat is attached, of a game that may be new: then its room is asked for, which says who sits there before the game begins.
+    async fn seated(&mut self, stream: &mut Stream, handle: u32, attached: &v1::Attached) -> Heard {
+        let id = attached.game_id.clone();
+        // The newest handle of a seat is its only one.
+        stream.games.retain(|_, other| *other != id);
+        stream.games.insert(handle, id.clone());
+        let mut room = None;
+        if !self.games.contains_key(&id) {
+            let asked = timeout(ROOM_TIMEOUT, self.client.get_room(&*attached.room_id)).await;
+            room = asked.ok().and_then(Result::ok).map(Box::new);
+            let ticket = match attached.ticket.as_str() {
+                "" => self.ticket.clone(),
+                ticket => ticket.to_owned(),
+            };
+            let game = Game {
+                ticket,
+                next_event: 1,
+                ended: false,
+            };
+            self.games.insert(id, game);
+        }
+        Heard::Seated(attached.clone(), room)
+    }
+}
+
+impl Game {
+    /// Leaves only what is new of some events; whether there was anything.
+    fn events(&mut self, batch: &mut v1::EventBatch) -> bool {
+        use v1::game_event::Kind::{GameAborted, GameEnded};
+        let next = self.next_event;
+        batch.events.retain(|event| event.sequence >= next);
+        if let Some(last) = batch.events.last() {
+            self.next_event = last.sequence.saturating_add(1);
+        }
+        let ends =
+            |event: &v1::GameEvent| matches!(event.kind, Some(GameEnded(_) | GameAborted(_)));
+        self.ended |= batch.events.iter().any(ends);
+        !batch.events.is_empty()
+    }
+}
+
+fn why_detached(reason: v1::DetachReason) -> &'static str {
+    match reason {
+        v1::DetachReason::Superseded => "another connection has taken this seat",
+        _ => "the server has ended the seat's connection",
+    }
 }
 
 /// Waits until nobody can send commands any more. Those that come while there is no connection are dropped: the server puts the decision anew.
-async fn closed(commands: &mut mpsc::Receiver<Command>) {
-    while commands.recv().await.is_some() {}
+async fn closed(orders: &mut mpsc::Receiver<Order>) {
+    while orders.recv().await.is_some() {}
 }
 
-fn request(command: Command) -> v1::PlayRequest {
-    v1::PlayRequest {
-        // The one seat of the stream is its first.
-        commands: vec![v1::SeatCommand {
-            handle: 0,
-            command: Some(command),
-        }],
+fn seat_command(handle: u32, command: Command) -> v1::SeatCommand {
+    v1::SeatCommand {
+        handle,
+        command: Some(command),
     }
 }
 

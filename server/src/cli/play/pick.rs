@@ -157,6 +157,18 @@ impl Decision {
         (self.quantity, self.jokers) = smallest.unwrap_or((1, 0));
     }
 
+    /// Takes the key of a stack: puts the cursor on it; when it is there already, takes one card more, and from all of them as few as are
+    /// needed.
+    pub(super) fn press(&mut self, at: usize) {
+        let stack = self.stacks.get(at);
+        let all = stack.is_none_or(|stack| stack.joker || self.quantity >= stack.count);
+        if at != self.at || all || self.kind() != v1::DecisionKind::Turn {
+            self.pick(at);
+        } else {
+            self.more(true);
+        }
+    }
+
     /// Over how much the cursor goes.
     fn choices(&self) -> usize {
         match self.kind() {
@@ -198,15 +210,18 @@ impl Decision {
         };
     }
 
-    /// One joker more with the cards; none after as many as there are.
-    pub(super) fn next_joker(&mut self) {
-        if self.kind() == v1::DecisionKind::Turn && self.stack().is_some_and(|it| !it.joker) {
-            self.jokers = if self.jokers < self.jokers_held {
-                self.jokers + 1
-            } else {
-                0
-            };
+    /// One joker more with the cards, none after as many as there are; in an exchange a joker alone. Says whether there is one that can.
+    pub(super) fn next_joker(&mut self) -> bool {
+        let turn = self.kind() == v1::DecisionKind::Turn;
+        let jokers = self.stacks.iter().position(|stack| stack.joker);
+        match jokers {
+            None => return false,
+            Some(jokers) if turn && self.at == jokers => return false,
+            Some(_) if turn && self.jokers < self.jokers_held => self.jokers += 1,
+            Some(_) if turn => self.jokers = 0,
+            Some(jokers) => self.pick(jokers),
         }
+        true
     }
 
     /// What is picked, in words.
@@ -222,7 +237,7 @@ impl Decision {
                     return match (stack.joker, stack.golden && stack.count == 1) {
                         (true, _) => "give a joker".to_owned(),
                         (false, true) => format!("give the Golden {}", stack.face),
-                        (false, false) => format!("give a {}", stack.face),
+                        (false, false) => format!("give one {}", stack.face),
                     };
                 }
                 let faces = u32::from(self.space.faces());

@@ -9,19 +9,20 @@ use super::super::terminal::screen::Key;
 use super::super::terminal::table::Table;
 use super::super::terminal::testing::{Dealt, as_kept, text};
 use super::app::{App, Dialog, Do, Input, Link};
+use super::run::command;
 use super::view;
 
 const ME: Viewer = Viewer::Seat(Seat::new(0));
 
 /// A game and the person who plays seat 0 of it.
-struct Evening {
-    dealt: Dealt,
-    app: App,
-    now_ms: u64,
+pub(super) struct Evening {
+    pub(super) dealt: Dealt,
+    pub(super) app: App,
+    pub(super) now_ms: u64,
 }
 
 impl Evening {
-    fn new(rules: &RuleSetSpec, seed: u8) -> Self {
+    pub(super) fn new(rules: &RuleSetSpec, seed: u8) -> Self {
         let (dealt, events) = Dealt::new(rules, seed, ME);
         let mut evening = Self {
             dealt,
@@ -33,22 +34,22 @@ impl Evening {
         evening
     }
 
-    fn tell(&mut self, update: Update) -> Option<Do> {
+    pub(super) fn tell(&mut self, update: Update) -> Option<Do> {
         let input = Input::Update(Box::new(update));
         self.app.take(input, self.now_ms)
     }
 
-    fn press(&mut self, code: KeyCode) -> Option<Do> {
+    pub(super) fn press(&mut self, code: KeyCode) -> Option<Do> {
         self.app.take(Input::Key(Key::Code(code)), self.now_ms)
     }
 
-    fn apply(&mut self, action: Action) {
+    pub(super) fn apply(&mut self, action: Action) {
         let events = self.dealt.apply(action);
         self.tell(Update::Events(v1::EventBatch { events }));
     }
 
     /// Has the others play, by default decisions or the first legal one, until the person is asked.
-    fn until_asked(&mut self) -> bool {
+    pub(super) fn until_asked(&mut self) -> bool {
         while let Some(decision) = self.dealt.game.decision() {
             if decision.seat.index() == 0 {
                 let request = self.dealt.request();
@@ -62,14 +63,14 @@ impl Evening {
     }
 
     /// Does what is picked, or passes where that cannot be done.
-    fn act(&mut self) -> Do {
+    pub(super) fn act(&mut self) -> Do {
         let picked = self.press(KeyCode::Enter);
         let what = picked.or_else(|| self.press(KeyCode::Char('p')));
         what.expect("one of the two is legal")
     }
 
     /// The server takes an answer.
-    fn answered(&mut self, what: Do) {
+    pub(super) fn answered(&mut self, what: Do) {
         let Do::Answer {
             decision_id,
             action,
@@ -87,14 +88,14 @@ impl Evening {
         self.apply(Action::new(u16::try_from(action).unwrap()));
     }
 
-    fn screen(&self) -> String {
+    pub(super) fn screen(&self) -> String {
         text(80, 24, |frame| {
-            view::draw(frame, Look::new(false), &self.app, self.now_ms);
+            view::draw_game(frame, Look::new(false), &self.app, self.now_ms);
         })
     }
 }
 
-fn shifts(shifts: u32) -> RuleSetSpec {
+pub(super) fn shifts(shifts: u32) -> RuleSetSpec {
     RuleSetSpec {
         stop: Stop::Shifts(shifts),
         ..RuleSetSpec::default()
@@ -165,7 +166,10 @@ fn everything_picked(evening: &mut Evening) -> (Vec<Action>, usize) {
                         assert_eq!(evening.app.notice, why);
                     }
                 }
-                evening.press(KeyCode::Char('j'));
+                // In an exchange it is the key of the jokers, which would begin anew.
+                if evening.app.open.as_ref().unwrap().decision.kind() == v1::DecisionKind::Turn {
+                    evening.press(KeyCode::Char('j'));
+                }
             }
             evening.press(KeyCode::Up);
         }
@@ -243,7 +247,7 @@ fn windows_of_any_size_are_drawn() {
         (250, 90),
     ] {
         let screen = text(columns, rows, |frame| {
-            view::draw(frame, Look::new(true), &evening.app, 0);
+            view::draw_game(frame, Look::new(true), &evening.app, 0);
         });
         let drawn = screen.contains("your hand");
         assert_eq!(drawn, columns >= 80 && rows >= 24, "{screen}");
@@ -292,7 +296,7 @@ fn times_go_with_answers_only_when_asked_for() {
             action: 2,
             took_ms,
         };
-        match super::command(what, times) {
+        match command(what, times) {
             Some(Command::Answer(answer)) => answer.annotations,
             other => panic!("{other:?}"),
         }

@@ -1,4 +1,5 @@
-//! The screen of `chefshat play`: the table, below it the person's hand, what is asked of it, and the keys.
+//! The screen of `chefshat play` at a table: the table, below it the person's hand, what is asked of it, and the keys. Between the games of a
+//! tournament the screen is that of `lobby_view`.
 
 use chefshat_client::v1;
 use ratatui::Frame;
@@ -11,6 +12,9 @@ use super::super::terminal::look::{Look, ingredient};
 use super::super::terminal::table::End;
 use super::super::terminal::view::{boxed, draw as draw_table, end_lines, popup};
 use super::app::{App, Dialog, EXPRESSIONS, Link, Open};
+use super::keys::key_of;
+use super::lobby_view;
+use super::part::Part;
 
 /// Rows below the table: the hand (7), what is asked (2), the keys (1).
 const ROWS: u16 = 10;
@@ -19,35 +23,54 @@ const BAR: u64 = 10;
 /// Below this the clock warns.
 const SHORT_MS: u64 = 5_000;
 
-const KEYS: &str = " ←→ card  ↑↓ how many  j joker  Enter play  p pass  e feeling  ? help  q leave";
+/// The keys that matter in a turn, in an exchange, when a special action is offered, and while others decide.
+const TURN_KEYS: &str =
+    " 1-9 ←→ card  ↑↓ number  j joker  Enter play  p pass  e feeling  ? keys  q leave";
+const EXCHANGE_KEYS: &str = " 1-9 ←→ card  J joker  Enter give  e feeling  ? keys  q leave";
+const SPECIAL_KEYS: &str = " d declare  n decline  e feeling  ? keys  q leave";
+const WAITING_KEYS: &str = " PgUp what happened  e feeling  ? keys  q leave";
 
-const HELP: [&str; 15] = [
+const HELP: [&str; 18] = [
     "You want to be the first without cards. A play is cards of one",
     "face, jokers with them or not. It must be of a lower face than",
     "the one on the board, and of no fewer cards. Who passes is out",
     "until the next pizza.",
     "",
+    "1 … 9, 0  the cards of face 1 … 9, 10; those of higher faces have",
+    "          a letter on their edge; again: one more of them",
+    "J         the jokers          j     a joker with the cards picked",
     "← →       to another card     Tab   to the next that can be used",
-    "1 … 9, 0  to the first, second, … tenth card of the hand",
-    "↑ ↓       more or fewer of it   j   jokers with it",
+    "↑ ↓       one card more, one fewer",
     "Enter     play (or give) what is picked",
     "p         pass",
     "d, n      declare a special action, or do not",
     "e         show a feeling to the table",
+    "PgUp      what happened before, PgDn goes on",
+    "s         in a tournament: the standings",
     "r         play on yourself after a substitute has played for you",
     "q         leave; the room's rules say who plays on",
-    "",
 ];
 
 /// Draws everything.
-pub(super) fn draw(frame: &mut Frame<'_>, look: Look, app: &App, now_ms: u64) {
-    let status = match &app.link {
-        Link::Connecting => "○ connecting",
-        Link::Live => "● connected",
-        Link::Lost(_) => "✕ connection lost",
-        Link::Over(_) => "○ over",
-    };
-    let Some(area) = draw_table(frame, look, &app.table, app.me, status, ROWS) else {
+pub(super) fn draw(frame: &mut Frame<'_>, look: Look, part: &Part, now_ms: u64) {
+    match (&part.game, &part.lobby) {
+        (Some(game), _) if !part.peek => draw_game(frame, look, game, now_ms),
+        (_, Some(lobby)) => lobby_view::draw(frame, look, part, lobby),
+        (_, None) => {
+            let words = match &part.link {
+                Link::Lost(why) => format!(" Connecting, again and again: {why}"),
+                _ => " Connecting.".to_owned(),
+            };
+            frame.render_widget(Paragraph::new(words), frame.area());
+        }
+    }
+    lobby_view::draw_over(frame, look, part);
+}
+
+/// Draws a game.
+pub(super) fn draw_game(frame: &mut Frame<'_>, look: Look, app: &App, now_ms: u64) {
+    let status = app.link.words();
+    let Some(area) = draw_table(frame, look, &app.table, app.me, status, app.scroll, ROWS) else {
         return;
     };
     let [hand, asked, keys] = Layout::vertical([
@@ -58,7 +81,13 @@ pub(super) fn draw(frame: &mut Frame<'_>, look: Look, app: &App, now_ms: u64) {
     .areas(area);
     draw_hand(frame, look, app, hand);
     draw_asked(frame, look, app, now_ms, asked);
-    frame.render_widget(Paragraph::new(KEYS).style(look.dim()), keys);
+    let words = match app.open.as_ref().map(|open| open.decision.kind()) {
+        Some(v1::DecisionKind::SpecialAction) => SPECIAL_KEYS,
+        Some(v1::DecisionKind::Exchange) => EXCHANGE_KEYS,
+        Some(_) => TURN_KEYS,
+        None => WAITING_KEYS,
+    };
+    frame.render_widget(Paragraph::new(words).style(look.dim()), keys);
     draw_over(frame, look, app);
 }
 
@@ -79,6 +108,7 @@ fn draw_hand(frame: &mut Frame<'_>, look: Look, app: &App, area: Rect) {
                 active: app.open.is_some(),
                 picked: None,
                 along: 0,
+                key: None,
             })
             .collect(),
         (None, None) => Vec::new(),
@@ -125,6 +155,9 @@ fn shown(open: &Open) -> Vec<Shown> {
             } else {
                 0
             },
+            // A face's own number, and J, are read off the card.
+            key: key_of(*stack)
+                .filter(|key| !stack.joker && stack.face.to_string() != key.to_string()),
         })
         .collect()
 }
@@ -166,11 +199,7 @@ fn asked(app: &App) -> String {
         return "A substitute plays for you. Press r to play on yourself.".to_owned();
     }
     let Some(open) = &app.open else {
-        return match app.table.turn {
-            _ if !app.table.started => "The game has not begun.".to_owned(),
-            Some(seat) if app.me != Some(seat) => format!("It is {}'s turn.", app.table.name(seat)),
-            _ => "Wait.".to_owned(),
-        };
+        return waiting(app);
     };
     let decision = &open.decision;
     if open.sent {
@@ -180,21 +209,48 @@ fn asked(app: &App) -> String {
         v1::DecisionKind::SpecialAction => {
             let dishwasher = app.me.and_then(|me| app.table.seat(me));
             let dishwasher = dishwasher.is_some_and(|it| it.role == v1::Role::Dishwasher);
-            let what = if dishwasher {
-                "Food Fight: all roles turn around"
+            if dishwasher {
+                "Two jokers! Food Fight: all roles turn around?".to_owned()
             } else {
-                "Dinner is Served: nobody exchanges cards"
-            };
-            let [declare, decline] = if decision.at == 0 {
-                ["[d declare]", " n decline "]
-            } else {
-                [" d declare ", "[n decline]"]
-            };
-            format!("Two jokers! {what}?  {declare} {decline}")
+                "Two jokers! Dinner is Served: no exchange?".to_owned()
+            }
         }
-        v1::DecisionKind::Exchange => format!("Give a card to your partner: {}?", decision.words()),
+        v1::DecisionKind::Exchange => {
+            format!("Give a card to {}: {}?", partner(app), decision.words())
+        }
         _ if !decision.can_play() => "Your turn: nothing can be played, pass with p.".to_owned(),
         _ => format!("Your turn: {}?", decision.words()),
+    }
+}
+
+/// Who gets what the person gives in the exchange.
+fn partner(app: &App) -> String {
+    let role = |seat| app.table.seat(seat).map(|place| place.role);
+    let theirs = match app.me.and_then(role) {
+        Some(v1::Role::Chef) => v1::Role::Dishwasher,
+        _ => v1::Role::Waiter,
+    };
+    let seats = (0u32..).zip(&app.table.seats);
+    let mut seats = seats.filter(|(_, place)| place.role == theirs);
+    match seats.next() {
+        Some((seat, _)) => app.table.name(seat),
+        None => "your partner".to_owned(),
+    }
+}
+
+/// What is waited for.
+fn waiting(app: &App) -> String {
+    let table = &app.table;
+    let first = table.turns == 0 && table.shift > 0;
+    match table.turn {
+        _ if table.end.is_some() => String::new(),
+        _ if !table.started => "The game has not begun.".to_owned(),
+        Some(seat) if app.me != Some(seat) => format!("It is {}'s turn.", table.name(seat)),
+        None if first && table.last_order.is_empty() => {
+            "Another player opens the Shift.".to_owned()
+        }
+        None if first => "The others decide: special action, exchange, the first turn.".to_owned(),
+        _ => "The others decide.".to_owned(),
     }
 }
 
@@ -202,7 +258,11 @@ fn asked(app: &App) -> String {
 fn hint(open: &Open, faces: u32) -> String {
     let decision = &open.decision;
     if decision.kind() == v1::DecisionKind::SpecialAction {
-        return " ← → chooses, Enter decides.".to_owned();
+        let [declare, decline] = match decision.at {
+            0 => ["[d declare]", " n decline "],
+            _ => [" d declare ", "[n decline]"],
+        };
+        return format!(" {declare} {decline}   ← → chooses, Enter decides.");
     }
     let name = decision.stacks.get(decision.at);
     let name = name.and_then(|stack| ingredient(stack.face, faces));
@@ -238,14 +298,21 @@ fn time(ms: u64) -> String {
 /// What stands over the table: the end, or a dialog.
 fn draw_over(frame: &mut Frame<'_>, look: Look, app: &App) {
     let plain = |words: &str| Line::from(words.to_owned());
+    if app.scroll.is_open() {
+        return;
+    }
     match (&app.table.end, &app.link, app.dialog) {
         (Some(end), ..) => {
             let mut lines = vec![plain("")];
             lines.extend(end_lines(look, &app.table, end));
             lines.push(plain(""));
-            lines.push(plain(&format!("game {}", app.table.game_id)));
+            if let Some(standing) = &app.standing {
+                lines.push(plain(standing));
+            } else {
+                lines.push(plain(&format!("game {}", app.table.game_id)));
+            }
             lines.push(plain(""));
-            lines.push(Line::from(Span::styled("Enter ends", look.dim())));
+            lines.push(Line::from(Span::styled(app.then, look.dim())));
             let title = match end {
                 End::Finished(_) => "the game is over",
                 End::Aborted(_) => "no result",
@@ -260,7 +327,7 @@ fn draw_over(frame: &mut Frame<'_>, look: Look, app: &App) {
                 frame,
                 look,
                 "the seat is lost",
-                vec![plain(&why), plain(""), plain("Enter ends")],
+                vec![plain(&why), plain(""), plain(app.then)],
             );
         }
         (None, _, Some(Dialog::Help)) => {

@@ -14,15 +14,19 @@ use super::service;
 /// Records asked for at a time.
 const PAGE: u32 = 100;
 
-/// List the records of a server, oldest first.
+/// List the records of a server, oldest first unless asked otherwise.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  chefshat records list --state finished\n  \
+                  chefshat records list --newest-first --participant Greta\n  \
                   chefshat records list --origin branched --json")]
 pub(super) struct List {
     #[command(flatten)]
     server: ServerArg,
     #[command(flatten)]
     filter: FilterArgs,
+    /// Begin with the newest, not with the oldest.
+    #[arg(long)]
+    newest_first: bool,
     /// Print each record's summary as a JSON line.
     #[arg(long)]
     json: bool,
@@ -36,6 +40,7 @@ impl List {
             filter: Some(self.filter.message()),
             page_size: PAGE,
             page_token: String::new(),
+            newest_first: self.newest_first,
         };
         let mut count = 0;
         loop {

@@ -32,7 +32,7 @@ pub(super) struct RecordsCommand {
 
 #[derive(Debug, Subcommand)]
 enum RecordsAction {
-    /// List the records of a server, oldest first.
+    /// List the records of a server, oldest or newest first.
     List(list::List),
     /// Fetch the record of one game.
     Get(transfer::Get),

@@ -18,7 +18,7 @@ use super::start::{StartArgs, players_of};
 /// Make a room and say how to join it.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Examples:\n  chefshat room create --name friday --seat greedy --seat random\n  \
+    after_help = "Examples:\n  chefshat room create --name friday --seat greedy --seat random=Rolf\n  \
                   chefshat room create --preset rulebook --target-shifts 10 --decision-time-ms 60000\n  \
                   chefshat room create --code-file ./join-code\n  \
                   chefshat room create --branch GAME-ID@40 --seat replay:GAME-ID:0 --seat greedy\n  \
@@ -31,10 +31,10 @@ pub(super) struct Create {
     #[command(flatten)]
     server: ServerArg,
     /// How the next seat is filled: random, random_unmasked, greedy or trained (played by the server), replay:GAME-ID:SEAT (played by the server
-    /// as the player of that seat of a recorded game played), or open, agent, human or robot (for whom it is free). Repeatable; seats
-    /// not named are open.
+    /// as the player of that seat of a recorded game played), each with =NAME to go by another name, or open, agent, human or robot (for whom it
+    /// is free). Repeatable; seats not named are open.
     #[arg(long = "seat", value_name = "SEAT", value_parser = seat)]
-    seats: Vec<FilledBy>,
+    seats: Vec<v1::SeatConfig>,
     /// The game seed, 64 hexadecimal digits, for experiments; such a game has no seed commitment.
     #[arg(long, value_name = "HEX", value_parser = game_seed)]
     game_seed: Option<[u8; 32]>,
@@ -126,17 +126,15 @@ impl Create {
                 format!("--seat: {described} seats are described, but {players} play").into(),
             );
         }
-        let open = FilledBy::ReservedFor(v1::ParticipantKind::Unspecified.into());
+        let open = v1::SeatConfig {
+            filled_by: Some(FilledBy::ReservedFor(0)),
+            ..v1::SeatConfig::default()
+        };
         let all = self.seats.iter().cloned().chain(std::iter::repeat(open));
         Ok(v1::CreateRoomRequest {
             name: self.name.clone(),
             rules: (self.start.branch().is_none()).then(|| self.rules.message()),
-            seats: all
-                .take(players)
-                .map(|filled_by| v1::SeatConfig {
-                    filled_by: Some(filled_by),
-                })
-                .collect(),
+            seats: all.take(players).collect(),
             policy: Some(v1::RoomPolicy {
                 waiting_time_ms: self.waiting_time_ms,
                 ..self.policy.message()
@@ -147,7 +145,22 @@ impl Create {
     }
 }
 
-fn seat(word: &str) -> Result<FilledBy, String> {
+fn seat(word: &str) -> Result<v1::SeatConfig, String> {
+    let (filled_by, name) = match word.split_once('=') {
+        Some((_, "")) => return Err("there is no name after the =".into()),
+        Some((agent, name)) => (filled_by(agent)?, name),
+        None => (filled_by(word)?, ""),
+    };
+    if !name.is_empty() && matches!(filled_by, FilledBy::ReservedFor(_)) {
+        return Err("a name is for a built-in agent; whoever joins brings their own".into());
+    }
+    Ok(v1::SeatConfig {
+        filled_by: Some(filled_by),
+        name: name.to_owned(),
+    })
+}
+
+fn filled_by(word: &str) -> Result<FilledBy, String> {
     if let Some(player) = word.strip_prefix("replay:") {
         return recorded_player(player).map(FilledBy::Replay);
     }
@@ -267,9 +280,25 @@ mod tests {
             seat: 3,
         });
         assert_eq!(request.seats[0].filled_by, Some(replay));
-        for word in ["replay", "replay:5f0c6a4d", "replay:5f0c6a4d:x", "ada"] {
+        for word in [
+            "replay",
+            "replay:5f0c6a4d",
+            "replay:5f0c6a4d:x",
+            "ada",
+            "human=Ada",
+            "greedy=",
+        ] {
             assert!(seat(word).is_err(), "{word}");
         }
+    }
+
+    #[test]
+    fn a_built_in_agent_may_go_by_another_name() {
+        let request = request("--seat greedy=Greta --seat random").expect("a room");
+        let names: Vec<&str> = request.seats.iter().map(|seat| &*seat.name).collect();
+        assert_eq!(names, ["Greta", "", "", ""]);
+        let greedy = FilledBy::BuiltInAgent("greedy".into());
+        assert_eq!(request.seats[0].filled_by, Some(greedy));
     }
 
     #[test]

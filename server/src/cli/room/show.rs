@@ -12,7 +12,7 @@ use super::super::{CommandError, say};
 /// Rooms asked for at a time.
 const PAGE: u32 = 100;
 
-/// List the rooms of a server.
+/// List the rooms of a server, newest first.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  chefshat room list --state playing")]
 pub(super) struct List {
@@ -198,7 +198,10 @@ fn seat_in_words(seat: &v1::Participant) -> String {
         );
     }
     if !seat.built_in_agent.is_empty() {
-        return format!("{name}, played by the server");
+        return match name == seat.built_in_agent {
+            true => format!("{name}, played by the server"),
+            false => format!("{name}, played by the server as {}", seat.built_in_agent),
+        };
     }
     let there = match (seat.substituted, seat.connected) {
         (true, _) => "substituted",

@@ -25,6 +25,8 @@ pub(in crate::cli) struct Shown {
     pub(in crate::cli) picked: Option<u8>,
     /// How many of it go with the stack that is picked (jokers).
     pub(in crate::cli) along: u8,
+    /// The key that picks it, where that is not what is written on the card.
+    pub(in crate::cli) key: Option<char>,
 }
 
 /// A hand in five lines: cards of four, and what is picked below them.
@@ -54,7 +56,7 @@ pub(in crate::cli) fn hand(
         let [left, line, right, side, low_left, low_right] = frame;
         let space = " ".repeat(gap);
         rows[0].push(Span::styled(
-            format!("{left}{}{right}{space}", line.repeat(inner)),
+            format!("{left}{}{right}{space}", top(line, inner, shown.key)),
             style,
         ));
         // Faces and counts are to be read in any case: the frame alone is coloured or dimmed.
@@ -81,6 +83,16 @@ pub(in crate::cli) fn hand(
         rows[4].push(Span::styled(format!("{mark:^width$}"), look.bold()));
     }
     rows.into_iter().map(Line::from).collect()
+}
+
+/// The upper edge of a card between its corners, with a key in the middle.
+fn top(line: &str, inner: usize, key: Option<char>) -> String {
+    let Some(key) = key else {
+        return line.repeat(inner);
+    };
+    let left = inner / 2;
+    let right = inner.saturating_sub(left + 1);
+    format!("{}{key}{}", line.repeat(left), line.repeat(right))
 }
 
 /// Corners, line and side of a card: heavy where the cursor is, broken where nothing legal can be done.

@@ -121,8 +121,15 @@ pub(in crate::cli) fn ingredient(face: u32, faces: u32) -> Option<&'static str> 
 
 /// What sits there, as a symbol and a word.
 pub(in crate::cli) fn kind(place: &Place) -> (&'static str, &'static str) {
-    match place.kind {
-        _ if place.name.is_empty() => ("·", "free"),
+    match place.name.is_empty() {
+        true => ("·", "free"),
+        false => symbol(place.kind),
+    }
+}
+
+/// A kind of participants, as a symbol and a word.
+pub(in crate::cli) fn symbol(kind: v1::ParticipantKind) -> (&'static str, &'static str) {
+    match kind {
         v1::ParticipantKind::Human => ("☺", "person"),
         v1::ParticipantKind::Robot => ("▣", "robot"),
         v1::ParticipantKind::Agent | v1::ParticipantKind::Unspecified => ("◆", "agent"),

@@ -51,11 +51,7 @@ pub(super) fn of(table: &Table, kind: &Kind) -> Vec<Line> {
             about(declared.seat, format!("✦ {words}"))
         }
         Kind::CardsExchanged(cards) => about(cards.giver, exchanged(table, cards)),
-        Kind::ShiftEnded(end) => {
-            let order = end.order.iter().map(|seat| table.name(*seat));
-            let order = order.collect::<Vec<_>>().join(", ");
-            heading(format!("Shift {} ends: {order}", end.shift))
-        }
+        Kind::ShiftEnded(end) => return shift_ended(table, end),
         Kind::GameStarted(_) => heading("the game begins".into()),
         Kind::GameEnded(_) => heading("the game is over".into()),
         Kind::GameAborted(end) => heading(format!("aborted: {}", abort_reason(end.reason()))),
@@ -98,6 +94,19 @@ fn heading(words: String) -> Line {
         words,
         heading: true,
     }
+}
+
+/// The order in which all finished, and what each got for it.
+fn shift_ended(table: &Table, end: &v1::ShiftEnded) -> Vec<Line> {
+    let mut lines = vec![heading(format!("Shift {} ends", end.shift))];
+    for (place, seat) in (1u32..).zip(&end.order) {
+        let index = usize::try_from(*seat).unwrap_or(usize::MAX);
+        let now = end.points.get(index).copied().unwrap_or(0);
+        let before = table.seat(*seat).map_or(0, |it| it.points);
+        let got = now.saturating_sub(before);
+        lines.push(about(*seat, format!("{}, +{got}", ordinal(place))));
+    }
+    lines
 }
 
 /// What made a decision other than the seat itself.

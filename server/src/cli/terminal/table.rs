@@ -11,8 +11,10 @@ use super::super::narrator::{MAX_NAME, clean, names};
 use super::hand::Hand;
 use super::story::{self, Line};
 
+/// Most columns of a room's name: the server takes no longer one.
+const MAX_ROOM_NAME: usize = 64;
 /// Most lines of the story that are kept.
-const MAX_LINES: usize = 200;
+const MAX_LINES: usize = 2000;
 
 /// One seat.
 #[derive(Debug, Clone, Default)]
@@ -75,8 +77,12 @@ pub(in crate::cli) struct Table {
     pub(in crate::cli) board: Option<OnBoard>,
     /// Who is to act, where the events say so.
     pub(in crate::cli) turn: Option<u32>,
-    /// What happened, oldest first.
+    /// Seats in the order in which they finished the last Shift.
+    pub(in crate::cli) last_order: Vec<u32>,
+    /// What happened, oldest first: the last of the lines that were told.
     pub(in crate::cli) story: VecDeque<Line>,
+    /// How many lines were told.
+    pub(in crate::cli) told: usize,
     pub(in crate::cli) end: Option<End>,
 }
 
@@ -84,7 +90,7 @@ impl Table {
     /// The table of a room before any of its events is known.
     pub(in crate::cli) fn of_room(room: &v1::Room) -> Self {
         let mut table = Self {
-            room_name: clean(&room.name, 30),
+            room_name: clean(&room.name, MAX_ROOM_NAME),
             game_id: room.game_id.clone(),
             rules: room.rules.as_ref().and_then(|it| rules_from_proto(it).ok()),
             ..Self::default()
@@ -129,6 +135,7 @@ impl Table {
         // Told first: whose cards they were is forgotten afterwards.
         let lines = story::of(self, kind);
         self.fold(kind);
+        self.told += lines.len();
         self.story.extend(lines);
         while self.story.len() > MAX_LINES {
             self.story.pop_front();
@@ -198,6 +205,7 @@ impl Table {
                 for (place, points) in self.seats.iter_mut().zip(&end.points) {
                     place.points = *points;
                 }
+                self.last_order.clone_from(&end.order);
                 self.turn = None;
             }
             Kind::GameEnded(end) => self.end = Some(End::Finished(end.standings.clone())),

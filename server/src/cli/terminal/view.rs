@@ -10,6 +10,7 @@ use ratatui::widgets::{Block, BorderType, Clear, Paragraph, Wrap};
 use super::super::narrator::{MAX_NAME, abort_reason, clean, columns, ordinal, title};
 use super::super::numbers::counted;
 use super::cards::fan;
+use super::log::{self, Scroll};
 use super::look::{Look, ingredient, kind};
 use super::table::{End, Table};
 
@@ -33,15 +34,11 @@ pub(in crate::cli) fn draw(
     table: &Table,
     me: Option<u32>,
     status: &str,
+    scroll: Scroll,
     rows: u16,
 ) -> Option<Rect> {
     let area = frame.area();
-    if area.width < MIN_COLUMNS || area.height < MIN_ROWS {
-        let words = format!(
-            "The table needs {MIN_COLUMNS}×{MIN_ROWS}; this window has {}×{}. Make it larger, or the letters smaller.",
-            area.width, area.height
-        );
-        frame.render_widget(Paragraph::new(words).wrap(Wrap { trim: true }), area);
+    if is_too_small(frame) {
         return None;
     }
     let [header, upper, pizza, lower] = Layout::vertical([
@@ -51,13 +48,31 @@ pub(in crate::cli) fn draw(
         Constraint::Length(rows),
     ])
     .areas(area);
+    draw_header(frame, look, table, status, header);
+    if scroll.is_open() {
+        log::draw_back(frame, look, table, scroll, upper.union(pizza));
+        return Some(lower);
+    }
     let [seats, story] =
         Layout::horizontal([Constraint::Length(SEATS_COLUMNS), Constraint::Min(1)]).areas(upper);
-    draw_header(frame, look, table, status, header);
     draw_seats(frame, look, table, me, seats);
-    draw_story(frame, look, table, story);
+    log::draw(frame, look, table, story);
     draw_pizza(frame, look, table, me, pizza);
     Some(lower)
+}
+
+/// Says that a window is too small for a table, where it is.
+pub(in crate::cli) fn is_too_small(frame: &mut Frame<'_>) -> bool {
+    let area = frame.area();
+    let small = area.width < MIN_COLUMNS || area.height < MIN_ROWS;
+    if small {
+        let words = format!(
+            "The table needs {MIN_COLUMNS}×{MIN_ROWS}; this window has {}×{}. Make it larger, or the letters smaller.",
+            area.width, area.height
+        );
+        frame.render_widget(Paragraph::new(words).wrap(Wrap { trim: true }), area);
+    }
+    small
 }
 
 /// A box with a title.
@@ -124,15 +139,12 @@ pub(in crate::cli) fn padded(text: &str, width: usize) -> String {
 }
 
 fn draw_header(frame: &mut Frame<'_>, look: Look, table: &Table, status: &str, area: Rect) {
-    let mut words = " Chef's Hat".to_owned();
-    if !table.room_name.is_empty() {
-        words.push_str(&format!(" · {}", table.room_name));
-    }
+    let mut progress = String::new();
     if table.shift > 0 {
-        words.push_str(&format!(" · Shift {} · pizza {}", table.shift, table.pizza));
+        progress.push_str(&format!(" · Shift {} · pizza {}", table.shift, table.pizza));
     }
     if let Some(rules) = &table.rules {
-        words.push_str(&match rules.stop() {
+        progress.push_str(&match rules.stop() {
             chefshat_engine::Stop::Points(points) => format!(" · to {points} points"),
             chefshat_engine::Stop::Shifts(shifts) => {
                 format!(" · {}", counted(u64::from(shifts), "Shift"))
@@ -140,6 +152,18 @@ fn draw_header(frame: &mut Frame<'_>, look: Look, table: &Table, status: &str, a
         });
     }
     let width = usize::from(area.width).saturating_sub(columns(status) + 1);
+    let space = width.saturating_sub(columns(&progress) + 1);
+    let room = &table.room_name;
+    // A long name takes the place of the game's own, and is cut where that is not enough.
+    let named = match room.is_empty() {
+        true => "Chef's Hat".to_owned(),
+        false => format!("Chef's Hat · {room}"),
+    };
+    let named = match columns(&named) <= space {
+        true => named,
+        false => clean(room, space),
+    };
+    let words = format!(" {named}{progress}");
     let line = Line::from(format!("{}{status} ", padded(&words, width)));
     frame.render_widget(Paragraph::new(line).style(look.header()), area);
 }
@@ -203,33 +227,16 @@ fn note_of(place: &super::table::Place) -> Option<String> {
     (place.passed && place.finished.is_none()).then(|| "passed".to_owned())
 }
 
-fn draw_story(frame: &mut Frame<'_>, look: Look, table: &Table, area: Rect) {
-    let rows = usize::from(area.height.saturating_sub(2));
-    let skip = table.story.len().saturating_sub(rows);
-    let lines = table.story.iter().skip(skip).map(|line| {
-        if line.heading {
-            return Line::from(Span::styled(format!("─ {}", line.words), look.bold()));
-        }
-        match line.seat {
-            Some(seat) => Line::from(vec![
-                Span::styled(table.name(seat), look.seat(seat)),
-                Span::raw(format!(" {}", line.words)),
-            ]),
-            None => Line::from(line.words.clone()),
-        }
-    });
-    let lines: Vec<Line<'_>> = lines.collect();
-    frame.render_widget(
-        Paragraph::new(lines).block(boxed(look, " what happened ")),
-        area,
-    );
-}
-
 fn draw_pizza(frame: &mut Frame<'_>, look: Look, table: &Table, me: Option<u32>, area: Rect) {
     let block = boxed(look, " the pizza ");
     let inner = block.inner(area);
     frame.render_widget(block, area);
     let Some(play) = table.board else {
+        if table.turns == 0 && !table.last_order.is_empty() && table.end.is_none() {
+            let lines = between(look, table, me);
+            frame.render_widget(Paragraph::new(lines).wrap(Wrap { trim: false }), inner);
+            return;
+        }
         let words = match (table.started, table.turn) {
             (false, _) => waiting(table),
             (true, Some(seat)) if me == Some(seat) => "The board is empty: you lead.".to_owned(),
@@ -281,6 +288,24 @@ fn draw_pizza(frame: &mut Frame<'_>, look: Look, table: &Table, me: Option<u32>,
         Line::from(format!(" {beat}")),
     ];
     frame.render_widget(Paragraph::new(lines), right);
+}
+
+/// What matters between two Shifts: how the last one ended, and what that makes of the person.
+fn between(look: Look, table: &Table, me: Option<u32>) -> Vec<Line<'static>> {
+    let last = table.shift.saturating_sub(1);
+    let mut spans = vec![Span::raw(format!("  Shift {last} ended: "))];
+    for (place, seat) in (1u32..).zip(&table.last_order) {
+        let dot = if place > 1 { " · " } else { "" };
+        spans.push(Span::raw(format!("{dot}{} ", ordinal(place))));
+        spans.push(Span::styled(table.name(*seat), look.seat(*seat)));
+    }
+    let mine = me.and_then(|me| table.seat(me)).map(|place| place.role);
+    let role = match mine {
+        Some(role) if role != v1::Role::Unspecified => format!(" You are {}.", title(role)),
+        _ => String::new(),
+    };
+    let now = format!("  Shift {} is dealt.{role}", table.shift);
+    vec![Line::from(now), Line::from(spans)]
 }
 
 /// A play in words: `2 × 7 + 1 joker`.

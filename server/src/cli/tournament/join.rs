@@ -134,13 +134,16 @@ impl Join {
             let state = state(end);
             say(serde_json::json!({"event": "over", "state": state, "standing": standing}))?;
         } else {
-            say(format_args!(
-                "the tournament is {}: {} of {participants}, score {} in {}",
-                state(end),
-                ordinal(standing.place),
-                standing.score,
-                counted(standing.games.into(), "game"),
-            ))?;
+            let place = match standing.place {
+                0 => "no game was counted".to_owned(),
+                place => format!(
+                    "{} of {participants}, score {} in {}",
+                    ordinal(place),
+                    standing.score,
+                    counted(standing.games.into(), "game"),
+                ),
+            };
+            say(format_args!("the tournament is {}: {place}", state(end)))?;
         }
         Ok(match end {
             v1::TournamentState::Finished => ExitCode::SUCCESS,

@@ -10,17 +10,20 @@ use super::super::narrator::{clean, ordinal};
 use super::super::numbers::counted;
 use super::super::{CommandError, say};
 use super::all_games;
-use super::words::{format_name, state};
+use super::words::{StateArg, format_name, state};
 
 /// Tournaments asked for at a time.
 const PAGE: u32 = 100;
 
-/// List the tournaments of a server, oldest first.
+/// List the tournaments of a server, newest first.
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  chefshat tournament list")]
+#[command(after_help = "Example:\n  chefshat tournament list --state open")]
 pub(super) struct List {
     #[command(flatten)]
     server: ServerArg,
+    /// Tournaments in this state alone.
+    #[arg(long)]
+    state: Option<StateArg>,
     /// Print each tournament as a JSON line.
     #[arg(long)]
     json: bool,
@@ -53,6 +56,9 @@ impl List {
         let mut request = v1::ListTournamentsRequest {
             page_size: PAGE,
             page_token: String::new(),
+            state: (self.state)
+                .map_or(v1::TournamentState::Unspecified, StateArg::state)
+                .into(),
         };
         let mut count = 0;
         loop {

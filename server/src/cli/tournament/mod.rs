@@ -9,8 +9,8 @@ mod list;
 mod owner;
 mod results;
 mod simulate;
-mod tables;
-mod words;
+pub(super) mod tables;
+pub(super) mod words;
 
 use std::process::ExitCode;
 

@@ -88,13 +88,17 @@ fn text(results: &v1::GetTournamentResultsResponse) -> String {
     if let Some(words) = of_deals(settings.deals()) {
         line(&mut text, words);
     }
-    if !is_over(&tournament) {
-        line(&mut text, "these standings are not final");
+    let has_counted = tables::has_counted(&results.standings);
+    match (has_counted, is_over(&tournament)) {
+        (false, false) => line(&mut text, "nothing has been played yet"),
+        (false, true) => line(&mut text, "no game was counted"),
+        (true, false) => line(&mut text, "these standings are not final"),
+        (true, true) => {}
     }
     let field = Field::new(&tournament);
     text.push('\n');
     tables::standings(&mut text, &field, &results.standings);
-    if over > 0 {
+    if has_counted {
         text.push('\n');
         tables::order(&mut text, &field, &results.confidence);
         text.push('\n');

@@ -12,13 +12,13 @@ const MAX_NAME: usize = 20;
 const SURE: f64 = 0.95;
 
 /// Who takes part, and what in tables depends on the format.
-pub(super) struct Field<'t> {
+pub(in crate::cli) struct Field<'t> {
     participants: &'t [v1::TournamentParticipant],
     knockout: bool,
 }
 
 impl<'t> Field<'t> {
-    pub(super) fn new(tournament: &'t v1::Tournament) -> Self {
+    pub(in crate::cli) fn new(tournament: &'t v1::Tournament) -> Self {
         let settings = tournament.settings.as_ref();
         Self {
             participants: &tournament.participants,
@@ -28,14 +28,14 @@ impl<'t> Field<'t> {
     }
 
     /// The participant of a number.
-    pub(super) fn get(&self, participant: u32) -> Option<&v1::TournamentParticipant> {
+    pub(in crate::cli) fn get(&self, participant: u32) -> Option<&v1::TournamentParticipant> {
         usize::try_from(participant)
             .ok()
             .and_then(|index| self.participants.get(index))
     }
 
     /// The name of a participant, safe to print.
-    pub(super) fn name(&self, participant: u32) -> String {
+    pub(in crate::cli) fn name(&self, participant: u32) -> String {
         match self.get(participant) {
             Some(who) => clean(&who.name, MAX_NAME),
             None => format!("participant {participant}"),
@@ -64,7 +64,7 @@ pub(super) fn kind_name(kind: v1::ParticipantKind) -> &'static str {
 }
 
 /// Mean score of a game; 0 if there was none.
-pub(super) fn mean_score(standing: &v1::TournamentStanding) -> f64 {
+pub(in crate::cli) fn mean_score(standing: &v1::TournamentStanding) -> f64 {
     a_game(standing.score, standing)
 }
 
@@ -83,12 +83,27 @@ fn mean_place(standing: &v1::TournamentStanding) -> String {
     format!("{:.2}", sum as f64 / games as f64)
 }
 
-/// Adds the table of who stands where.
+/// Whether a game has counted: before, nobody has a place.
+pub(super) fn has_counted(standings: &[v1::TournamentStanding]) -> bool {
+    standings.iter().any(|standing| standing.place > 0)
+}
+
+/// Adds the table of who stands where; before a game has counted, of who takes part.
 pub(super) fn standings(
     text: &mut String,
     field: &Field<'_>,
     standings: &[v1::TournamentStanding],
 ) {
+    if !has_counted(standings) {
+        heading(text, "Who takes part");
+        let rows = (standings.iter()).map(|standing| {
+            vec![
+                field.name(standing.participant),
+                field.what(standing.participant),
+            ]
+        });
+        return table(text, &["Participant", "What"], &[0, 1], rows);
+    }
     heading(text, "Standings");
     let mut header = vec![
         "Place",
@@ -199,6 +214,27 @@ fn rating(rating: Option<&v1::Rating>) -> (String, String) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn before_a_game_has_counted_it_is_told_who_takes_part() {
+        let tournament = v1::Tournament {
+            participants: vec![v1::TournamentParticipant {
+                name: "Ada".into(),
+                kind: v1::ParticipantKind::Human.into(),
+                ..v1::TournamentParticipant::default()
+            }],
+            ..v1::Tournament::default()
+        };
+        let lines = [v1::TournamentStanding::default()];
+        assert!(!has_counted(&lines));
+        let mut text = String::new();
+        standings(&mut text, &Field::new(&tournament), &lines);
+        let text = anstream::adapter::strip_str(&text).to_string();
+        for words in ["Who takes part", "Ada", "human"] {
+            assert!(text.contains(words), "{words} is not in {text}");
+        }
+        assert!(!text.contains("Place"), "{text}");
+    }
 
     #[test]
     fn tables_fit_on_a_page() {

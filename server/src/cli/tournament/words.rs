@@ -46,8 +46,32 @@ impl DealsArg {
     }
 }
 
+/// Where a tournament stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum StateArg {
+    /// Participants may join.
+    Open,
+    /// It is being played.
+    Playing,
+    /// It has been played to its end.
+    Finished,
+    /// It was closed before its end.
+    Closed,
+}
+
+impl StateArg {
+    pub(super) fn state(self) -> v1::TournamentState {
+        match self {
+            Self::Open => v1::TournamentState::Open,
+            Self::Playing => v1::TournamentState::Playing,
+            Self::Finished => v1::TournamentState::Finished,
+            Self::Closed => v1::TournamentState::Closed,
+        }
+    }
+}
+
 /// The name of a format.
-pub(super) fn format_name(format: v1::TournamentFormat) -> &'static str {
+pub(in crate::cli) fn format_name(format: v1::TournamentFormat) -> &'static str {
     match format {
         v1::TournamentFormat::Unspecified => "unknown",
         v1::TournamentFormat::Knockout => "knockout",
@@ -68,7 +92,7 @@ pub(super) fn state(state: v1::TournamentState) -> &'static str {
 }
 
 /// Whether nothing more happens in a tournament.
-pub(super) fn is_over(tournament: &v1::Tournament) -> bool {
+pub(in crate::cli) fn is_over(tournament: &v1::Tournament) -> bool {
     use v1::TournamentState::{Closed, Finished};
     [Finished, Closed].contains(&tournament.state())
 }

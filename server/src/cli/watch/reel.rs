@@ -4,6 +4,7 @@
 use chefshat_client::v1::{self, game_event::Kind};
 use ratatui::crossterm::event::KeyCode;
 
+use super::super::terminal::log::Scroll;
 use super::super::terminal::screen::Key;
 use super::super::terminal::table::Table;
 
@@ -31,6 +32,8 @@ pub(super) struct Reel {
     pub(super) lost: Option<String>,
     pub(super) hands: bool,
     pub(super) help: bool,
+    /// How far back the person looks at what happened.
+    pub(super) scroll: Scroll,
     pub(super) left: bool,
 }
 
@@ -61,6 +64,7 @@ impl Reel {
             lost: None,
             hands: !live,
             help: false,
+            scroll: Scroll::default(),
             left: false,
         }
     }
@@ -115,6 +119,11 @@ impl Reel {
         if std::mem::take(&mut self.help) {
             return;
         }
+        if self.scroll.key(code, &self.table) {
+            // What is read does not run away.
+            self.running &= !self.scroll.is_open();
+            return;
+        }
         self.moved_ms = now_ms;
         match code {
             KeyCode::Char('q') | KeyCode::Esc => self.left = true,
@@ -127,8 +136,8 @@ impl Reel {
             KeyCode::Down | KeyCode::Char('-') => self.pace = self.pace.saturating_sub(1),
             KeyCode::Left => self.stop_at(self.at.saturating_sub(1)),
             KeyCode::Right => self.stop_at(self.at + 1),
-            KeyCode::PageUp => self.stop_at(self.shift_before()),
-            KeyCode::PageDown => self.stop_at(self.shift_after()),
+            KeyCode::Char('S') => self.stop_at(self.shift_before()),
+            KeyCode::Char('s') => self.stop_at(self.shift_after()),
             KeyCode::Home => self.stop_at(0),
             KeyCode::End => {
                 self.wind_to(self.events.len());

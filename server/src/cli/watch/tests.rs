@@ -47,9 +47,9 @@ fn the_reel_runs_stops_and_jumps() {
     assert!(!reel.tick(999) && reel.tick(1000) && !reel.tick(1999));
     press(&mut reel, KeyCode::Char(' '));
     assert!(!reel.tick(9_999_999));
-    press(&mut reel, KeyCode::PageDown);
+    press(&mut reel, KeyCode::Char('s'));
     assert_eq!(reel.table.shift, 2);
-    press(&mut reel, KeyCode::PageUp);
+    press(&mut reel, KeyCode::Char('S'));
     assert_eq!(reel.at, deal);
     press(&mut reel, KeyCode::Char(' '));
     press(&mut reel, KeyCode::Up);

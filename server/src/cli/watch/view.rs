@@ -12,12 +12,13 @@ use super::super::terminal::table::Table;
 use super::super::terminal::view::{boxed, draw as draw_table, end_lines, padded, popup};
 use super::reel::Reel;
 
-const KEYS: &str = " space stop  ←→ step  ↑↓ speed  PgUp/PgDn Shift  h hands  ? help  q end";
+const KEYS: &str = " space stop  ←→ step  ↑↓ speed  s S Shift  PgUp story  h hands  ? keys  q end";
 
-const HELP: [&str; 9] = [
+const HELP: [&str; 10] = [
     "space        stops, and runs again",
     "← →          one event back, one on",
-    "PgUp PgDn    to the deal before, to the next",
+    "s S          to the next deal, to the one before",
+    "PgUp PgDn    back and on in what happened",
     "Home End     to the beginning, to the end (and follow a live game)",
     "↑ ↓          faster, slower",
     "h            shows or hides the hands (known once a game is over)",
@@ -44,7 +45,7 @@ pub(super) fn draw(frame: &mut Frame<'_>, look: Look, reel: &Reel) {
         (false, true) if reel.at == reel.len() => "■ the end",
         (false, true) => "▶ running",
     };
-    let Some(area) = draw_table(frame, look, table, None, status, rows) else {
+    let Some(area) = draw_table(frame, look, table, None, status, reel.scroll, rows) else {
         return;
     };
     let [hands, bar, keys] = Layout::vertical([
@@ -61,7 +62,9 @@ pub(super) fn draw(frame: &mut Frame<'_>, look: Look, reel: &Reel) {
     if reel.help {
         let lines = HELP.iter().map(|line| Line::from(*line)).collect();
         popup(frame, look, "help", lines);
-    } else if let (Some(end), true) = (&table.end, reel.at == reel.len()) {
+    } else if let (Some(end), true, false) =
+        (&table.end, reel.at == reel.len(), reel.scroll.is_open())
+    {
         let mut lines = end_lines(look, table, end);
         lines.push(Line::default());
         lines.push(Line::from(format!("game {}", table.game_id)));

@@ -10,7 +10,7 @@ use super::{
     BUILT_IN_BUDGET, Core, JOIN_HOLD, LOOK_AGAIN, MAX_HANDOVER, RECALL_TIME, REPLAY_COST, State,
 };
 use crate::room::policy::AbortPolicy;
-use crate::store::journal::{AbortReason, Change, Fill, Source};
+use crate::store::journal::{AbortReason, Change, Fill, ParticipantKind, Source};
 
 impl Core {
     /// When the room must next be told that time has passed; `None` when nothing depends on it.
@@ -25,7 +25,7 @@ impl Core {
                 let open = self.open.as_ref()?;
                 let seat = open.decision.seat;
                 Some(if self.is_automatic(seat) {
-                    open.released + self.header.policy.pace
+                    open.released + self.pace()
                 } else {
                     let deadline = open.start.unwrap_or(open.released) + self.time_allowed(seat);
                     deadline.max(open.look_again)
@@ -60,8 +60,7 @@ impl Core {
             }
             let due = self.state == State::Playing
                 && self.open.as_ref().is_some_and(|open| {
-                    self.is_automatic(open.decision.seat)
-                        && open.released + self.header.policy.pace <= now
+                    self.is_automatic(open.decision.seat) && open.released + self.pace() <= now
                 });
             if !due {
                 return;
@@ -69,6 +68,16 @@ impl Core {
             budget = budget.saturating_sub(self.cost_of_open());
             self.decide_automatically(now);
         }
+    }
+
+    /// What a built-in agent or substitute waits before it decides.
+    pub fn pace(&self) -> Duration {
+        let mut participants = self
+            .seats
+            .iter()
+            .filter_map(|seat| seat.participant.as_ref());
+        let with_people = participants.any(|it| it.kind == ParticipantKind::Human);
+        self.header.policy.pace_of(with_people)
     }
 
     /// What the open decision of a built-in agent counts for.

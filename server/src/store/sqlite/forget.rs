@@ -123,6 +123,27 @@ impl Forgetting {
         Ok(name)
     }
 
+    /// The names of those who sat down in a game that was hosted, in order, whether they stayed or not; nobody's if it is not here.
+    ///
+    /// # Errors
+    /// The database failed, or the game's journal cannot be read.
+    pub async fn sat_down(&mut self, game: Id) -> Result<Vec<String>, ForgetError> {
+        let row = sqlx::query("SELECT number, last_row FROM games WHERE game_id = $1")
+            .bind(game.0.as_slice())
+            .fetch_optional(&mut self.0.writer)
+            .await?;
+        let Some(row) = row else {
+            return Ok(Vec::new());
+        };
+        let journal = journal_of(&mut self.0.writer, &row).await?;
+        let entries = journal.into_iter().flat_map(|(_, entries)| entries);
+        let names = entries.filter_map(|entry| match entry.change {
+            Change::Seated { participant, .. } => Some(participant.name),
+            _ => None,
+        });
+        Ok(names.collect())
+    }
+
     /// Notes that the records have been written anew, and writes the database anew, so that nothing of what was there before is left in parts
     /// of it that are not used any more, or in the log of writes. This takes as much space on the disk as the database has.
     ///
@@ -200,12 +221,11 @@ async fn forget_game(
     Ok(taken_out)
 }
 
-/// Takes somebody out of the journal of a game, of which only the rows that change are written.
-async fn forget_journal(
+/// The journal of a game, by rows in order: the numbers of the rows, and what each holds.
+async fn journal_of(
     connection: &mut SqliteConnection,
     game: &SqliteRow,
-    who: &Pseudonym,
-) -> Result<TakenOut, ForgetError> {
+) -> Result<Vec<(i64, Vec<Entry>)>, ForgetError> {
     let number: i64 = game.get("number");
     let last_row: Option<i64> = game.get("last_row");
     let rows = sqlx::query(match last_row {
@@ -224,8 +244,7 @@ async fn forget_journal(
     .bind(number)
     .fetch_all(&mut *connection)
     .await?;
-    let (mut own, mut all) = (OwnSeats::default(), TakenOut::default());
-    for row in rows {
+    let read = |row: &SqliteRow| {
         let mut entries = Vec::new();
         form::read_entries(row.get("entries"), &mut entries).map_err(|problem| {
             ForgetError::Unreadable {
@@ -233,6 +252,19 @@ async fn forget_journal(
                 problem: problem.to_string(),
             }
         })?;
+        Ok((row.get("row"), entries))
+    };
+    rows.iter().map(read).collect()
+}
+
+/// Takes somebody out of the journal of a game, of which only the rows that change are written.
+async fn forget_journal(
+    connection: &mut SqliteConnection,
+    game: &SqliteRow,
+    who: &Pseudonym,
+) -> Result<TakenOut, ForgetError> {
+    let (mut own, mut all) = (OwnSeats::default(), TakenOut::default());
+    for (row, mut entries) in journal_of(connection, game).await? {
         let taken_out = forget_entries(&mut entries, &mut own, who);
         if taken_out == TakenOut::default() {
             continue;
@@ -243,7 +275,7 @@ async fn forget_journal(
             form::put_entry(entry, &mut bytes);
         }
         sqlx::query("UPDATE journal SET entries = $2 WHERE row = $1")
-            .bind(row.get::<i64, _>("row"))
+            .bind(row)
             .bind(bytes)
             .execute(&mut *connection)
             .await?;

@@ -28,7 +28,7 @@ pub use open::OpenError;
 
 use super::journal::{Entry, GameHeader};
 use super::tournaments::{KeptTournament, TournamentEntry, TournamentHeader};
-use super::{Journal, KeptGame, LeftGame, Store, StoreError};
+use super::{Journal, KeptGame, LeftGame, Part, Store, StoreError};
 use crate::ids::Id;
 use crate::room::policy::Durability;
 use errors::explain;
@@ -141,10 +141,10 @@ impl Store for SqliteStore {
     fn list<'a>(
         &'a self,
         filter: &'a v1::RecordFilter,
-        after: u64,
+        part: Part,
         count: usize,
     ) -> BoxFuture<'a, Result<Vec<(u64, v1::RecordSummary)>, StoreError>> {
-        self.reader.list(filter, after, count).boxed()
+        self.reader.list(filter, part, count).boxed()
     }
 
     fn import(

@@ -16,10 +16,29 @@ use super::journals::{DurableJournal, Orders};
 use crate::ids::Id;
 use crate::store::journal::{Entry, GameHeader};
 use crate::store::tournaments::{KeptTournament, TournamentEntry};
-use crate::store::{KeptGame, LeftGame, StoreError};
+use crate::store::{KeptGame, LeftGame, Part, StoreError};
 
 /// Games that had ended of which the rooms are there again; the last ones, since of earlier ones everybody has heard.
 const MOST_ENDED: i64 = 256;
+
+/// The query for a list of finished games: the condition that their numbers meet, the order in which they come.
+macro_rules! list_query {
+    ($part:literal, $order:literal) => {
+        concat!(
+            "SELECT number, summary FROM games
+             WHERE summary IS NOT NULL AND ",
+            $part,
+            " AND ($2 = 0 OR state = $2) AND ($3 = 0 OR origin = $3) AND ($4 = '' OR room_name = $4)
+               AND created_at_ms >= $5 AND ($6 = 0 OR created_at_ms < $6)
+               AND ($7 = 0 OR EXISTS (SELECT 1 FROM participants WHERE game = number AND kind = $7))
+               AND ($8 = '' OR number IN (SELECT game FROM participants WHERE name = $8 OR agent = $8))
+               AND NOT ($9 AND added)
+             ORDER BY ",
+            $order,
+            " LIMIT $10"
+        )
+    };
+}
 
 /// Reads what is kept.
 pub(super) struct Reader(pub(super) SqlitePool);
@@ -210,32 +229,27 @@ impl Reader {
     pub(super) async fn list(
         &self,
         filter: &v1::RecordFilter,
-        after: u64,
+        part: Part,
         count: usize,
     ) -> Result<Vec<(u64, v1::RecordSummary)>, StoreError> {
-        let rows = sqlx::query(
-            "SELECT number, summary FROM games
-             WHERE summary IS NOT NULL AND number > $1
-               AND ($2 = 0 OR state = $2) AND ($3 = 0 OR origin = $3) AND ($4 = '' OR room_name = $4)
-               AND created_at_ms >= $5 AND ($6 = 0 OR created_at_ms < $6)
-               AND ($7 = 0 OR EXISTS (SELECT 1 FROM participants WHERE game = number AND kind = $7))
-               AND ($8 = '' OR number IN (SELECT game FROM participants WHERE name = $8 OR agent = $8))
-               AND NOT ($9 AND added)
-             ORDER BY number LIMIT $10",
-        )
-        .bind(i64::try_from(after).unwrap_or(i64::MAX))
-        .bind(filter.state)
-        .bind(filter.origin)
-        .bind(filter.room_name.as_str())
-        .bind(i64::try_from(filter.created_from_ms).unwrap_or(i64::MAX))
-        .bind(i64::try_from(filter.created_before_ms).unwrap_or(i64::MAX))
-        .bind(filter.kind)
-        .bind(filter.participant.as_str())
-        .bind(filter.hosted_here)
-        .bind(i64::try_from(count).unwrap_or(i64::MAX))
-        .fetch_all(&self.0)
-        .await
-        .map_err(failure)?;
+        let (query, number) = match part {
+            Part::After(number) => (list_query!("number > $1", "number"), number),
+            Part::Before(number) => (list_query!("number < $1", "number DESC"), number),
+        };
+        let rows = sqlx::query(query)
+            .bind(i64::try_from(number).unwrap_or(i64::MAX))
+            .bind(filter.state)
+            .bind(filter.origin)
+            .bind(filter.room_name.as_str())
+            .bind(i64::try_from(filter.created_from_ms).unwrap_or(i64::MAX))
+            .bind(i64::try_from(filter.created_before_ms).unwrap_or(i64::MAX))
+            .bind(filter.kind)
+            .bind(filter.participant.as_str())
+            .bind(filter.hosted_here)
+            .bind(i64::try_from(count).unwrap_or(i64::MAX))
+            .fetch_all(&self.0)
+            .await
+            .map_err(failure)?;
         rows.iter()
             .map(|row| {
                 let number: i64 = row.get(0);

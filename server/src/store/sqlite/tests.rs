@@ -1,5 +1,7 @@
 //! The database: what is kept is found again. Folders and files that cannot be used are in `opening`.
 
+mod forget;
+mod lists;
 mod opening;
 mod tournaments;
 
@@ -23,7 +25,7 @@ use crate::store::journal::{
     AbortReason, Branch, Change, Decided, Entry, Fill, GameHeader, GameStart, ParticipantKind,
     RecordedSeat, SeatedParticipant, Source, TakenOver,
 };
-use crate::store::{KeptGame, Store};
+use crate::store::{KeptGame, Part, Store};
 
 fn header(game: u8, durability: Durability) -> GameHeader {
     GameHeader {
@@ -35,6 +37,8 @@ fn header(game: u8, durability: Durability) -> GameHeader {
         policy: Policy {
             durability,
             bank: Duration::from_millis(1_234),
+            pace: Some(Duration::ZERO),
+            clocks: Vec::new(),
             ..Policy::default()
         },
         fills: vec![
@@ -48,6 +52,7 @@ fn header(game: u8, durability: Durability) -> GameHeader {
                 seat: Seat::new(2),
             }),
         ],
+        called: BTreeMap::new(),
         recorded: BTreeMap::new(),
         start: GameStart {
             script: None,
@@ -282,132 +287,6 @@ async fn many_rooms_share_the_writer() {
 }
 
 #[tokio::test]
-async fn lists_are_filtered_and_paged() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let store = opened(folder.path()).await;
-    for game in 1..=5 {
-        let mut header = header(game, Durability::Durable);
-        header.created_at_ms = u64::from(game) * 1_000;
-        let header = Arc::new(header);
-        let mut journal = store
-            .create(Arc::clone(&header), Vec::new())
-            .await
-            .expect("kept");
-        journal.finish(Some(summary(&header))).await.expect("kept");
-    }
-    let unheard_of = {
-        let mut journal = store
-            .create(Arc::new(header(6, Durability::Durable)), Vec::new())
-            .await
-            .expect("kept");
-        // Nothing was dealt in it: there is no record.
-        journal.finish(None).await
-    };
-    unheard_of.expect("kept");
-    let filter = v1::RecordFilter::default;
-    let robot = v1::ParticipantKind::Robot.into();
-    let human = v1::ParticipantKind::Human.into();
-    let finished = v1::RoomState::Finished.into();
-    let table = [
-        (filter(), 0, 9, vec![1, 2, 3, 4, 5]),
-        (filter(), 0, 2, vec![1, 2]),
-        (filter(), 2, 2, vec![3, 4]),
-        (filter(), 5, 2, vec![]),
-        (
-            v1::RecordFilter {
-                participant: "player of 3".into(),
-                ..filter()
-            },
-            0,
-            9,
-            vec![3],
-        ),
-        (
-            v1::RecordFilter {
-                participant: "agent of 4".into(),
-                ..filter()
-            },
-            0,
-            9,
-            vec![4],
-        ),
-        (
-            v1::RecordFilter {
-                participant: "player of".into(),
-                ..filter()
-            },
-            0,
-            9,
-            vec![],
-        ),
-        (
-            v1::RecordFilter {
-                kind: robot,
-                state: finished,
-                ..filter()
-            },
-            3,
-            9,
-            vec![4, 5],
-        ),
-        (
-            v1::RecordFilter {
-                kind: human,
-                ..filter()
-            },
-            0,
-            9,
-            vec![],
-        ),
-        (
-            v1::RecordFilter {
-                state: v1::RoomState::Aborted.into(),
-                ..filter()
-            },
-            0,
-            9,
-            vec![],
-        ),
-        (
-            v1::RecordFilter {
-                origin: v1::GameOrigin::Branched.into(),
-                ..filter()
-            },
-            0,
-            9,
-            vec![],
-        ),
-        (
-            v1::RecordFilter {
-                room_name: "another".into(),
-                ..filter()
-            },
-            0,
-            9,
-            vec![],
-        ),
-        (
-            v1::RecordFilter {
-                created_from_ms: 2_000,
-                created_before_ms: 4_000,
-                ..filter()
-            },
-            0,
-            9,
-            vec![2, 3],
-        ),
-    ];
-    for (filter, after, count, expected) in table {
-        let listed = store.list(&filter, after, count).await.expect("readable");
-        let numbers: Vec<u64> = listed.iter().map(|(number, _)| *number).collect();
-        assert_eq!(numbers, expected, "{filter:?}");
-        for (number, summary) in listed {
-            assert!(super::super::lets_through(&filter, &summary), "{number}");
-        }
-    }
-}
-
-#[tokio::test]
 async fn an_imported_game_is_kept_once() {
     let folder = tempfile::tempdir().expect("a folder");
     let store = opened(folder.path()).await;
@@ -432,14 +311,15 @@ async fn an_imported_game_is_kept_once() {
         store.failed().now_or_never().is_none(),
         "that is no failure"
     );
-    let listed = store.list(&v1::RecordFilter::default(), 0, 9).await;
+    let listed = (store.list(&v1::RecordFilter::default(), Part::FROM_OLDEST, 9)).await;
     let listed = listed.expect("readable");
     assert!(listed.len() == 1 && listed[0].1.added);
     let hosted_here = v1::RecordFilter {
         hosted_here: true,
         ..v1::RecordFilter::default()
     };
-    let listed = store.list(&hosted_here, 0, 9).await.expect("readable");
+    let listed = store.list(&hosted_here, Part::FROM_OLDEST, 9).await;
+    let listed = listed.expect("readable");
     assert!(listed.is_empty());
     let kept = store.finished(header.game_id).await.expect("readable");
     let Some(KeptGame::Imported(kept)) = kept else {
@@ -554,4 +434,15 @@ fn the_form_of_what_is_kept_does_not_change() {
     let mut read = Vec::new();
     form::read_entries(&bytes, &mut read).expect("readable");
     assert_eq!(shown(&read), shown(&entries()));
+}
+
+#[test]
+fn what_has_come_to_the_form_since_is_read_back_too() {
+    let header = GameHeader {
+        called: BTreeMap::from([(2, "Greta".to_owned())]),
+        policy: Policy::default(),
+        ..header(1, Durability::Durable)
+    };
+    let read = form::header_from_bytes(&form::header_to_bytes(&header)).expect("readable");
+    assert_eq!(shown(&read), shown(&header));
 }

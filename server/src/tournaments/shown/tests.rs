@@ -250,17 +250,17 @@ fn no_message_outgrows_what_standard_clients_take() {
             }),
         };
     }
-    assert_eq!(results.confidence.len(), MAX_PARTICIPANTS - 1);
-    for pair in &mut results.confidence {
-        *pair = v1::OrderConfidence {
-            upper: u32::MAX,
-            lower: u32::MAX,
-            difference: 1.0,
-            standard_error: 1.0,
-            confidence: 1.0,
-            more_games: Some(u64::MAX),
-        };
-    }
+    assert_eq!(results.standings.len(), MAX_PARTICIPANTS);
+    // Once a game has counted there is one for each two neighbours.
+    let pair = v1::OrderConfidence {
+        upper: u32::MAX,
+        lower: u32::MAX,
+        difference: 1.0,
+        standard_error: 1.0,
+        confidence: 1.0,
+        more_games: Some(u64::MAX),
+    };
+    results.confidence = vec![pair; MAX_PARTICIPANTS - 1];
     let size = results.encoded_len();
     assert!(size < STANDARD_LIMIT, "{size} bytes of results");
     let seat = v1::TournamentGameSeat {

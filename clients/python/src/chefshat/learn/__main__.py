@@ -1,6 +1,6 @@
 """The command line `python -m chefshat.learn`: its commands and their options. Each command is the function `run` of a module.
 
-Nothing but the standard library is imported before the options are read, so that `--help` always answers.
+Nothing that an extra brings is imported before the options are read, so that `--help` always answers.
 """
 
 import argparse
@@ -10,6 +10,8 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
+
+from chefshat import way_in
 
 EXAMPLES = """examples:
   python -m chefshat.learn ppo --out strong.safetensors --minutes 30 --seed 1
@@ -169,9 +171,10 @@ def _deep_q_games(command: argparse.ArgumentParser) -> None:
 def _play(command: argparse.ArgumentParser) -> None:
     command.add_argument("file", type=Path, help="the network")
     command.add_argument("--address", required=True, metavar="HOST:PORT", help="the server")
-    command.add_argument("--code", dest="join_code", required=True, help="the room's join code")
-    command.add_argument("--name", required=True, help="name to show, 1 to 64 characters")
-    command.add_argument("--seat", type=_natural, help="a certain seat")
+    way_in.add_options(command)
+    command.add_argument("--name", help="name to show, 1 to 64 characters; not needed with a ticket")
+    # Which of these go together is checked when all have been read.
+    command.set_defaults(parser=command)
 
 
 def _count(text: str) -> int:
@@ -201,7 +204,7 @@ COMMANDS: dict[str, tuple[str, str, Callable[[argparse.ArgumentParser], None]]] 
     "deep-q": ("deep_q_command", "trains a Deep Q agent, the 2020 paper's, against built-in agents", _deep_q),
     "tune": ("tune", "looks for good hyper-parameters of the Deep Q agent", _tune),
     "curve": ("curve", "draws how a training went, from its log", _curve),
-    "play": ("play", "joins a room with a trained network and plays one game", _play),
+    "play": ("play", "joins a room with a trained network and plays one game, or a tournament to its end", _play),
 }
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """An agent that plays by a network from a file, in any room of a server whose rule set has the sizes it was trained for.
 
 It takes the legal action with the highest output, and the default decision where the network has no say; so it never takes a wrong
-action, however it was trained. The command `python -m chefshat.learn play` joins a room with it.
+action, however it was trained. The command `python -m chefshat.learn play` takes part with it in rooms and tournaments.
 """
 
 import argparse
@@ -10,7 +10,7 @@ import json
 import numpy as np
 import numpy.typing as npt
 
-from chefshat import Agent, Client, Decision, SeatInfo, agent, pb
+from chefshat import Agent, Client, Decision, SeatInfo, outcome, pb, way_in
 from chefshat.errors import ChefsHatError, failed
 from chefshat.learn import network
 from chefshat.learn.network import Network, NetworkFileError
@@ -73,21 +73,16 @@ class Row:
 
 
 def run(options: argparse.Namespace) -> int:
-    """The command: joins a room, plays one game, prints the standings. Returns the exit code."""
+    """The command: plays one game in a room, or a tournament to its end, and prints the standings. Returns the exit code."""
+    (way,) = way_in.ways(options.parser, options)
     try:
-        player = NetworkAgent(network.load(options.file))
+        net = network.load(options.file)
         with Client(options.address) as client:
-            # Who has not joined cannot see what room a code is of; a seat that is not attached starts no game.
-            joined = client.join_room(options.join_code, options.name, seat=options.seat)
-            try:
-                player.check_rules(joined.room.rules)
-            except RulesDoNotFit as error:
-                raise RulesDoNotFit(f"{error}; its seat {joined.seat} will be free again within two minutes") from error
-            result = client.play(player, joined.ticket)
+            played = way_in.take_part(client, way, lambda seat: NetworkAgent(net), check_rules=NetworkAgent(net).check_rules)
     except (ChefsHatError, NetworkFileError, RulesDoNotFit, OSError) as error:
         return failed(error, as_json=options.json)
-    print(json.dumps(agent.as_json(result)) if options.json else agent.as_table(result), flush=True)
-    return 0 if result.finished else 1
+    print(json.dumps(outcome.as_json(played)) if options.json else outcome.as_table(played), flush=True)
+    return 0 if played.finished else 1
 
 
 def _row(values: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:

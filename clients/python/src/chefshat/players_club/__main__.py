@@ -1,34 +1,42 @@
-"""The command `python -m chefshat.players_club`: joins rooms with a player of the reference implementation, prints the standings.
+"""The command `python -m chefshat.players_club`: plays in rooms or a tournament with a player of the reference implementation.
 
-How the player is run and understood is in `process` and `agent`; here are the arguments and what is printed.
+How the player is run and understood is in `process` and `agent`, how a place is come by in `way_in`; here are the arguments and
+what is printed.
 """
 
 import argparse
 import json
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from chefshat import Client
-from chefshat.agent import as_json, as_table
+from chefshat import Client, outcome, way_in
 from chefshat.errors import ChefsHatError, failed
-from chefshat.players_club.agent import ATTEMPTS, PlayersClubAgent, RulesDoNotFit, check_rules
-from chefshat.players_club.process import AgentError, AgentProcess, AgentSpec
-from chefshat.result import SeatResult
+from chefshat.outcome import Played
+from chefshat.players_club.agent import ATTEMPTS, RulesDoNotFit, check_rules
+from chefshat.players_club.players import Players
+from chefshat.players_club.process import AgentError, AgentSpec
+from chefshat.way_in import WayIn
 
-EXAMPLE = """example:
+EXAMPLE = """examples:
   python -m chefshat.players_club --server 127.0.0.1:50051 --code BCDF2345 \\
     --agent ChefsHatGym.agents.agent_random:AgentRandon --python ~/venv-chefshatgym/bin/python --name Rolf
   python -m chefshat.players_club --server 127.0.0.1:50051 --code BCDF2345 --code GHJK6789 \\
     --agent my_players:Cautious --path ~/players --arguments '{"verbose_console": false}'
+  python -m chefshat.players_club --server 127.0.0.1:50051 --tournament BCDF2345 --games 2 --name Dora \\
+    --agent my_players:Cautious --path ~/players --ticket-file dora.ticket
 
 The player runs with all your rights, like any program that you start. What it chooses illegally is sent, counted by the server as a
 wrong action, and the player is asked again. Where it raises, hangs or dies, the default decision of the rules is taken; a process
-that is gone is started anew at the next call.
+that is gone is started anew at the next call. With --games N it plays in N processes, which know nothing of each other.
 
-exit code: 0 every game was finished, 1 one was refused, lost or aborted, or the player was given up, 2 the arguments are wrong,
-130 interrupted
+If this command itself dies, another goes on in its place with the ticket that it printed, or with the same --ticket-file. The
+player is told the game from the beginning, but knows nothing else of before.
+
+exit code: 0 every game or the tournament was finished, 1 one was refused, lost or aborted, or the player was given up, 2 the
+arguments are wrong, 130 interrupted
 """
 # Characters of the longest name a server shows.
 MAX_NAME = 64
@@ -49,51 +57,52 @@ def main(arguments: Sequence[str] | None = None) -> int:
         log=options.log,
     )
     try:
-        # First the player, then the room: nobody waits for a player that cannot be made.
-        with AgentProcess(spec) as process, Client(options.address) as client:
-            finished = [play(client, process, code, options) for code in options.code]
-            return 0 if all(finished) and not process.given_up else 1
-    except (ChefsHatError, AgentError, RulesDoNotFit) as error:
+        # First the player, then the place: nobody waits for a player that cannot be made.
+        with Players(spec, options.games or 1, attempts=options.attempts) as players, Client(options.address) as client:
+            finished = [play(client, players, way, as_json_line=options.json) for way in options.ways]
+            return 0 if all(finished) and not players.given_up else 1
+    except (ChefsHatError, AgentError, RulesDoNotFit, OSError) as error:
         return failed(error, as_json=options.json)
     except KeyboardInterrupt:
-        print("interrupted; the seat is the server's to fill", file=sys.stderr)
+        print("interrupted; the place is the server's to fill until its ticket is used again", file=sys.stderr)
         return 130
 
 
-def play(client: Client, process: AgentProcess, code: str, options: argparse.Namespace) -> bool:
-    """Plays the game of one room. Returns whether it was finished."""
-    joined = client.join_room(code, options.name or process.name[:MAX_NAME], seat=options.seat)
-    check_rules(joined.room.rules)
-    agent = PlayersClubAgent(process, attempts=options.attempts)
-    restarts = process.restarts
-    result = client.play(agent, joined.ticket)
-    report(result, agent, process.restarts - restarts, as_json_line=options.json)
-    return result.finished
+def play(client: Client, players: Players, way: WayIn, *, as_json_line: bool) -> bool:
+    """Plays the game of one room, or a tournament. Returns whether it was finished."""
+    way = replace(way, name=way.name or players.name[:MAX_NAME])
+    before, restarts = len(players.agents), players.restarts
+    played = way_in.take_part(client, way, players.seat, check_rules=check_rules)
+    agents = players.agents[before:]
+    own = {
+        "failures": sum(agent.failures for agent in agents),
+        "replaced": sum(agent.replaced for agent in agents),
+        "restarts": players.restarts - restarts,
+    }
+    report(played, own, as_json_line=as_json_line)
+    return played.finished
 
 
-def report(result: SeatResult, agent: PlayersClubAgent, restarts: int, *, as_json_line: bool) -> None:
-    """Prints how the game ended and how much of it was the player's own."""
+def report(played: Played, own: dict[str, int], *, as_json_line: bool) -> None:
+    """Prints how it ended and how much of it was the player's own."""
     if as_json_line:
-        own = {"failures": agent.failures, "replaced": agent.replaced, "restarts": restarts}
-        print(json.dumps({**as_json(result), **own}), flush=True)
+        print(json.dumps({**outcome.as_json(played), **own}), flush=True)
         return
-    print(as_table(result))
-    print(f"{agent.failures} failures of the player, {agent.replaced} decisions taken for it, {restarts} restarts", flush=True)
+    print(outcome.as_table(played))
+    print("{failures} failures of the player, {replaced} decisions taken for it, {restarts} restarts".format(**own), flush=True)
 
 
 def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
-    """The arguments, checked."""
+    """The arguments, checked; the places they name are in `ways`."""
     parser = argparse.ArgumentParser(
         prog="python -m chefshat.players_club",
-        description="Joins a room of a Chef's Hat server with a player written for the reference implementation's second version "
-        "(ChefsHatGym 2, Chef's Hat Players Club), unchanged.",
+        description="Joins a room or a tournament of a Chef's Hat server with a player written for the reference implementation's "
+        "second version (ChefsHatGym 2, Chef's Hat Players Club), unchanged.",
         epilog=EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--server", "--address", dest="address", required=True, help="the server, HOST:PORT")
-    parser.add_argument(
-        "--code", action="append", required=True, help="a room's join code; several times: rooms played one after the other"
-    )
+    way_in.add_options(parser, several_codes=True)
     parser.add_argument("--agent", required=True, type=class_name, help="the player, module.path:Class")
     parser.add_argument("--python", default=sys.executable, help="the Python that has what the player needs (default: this one)")
     parser.add_argument(
@@ -103,7 +112,6 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--arguments", type=json_object, default={}, metavar="JSON", help="arguments of its constructor, as an object"
     )
-    parser.add_argument("--seat", type=int, help="a certain seat (default: the first free one)")
     parser.add_argument(
         "--attempts",
         type=count,
@@ -114,10 +122,12 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         "--limit", type=seconds, default=60.0, metavar="S", help="seconds a call may take before the player counts as hanging"
     )
     parser.add_argument("--start-limit", type=seconds, default=120.0, metavar="S", help="seconds it may take to be made")
-    parser.add_argument("--restarts", type=count, default=3, help="how often its process is started anew (default: %(default)s)")
+    parser.add_argument("--restarts", type=count, default=3, help="how often a process is started anew (default: %(default)s)")
     parser.add_argument("--log", type=Path, metavar="FILE", help="a file to append what the player prints to (default: not kept)")
-    parser.add_argument("--json", action="store_true", help="print one line of JSON a game instead of a table")
-    return parser.parse_args(arguments)
+    parser.add_argument("--json", action="store_true", help="print one line of JSON a game or tournament instead of a table")
+    options = parser.parse_args(arguments)
+    options.ways = way_in.ways(parser, options, needs_name=False)
+    return options
 
 
 def class_name(text: str) -> str:

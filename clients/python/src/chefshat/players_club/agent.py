@@ -54,6 +54,7 @@ class PlayersClubAgent(Agent):
     Attributes:
         failures: how often the player raised, was lost, or answered with what is no answer.
         replaced: decisions that were taken for it, because it failed or chose nothing legal to the last.
+        over: whether its game is over, and the player has been told.
     """
 
     def __init__(self, process: AgentProcess, *, attempts: int = ATTEMPTS) -> None:
@@ -69,11 +70,11 @@ class PlayersClubAgent(Agent):
         # The decision that is open, and how often it was answered illegally.
         self._decision_id = 0
         self._refused = 0
-        # Gifts this Shift's exchange has asked for, and cards the player has chosen that are still to be given.
-        self._gifts = 0
+        # Cards the player has chosen that are still to be given.
         self._to_give: list[int] = []
         self.failures = 0
         self.replaced = 0
+        self.over = False
 
     def on_attached(self, seat: SeatInfo) -> None:
         """Learns the number of the seat."""
@@ -85,11 +86,12 @@ class PlayersClubAgent(Agent):
         if event.HasField("game_started"):
             check_rules(event.game_started.rules)
         if event.HasField("shift_started"):
-            self._gifts, self._to_give = 0, []
+            self._to_give = []
         self._tell(self._seen.event(event))
 
     def on_game_over(self, result: SeatResult) -> None:
         """Says how much of the game was the player's own."""
+        self.over = True
         if self.failures:
             LOG.warning("%s failed %d times in this game", self._process.name, self.failures)
 
@@ -99,7 +101,6 @@ class PlayersClubAgent(Agent):
             self._refused += 1
         else:
             self._decision_id, self._refused = request.decision_id, 0
-            self._gifts += request.kind == pb.DECISION_KIND_EXCHANGE
         left = request.invalid_attempts_left
         # The last attempt that the room grants is not wasted: after it the server would decide.
         insists = self._refused < self._attempts and (left is None or left > 1)
@@ -148,7 +149,8 @@ class PlayersClubAgent(Agent):
         if self._refused:
             self._to_give = []
         if not self._to_give:
-            amount = max(GIVEN_BY.get(int(request.roles[request.seat]), 1) - self._gifts + 1, 1)
+            # Some may have been given already, by a process before this one too.
+            amount = max(GIVEN_BY.get(int(request.roles[request.seat]), 1) - int(request.gave.sum()), 1)
             cards = [int(card) for card in np.repeat(np.arange(1, JOKER + 1), request.hand)]
             try:
                 answer = self._process.call("get_exhanged_cards", cards, amount)

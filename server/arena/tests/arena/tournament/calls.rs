@@ -98,13 +98,13 @@ fn who_does_not_come_is_waited_for_then_called_again_then_forfeits() {
     // The filler in its seat wins; the others move up.
     end(&mut tournament, 0, played(&[2, 3, 1, 4]));
     let result = tournament.games()[0].result().unwrap();
-    let places: Vec<usize> = result.seats.iter().map(|seat| seat.place).collect();
+    let places: Vec<usize> = result.seats.iter().map(|seat| seat.did.place).collect();
     let scores: Vec<u32> = result.seats.iter().map(|seat| seat.score).collect();
     assert_eq!((places, scores), (vec![1, 2, 4, 3], vec![5, 3, 0, 1]));
     let forfeit = result.seats[2];
     assert!(forfeit.forfeited);
     assert_eq!(
-        (forfeit.points, forfeit.decisions),
+        (forfeit.did.points, forfeit.did.decisions),
         (0, 0),
         "what the filler did is not its own"
     );
@@ -193,7 +193,7 @@ fn whoever_did_not_sit_down_at_the_last_call_forfeits_though_connected() {
     assert_eq!(follow(&mut tournament, 0), [forfeited(0, &both)]);
     end(&mut tournament, 0, played(&[4, 1, 2, 3]));
     let result = tournament.games()[0].result().unwrap();
-    let places: Vec<usize> = result.seats.iter().map(|seat| seat.place).collect();
+    let places: Vec<usize> = result.seats.iter().map(|seat| seat.did.place).collect();
     assert_eq!(
         places,
         [2, 3, 1, 4],

@@ -1,12 +1,23 @@
 //! In which order participants stand, and what their lines say.
 
+use std::collections::BTreeSet;
+
 use chefshat_arena::tournament::{Ended, Format, SeatPlayed, Tournament};
 
 use super::support::{begun, end, follow, played, settings};
 
-/// Plays the games of one table of four by a script: places by participant, points by participant.
-fn script(games: &[([usize; 4], [u64; 4])]) -> Tournament {
+/// Places by participant and points by participant, for each game of one table of four.
+type Script = [([usize; 4], [u64; 4])];
+
+/// Plays the games of a script.
+fn script(games: &Script) -> Tournament {
+    drawn_by(7, games)
+}
+
+/// The same, drawn by another seed.
+fn drawn_by(seed: u8, games: &Script) -> Tournament {
     let mut settings = settings(Format::RoundRobin);
+    settings.draw_seed = [seed; 32];
     settings.rounds = Some(games.len() as u32);
     let mut tournament = begun(settings, 4);
     for (game, (places, points)) in games.iter().enumerate() {
@@ -151,16 +162,41 @@ fn who_has_played_less_is_not_behind_for_it() {
 
 #[test]
 fn what_is_level_is_drawn_by_the_seed() {
-    let orders: Vec<Vec<usize>> = (0..4)
-        .map(|seed| {
-            let mut settings = settings(Format::Swiss);
-            settings.draw_seed = [seed; 32];
-            let tournament = begun(settings, 16);
-            assert_eq!(order(&tournament), order(&tournament));
-            order(&tournament)
-        })
-        .collect();
-    for (index, one) in orders.iter().enumerate() {
-        assert!(!orders[..index].contains(one));
+    // The first and the last of one game change places in the other, and so do those between.
+    let games = [([1, 2, 3, 4], [4; 4]), ([4, 3, 2, 1], [4; 4])];
+    let ahead = |seed: u8| {
+        let order = order(&drawn_by(seed, &games));
+        assert_eq!(order, self::order(&drawn_by(seed, &games)));
+        order[0]
+    };
+    let ahead: BTreeSet<usize> = (0..16).map(ahead).collect();
+    assert_eq!(ahead, BTreeSet::from([0, 3]));
+}
+
+#[test]
+fn before_a_game_has_counted_nobody_has_a_place() {
+    for format in Format::ALL {
+        let mut tournament = begun(settings(format), 8);
+        follow(&mut tournament, 0);
+        let standings = tournament.standings();
+        let lines: Vec<(u32, usize)> = (standings.iter())
+            .map(|line| (line.place, line.participant))
+            .collect();
+        let joined: Vec<(u32, usize)> = (0..8).map(|number| (0, number)).collect();
+        assert_eq!(lines, joined, "{format:?}");
+        assert!(tournament.order_confidence().is_empty());
+        assert!(!tournament.has_counted());
+
+        let mut closed = tournament.clone();
+        closed.fold(&closed.close().unwrap());
+        assert_eq!(closed.standings(), standings);
+
+        end(&mut tournament, 0, played(&[1, 2, 3, 4]));
+        assert!(tournament.has_counted());
+        let places: Vec<u32> = (tournament.standings().iter())
+            .map(|line| line.place)
+            .collect();
+        assert_eq!(places, [1, 2, 3, 4, 5, 6, 7, 8]);
+        assert_eq!(tournament.order_confidence().len(), 7);
     }
 }

@@ -1,8 +1,10 @@
 //! Deadlines, banks, defaults, substitution, giving up.
 
 use chefshat_arena::AgentKind;
+use chefshat_proto::v1;
 
 use super::*;
+use crate::convert;
 use crate::room::policy::{AbortPolicy, KindClock};
 use crate::store::journal::AbortReason;
 
@@ -233,7 +235,7 @@ fn a_seat_that_attaches_anew_plays_itself_again() {
     let mut table = Table::playing(Policy {
         max_timeouts: 1,
         bank: ms(0),
-        pace: ms(400),
+        pace: Some(ms(400)),
         abort: AbortPolicy::Never,
         ..quick()
     });
@@ -322,7 +324,7 @@ fn built_in_agents_play_by_themselves_at_their_pace() {
     ];
     let mut table = Table::empty(
         Policy {
-            pace: ms(100),
+            pace: Some(ms(100)),
             max_invalid_attempts: Some(5),
             ..Policy::default()
         },
@@ -384,4 +386,66 @@ fn kinds_of_participants_may_have_clocks_of_their_own() {
         assert_eq!(table.last_decision().source, Source::Timeout);
         table.assert_replays();
     }
+}
+
+#[test]
+fn built_in_agents_wait_a_second_where_a_person_plays() {
+    for (kind, pace) in [
+        (ParticipantKind::Human, ms(1000)),
+        (ParticipantKind::Agent, Duration::ZERO),
+    ] {
+        let fills = [
+            OPEN,
+            Fill::BuiltIn(AgentKind::Greedy),
+            Fill::BuiltIn(AgentKind::Random),
+            Fill::BuiltIn(AgentKind::Random),
+        ];
+        let mut table = Table::empty(Policy::default(), fills.to_vec());
+        let seat = table.join(kind).expect("a seat is free");
+        table.attach(seat);
+        if table.open().0 == seat {
+            table.play_one();
+        }
+        match kind {
+            ParticipantKind::Human => {
+                assert_ne!(table.open().0, seat, "a built-in agent thinks");
+                assert_eq!(table.core.deadline(), Some(table.now + pace));
+                let decisions = table.core.decisions();
+                table.pass_time(pace - ms(1));
+                assert_eq!(table.core.decisions(), decisions);
+                table.pass_time(ms(1));
+                assert!(table.core.decisions() > decisions);
+            }
+            _ => assert_eq!(table.open().0, seat, "the built-in agents have decided"),
+        }
+        table.assert_replays();
+    }
+}
+
+#[test]
+fn people_have_more_time_unless_somebody_says_otherwise() {
+    let policy = Policy::default();
+    let times = |kind| {
+        (
+            policy.decision_time_of(Some(kind)),
+            policy.bank_of(Some(kind)),
+        )
+    };
+    assert_eq!(times(ParticipantKind::Human), (ms(60_000), ms(300_000)));
+    assert_eq!(times(ParticipantKind::Agent), (ms(10_000), ms(60_000)));
+    let chosen = v1::RoomPolicy {
+        decision_time_ms: Some(2000),
+        ..v1::RoomPolicy::default()
+    };
+    let read = |message: v1::RoomPolicy| {
+        convert::policy_from_proto(&message).expect("the policy makes sense")
+    };
+    let chosen = read(chosen);
+    for policy in [&policy, &chosen] {
+        assert_eq!(read(convert::policy_to_proto(policy)), *policy);
+    }
+    assert_eq!(
+        chosen.decision_time_of(Some(ParticipantKind::Human)),
+        ms(2000)
+    );
 }

@@ -51,6 +51,7 @@ impl Table {
             rules: rules.validate().expect("the rule set makes sense"),
             rules_version: RULES_VERSION,
             policy,
+            called: BTreeMap::new(),
             recorded: BTreeMap::new(),
             start: GameStart::default(),
             fills,

@@ -126,7 +126,7 @@ fn built_in_agents_do_what_they_would_have_done() {
         Fill::BuiltIn(AgentKind::Random),
     ];
     let paced = Policy {
-        pace: ms(10),
+        pace: Some(ms(10)),
         ..Policy::default()
     };
     let play = |restarts: &[u64]| {

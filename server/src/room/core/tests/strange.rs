@@ -97,7 +97,7 @@ proptest! {
             bank: ms(2000),
             max_timeouts: 2,
             max_invalid_attempts: Some(3),
-            pace: ms(50),
+            pace: Some(ms(50)),
             ..Policy::default()
         };
         let mut table = Table::empty(policy, fills);

@@ -1,7 +1,9 @@
 //! Tournaments: headers and what moved them.
 
 use chefshat_arena::AgentKind;
-use chefshat_arena::tournament::{Change, Entrant, EntrantKind, GameResult, SeatResult};
+use chefshat_arena::tournament::{
+    Change, Entrant, EntrantKind, GameResult, SeatPlayed, SeatResult,
+};
 use chefshat_proto::v1;
 use prost::Message;
 
@@ -347,16 +349,16 @@ fn seat_to_form(seat: &SeatResult) -> SeatForm {
     SeatForm {
         participant: wide(seat.participant),
         forfeited: seat.forfeited,
-        substituted: seat.substituted,
-        place: wide(seat.place),
+        substituted: seat.did.substituted,
+        place: wide(seat.did.place),
         score: seat.score,
-        points: seat.points,
-        decisions: seat.decisions,
-        wrong_actions: seat.wrong_actions,
-        timeouts: seat.timeouts,
-        decision_time_us: seat.decision_time_us,
-        timed_decisions: seat.timed_decisions,
-        performance_score: seat.performance_score,
+        points: seat.did.points,
+        decisions: seat.did.decisions,
+        wrong_actions: seat.did.wrong_actions,
+        timeouts: seat.did.timeouts,
+        decision_time_us: seat.did.decision_time_us,
+        timed_decisions: seat.did.timed_decisions,
+        performance_score: seat.did.performance_score,
     }
 }
 
@@ -364,16 +366,18 @@ fn seat_from_form(form: SeatForm) -> Result<SeatResult, Unreadable> {
     Ok(SeatResult {
         participant: narrow(form.participant)?,
         forfeited: form.forfeited,
-        substituted: form.substituted,
-        place: narrow(form.place)?,
         score: form.score,
-        points: form.points,
-        decisions: form.decisions,
-        wrong_actions: form.wrong_actions,
-        timeouts: form.timeouts,
-        decision_time_us: form.decision_time_us,
-        timed_decisions: form.timed_decisions,
-        performance_score: form.performance_score,
+        did: SeatPlayed {
+            place: narrow(form.place)?,
+            points: form.points,
+            substituted: form.substituted,
+            decisions: form.decisions,
+            wrong_actions: form.wrong_actions,
+            timeouts: form.timeouts,
+            decision_time_us: form.decision_time_us,
+            timed_decisions: form.timed_decisions,
+            performance_score: form.performance_score,
+        },
     })
 }
 

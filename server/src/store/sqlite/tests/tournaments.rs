@@ -1,6 +1,8 @@
 //! Tournaments: what is kept of them is found again, in a form that stays readable.
 
-use chefshat_arena::tournament::{Change, Entrant, EntrantKind, GameResult, SeatResult};
+use chefshat_arena::tournament::{
+    Change, Entrant, EntrantKind, GameResult, SeatPlayed, SeatResult,
+};
 
 use super::*;
 use crate::store::journal::TournamentGame;
@@ -43,22 +45,27 @@ fn moved() -> Vec<TournamentEntry> {
     let seat = SeatResult {
         participant: 4,
         forfeited: false,
-        substituted: true,
-        place: 2,
         score: 3,
-        points: u64::MAX,
-        decisions: 71,
-        wrong_actions: 5,
-        timeouts: 6,
-        decision_time_us: 7_000_000,
-        timed_decisions: 8,
-        performance_score: 1.25,
+        did: SeatPlayed {
+            place: 2,
+            points: u64::MAX,
+            substituted: true,
+            decisions: 71,
+            wrong_actions: 5,
+            timeouts: 6,
+            decision_time_us: 7_000_000,
+            timed_decisions: 8,
+            performance_score: 1.25,
+        },
     };
     let forfeited = SeatResult {
         participant: 0,
         forfeited: true,
-        substituted: false,
-        ..seat
+        score: 3,
+        did: SeatPlayed {
+            substituted: false,
+            ..seat.did
+        },
     };
     let change = TournamentEntry::Change;
     vec![

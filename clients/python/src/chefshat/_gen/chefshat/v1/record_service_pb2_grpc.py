@@ -62,7 +62,7 @@ class RecordServiceServicer:
     """
 
     def ListRecords(self, request, context):
-        """What the server holds, oldest first. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, FILTER_REFUSED).
+        """What the server holds, oldest first unless asked otherwise. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, FILTER_REFUSED).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

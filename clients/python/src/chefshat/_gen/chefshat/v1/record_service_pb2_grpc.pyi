@@ -34,7 +34,7 @@ class RecordServiceStub:
     @_typing.overload
     def __new__(cls, channel: _aio.Channel) -> RecordServiceAsyncStub: ...
     ListRecords: _grpc.UnaryUnaryMultiCallable[_record_service_pb2.ListRecordsRequest, _record_service_pb2.ListRecordsResponse]
-    """What the server holds, oldest first. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, FILTER_REFUSED)."""
+    """What the server holds, oldest first unless asked otherwise. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, FILTER_REFUSED)."""
     GetRecord: _grpc.UnaryStreamMultiCallable[_record_service_pb2.GetRecordRequest, _record_service_pb2.GetRecordResponse]
     """The record of one game, in order, many lines a message. NOT_FOUND (GAME_UNKNOWN) if the server does not hold it;
     FAILED_PRECONDITION (GAME_RUNNING) while it is being played, (SERIES_OPEN) while other games with the same deals are.
@@ -54,7 +54,7 @@ class RecordServiceAsyncStub(RecordServiceStub):
 
     def __init__(self, channel: _aio.Channel) -> None: ...
     ListRecords: _aio.UnaryUnaryMultiCallable[_record_service_pb2.ListRecordsRequest, _record_service_pb2.ListRecordsResponse]  # type: ignore[assignment]
-    """What the server holds, oldest first. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, FILTER_REFUSED)."""
+    """What the server holds, oldest first unless asked otherwise. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, FILTER_REFUSED)."""
     GetRecord: _aio.UnaryStreamMultiCallable[_record_service_pb2.GetRecordRequest, _record_service_pb2.GetRecordResponse]  # type: ignore[assignment]
     """The record of one game, in order, many lines a message. NOT_FOUND (GAME_UNKNOWN) if the server does not hold it;
     FAILED_PRECONDITION (GAME_RUNNING) while it is being played, (SERIES_OPEN) while other games with the same deals are.
@@ -77,7 +77,7 @@ class RecordServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _record_service_pb2.ListRecordsRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_record_service_pb2.ListRecordsResponse, _abc.Awaitable[_record_service_pb2.ListRecordsResponse]]:
-        """What the server holds, oldest first. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, FILTER_REFUSED)."""
+        """What the server holds, oldest first unless asked otherwise. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, FILTER_REFUSED)."""
 
     @_abc_1.abstractmethod
     def GetRecord(

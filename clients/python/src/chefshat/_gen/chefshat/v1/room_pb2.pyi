@@ -249,10 +249,13 @@ class SeatConfig(_message.Message):
     RESERVED_FOR_FIELD_NUMBER: _builtins.int
     BUILT_IN_AGENT_FIELD_NUMBER: _builtins.int
     REPLAY_FIELD_NUMBER: _builtins.int
+    NAME_FIELD_NUMBER: _builtins.int
     reserved_for: Global___ParticipantKind.ValueType
     """Participants of this kind, with the room's join code; UNSPECIFIED admits every kind."""
     built_in_agent: _builtins.str
     """A built-in agent of the server: "random", "random_unmasked", "greedy" or "trained"."""
+    name: _builtins.str
+    """Name to show for a built-in agent, 1..=64 characters; empty: its own. Whoever joins an open seat brings their own."""
     @_builtins.property
     def replay(self) -> Global___RecordedPlayer:
         """A built-in agent that plays what a recorded player played."""
@@ -263,10 +266,11 @@ class SeatConfig(_message.Message):
         reserved_for: Global___ParticipantKind.ValueType = ...,
         built_in_agent: _builtins.str = ...,
         replay: Global___RecordedPlayer | None = ...,
+        name: _builtins.str = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["built_in_agent", b"built_in_agent", "filled_by", b"filled_by", "replay", b"replay", "reserved_for", b"reserved_for"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["built_in_agent", b"built_in_agent", "filled_by", b"filled_by", "replay", b"replay", "reserved_for", b"reserved_for"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["built_in_agent", b"built_in_agent", "filled_by", b"filled_by", "name", b"name", "replay", b"replay", "reserved_for", b"reserved_for"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType_filled_by: _TypeAlias = _typing.Literal["reserved_for", "built_in_agent", "replay"]  # noqa: Y015
     _WhichOneofArgType_filled_by: _TypeAlias = _typing.Literal["filled_by", b"filled_by"]  # noqa: Y015
@@ -338,7 +342,9 @@ Global___BranchPoint: _TypeAlias = BranchPoint  # noqa: Y015
 
 @_typing.final
 class RoomPolicy(_message.Message):
-    """Times, limits and manners of a room. In a request an unset field takes the standard value; in a response every field is set."""
+    """Times, limits and manners of a room. In a request an unset field takes the standard value; in a response every field is set (but in the
+    settings of a tournament pace_ms, where it depends on who plays at a table).
+    """
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -357,9 +363,9 @@ class RoomPolicy(_message.Message):
     DURABILITY_FIELD_NUMBER: _builtins.int
     CLOCKS_FIELD_NUMBER: _builtins.int
     decision_time_ms: _builtins.int
-    """Milliseconds for a decision, 10..=86400000; standard 10000."""
+    """Milliseconds for a decision, 10..=86400000; standard 10000, for people 60000."""
     bank_ms: _builtins.int
-    """Milliseconds each seat may use beyond that over the whole game, 0..=86400000; standard 60000."""
+    """Milliseconds each seat may use beyond that over the whole game, 0..=86400000; standard 60000, for people 300000."""
     max_invalid_attempts: _builtins.int
     """Invalid attempts at one decision after which the default decision is taken, at most 1000; 0 is unlimited (but for 10000, which
     bounds what a record can hold); standard 10.
@@ -373,7 +379,9 @@ class RoomPolicy(_message.Message):
     reward_scheme: Global___RewardScheme.ValueType
     """Rewards told to seats."""
     pace_ms: _builtins.int
-    """Milliseconds a built-in agent or substitute waits before it decides, so that people can follow, 0..=60000; standard 0."""
+    """Milliseconds a built-in agent or substitute waits before it decides, so that people can follow, 0..=60000; standard
+    1000 in a game that a person plays in, 0 in all others.
+    """
     waiting_time_ms: _builtins.int
     """Milliseconds the room waits for its seats to be filled and attached, 1000..=86400000; standard 3600000. Then it is closed."""
     spectators: _builtins.bool
@@ -388,7 +396,9 @@ class RoomPolicy(_message.Message):
     """What the game outlives; standard DURABLE, or EPHEMERAL on a server that keeps games in memory alone and refuses DURABLE."""
     @_builtins.property
     def clocks(self) -> _containers.RepeatedCompositeFieldContainer[Global___KindClock]:
-        """Other times for participants of some kinds; each kind at most once."""
+        """Other times for participants of some kinds; each kind at most once. Where none are given, and neither decision_time_ms nor bank_ms, people
+        have the standard times for people.
+        """
 
     def __init__(
         self,

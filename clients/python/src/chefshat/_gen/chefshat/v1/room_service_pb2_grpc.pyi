@@ -42,8 +42,9 @@ class RoomServiceStub:
     GetRoom: _grpc.UnaryUnaryMultiCallable[_room_service_pb2.GetRoomRequest, _room_service_pb2.GetRoomResponse]
     """One room. NOT_FOUND (ROOM_UNKNOWN)."""
     ListRooms: _grpc.UnaryUnaryMultiCallable[_room_service_pb2.ListRoomsRequest, _room_service_pb2.ListRoomsResponse]
-    """Rooms of the server, newest last. A page may hold fewer rooms than asked for and still have a next one. INVALID_ARGUMENT
-    (PAGE_TOKEN_REFUSED, STATE_REFUSED).
+    """Rooms of the server, newest first: a page goes on with those made before the last one of the page before, so that rooms made meanwhile
+    do not come up. A page may hold fewer rooms than asked for and still have a next one. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED,
+    STATE_REFUSED).
     """
     JoinRoom: _grpc.UnaryUnaryMultiCallable[_room_service_pb2.JoinRoomRequest, _room_service_pb2.JoinRoomResponse]
     """Takes a seat and gives the ticket for it. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED (ROOM_FULL);
@@ -67,8 +68,9 @@ class RoomServiceAsyncStub(RoomServiceStub):
     GetRoom: _aio.UnaryUnaryMultiCallable[_room_service_pb2.GetRoomRequest, _room_service_pb2.GetRoomResponse]  # type: ignore[assignment]
     """One room. NOT_FOUND (ROOM_UNKNOWN)."""
     ListRooms: _aio.UnaryUnaryMultiCallable[_room_service_pb2.ListRoomsRequest, _room_service_pb2.ListRoomsResponse]  # type: ignore[assignment]
-    """Rooms of the server, newest last. A page may hold fewer rooms than asked for and still have a next one. INVALID_ARGUMENT
-    (PAGE_TOKEN_REFUSED, STATE_REFUSED).
+    """Rooms of the server, newest first: a page goes on with those made before the last one of the page before, so that rooms made meanwhile
+    do not come up. A page may hold fewer rooms than asked for and still have a next one. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED,
+    STATE_REFUSED).
     """
     JoinRoom: _aio.UnaryUnaryMultiCallable[_room_service_pb2.JoinRoomRequest, _room_service_pb2.JoinRoomResponse]  # type: ignore[assignment]
     """Takes a seat and gives the ticket for it. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED (ROOM_FULL);
@@ -107,8 +109,9 @@ class RoomServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _room_service_pb2.ListRoomsRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_room_service_pb2.ListRoomsResponse, _abc.Awaitable[_room_service_pb2.ListRoomsResponse]]:
-        """Rooms of the server, newest last. A page may hold fewer rooms than asked for and still have a next one. INVALID_ARGUMENT
-        (PAGE_TOKEN_REFUSED, STATE_REFUSED).
+        """Rooms of the server, newest first: a page goes on with those made before the last one of the page before, so that rooms made meanwhile
+        do not come up. A page may hold fewer rooms than asked for and still have a next one. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED,
+        STATE_REFUSED).
         """
 
     @_abc_1.abstractmethod

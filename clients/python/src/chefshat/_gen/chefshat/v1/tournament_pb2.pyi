@@ -462,7 +462,8 @@ class TournamentStanding(_message.Message):
     RATING_FIELD_NUMBER: _builtins.int
     place: _builtins.int
     """Place in the tournament, from 1. In a knockout those who got further stand higher; else the mean score of a game decides, then the mean
-    of points, then who was placed better when they met, then the draw.
+    of points, then who was placed better when they met, then the draw. 0 for all as long as no game has counted: nobody is better than
+    anybody else then.
     """
     participant: _builtins.int
     """Who."""

@@ -130,19 +130,23 @@ class ListTournamentsRequest(_message.Message):
 
     PAGE_SIZE_FIELD_NUMBER: _builtins.int
     PAGE_TOKEN_FIELD_NUMBER: _builtins.int
+    STATE_FIELD_NUMBER: _builtins.int
     page_size: _builtins.int
     """Tournaments a page, 1..=100; 0 means 50."""
     page_token: _builtins.str
     """`next_page_token` of the page before, or empty."""
+    state: _tournament_pb2.TournamentState.ValueType
+    """Tournaments in this state alone; UNSPECIFIED: all."""
     def __init__(
         self,
         *,
         page_size: _builtins.int = ...,
         page_token: _builtins.str = ...,
+        state: _tournament_pb2.TournamentState.ValueType = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["page_size", b"page_size", "page_token", b"page_token"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["page_size", b"page_size", "page_token", b"page_token", "state", b"state"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
@@ -387,7 +391,7 @@ class FollowTournamentResponse(_message.Message):
 
     @_builtins.property
     def standings(self) -> _containers.RepeatedCompositeFieldContainer[_tournament_pb2.TournamentStanding]:
-        """Its standings, best first."""
+        """Its standings, best first; as long as no game has counted those who take part, in the order of joining, without places."""
 
     @_builtins.property
     def games(self) -> _containers.RepeatedCompositeFieldContainer[_tournament_pb2.TournamentGame]:
@@ -447,11 +451,11 @@ class GetTournamentResultsResponse(_message.Message):
 
     @_builtins.property
     def standings(self) -> _containers.RepeatedCompositeFieldContainer[_tournament_pb2.TournamentStanding]:
-        """The standings, best first."""
+        """The standings, best first; as long as no game has counted those who take part, in the order of joining, without places."""
 
     @_builtins.property
     def confidence(self) -> _containers.RepeatedCompositeFieldContainer[_tournament_pb2.OrderConfidence]:
-        """For each neighbouring pair of the standings, how sure their order is."""
+        """For each neighbouring pair of the standings, how sure their order is; empty as long as no game has counted."""
 
     def __init__(
         self,

@@ -108,7 +108,8 @@ class TournamentServiceServicer:
         raise NotImplementedError('Method not implemented!')
 
     def ListTournaments(self, request, context):
-        """Tournaments of the server, newest last. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED).
+        """Tournaments of the server, newest first: a page goes on with those made before the last one of the page before, so that tournaments made
+        meanwhile do not come up. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

@@ -41,7 +41,9 @@ class TournamentServiceStub:
     GetTournament: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.GetTournamentRequest, _tournament_service_pb2.GetTournamentResponse]
     """One tournament. NOT_FOUND (TOURNAMENT_UNKNOWN)."""
     ListTournaments: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.ListTournamentsRequest, _tournament_service_pb2.ListTournamentsResponse]
-    """Tournaments of the server, newest last. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED)."""
+    """Tournaments of the server, newest first: a page goes on with those made before the last one of the page before, so that tournaments made
+    meanwhile do not come up. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
+    """
     JoinTournament: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.JoinTournamentRequest, _tournament_service_pb2.JoinTournamentResponse]
     """Joins and gives the ticket: attached to a Play or Watch stream it has the server seat the participant in each of its games.
     PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN,
@@ -84,7 +86,9 @@ class TournamentServiceAsyncStub(TournamentServiceStub):
     GetTournament: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.GetTournamentRequest, _tournament_service_pb2.GetTournamentResponse]  # type: ignore[assignment]
     """One tournament. NOT_FOUND (TOURNAMENT_UNKNOWN)."""
     ListTournaments: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.ListTournamentsRequest, _tournament_service_pb2.ListTournamentsResponse]  # type: ignore[assignment]
-    """Tournaments of the server, newest last. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED)."""
+    """Tournaments of the server, newest first: a page goes on with those made before the last one of the page before, so that tournaments made
+    meanwhile do not come up. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
+    """
     JoinTournament: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.JoinTournamentRequest, _tournament_service_pb2.JoinTournamentResponse]  # type: ignore[assignment]
     """Joins and gives the ticket: attached to a Play or Watch stream it has the server seat the participant in each of its games.
     PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN,
@@ -142,7 +146,9 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _tournament_service_pb2.ListTournamentsRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_tournament_service_pb2.ListTournamentsResponse, _abc.Awaitable[_tournament_service_pb2.ListTournamentsResponse]]:
-        """Tournaments of the server, newest last. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED)."""
+        """Tournaments of the server, newest first: a page goes on with those made before the last one of the page before, so that tournaments made
+        meanwhile do not come up. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
+        """
 
     @_abc_1.abstractmethod
     def JoinTournament(

@@ -1,0 +1,105 @@
+"""What came of a place, as commands print it: for people as a table, for programs as plain values.
+
+How the place was come by is in `way_in`; what is left of a single seat's game is in `result`.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from chefshat import pb
+from chefshat.result import SeatResult
+
+
+@dataclass(frozen=True)
+class Played:
+    """What came of a place in a room or a tournament.
+
+    Attributes:
+        games: the games that were played here, in the order in which they were begun; that of a room alone.
+        tournament: how the tournament stood when it was over; None for a room.
+        participant: number of the participant in the tournament; 0 for a room.
+    """
+
+    games: Sequence[SeatResult]
+    tournament: pb.GetTournamentResultsResponse | None = None
+    participant: int = 0
+
+    @property
+    def finished(self) -> bool:
+        """Whether the tournament ended by itself, or the room's game with a result."""
+        if self.tournament is None:
+            return self.games[0].finished
+        return self.tournament.tournament.state == pb.TOURNAMENT_STATE_FINISHED
+
+
+def as_json(played: Played) -> dict[str, object]:
+    """What came of a place as plain values."""
+    if played.tournament is None:
+        return _game_as_json(played.games[0])
+    games = [
+        {**_game_as_json(result), **({"event": "error", "reason": result.error.reason} if result.error else {})}
+        for result in played.games
+    ]
+    standings = played.tournament.standings
+    return {
+        "event": "finished" if played.finished else "closed",
+        "tournament_id": played.tournament.tournament.tournament_id,
+        "participant": played.participant,
+        "place": next((line.place or None for line in standings if line.participant == played.participant), None),
+        "standings": [
+            {"participant": line.participant, "place": line.place, "score": line.score, "points": line.points, "games": line.games}
+            for line in standings
+        ],
+        "games": games,
+    }
+
+
+def as_table(played: Played) -> str:
+    """What came of a place for people."""
+    if played.tournament is None:
+        return _game_as_table(played.games[0])
+    return _tournament_as_table(played.tournament, played.participant)
+
+
+def _game_as_json(result: SeatResult) -> dict[str, object]:
+    return {
+        "event": "finished" if result.finished else "aborted",
+        "abort_reason": result.abort_reason,
+        "room_id": result.room_id,
+        "game_id": result.game_id,
+        "seat": result.seat,
+        "place": result.place,
+        "points": result.points,
+        "standings": [{"seat": line.seat, "points": line.points, "place": line.place} for line in result.standings],
+        "decisions": result.decisions,
+        "invalid": result.invalid,
+        "late": result.late,
+        "annotations_dropped": result.annotations_dropped,
+        "reconnects": result.reconnects,
+        "entropy": result.entropy.hex(),
+    }
+
+
+def _game_as_table(result: SeatResult) -> str:
+    if not result.finished:
+        return f"The game was aborted ({result.abort_reason}) and has no result."
+    lines = ["place  seat  points"]
+    for line in result.standings:
+        mine = "  <- this agent" if line.seat == result.seat else ""
+        lines.append(f"{line.place:>5}  {line.seat:>4}  {line.points:>6}{mine}")
+    lines.append(f"{result.decisions} decisions, {result.invalid} invalid answers, {result.late} too late")
+    return "\n".join(lines)
+
+
+def _tournament_as_table(results: pb.GetTournamentResultsResponse, participant: int) -> str:
+    """Scores and points are means of a game, by which the order goes. Before a game has counted nobody has a place."""
+    lines = ["place  score  points  games  name"]
+    names = [entrant.name for entrant in results.tournament.participants]
+    for line in results.standings:
+        mine = "  <- this agent" if line.participant == participant else ""
+        games = max(line.games, 1)
+        means = f"{line.score / games:>5.2f}  {line.points / games:>6.2f}"
+        lines.append(f"{line.place or '-':>5}  {means}  {line.games:>5}  {names[line.participant]}{mine}")
+    if results.tournament.state != pb.TOURNAMENT_STATE_FINISHED:
+        lines.append("The tournament was closed before its end.")
+    return "\n".join(lines)

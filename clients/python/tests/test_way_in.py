@@ -1,0 +1,233 @@
+"""How commands come by their places, and by the same places again after they were killed, on the fake server and the real one."""
+
+import json
+import os
+import stat
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fake_game import FakeGame, FakeSeat
+from fake_server import FakeServer
+from stalling import STALLS
+
+import chefshat
+from chefshat import ChefsHatError, RandomAgent, pb
+from chefshat import agent as command
+from chefshat.files import secret_file
+from chefshat.way_in import TICKET
+
+TESTS = Path(__file__).parent
+# Seconds a command may take before it counts as hanging.
+LIMIT_S = 120
+# Far longer than a test: who is killed comes back in time, however slow the machine is.
+PATIENT = pb.RoomPolicy(decision_time_ms=600_000)
+GAMES = 6
+Processes = list["subprocess.Popen[str]"]
+
+
+@pytest.fixture(autouse=True)
+def no_ticket(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the tests run there may be a ticket; it is not theirs."""
+    monkeypatch.delenv(TICKET, raising=False)
+
+
+def new_room(client: chefshat.Client) -> pb.CreateRoomResponse:
+    return client.create_room(seats=["random", None, "random", "random"], policy=PATIENT)
+
+
+def new_cup(client: chefshat.Client) -> pb.CreateTournamentResponse:
+    settings = pb.TournamentSettings(
+        name="Coppa",
+        format=pb.TOURNAMENT_FORMAT_ROUND_ROBIN,
+        rules=pb.RuleSet(target_shifts=1),
+        policy=PATIENT,
+        rounds=3,
+        games_per_pairing=2,
+        built_in_agents=["random", "random", "random"],
+        start_when_joined=4,
+    )
+    return client.create_tournament(settings)
+
+
+def start(processes: Processes, *arguments: str, ticket: str = "") -> "subprocess.Popen[str]":
+    """Starts the command of agents."""
+    environment = {**os.environ, **({TICKET: ticket} if ticket else {})}
+    call = [sys.executable, "-m", "chefshat.agent", "--json", *arguments]
+    pipe = subprocess.PIPE
+    processes.append(subprocess.Popen(call, stdout=pipe, stderr=pipe, text=True, cwd=TESTS, env=environment))
+    return processes[-1]
+
+
+def kill_when_it_stalls(process: "subprocess.Popen[str]") -> list[str]:
+    """Kills the command in the middle of a game. Returns what it had said by then, line by line."""
+    assert process.stderr is not None
+    said: list[str] = []
+    for line in process.stderr:
+        if line.strip() == STALLS:
+            process.kill()
+            process.wait(LIMIT_S)
+            return said
+        said.append(line)
+    raise AssertionError(f"it never stalled: {said}")
+
+
+def one_line(process: "subprocess.Popen[str]") -> dict[str, Any]:
+    """The line of JSON that a command prints when all has gone well."""
+    printed, said = process.communicate(timeout=LIMIT_S)
+    assert process.returncode == 0, said
+    assert printed.count("\n") == 1
+    told: dict[str, Any] = json.loads(printed)
+    return told
+
+
+def kill_and_go_on(address: str, way: list[str], processes: Processes, file: Path | None) -> dict[str, Any]:
+    """Takes the place, is killed in mid-game, and goes on with the ticket it printed or with that in the file."""
+    kept = [] if file is None else ["--ticket-file", str(file)]
+    joining = ["--address", address, *way, *kept]
+    said = kill_when_it_stalls(start(processes, *joining, "--agent", "stalling:Stalling"))
+    (line,) = said
+    if file is not None:
+        assert stat.S_IMODE(file.stat().st_mode) == 0o600
+        ticket = file.read_text().strip()
+        assert ticket not in line
+        told = one_line(start(processes, *joining))
+        assert not file.exists(), "nobody goes on where all is over"
+        return told
+    ticket = line.partition("--ticket ")[2].split()[0]
+    return one_line(start(processes, "--address", address, ticket=ticket))
+
+
+@pytest.mark.parametrize("in_file", [False, True], ids=["printed", "in a file"])
+def test_a_command_that_was_killed_goes_on_in_its_seat(address: str, in_file: bool, tmp_path: Path, processes: Processes) -> None:
+    with chefshat.Client(address) as client:
+        room = new_room(client)
+        way = ["--code", room.join_code, "--name", "Ada"]
+        told = kill_and_go_on(address, way, processes, tmp_path / "ticket" if in_file else None)
+        lines = list(client.record(room.room.game_id))
+    assert (told["event"], told["game_id"], told["seat"]) == ("finished", room.room.game_id, 1)
+    decisions = [line.decision for line in lines if line.HasField("decision") and line.decision.seat == 1]
+    # The two of before it was killed are not among its own. The records of the fake server have none.
+    assert not decisions or len(decisions) == told["decisions"] + 2
+    assert all(decision.source == pb.DECISION_SOURCE_AGENT for decision in decisions)
+
+
+@pytest.mark.parametrize("in_file", [False, True], ids=["printed", "in a file"])
+def test_a_command_that_was_killed_goes_on_in_its_tournament(
+    address: str, in_file: bool, tmp_path: Path, processes: Processes
+) -> None:
+    with chefshat.Client(address) as client:
+        cup = new_cup(client)
+        tournament_id = cup.tournament.tournament_id
+        way = ["--tournament", cup.join_code, "--name", "Ada", "--games", "2"]
+        told = kill_and_go_on(address, way, processes, tmp_path / "ticket" if in_file else None)
+        games = {game.game_id: game for game in client.tournament_games(tournament_id)}
+        results = client.tournament_results(tournament_id)
+    assert (told["event"], told["tournament_id"]) == ("finished", tournament_id)
+    assert results.tournament.participants[told["participant"]].name == "Ada"
+    assert len(games) == GAMES
+    # Two of them were begun before; all were finished after.
+    assert {game["game_id"] for game in told["games"]} == set(games)
+    for game in told["games"]:
+        seat = games[game["game_id"]].seats[game["seat"]]
+        assert (seat.participant, seat.place, seat.points) == (told["participant"], game["place"], game["points"])
+    # Nobody's place was taken by a substitute or a filler meanwhile.
+    assert [line.forfeited for line in results.standings] == [0] * 4
+    assert [line.substituted for line in results.standings] == [0] * 4
+
+
+def close(game: FakeGame, seat: FakeSeat, answer: pb.Answer) -> str:
+    """A fault of the fake server: the room is closed before anything is answered."""
+    game.end(pb.ABORT_REASON_CLOSED)
+    return ""
+
+
+def test_a_ticket_is_kept_as_long_as_the_place(fake: FakeServer, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "ticket"
+    file.write_text("nobody's\n")
+    with chefshat.Client(fake.address) as client:
+        code = new_room(client).join_code
+        joining = ["--address", fake.address, "--code", code, "--name", "Ada", "--ticket-file", str(file)]
+        assert command.main(joining) == 1
+        assert f"TICKET_UNKNOWN: no seat has this ticket; the ticket is that in {file}" in capsys.readouterr().err
+        assert file.read_text() == "nobody's\n"
+        file.write_text("")
+        assert command.main(joining) == 0
+        assert list(tmp_path.iterdir()) == []
+        room = new_room(client)
+        fake.fault = close
+        assert command.main([*joining, "--code", room.join_code]) == 1
+        assert "aborted (CLOSED)" in capsys.readouterr().out
+        assert list(tmp_path.iterdir()) == []
+
+
+def test_without_a_place_for_the_ticket_no_seat_is_taken(
+    fake: FakeServer, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with chefshat.Client(fake.address) as client:
+        room = new_room(client)
+        joining = ["--address", fake.address, "--code", room.join_code, "--name", "Ada", "--ticket-file"]
+        assert command.main([*joining, str(tmp_path)]) == 1
+        assert "Is a directory" in capsys.readouterr().err
+        assert command.main([*joining, str(tmp_path / "no such folder" / "ticket")]) == 1
+        assert "no such folder" in capsys.readouterr().err
+        assert client.get_room(room.room.room_id).seats[1].name == ""
+    assert command.main(["--address", fake.address, "--ticket-file", str(tmp_path / "none")]) == 1
+    assert "there is no ticket in" in capsys.readouterr().err
+    joining[joining.index(room.join_code)] = "WRONG"
+    assert command.main([*joining, str(tmp_path / "ticket")]) == 1
+    assert list(tmp_path.iterdir()) == [], "nothing is left of a file that got no ticket"
+
+
+def test_a_secret_replaces_what_stood_there(tmp_path: Path) -> None:
+    file = tmp_path / "secret"
+    file.write_text("old")
+    file.chmod(0o644)
+    with secret_file(file):
+        pass
+    assert file.read_text() == "old"
+    with secret_file(file) as keep:
+        keep("new")
+    assert (file.read_text(), stat.S_IMODE(file.stat().st_mode)) == ("new\n", 0o600)
+    assert list(tmp_path.iterdir()) == [file]
+
+
+def test_a_seat_s_ticket_is_no_participant_s(address: str) -> None:
+    with chefshat.Client(address) as client:
+        seat = client.join_room(new_room(client).join_code, "Ada")
+        (result,) = client.play_tournament(seat.ticket, lambda info: RandomAgent(info.seat))
+        assert (result.seat, result.finished) == (seat.seat, True)
+        participant = client.join_tournament(new_cup(client).join_code, "Ada")
+        with pytest.raises(ChefsHatError, match="TICKET_OF_PARTICIPANT"):
+            client.play(RandomAgent(), participant.ticket)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "ticket", "said"),
+    [
+        ([], "", "give --code, --tournament, --ticket or --ticket-file"),
+        (["--code", "X"], "", "--name"),
+        (["--tournament", "X", "--ticket-file", "F"], "", "--name"),
+        (["--code", "X", "--tournament", "Y"], "", "--code and --tournament are several ways in"),
+        (["--code", "X", "--ticket", "T"], "", "--code and --ticket are several ways in"),
+        (["--tournament", "X"], "T", f"--tournament and the environment variable {TICKET} are several ways in"),
+        (["--ticket", "T", "--ticket-file", "F"], "", "--ticket and --ticket-file both say which place it is"),
+        (["--ticket-file", "F"], "T", f"{TICKET} and --ticket-file both say which place it is"),
+        (["--code", "X", "--name", "Ada", "--games", "2"], "", "--games and --stateless are for tournaments"),
+        (["--code", "X", "--name", "Ada", "--stateless"], "", "--games and --stateless are for tournaments"),
+        (["--tournament", "X", "--name", "Ada", "--seat", "1"], "", "--seat is for joining a room"),
+        (["--ticket", "T", "--seat", "1"], "", "--seat is for joining a room"),
+        (["--tournament", "X", "--name", "Ada", "--games", "0"], "", "at least one game at a time"),
+    ],
+)
+def test_ways_in_that_do_not_go_together_are_refused(
+    arguments: list[str], ticket: str, said: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    if ticket:
+        monkeypatch.setenv(TICKET, ticket)
+    with pytest.raises(SystemExit) as exit_info:
+        command.main(["--address", "127.0.0.1:1", *arguments])
+    assert exit_info.value.code == 2
+    assert said in capsys.readouterr().err

@@ -1,0 +1,138 @@
+//! What is said of a part when the screen is gone: how it ended, where more is to be found, and how one comes back.
+
+use std::process::ExitCode;
+
+use chefshat_client::v1;
+
+use super::super::narrator::{MAX_NAME, abort_reason, ordinal};
+use super::super::numbers::counted;
+use super::super::terminal::table::End;
+use super::super::terminal::view::padded;
+use super::super::tournament::tables::mean_score;
+use super::super::{CommandError, say};
+use super::app::{App, Link};
+use super::lobby::{Lobby, Report};
+use super::part::Part;
+
+/// Where more is to be found.
+pub(super) struct Hints {
+    /// The command that gets the record of the game with an id.
+    pub(super) record: Box<dyn Fn(&str) -> String + Send>,
+    /// The command that shows a tournament's results, but for its id.
+    pub(super) results: String,
+    /// The command that goes on where the person stood, if one can.
+    pub(super) back: Option<String>,
+}
+
+/// The end in a few lines; the exit code of the command.
+///
+/// # Errors
+/// The seat, or the place in the tournament, is lost.
+pub(super) fn told(part: &Part, hints: &Hints) -> Result<ExitCode, CommandError> {
+    if let Some(lobby) = &part.lobby {
+        return of_tournament(part, lobby, hints);
+    }
+    let lost = match &part.link {
+        Link::Over(why) => why.clone(),
+        _ => None,
+    };
+    let end = part.game.as_ref().and_then(|game| game.table.end.as_ref());
+    match (&part.game, end) {
+        (Some(game), Some(End::Finished(standings))) => {
+            finished(game, standings, hints)?;
+            Ok(ExitCode::SUCCESS)
+        }
+        (_, Some(End::Aborted(reason))) => {
+            let why = abort_reason(*reason);
+            say(format_args!(
+                "the game was aborted and has no result: {why}"
+            ))?;
+            Ok(ExitCode::FAILURE)
+        }
+        (_, _) => {
+            if let Some(why) = lost {
+                return Err(format!("the seat is lost: {why}").into());
+            }
+            say("you left the table before the game ended")?;
+            back(hints)?;
+            Ok(ExitCode::FAILURE)
+        }
+    }
+}
+
+fn finished(game: &App, standings: &[v1::Standing], hints: &Hints) -> Result<(), CommandError> {
+    for line in standings {
+        let name = padded(&game.table.name(line.seat), MAX_NAME);
+        let points = counted(line.points, "point");
+        say(format_args!(
+            "{}  {name}  {points:>10}",
+            ordinal(line.place)
+        ))?;
+    }
+    let mut mine = standings.iter().filter(|line| Some(line.seat) == game.me);
+    if let Some(line) = mine.next() {
+        say(format_args!(
+            "you have place {} of {}",
+            line.place,
+            standings.len()
+        ))?;
+    }
+    let record = (hints.record)(&game.table.game_id);
+    say(format_args!("the record: {record}"))
+}
+
+fn of_tournament(part: &Part, lobby: &Lobby, hints: &Hints) -> Result<ExitCode, CommandError> {
+    let results = format!("the results: {} {}", hints.results, lobby.tournament_id);
+    let state = lobby.report.as_ref().map(|it| it.tournament.state());
+    let code = match (state, &part.link) {
+        (Some(v1::TournamentState::Finished), _) => {
+            say(standing(lobby, "the tournament is over"))?;
+            ExitCode::SUCCESS
+        }
+        (Some(v1::TournamentState::Closed), _) => {
+            say(standing(lobby, "the tournament was closed before its end"))?;
+            ExitCode::FAILURE
+        }
+        (_, Link::Over(Some(why))) => {
+            return Err(format!("the place in the tournament is lost: {why}").into());
+        }
+        (_, Link::Over(None)) => {
+            say(standing(lobby, "the tournament is over"))?;
+            ExitCode::SUCCESS
+        }
+        _ if !lobby.has_games_to_come() => {
+            say(standing(lobby, "your games are over"))?;
+            ExitCode::SUCCESS
+        }
+        _ => {
+            say("you left the tournament before its end")?;
+            back(hints)?;
+            return Ok(ExitCode::FAILURE);
+        }
+    };
+    say(results)?;
+    Ok(code)
+}
+
+/// How the person stands, after other words.
+fn standing(lobby: &Lobby, what: &str) -> String {
+    let report = lobby.report.as_ref();
+    let line = report.and_then(|report| report.standing(lobby.me));
+    let all = report.map_or(0, |Report { standings, .. }| standings.len());
+    match line {
+        Some(line) => format!(
+            "{what}: you are {} of {all}, score {:.2} a game in {}",
+            ordinal(line.place),
+            mean_score(line),
+            counted(line.games.into(), "game"),
+        ),
+        None => what.to_owned(),
+    }
+}
+
+fn back(hints: &Hints) -> Result<(), CommandError> {
+    match &hints.back {
+        Some(back) => say(format_args!("to go on where you stood: {back}")),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,73 @@
+//! How a tournament stands, heard from the server while the person takes part in it, with the person's next game where the server does not
+//! tell it by itself. What is made of it is in `lobby`.
+
+use chefshat_client::{Client, Error, v1};
+use tokio::sync::mpsc;
+
+use super::lobby::{Report, sits};
+use super::part::Heard;
+
+/// Games asked for at a time, and how often at most: more of them no person plays.
+const GAMES_PAGE: u32 = 500;
+const MAX_PAGES: usize = 20;
+
+/// Passes on each report until the tournament is over or nobody listens any more.
+pub(super) async fn follow(client: Client, entered: v1::Entered, heard: mpsc::Sender<Heard>) {
+    let mut follower = client.follow_tournament(&*entered.tournament_id);
+    // The next game as it was found last.
+    let mut found: Option<v1::TournamentGame> = None;
+    loop {
+        let mut report = match follower.next().await {
+            Ok(Some(response)) => match Report::of(response) {
+                Some(report) => report,
+                None => continue,
+            },
+            Ok(None) => return,
+            Err(error) => {
+                // Whoever does not listen any more need not know.
+                let _ = heard
+                    .send(Heard::Unfollowed(error.message().to_owned()))
+                    .await;
+                return;
+            }
+        };
+        // Of a round robin only the games that are being played are told.
+        let round_robin = report.format() == v1::TournamentFormat::RoundRobin;
+        let playing = report.tournament.state() == v1::TournamentState::Playing;
+        if round_robin && playing && report.own_game(entered.participant).is_none() {
+            // Without an answer the one that was found before is as good as can be.
+            if let Ok(next) = next_game(&client, &entered).await {
+                found = next;
+            }
+            report.next.clone_from(&found);
+        }
+        if heard.send(Heard::Report(Box::new(report))).await.is_err() {
+            return;
+        }
+    }
+}
+
+/// The participant's first game that is not over.
+async fn next_game(
+    client: &Client,
+    entered: &v1::Entered,
+) -> Result<Option<v1::TournamentGame>, Error> {
+    let mut page_token = String::new();
+    for _ in 0..MAX_PAGES {
+        let request = v1::ListTournamentGamesRequest {
+            tournament_id: entered.tournament_id.clone(),
+            page_size: GAMES_PAGE,
+            page_token,
+        };
+        let page = client.tournament_games(request).await?;
+        let found = page.games.into_iter().find(|game| {
+            use v1::TournamentGameState::{Due, Playing};
+            [Due, Playing].contains(&game.state()) && sits(game, entered.participant)
+        });
+        if found.is_some() || page.next_page_token.is_empty() {
+            return Ok(found);
+        }
+        page_token = page.next_page_token;
+    }
+    Ok(None)
+}

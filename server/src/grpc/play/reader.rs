@@ -1,0 +1,305 @@
+//! Reads what is asked on one stream of `PlayService` and does it: seats are attached, act, and leave. Participants of tournaments, who are
+//! called to their seats, are in `participants`.
+
+use std::collections::BTreeMap;
+use std::future::poll_fn;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::task::Poll;
+
+use chefshat_proto::v1::{self, seat_command::Command, seat_update::Update};
+use chefshat_records::convert::FieldProblem;
+use chefshat_records::seeds::MAX_ENTROPY;
+use futures::StreamExt as _;
+use tokio::sync::mpsc;
+use tokio::time::Instant;
+use tonic::{Code, Status, Streaming};
+
+use super::participants::{BoundParticipant, FIRST_CALLED};
+use super::{answer_action, express_action};
+use crate::config::{MAX_CALLS_WAITING, MAX_COMMANDS_PER_MESSAGE, MAX_SEATS_PER_STREAM};
+use crate::grpc::status::{field, refused, room_gone, status, ticket_unknown};
+use crate::ids::Token;
+use crate::outbox::Outbox;
+use crate::room::core::ConnectionId;
+use crate::room::delivery::Wishes;
+use crate::room::{AttachRequest, Handle, RoomGone, SeatAction};
+use crate::rooms::Rooms;
+use crate::tournaments::{Call, Tournaments};
+use crate::wire::Updates;
+
+/// A seat that is attached to a stream.
+pub(super) struct BoundSeat {
+    pub(super) room: Handle,
+    seat: chefshat_engine::Seat,
+    connection: ConnectionId,
+    pub(super) secret: [u8; 32],
+    /// Set when the room has told the seat that it has left the stream.
+    ended: Arc<AtomicBool>,
+}
+
+impl BoundSeat {
+    pub(super) fn has_ended(&self) -> bool {
+        self.ended.load(Ordering::Relaxed)
+    }
+}
+
+/// Reads the requests of one stream, and attaches seats that participants of tournaments are called to.
+pub(super) struct Reader {
+    rooms: Arc<Rooms>,
+    tournaments: Arc<Tournaments>,
+    pub(super) outbox: Arc<Outbox<Updates>>,
+    /// Those attached, by handle.
+    pub(super) seats: BTreeMap<u32, BoundSeat>,
+    pub(super) participants: BTreeMap<u32, BoundParticipant>,
+    next_handle: u32,
+    pub(super) next_called: u32,
+    /// Where tournaments call participants of this stream, and what they have called.
+    pub(super) calls: mpsc::Sender<(u32, Call)>,
+    pub(super) called: mpsc::Receiver<(u32, Call)>,
+    /// What unspecified delivery means: on Play with decisions, on Watch at once.
+    with_decisions: bool,
+}
+
+/// What a reader does next.
+enum Next {
+    Message(Option<Result<v1::PlayRequest, Status>>),
+    Call(u32, Call),
+}
+
+impl Reader {
+    /// The reader of a stream whose responses go into `outbox`.
+    pub(super) fn new(
+        rooms: &Arc<Rooms>,
+        tournaments: &Arc<Tournaments>,
+        outbox: &Arc<Outbox<Updates>>,
+        with_decisions: bool,
+    ) -> Self {
+        let (calls, called) = mpsc::channel(MAX_CALLS_WAITING);
+        Self {
+            rooms: Arc::clone(rooms),
+            tournaments: Arc::clone(tournaments),
+            outbox: Arc::clone(outbox),
+            seats: BTreeMap::new(),
+            participants: BTreeMap::new(),
+            next_handle: 0,
+            next_called: FIRST_CALLED,
+            calls,
+            called,
+            with_decisions,
+        }
+    }
+
+    pub(super) async fn read(mut self, mut requests: Streaming<v1::PlayRequest>) {
+        let outbox = Arc::clone(&self.outbox);
+        let end = loop {
+            let next = poll_fn(|context| {
+                if outbox.poll_hung_up(context) {
+                    return Poll::Ready(Next::Message(None));
+                }
+                // The sender is the reader's own: there is always one.
+                if let Poll::Ready(Some((handle, call))) = self.called.poll_recv(context) {
+                    return Poll::Ready(Next::Call(handle, call));
+                }
+                requests.poll_next_unpin(context).map(Next::Message)
+            });
+            let message = match next.await {
+                Next::Message(message) => message.transpose(),
+                Next::Call(handle, call) => {
+                    self.follow_call(handle, call).await;
+                    continue;
+                }
+            };
+            let arrived = Instant::now();
+            match message {
+                Ok(Some(request)) if request.commands.len() > MAX_COMMANDS_PER_MESSAGE => {
+                    break Err(status(
+                        Code::InvalidArgument,
+                        "TOO_MANY_COMMANDS",
+                        format!("a message holds at most {MAX_COMMANDS_PER_MESSAGE} commands"),
+                        [("field", "commands")],
+                    ));
+                }
+                Ok(Some(request)) => {
+                    for command in request.commands {
+                        self.obey(command, arrived).await;
+                    }
+                }
+                Ok(None) => break Ok(()),
+                Err(status) => break Err(status),
+            }
+        };
+        self.leave_all().await;
+        self.outbox.end(end);
+    }
+
+    async fn obey(&mut self, command: v1::SeatCommand, arrived: Instant) {
+        let handle = command.handle;
+        let action = match command.command {
+            Some(Command::Attach(attach)) => return self.attach(attach).await,
+            Some(Command::Detach(_)) => return self.detach(handle).await,
+            Some(Command::Answer(answer)) => answer_action(answer),
+            Some(Command::Express(expression)) => match express_action(&expression) {
+                Ok(action) => action,
+                Err(problem) => {
+                    return self.refuse_field(handle, 0, "EXPRESSION_REFUSED", &problem);
+                }
+            },
+            Some(Command::Resume(_)) => SeatAction::Resume,
+            None => {
+                let problem = FieldProblem::new("command", "say what the seat does");
+                return self.refuse_field(handle, 0, "COMMAND_MISSING", &problem);
+            }
+        };
+        let Some(bound) = self.seats.get(&handle) else {
+            let problem = FieldProblem::new(
+                "handle",
+                "no seat of this stream has this handle; attach first",
+            );
+            return self.refuse_field(handle, 0, "HANDLE_UNKNOWN", &problem);
+        };
+        let (room, seat, connection) = (bound.room.clone(), bound.seat, bound.connection);
+        if room
+            .perform(seat, connection, action, arrived)
+            .await
+            .is_err()
+        {
+            self.refuse(handle, 0, &room_gone());
+        }
+    }
+
+    pub(super) async fn attach(&mut self, attach: v1::Attach) {
+        let handle = self.next_handle;
+        self.next_handle = self.next_handle.wrapping_add(1);
+        let request_id = attach.request_id;
+        if !self.has_space() {
+            return self.refuse(handle, request_id, &too_many_seats());
+        }
+        if attach.entropy.len() > MAX_ENTROPY {
+            let problem = FieldProblem::new("entropy", format!("at most {MAX_ENTROPY} bytes"));
+            return self.refuse_field(handle, request_id, "ENTROPY_REFUSED", &problem);
+        }
+        if let Some(token) = Token::parse(&attach.ticket)
+            && let Some(tournament) = self.tournaments.get(token.room)
+        {
+            return self.enter(tournament, token, attach, handle).await;
+        }
+        match self.bind(attach, handle, None).await {
+            Ok(Some(bound)) => {
+                self.seats.insert(handle, bound);
+            }
+            Ok(None) => self.refuse(handle, request_id, &ticket_unknown()),
+            // A seat that is refused is given up by its agent; a stream that ends so is opened again until the room is back.
+            Err(RoomGone) => self.outbox.end(Err(room_gone())),
+        }
+    }
+
+    /// Whether the stream can take one more seat.
+    pub(super) fn has_space(&mut self) -> bool {
+        let full =
+            |reader: &Self| reader.seats.len() + reader.participants.len() >= MAX_SEATS_PER_STREAM;
+        if full(self) {
+            self.seats.retain(|_, bound| !bound.has_ended());
+        }
+        !full(self)
+    }
+
+    /// Attaches a seat; `None` if nobody has such a ticket.
+    pub(super) async fn bind(
+        &self,
+        attach: v1::Attach,
+        handle: u32,
+        told_ticket: Option<Token>,
+    ) -> Result<Option<BoundSeat>, RoomGone> {
+        let Some(token) = Token::parse(&attach.ticket) else {
+            return Ok(None);
+        };
+        let Some(room) = self.rooms.get(token.room) else {
+            return Ok(None);
+        };
+        let at_once = match attach.delivery() {
+            v1::EventDelivery::Unspecified => !self.with_decisions,
+            v1::EventDelivery::WithDecisions => false,
+            v1::EventDelivery::AtOnce => true,
+        };
+        let ended = Arc::new(AtomicBool::new(false));
+        let from = attach.from_sequence.saturating_sub(1);
+        let request = AttachRequest {
+            secret: token.secret,
+            request_id: attach.request_id,
+            outbox: Arc::clone(&self.outbox),
+            handle,
+            wishes: Wishes {
+                at_once,
+                no_mask: attach.no_mask,
+                snapshot: attach.snapshot,
+                from: usize::try_from(from).unwrap_or(usize::MAX),
+            },
+            entropy: attach.entropy,
+            arrived: Instant::now(),
+            ended: Arc::clone(&ended),
+            told_ticket,
+        };
+        let attached = room.attach(request).await?;
+        Ok(attached.map(|(seat, connection)| BoundSeat {
+            room,
+            seat,
+            connection,
+            secret: token.secret,
+            ended,
+        }))
+    }
+
+    async fn detach(&mut self, handle: u32) {
+        if let Some(bound) = self.seats.remove(&handle) {
+            bound
+                .room
+                .lost(
+                    bound.seat,
+                    bound.connection,
+                    Some(v1::DetachReason::Requested),
+                )
+                .await;
+        }
+        if let Some(bound) = self.participants.remove(&handle) {
+            let requested = v1::DetachReason::Requested.into();
+            self.tell(handle, Update::Detached(v1::Detached { reason: requested }));
+            bound.leave().await;
+        }
+    }
+
+    pub(super) async fn leave_all(&mut self) {
+        for bound in std::mem::take(&mut self.participants).into_values() {
+            bound.leave().await;
+        }
+        for bound in std::mem::take(&mut self.seats).into_values() {
+            bound.room.lost(bound.seat, bound.connection, None).await;
+        }
+    }
+
+    fn refuse_field(&self, handle: u32, request_id: u32, reason: &str, problem: &FieldProblem) {
+        self.refuse(handle, request_id, &field(reason, problem));
+    }
+
+    pub(super) fn refuse(&self, handle: u32, request_id: u32, refusal: &Status) {
+        self.tell(handle, Update::Refused(refused(request_id, refusal)));
+    }
+
+    /// Tells the client; `false` if it does not read what it was told before.
+    pub(super) fn tell(&self, handle: u32, update: Update) -> bool {
+        let mut updates = Updates::default();
+        updates.add(handle, update);
+        self.outbox.push(&mut updates, None, None)
+    }
+}
+
+pub(super) fn too_many_seats() -> Status {
+    status(
+        Code::ResourceExhausted,
+        "TOO_MANY_SEATS",
+        format!(
+            "a stream takes at most {MAX_SEATS_PER_STREAM} seats at a time; detach those that are over, or open another"
+        ),
+        [("max_seats_per_stream", &MAX_SEATS_PER_STREAM.to_string())],
+    )
+}

@@ -1,0 +1,148 @@
+//! Lists of finished games: filtered, page by page, in both orders.
+
+use super::*;
+
+#[tokio::test]
+async fn lists_are_filtered_and_paged() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let store = opened(folder.path()).await;
+    for game in 1..=5 {
+        let mut header = header(game, Durability::Durable);
+        header.created_at_ms = u64::from(game) * 1_000;
+        let header = Arc::new(header);
+        let mut journal = store
+            .create(Arc::clone(&header), Vec::new())
+            .await
+            .expect("kept");
+        journal.finish(Some(summary(&header))).await.expect("kept");
+    }
+    let unheard_of = {
+        let mut journal = store
+            .create(Arc::new(header(6, Durability::Durable)), Vec::new())
+            .await
+            .expect("kept");
+        // Nothing was dealt in it: there is no record.
+        journal.finish(None).await
+    };
+    unheard_of.expect("kept");
+    let filter = v1::RecordFilter::default;
+    let robot = v1::ParticipantKind::Robot.into();
+    let human = v1::ParticipantKind::Human.into();
+    let finished = v1::RoomState::Finished.into();
+    let table = [
+        (filter(), 0, 9, vec![1, 2, 3, 4, 5]),
+        (filter(), 0, 2, vec![1, 2]),
+        (filter(), 2, 2, vec![3, 4]),
+        (filter(), 5, 2, vec![]),
+        (
+            v1::RecordFilter {
+                participant: "player of 3".into(),
+                ..filter()
+            },
+            0,
+            9,
+            vec![3],
+        ),
+        (
+            v1::RecordFilter {
+                participant: "agent of 4".into(),
+                ..filter()
+            },
+            0,
+            9,
+            vec![4],
+        ),
+        (
+            v1::RecordFilter {
+                participant: "player of".into(),
+                ..filter()
+            },
+            0,
+            9,
+            vec![],
+        ),
+        (
+            v1::RecordFilter {
+                kind: robot,
+                state: finished,
+                ..filter()
+            },
+            3,
+            9,
+            vec![4, 5],
+        ),
+        (
+            v1::RecordFilter {
+                kind: human,
+                ..filter()
+            },
+            0,
+            9,
+            vec![],
+        ),
+        (
+            v1::RecordFilter {
+                state: v1::RoomState::Aborted.into(),
+                ..filter()
+            },
+            0,
+            9,
+            vec![],
+        ),
+        (
+            v1::RecordFilter {
+                origin: v1::GameOrigin::Branched.into(),
+                ..filter()
+            },
+            0,
+            9,
+            vec![],
+        ),
+        (
+            v1::RecordFilter {
+                room_name: "another".into(),
+                ..filter()
+            },
+            0,
+            9,
+            vec![],
+        ),
+        (
+            v1::RecordFilter {
+                created_from_ms: 2_000,
+                created_before_ms: 4_000,
+                ..filter()
+            },
+            0,
+            9,
+            vec![2, 3],
+        ),
+    ];
+    for (filter, after, count, expected) in table {
+        let part = Part::After(after);
+        let listed = store.list(&filter, part, count).await.expect("readable");
+        let numbers: Vec<u64> = listed.iter().map(|(number, _)| *number).collect();
+        assert_eq!(numbers, expected, "{filter:?}");
+        for (number, summary) in listed {
+            assert!(crate::store::lets_through(&filter, &summary), "{number}");
+        }
+        // The other way round the same come, whole or page by page.
+        let all = store.list(&filter, Part::FROM_OLDEST, 9).await;
+        let backwards: Vec<u64> = (all.expect("readable").iter().rev())
+            .map(|(number, _)| *number)
+            .collect();
+        for count in [2, 9] {
+            let mut numbers = Vec::new();
+            let mut part = Part::FROM_NEWEST;
+            loop {
+                let listed = store.list(&filter, part, count).await.expect("readable");
+                let Some((last, _)) = listed.last() else {
+                    break;
+                };
+                part = Part::Before(*last);
+                numbers.extend(listed.iter().map(|(number, _)| *number));
+            }
+            assert_eq!(numbers, backwards, "{filter:?}");
+        }
+    }
+}

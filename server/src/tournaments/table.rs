@@ -1,0 +1,77 @@
+//! The list of the tournaments: in the order in which they were made, found by their ids and join codes. What a tournament is, and how it is
+//! made, is decided elsewhere.
+
+use std::collections::{BTreeMap, HashMap};
+use std::sync::Arc;
+
+use super::hosted::Hosted;
+use crate::config::MAX_TOURNAMENTS;
+use crate::ids::Id;
+
+#[derive(Debug, Default)]
+pub(super) struct Table {
+    next_number: u64,
+    /// In the order in which they were made.
+    by_number: BTreeMap<u64, Arc<Hosted>>,
+    numbers: HashMap<Id, u64>,
+    codes: HashMap<String, u64>,
+    /// Places taken for tournaments that are being made.
+    being_made: usize,
+}
+
+impl Table {
+    /// A tournament by its id.
+    pub(super) fn get(&self, id: Id) -> Option<&Arc<Hosted>> {
+        self.by_number.get(self.numbers.get(&id)?)
+    }
+
+    /// A tournament by its join code in capitals, without spaces and dashes.
+    pub(super) fn by_code(&self, code: &str) -> Option<&Arc<Hosted>> {
+        self.by_number.get(self.codes.get(code)?)
+    }
+
+    /// Those made before the one numbered `before`, or all; with their numbers, newest first.
+    pub(super) fn earlier(
+        &self,
+        before: Option<u64>,
+    ) -> impl Iterator<Item = (u64, &Arc<Hosted>)> + '_ {
+        let earlier = self.by_number.range(..before.unwrap_or(u64::MAX)).rev();
+        earlier.map(|(number, hosted)| (*number, hosted))
+    }
+
+    /// Takes a place for a tournament that is about to be made; `false` if there is none.
+    pub(super) fn reserve(&mut self) -> bool {
+        let open = self.by_number.values().filter(|hosted| !hosted.is_over());
+        let has_place = open.count() + self.being_made < MAX_TOURNAMENTS;
+        self.being_made += usize::from(has_place);
+        has_place
+    }
+
+    /// Gives back a place that was taken.
+    pub(super) fn give_back(&mut self) {
+        self.being_made -= 1;
+    }
+
+    /// Adds a tournament. Those that are over are shown only as long as there is space for them.
+    pub(super) fn enter(&mut self, hosted: Arc<Hosted>) {
+        while self.by_number.len() >= MAX_TOURNAMENTS
+            && let Some(number) = (self.by_number.iter())
+                .find(|(_, hosted)| hosted.is_over())
+                .map(|(number, _)| *number)
+        {
+            self.remove(number);
+        }
+        let number = self.next_number;
+        self.next_number += 1;
+        self.numbers.insert(hosted.id(), number);
+        self.codes.insert(hosted.join_code().to_owned(), number);
+        self.by_number.insert(number, hosted);
+    }
+
+    fn remove(&mut self, number: u64) {
+        if let Some(hosted) = self.by_number.remove(&number) {
+            self.numbers.remove(&hosted.id());
+            self.codes.remove(hosted.join_code());
+        }
+    }
+}
