@@ -127,7 +127,15 @@ impl RoomService for RoomCalls {
             .map_err(|problem| field("KIND_REFUSED", &problem))?
             .unwrap_or(ParticipantKind::Agent);
         let name = request.name.trim().to_owned();
-        convert::check_name("name", &name, 1).map_err(|problem| field("NAME_REFUSED", &problem))?;
+        // Says which room it is: who has its code can ask for it without a name, and look at the seats before choosing one.
+        convert::check_name("name", &name, 1).map_err(|problem| {
+            let metadata = [
+                ("field", problem.field),
+                ("room_id", &handle.id().to_string()),
+            ];
+            let words = problem.to_string();
+            status::status(Code::InvalidArgument, "NAME_REFUSED", words, metadata)
+        })?;
         let joined = handle
             .join(JoinRequest {
                 name,

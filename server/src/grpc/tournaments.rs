@@ -149,8 +149,6 @@ impl TournamentService for TournamentCalls {
         request: Request<v1::JoinTournamentRequest>,
     ) -> Result<Response<v1::JoinTournamentResponse>, Status> {
         let request = request.into_inner();
-        let name = request.name.trim().to_owned();
-        convert::check_name("name", &name, 1).map_err(|problem| field("NAME_REFUSED", &problem))?;
         let kind = convert::kind_from_proto("kind", request.kind)
             .map_err(|problem| field("KIND_REFUSED", &problem))?
             .unwrap_or(ParticipantKind::Agent);
@@ -166,6 +164,16 @@ impl TournamentService for TournamentCalls {
                 "no tournament here has this join code; ask its owner for it",
                 [("field", "join_code")],
             )
+        })?;
+        // As in a room: who has the code can ask for the tournament without a name.
+        let name = request.name.trim().to_owned();
+        convert::check_name("name", &name, 1).map_err(|problem| {
+            let metadata = [
+                ("field", problem.field),
+                ("tournament_id", &hosted.id().to_string()),
+            ];
+            let words = problem.to_string();
+            status(Code::InvalidArgument, "NAME_REFUSED", words, metadata)
         })?;
         if !hosted.admits(kind) {
             return Err(status(

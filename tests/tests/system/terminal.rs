@@ -113,6 +113,7 @@ async fn room(client: &Client) -> (String, String) {
             rules: Some(one_shift()),
             policy: Some(v1::RoomPolicy {
                 decision_time_ms: Some(3_600_000),
+                pace_ms: Some(0),
                 ..v1::RoomPolicy::default()
             }),
             seats: seats
@@ -211,6 +212,7 @@ async fn tournament(client: &Client) -> (String, String) {
             rules: Some(one_shift()),
             policy: Some(v1::RoomPolicy {
                 decision_time_ms: Some(3_600_000),
+                pace_ms: Some(0),
                 ..v1::RoomPolicy::default()
             }),
             built_in_agents: ["greedy", "random", "greedy"].map(Into::into).into(),

@@ -224,11 +224,15 @@ impl Lobby {
     /// Whom a game waits for, and why.
     fn awaited(&self, report: &Report, game: &v1::TournamentGame) -> Option<String> {
         let field = Field::new(&report.tournament);
-        let busy = |who: u32| {
-            let mut games = report.games.iter();
-            games.find(|other| {
-                other.game != game.game && other.state() == GameState::Playing && sits(other, who)
-            })
+        // Where somebody plays already who can play no more games at a time.
+        let busy = |who: &v1::TournamentParticipant| {
+            let mut playing = report.games.iter().filter(|other| {
+                other.game != game.game
+                    && other.state() == GameState::Playing
+                    && sits(other, who.participant)
+            });
+            let most = usize::try_from(who.max_games.max(1)).unwrap_or(usize::MAX);
+            playing.nth(most - 1)
         };
         let seats = game.seats.iter().map(|seat| seat.participant);
         let whom = seats.filter(|who| *who != self.me).filter_map(|who| {
@@ -237,7 +241,7 @@ impl Lobby {
             if !participant.connected && participant.built_in_agent.is_empty() {
                 return Some(format!("{name} (not here)"));
             }
-            let other = busy(who).filter(|_| game.state() == GameState::Due)?;
+            let other = busy(participant).filter(|_| game.state() == GameState::Due)?;
             Some(format!("{name} (plays at table {})", other.table))
         });
         let whom: Vec<String> = whom.collect();

@@ -47,7 +47,7 @@ const MAX_PACE_MS: i64 = 60_000;
 #[command(after_help = "Examples:\n  chefshat play --local\n  \
                   chefshat play --server http://127.0.0.1:50051 --code BCDF2345 --name Ada\n  \
                   chefshat play --local --agents trained,trained,trained --target-shifts 3\n\n\
-                  A code that is no room's is tried as a tournament's: then every game of yours begins by itself, with the standings\n\
+                  A code that is no room's is tried as a tournament's: then every game of yours begins by itself, with the standings \
                   between them, until the tournament is over.\n\n\
                   Press ? for the keys. Who leaves is told a ticket; with it, --ticket goes on.\n\n\
                   Exit code: 0 when the game or tournament finished, 1 when it was aborted, closed, left or lost, 2 without a terminal.")]

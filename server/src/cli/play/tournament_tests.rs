@@ -132,6 +132,8 @@ fn participant(number: u32, name: &str) -> v1::TournamentParticipant {
         }
         .into(),
         connected: number != 5,
+        // The first can play two games at a time.
+        max_games: if number == 0 { 2 } else { 1 },
         ..v1::TournamentParticipant::default()
     }
 }
@@ -282,9 +284,9 @@ fn the_lobby_says_what_comes() {
             report(
                 Swiss,
                 Playing,
-                vec![game(2, Due, mine), game(3, Called, [0, 3, 4, 6])],
+                vec![game(2, Due, mine), game(3, Called, [0, 1, 4, 6])],
             ),
-            "greedy (plays at table 2)",
+            "It waits for Ben (plays at table 2) and Eve (not here).",
         ),
         (
             report(Knockout, Playing, vec![game(3, Called, others)]),

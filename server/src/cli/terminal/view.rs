@@ -152,7 +152,7 @@ fn draw_header(frame: &mut Frame<'_>, look: Look, table: &Table, status: &str, a
         });
     }
     let width = usize::from(area.width).saturating_sub(columns(status) + 1);
-    let space = width.saturating_sub(columns(&progress) + 1);
+    let space = width.saturating_sub(columns(&progress) + 2);
     let room = &table.room_name;
     // A long name takes the place of the game's own, and is cut where that is not enough.
     let named = match room.is_empty() {
