@@ -23,7 +23,7 @@ pub(super) struct PolicyArgs {
     #[arg(long, value_name = "MS")]
     bank_ms: Option<u32>,
     /// Other times for participants of a kind: milliseconds for a decision and, after another colon, beyond that, for instance human:60000
-    /// or robot:30000:120000. Repeatable.
+    /// or robot:30000:120000. Repeatable. People have their standard times unless --decision-time-ms or --bank-ms is given.
     #[arg(long = "clock", value_name = "KIND:MS[:MS]", value_parser = clock)]
     clocks: Vec<v1::KindClock>,
     /// Invalid attempts at one decision before the default is taken, 0 for no limit; standard 10.

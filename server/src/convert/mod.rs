@@ -20,7 +20,7 @@ pub use decision::{
     observation_from_proto, observation_to_proto,
 };
 pub use log::{game_started, view};
-pub use name::check_name;
+pub use name::name_to_show;
 pub use played::{MAX_RECORDED_ATTEMPTS, Played};
 pub use players::recorded_player;
 pub use policy::{millis, policy_from_proto, policy_to_proto};

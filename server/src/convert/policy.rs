@@ -8,8 +8,9 @@ use chefshat_proto::v1;
 use chefshat_records::convert::{FieldProblem, reward_scheme_from_proto, reward_scheme_to_proto};
 
 use super::room::{kind_from_proto, kind_to_proto};
-use crate::room::core::Core;
+use crate::room::core::{Core, State};
 use crate::room::policy::{AbortPolicy, Durability, KindClock, Policy};
+use crate::store::journal::ParticipantKind;
 
 /// A day, the longest time a policy may name, milliseconds.
 const DAY_MS: u32 = 86_400_000;
@@ -64,16 +65,7 @@ pub fn policy_from_proto(message: &v1::RoomPolicy) -> Result<Policy, FieldProble
             Ok(v1::Durability::Ephemeral) => Durability::Ephemeral,
             Err(_) => return Err(unknown("durability", message.durability)),
         },
-        clocks: match message {
-            // Times that were chosen are everybody's.
-            v1::RoomPolicy {
-                clocks,
-                decision_time_ms: None,
-                bank_ms: None,
-                ..
-            } if clocks.is_empty() => standard.clocks,
-            _ => clocks(&message.clocks)?,
-        },
+        clocks: clocks(message)?,
     };
     if policy.spectators_see_hands && policy.spectator_delay_decisions == 0 {
         return Err(FieldProblem::new(
@@ -84,12 +76,13 @@ pub fn policy_from_proto(message: &v1::RoomPolicy) -> Result<Policy, FieldProble
     Ok(policy)
 }
 
-/// The policy of a room with every field set.
+/// The policy of a room: a pace that depends on who plays is set when that stands.
 pub(super) fn policy_of(core: &Core) -> v1::RoomPolicy {
-    v1::RoomPolicy {
-        pace_ms: Some(millis(core.pace())),
-        ..policy_to_proto(&core.header().policy)
+    let mut policy = policy_to_proto(&core.header().policy);
+    if core.state() != State::Waiting {
+        policy.pace_ms = Some(millis(core.pace()));
     }
+    policy
 }
 
 /// A policy with every field set, but for a pace that depends on who plays.
@@ -129,10 +122,10 @@ pub fn policy_to_proto(policy: &Policy) -> v1::RoomPolicy {
     }
 }
 
-/// Clocks for kinds of participants, each kind at most once.
-fn clocks(messages: &[v1::KindClock]) -> Result<Vec<KindClock>, FieldProblem> {
+/// Clocks for kinds of participants, each kind at most once. Times that were chosen for the room are everybody's, also people's.
+fn clocks(policy: &v1::RoomPolicy) -> Result<Vec<KindClock>, FieldProblem> {
     let mut clocks: Vec<KindClock> = Vec::new();
-    for message in messages {
+    for message in &policy.clocks {
         let kind = kind_from_proto("clocks", message.kind)?
             .ok_or_else(|| FieldProblem::new("clocks", "say for which kind a clock is"))?;
         if clocks.iter().any(|clock| clock.kind == kind) {
@@ -143,6 +136,11 @@ fn clocks(messages: &[v1::KindClock]) -> Result<Vec<KindClock>, FieldProblem> {
             decision_time: time("clocks", message.decision_time_ms, 10..=DAY_MS)?,
             bank: time("clocks", message.bank_ms, 0..=DAY_MS)?,
         });
+    }
+    let chosen = policy.decision_time_ms.is_some() || policy.bank_ms.is_some();
+    let for_people = (clocks.iter()).any(|clock| clock.kind == ParticipantKind::Human);
+    if !chosen && !for_people {
+        clocks.push(KindClock::PEOPLE);
     }
     Ok(clocks)
 }

@@ -8,7 +8,7 @@ use chefshat_proto::v1::{self, seat_config::FilledBy};
 use chefshat_records::convert::{FieldProblem, rules_to_proto, seat_number};
 
 use super::log::abort_reason;
-use super::name::check_name;
+use super::name::name_to_show;
 use super::policy::{agent, policy_of};
 use super::start::{branch_point, origin};
 use crate::ids::Id;
@@ -68,8 +68,7 @@ pub fn called_from_proto(
                 let problem = "a name is for a built-in agent; whoever joins brings their own";
                 return Err(FieldProblem::new("seats", problem));
             }
-            check_name("seats", &config.name, 1)?;
-            Ok((seat, config.name.clone()))
+            Ok((seat, name_to_show("seats", &config.name, 1)?))
         })
         .collect()
 }

@@ -31,8 +31,8 @@ pub(super) async fn new_room(
     recorded: &Recorded,
     request: v1::CreateRoomRequest,
 ) -> Result<NewRoom, Status> {
-    let name = request.name.trim().to_owned();
-    convert::check_name("name", &name, 0).map_err(|problem| field("NAME_REFUSED", &problem))?;
+    let name = convert::name_to_show("name", &request.name, 0)
+        .map_err(|problem| field("NAME_REFUSED", &problem))?;
     let policy = kept_policy(recorded, &request.policy.unwrap_or_default())
         .map_err(|problem| field("POLICY_REFUSED", &problem))?;
     let game_seed = game_seed(&request.game_seed)?;

@@ -126,9 +126,8 @@ impl RoomService for RoomCalls {
         let kind = convert::kind_from_proto("kind", request.kind)
             .map_err(|problem| field("KIND_REFUSED", &problem))?
             .unwrap_or(ParticipantKind::Agent);
-        let name = request.name.trim().to_owned();
         // Says which room it is: who has its code can ask for it without a name, and look at the seats before choosing one.
-        convert::check_name("name", &name, 1).map_err(|problem| {
+        let name = convert::name_to_show("name", &request.name, 1).map_err(|problem| {
             let metadata = [
                 ("field", problem.field),
                 ("room_id", &handle.id().to_string()),

@@ -87,8 +87,8 @@ impl TournamentService for TournamentCalls {
         request: Request<v1::CreateTournamentRequest>,
     ) -> Result<Response<v1::CreateTournamentResponse>, Status> {
         let settings = request.into_inner().settings.unwrap_or_default();
-        let name = settings.name.trim().to_owned();
-        convert::check_name("name", &name, 1).map_err(|problem| field("NAME_REFUSED", &problem))?;
+        let name = convert::name_to_show("name", &settings.name, 1)
+            .map_err(|problem| field("NAME_REFUSED", &problem))?;
         let mut plan = convert::tournament_plan(&settings, random_bytes())
             .map_err(|problem| refused(&problem))?;
         if let Some(problem) = too_long(&plan.rules) {
@@ -166,8 +166,7 @@ impl TournamentService for TournamentCalls {
             )
         })?;
         // As in a room: who has the code can ask for the tournament without a name.
-        let name = request.name.trim().to_owned();
-        convert::check_name("name", &name, 1).map_err(|problem| {
+        let name = convert::name_to_show("name", &request.name, 1).map_err(|problem| {
             let metadata = [
                 ("field", problem.field),
                 ("tournament_id", &hosted.id().to_string()),

@@ -154,6 +154,14 @@ pub trait Journal: Send + 'static {
     ) -> BoxFuture<'_, Result<(), StoreError>>;
 }
 
+/// Who had a seat: a built-in agent is itself, whatever it was called.
+fn identity(seat: &v1::Participant) -> &String {
+    match seat.built_in_agent.is_empty() {
+        true => &seat.name,
+        false => &seat.built_in_agent,
+    }
+}
+
 /// Whether a filter lets a record through.
 fn lets_through(filter: &v1::RecordFilter, summary: &v1::RecordSummary) -> bool {
     let unset = 0;
@@ -165,8 +173,5 @@ fn lets_through(filter: &v1::RecordFilter, summary: &v1::RecordSummary) -> bool 
         && (filter.created_before_ms == 0 || summary.created_at_ms < filter.created_before_ms)
         && (filter.kind == unset || summary.seats.iter().any(|seat| seat.kind == filter.kind))
         && (filter.participant.is_empty()
-            || summary
-                .seats
-                .iter()
-                .any(|seat| [&seat.name, &seat.built_in_agent].contains(&&filter.participant)))
+            || (summary.seats.iter()).any(|seat| *identity(seat) == filter.participant))
 }

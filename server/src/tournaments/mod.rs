@@ -168,11 +168,12 @@ impl Tournaments {
     ) -> Vec<(u64, Arc<Hosted>)> {
         let is_wanted =
             |hosted: &Hosted| state.is_none_or(|state| hosted.look(Tournament::state) == state);
-        (self.lock().earlier(before))
-            .filter(|(_, hosted)| is_wanted(hosted))
-            .take(count)
+        // Looked at when the table is free again: each may be busy for a moment.
+        let earlier: Vec<_> = (self.lock().earlier(before))
             .map(|(number, hosted)| (number, Arc::clone(hosted)))
-            .collect()
+            .collect();
+        let wanted = (earlier.into_iter()).filter(|(_, hosted)| is_wanted(hosted));
+        wanted.take(count).collect()
     }
 
     /// Enters a tournament into the table and lets it move.

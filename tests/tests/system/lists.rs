@@ -3,7 +3,7 @@
 
 use chefshat_client::Client;
 use chefshat_proto::v1::{self, tournament_service_client::TournamentServiceClient};
-use chefshat_tests::TestServer;
+use chefshat_tests::{TestServer, attach_all, one_shift, room_of_four};
 use tonic_types::StatusExt as _;
 
 use crate::tournaments::{create, id_of};
@@ -43,12 +43,16 @@ async fn rooms_are_listed_newest_first() {
     }
     made.reverse();
     assert_eq!(listed, made);
+    let (begun, tickets) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
+    let _seats = attach_all(&server, &tickets).await;
+    let begun = begun.room.expect("a room").room_id;
     let playing = v1::ListRoomsRequest {
         state: v1::RoomState::Playing.into(),
         ..v1::ListRoomsRequest::default()
     };
-    let playing = client.list_rooms(playing).await.expect("a page");
-    assert!(playing.rooms.is_empty());
+    let playing = client.list_rooms(playing).await.expect("a page").rooms;
+    let playing: Vec<&str> = playing.iter().map(|room| &*room.room_id).collect();
+    assert_eq!(playing, [&*begun]);
 }
 
 #[tokio::test]

@@ -2,13 +2,15 @@
 
 use chefshat_client::Client;
 use chefshat_engine::RuleSetSpec;
-use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
+use chefshat_proto::v1::{
+    self, game_event::Kind, record_line::Line, record_service_client::RecordServiceClient,
+};
 use chefshat_records::{jsonl, replay};
 use chefshat_tests::{
-    TestServer, attach_all, one_shift, patiently, play_on, random_agents, room_of_four,
+    StreamSeat, TestServer, attach_all, one_shift, patiently, play_on, random_agents, room_of_four,
 };
 
-use crate::played::built_in;
+use crate::played::{built_in, ended};
 
 async fn until_over(client: &Client, room_id: &str) -> v1::Room {
     let mut watching = client.spectate(room_id, 0);
@@ -280,4 +282,110 @@ async fn rewards_are_told_to_their_own_seat_alone() {
     }
     assert_eq!(hands(&told), 4);
     assert!(told.iter().all(|event| event.rewards.is_empty()));
+}
+
+#[tokio::test]
+async fn built_in_agents_go_by_the_names_they_are_given() {
+    let server = TestServer::start().await;
+    let client = server.client().await;
+    let named = |agent: &str, name: &str| v1::SeatConfig {
+        name: name.into(),
+        ..built_in(agent)
+    };
+    let open = v1::SeatConfig {
+        name: "Ada".into(),
+        ..v1::SeatConfig::default()
+    };
+    for refused in [open, named("greedy", "Gre\u{200b}ta")] {
+        let request = v1::CreateRoomRequest {
+            seats: vec![
+                refused,
+                built_in("random"),
+                built_in("random"),
+                built_in("random"),
+            ],
+            ..v1::CreateRoomRequest::default()
+        };
+        let error = client.create_room(request).await.expect_err("no such seat");
+        assert_eq!(error.reason(), Some("SEATS_REFUSED"));
+    }
+    let seats = vec![
+        named("greedy", " Greta "),
+        named("random", "Rolf"),
+        built_in("random"),
+        built_in("trained"),
+    ];
+    let game = ended(
+        &client,
+        v1::CreateRoomRequest {
+            rules: Some(one_shift()),
+            seats,
+            ..v1::CreateRoomRequest::default()
+        },
+    )
+    .await;
+    let names = |seats: &[v1::Participant]| -> Vec<[String; 2]> {
+        let names = seats
+            .iter()
+            .map(|it| [it.name.clone(), it.built_in_agent.clone()]);
+        names.collect()
+    };
+    let expected = [
+        ["Greta", "greedy"],
+        ["Rolf", "random"],
+        ["random", "random"],
+        ["trained", "trained"],
+    ];
+    assert_eq!(names(&game.room.seats), expected);
+    assert_eq!(names(&game.header().seats), expected);
+    let mut records = RecordServiceClient::new(server.channel().await);
+    for (participant, count) in [("greedy", 1), ("Greta", 0), ("random", 1)] {
+        let request = v1::ListRecordsRequest {
+            filter: Some(v1::RecordFilter {
+                participant: participant.into(),
+                ..v1::RecordFilter::default()
+            }),
+            ..v1::ListRecordsRequest::default()
+        };
+        let page = records.list_records(request).await.expect("a page");
+        assert_eq!(page.into_inner().records.len(), count, "{participant}");
+    }
+}
+
+#[tokio::test]
+async fn a_person_is_given_time_and_can_follow() {
+    let server = TestServer::start().await;
+    let client = server.client().await;
+    for (kind, time_ms, bank_ms, pace_ms) in [
+        (v1::ParticipantKind::Human, 60_000, 300_000, 1000),
+        (v1::ParticipantKind::Robot, 10_000, 60_000, 0),
+    ] {
+        let request = v1::CreateRoomRequest {
+            seats: ["", "greedy", "greedy", "greedy"]
+                .map(|agent| match agent {
+                    "" => v1::SeatConfig::default(),
+                    agent => built_in(agent),
+                })
+                .into(),
+            ..v1::CreateRoomRequest::default()
+        };
+        let created = client.create_room(request).await.expect("the room is made");
+        let room = created.room.expect("a room");
+        assert_eq!(room.policy.expect("a policy").pace_ms, None, "it depends");
+        let joined = client
+            .join(v1::JoinRoomRequest {
+                join_code: created.join_code,
+                name: "Ada".into(),
+                kind: kind.into(),
+                ..v1::JoinRoomRequest::default()
+            })
+            .await
+            .expect("the seat is free");
+        let mut seat = StreamSeat::attached(server.channel().await, &joined.ticket).await;
+        let decision = patiently("a decision", seat.decision()).await;
+        assert_eq!(decision.bank_left_ms, bank_ms);
+        assert!(decision.time_left_ms <= time_ms);
+        let room = client.get_room(&room.room_id).await.expect("it is there");
+        assert_eq!(room.policy.expect("a policy").pace_ms, Some(pace_ms));
+    }
 }

@@ -102,8 +102,8 @@ pub fn order_confidence(upper: &[Scored], lower: &[Scored]) -> OrderConfidence {
 }
 
 impl Tournament {
-    /// How sure the order of each two neighbours in the standings is (none before a game has counted), from the top, by the scores of all games that counted. Of two who always
-    /// sat at the same tables, every deal or game tells something. Others met others, who were better or worse, in all games of a
+    /// How sure the order of each two neighbours in the standings is (none before a game has counted), from the top, by the scores of all games
+    /// that counted. Of two who always sat at the same tables, every deal or game tells something. Others met others, who were better or worse, in all games of a
     /// round: of them it is whole rounds that tell.
     pub fn order_confidence(&self) -> Vec<Neighbours> {
         let mut played: Vec<Vec<Played>> = vec![Vec::new(); self.participants().len()];

@@ -11,9 +11,9 @@ use super::settings::Format;
 /// How a participant stands. Games it forfeited count, with a score of 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Standing {
-    /// Place in the tournament, from 1; 0 for all as long as no game has counted: they stand in the order of joining then. The mean score of a game decides, then the mean of points, then, among those who are level, who was
-    /// more often placed better when they met, then the draw. In a knockout those who got further come first: in later rounds, then in a better
-    /// place at their last table, once its round is over.
+    /// Place in the tournament, from 1; 0 for all as long as no game has counted: they stand in the order of joining then. The mean score of a
+    /// game decides, then the mean of points, then, among those who are level, who was more often placed better when they met, then the draw.
+    /// In a knockout those who got further come first: in later rounds, then in a better place at their last table, once its round is over.
     pub place: u32,
     /// Who.
     pub participant: usize,

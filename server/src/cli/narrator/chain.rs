@@ -3,8 +3,8 @@
 
 use chefshat_client::v1;
 
+use super::super::numbers::ordinal;
 use super::name_of;
-use super::tables::ordinal;
 use super::text::{BOLD, DIM, GOLD, PLAIN, Piece, WIDTH, clean, columns, seat_style};
 
 /// Columns before the first play of a line: the pizza's number.

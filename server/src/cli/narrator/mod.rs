@@ -14,7 +14,7 @@ use chefshat_records::convert::rules_from_proto;
 
 use chain::Chain;
 pub(super) use chain::{cards, reason};
-pub(super) use tables::{abort_reason, ordinal};
+pub(super) use tables::abort_reason;
 use text::{BOLD, DIM, GOLD, PLAIN, Piece, label, seat_style, wrapped};
 pub(super) use text::{MAX_NAME, clean, columns, heading, row};
 

@@ -3,6 +3,7 @@
 use chefshat_client::v1;
 use chefshat_engine::Stop;
 
+use super::super::numbers::ordinal;
 use super::text::{BOLD, DIM, GOLD, PLAIN, Piece, clean, columns, heading, seat_style};
 use super::{INDENT, Narrator, name_of};
 
@@ -109,17 +110,6 @@ impl Narrator {
         });
         most.max(goal).max(1)
     }
-}
-
-/// A place: 1st, 2nd, …
-pub(in crate::cli) fn ordinal(place: u32) -> String {
-    let ending = match place {
-        1 => "st",
-        2 => "nd",
-        3 => "rd",
-        _ => "th",
-    };
-    format!("{place}{ending}")
 }
 
 /// Why a game has no result, in words.

@@ -16,6 +16,10 @@ use super::{CommandError, data_dir};
 
 /// Give out or delete what is known of a participant.
 #[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  chefshat participant export P07 --out p07.jsonl --data-dir ./chefshat-data\n  \
+                  chefshat participant delete P07 --data-dir ./chefshat-data"
+)]
 pub(super) struct ParticipantCommand {
     #[command(subcommand)]
     command: Command,

@@ -94,6 +94,8 @@ pub(super) struct App {
     pub(super) then: &'static str,
     /// How the person stands in the tournament, to be shown with the result.
     pub(super) standing: Option<String>,
+    /// What the person should know of other games that go on beside this one.
+    pub(super) others: Option<String>,
     /// The answer not yet acknowledged.
     unacknowledged: Option<(u64, u32)>,
     pub(super) left: bool,
@@ -124,6 +126,7 @@ impl App {
             scroll: Scroll::default(),
             then: "Enter ends",
             standing: None,
+            others: None,
             unacknowledged: None,
             left: false,
         }
@@ -163,6 +166,12 @@ impl App {
     /// Whether a key means what it means at the table: nothing stands over that.
     pub(super) fn takes_keys(&self) -> bool {
         self.dialog.is_none() && !self.scroll.is_open()
+    }
+
+    /// Since when the person is asked; `None` while others decide, or the server has the answer.
+    pub(super) fn asks_since(&self) -> Option<u64> {
+        let open = self.open.as_ref().filter(|open| !open.sent)?;
+        Some(open.since_ms)
     }
 
     /// Whether a substitute plays for this seat.

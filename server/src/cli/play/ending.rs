@@ -4,14 +4,14 @@ use std::process::ExitCode;
 
 use chefshat_client::v1;
 
-use super::super::narrator::{MAX_NAME, abort_reason, ordinal};
-use super::super::numbers::counted;
+use super::super::narrator::{MAX_NAME, abort_reason};
+use super::super::numbers::{counted, ordinal};
 use super::super::terminal::table::End;
 use super::super::terminal::view::padded;
-use super::super::tournament::tables::mean_score;
+use super::super::tournament::tables::{NO_GAME_COUNTED, place_in_words};
 use super::super::{CommandError, say};
 use super::app::{App, Link};
-use super::lobby::{Lobby, Report};
+use super::lobby::Lobby;
 use super::part::Part;
 
 /// Where more is to be found.
@@ -116,16 +116,13 @@ fn of_tournament(part: &Part, lobby: &Lobby, hints: &Hints) -> Result<ExitCode, 
 
 /// How the person stands, after other words.
 fn standing(lobby: &Lobby, what: &str) -> String {
-    let report = lobby.report.as_ref();
-    let line = report.and_then(|report| report.standing(lobby.me));
-    let all = report.map_or(0, |Report { standings, .. }| standings.len());
-    match line {
-        Some(line) => format!(
-            "{what}: you are {} of {all}, score {:.2} a game in {}",
-            ordinal(line.place),
-            mean_score(line),
-            counted(line.games.into(), "game"),
-        ),
+    let told = lobby.report.as_ref().and_then(|report| {
+        let line = report.standing(lobby.me)?;
+        let place = place_in_words(line, report.standings.len());
+        Some(place.map_or_else(|| NO_GAME_COUNTED.to_owned(), |it| format!("you are {it}")))
+    });
+    match told {
+        Some(told) => format!("{what}: {told}"),
         None => what.to_owned(),
     }
 }
@@ -134,5 +131,43 @@ fn back(hints: &Hints) -> Result<(), CommandError> {
     match &hints.back {
         Some(back) => say(format_args!("to go on where you stood: {back}")),
         None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::lobby::Report;
+    use super::*;
+
+    /// A tournament that was closed tells no place that nobody has.
+    #[test]
+    fn a_tournament_that_is_over_says_how_one_stands() {
+        let standing = |participant, place, games| v1::TournamentStanding {
+            participant,
+            place,
+            games,
+            score: 6,
+            ..v1::TournamentStanding::default()
+        };
+        let closed = "the tournament was closed before its end";
+        let table = [
+            (
+                vec![standing(0, 0, 0), standing(1, 0, 0)],
+                ": no game was counted",
+            ),
+            (
+                vec![standing(0, 1, 3), standing(1, 2, 4)],
+                ": you are 2nd of 2, score 1.50 a game in 4 games",
+            ),
+            (Vec::new(), ""),
+        ];
+        for (standings, words) in table {
+            let mut lobby = Lobby::new("7ea82e54d878816e4e9bde8b21aa7dce".into(), 1);
+            lobby.report = Some(Report {
+                standings,
+                ..Report::default()
+            });
+            assert_eq!(super::standing(&lobby, closed), format!("{closed}{words}"));
+        }
     }
 }

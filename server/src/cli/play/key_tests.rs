@@ -1,9 +1,11 @@
-//! The keys that name cards, and those that go back in what happened.
+//! The keys that name cards, those that go back in what happened, and those that leave, show a feeling or take a seat back.
 
-use chefshat_client::v1;
+use chefshat_client::v1::{self, game_event::Kind, seat_update::Update};
 use chefshat_engine::RuleSetSpec;
 use ratatui::crossterm::event::KeyCode;
 
+use super::super::terminal::screen::Key;
+use super::app::{Dialog, Do, Input};
 use super::keys::key_of;
 use super::tests::{Evening, shifts};
 
@@ -39,7 +41,7 @@ fn every_stack_has_its_key() {
                     }
                 }
                 let request = evening.dealt.request();
-                evening.tell(v1::seat_update::Update::Decision(request));
+                evening.tell(Update::Decision(request));
             }
             let what = evening.act();
             evening.answered(what);
@@ -125,15 +127,48 @@ fn what_happened_is_scrolled_back() {
 fn long_lines_are_wrapped() {
     let mut evening = Evening::new(&shifts(1), 3);
     let restarted = v1::GameEvent {
-        kind: Some(v1::game_event::Kind::ServerRestarted(
-            v1::ServerRestarted::default(),
-        )),
+        kind: Some(Kind::ServerRestarted(v1::ServerRestarted::default())),
         ..v1::GameEvent::default()
     };
-    evening.tell(v1::seat_update::Update::Events(v1::EventBatch {
+    evening.tell(Update::Events(v1::EventBatch {
         events: vec![restarted],
     }));
     let screen = evening.screen();
     assert!(screen.contains("─ the server was"), "{screen}");
     assert!(screen.contains("  restarted"), "{screen}");
+}
+
+#[test]
+fn leaving_asks_first() {
+    let mut evening = Evening::new(&shifts(1), 3);
+    assert_eq!(evening.press(KeyCode::Char('q')), None);
+    assert_eq!(evening.app.dialog, Some(Dialog::Leave));
+    assert_eq!(evening.press(KeyCode::Char('n')), None);
+    assert!(evening.app.dialog.is_none() && !evening.app.left);
+    evening.press(KeyCode::Esc);
+    assert_eq!(evening.press(KeyCode::Char('y')), Some(Do::Leave));
+    assert!(evening.app.left);
+    let mut evening = Evening::new(&shifts(1), 3);
+    let interrupted = evening.app.take(Input::Key(Key::Interrupt), 0);
+    assert_eq!(interrupted, Some(Do::Leave));
+}
+
+#[test]
+fn feelings_and_substitutes_have_their_keys() {
+    let mut evening = Evening::new(&shifts(1), 3);
+    evening.press(KeyCode::Char('e'));
+    assert!(evening.screen().contains("surprise"));
+    assert_eq!(evening.press(KeyCode::Char('3')), Some(Do::Express(2)));
+    assert_eq!(evening.press(KeyCode::Char('r')), None);
+    let substituted = v1::GameEvent {
+        kind: Some(Kind::Substituted(v1::Substituted {
+            seat: 0,
+            built_in_agent: "random".into(),
+        })),
+        ..v1::GameEvent::default()
+    };
+    let events = vec![substituted];
+    evening.tell(Update::Events(v1::EventBatch { events }));
+    assert!(evening.screen().contains("Press r"));
+    assert_eq!(evening.press(KeyCode::Char('r')), Some(Do::Resume));
 }

@@ -4,10 +4,10 @@
 use chefshat_client::v1::{self, TournamentGameState as GameState};
 use ratatui::crossterm::event::KeyCode;
 
-use super::super::narrator::{MAX_NAME, clean, ordinal};
-use super::super::numbers::counted;
+use super::super::narrator::{MAX_NAME, clean};
+use super::super::numbers::{counted, ordinal};
 use super::super::terminal::table::End;
-use super::super::tournament::tables::{Field, mean_score};
+use super::super::tournament::tables::{Field, place_in_words};
 use super::super::tournament::words::is_over;
 use super::app::App;
 
@@ -150,14 +150,18 @@ impl Lobby {
         };
     }
 
-    /// What the person should know, best first.
-    pub(super) fn words(&self) -> Vec<String> {
+    /// What the person should know, best first; `ended` if no game comes any more, whatever was told last of the tournament.
+    pub(super) fn words(&self, ended: bool) -> Vec<String> {
         let Some(report) = &self.report else {
             return vec!["Waiting for the server to say how the tournament stands.".to_owned()];
         };
         let mut lines = vec![self.own_standing(report)];
         lines.extend(self.last.clone());
-        lines.extend(self.what_comes(report));
+        if ended && !report.is_over() {
+            lines.push("The tournament is over.".to_owned());
+        } else {
+            lines.extend(self.what_comes(report));
+        }
         lines
     }
 
@@ -165,25 +169,17 @@ impl Lobby {
     pub(super) fn in_short(&self) -> Option<String> {
         let report = self.report.as_ref()?;
         let standing = report.standing(self.me).filter(|it| it.games > 0)?;
-        let (place, all) = (ordinal(standing.place), report.standings.len());
-        let score = mean_score(standing);
-        let games = counted(standing.games.into(), "game");
-        Some(format!(
-            "In the tournament: {place} of {all}, score {score:.2} a game in {games}"
-        ))
+        let place = place_in_words(standing, report.standings.len())?;
+        Some(format!("In the tournament: {place}"))
     }
 
     fn own_standing(&self, report: &Report) -> String {
         let name = Field::new(&report.tournament).name(self.me);
-        match report.standing(self.me) {
-            Some(standing) if standing.games > 0 => format!(
-                "{name}, you are {} of {}: score {:.2} a game in {}.",
-                ordinal(standing.place),
-                report.standings.len(),
-                mean_score(standing),
-                counted(standing.games.into(), "game"),
-            ),
-            _ => format!("{name}, you take part."),
+        let standing = report.standing(self.me).filter(|it| it.games > 0);
+        let place = standing.and_then(|it| place_in_words(it, report.standings.len()));
+        match place {
+            Some(place) => format!("{name}, you are {place}."),
+            None => format!("{name}, you take part."),
         }
     }
 

@@ -47,23 +47,23 @@ pub(super) fn draw(frame: &mut Frame<'_>, look: Look, part: &Part, lobby: &Lobby
     ])
     .areas(area);
     draw_header(frame, look, part, lobby, header);
-    draw_own(frame, look, lobby, own);
+    draw_own(frame, look, part, lobby, own);
     draw_standings(frame, look, lobby, standings);
     let (words, style) = match &part.link {
+        Link::Over(Some(why)) if !lobby.is_over() => (
+            format!(" ! Your place is lost: {why}. Enter ends."),
+            look.warning(),
+        ),
+        _ if part.is_over() && !part.peek => (" Enter ends.".to_owned(), look.bold()),
         Link::Lost(why) => (
             format!(" The connection is lost and being made again: {why}"),
             look.warning(),
         ),
         _ if !lobby.notice.is_empty() => (format!(" ! {}", lobby.notice), look.warning()),
-        Link::Over(Some(why)) if !lobby.is_over() => (
-            format!(" ! Your place is lost: {why}. Enter ends."),
-            look.warning(),
-        ),
         _ if part.peek => (
             " Your game goes on. Any key goes back to it.".to_owned(),
             look.bold(),
         ),
-        _ if lobby.is_over() => (" Enter ends.".to_owned(), look.bold()),
         _ if lobby.has_games_to_come() => (
             " Your next game begins here by itself.".to_owned(),
             look.bold(),
@@ -131,8 +131,9 @@ fn draw_header(frame: &mut Frame<'_>, look: Look, part: &Part, lobby: &Lobby, ar
     frame.render_widget(Paragraph::new(line).style(look.header()), area);
 }
 
-fn draw_own(frame: &mut Frame<'_>, look: Look, lobby: &Lobby, area: Rect) {
-    let words = lobby.words().into_iter();
+fn draw_own(frame: &mut Frame<'_>, look: Look, part: &Part, lobby: &Lobby, area: Rect) {
+    let ended = matches!(part.link, Link::Over(None));
+    let words = lobby.words(ended).into_iter();
     let mut lines: Vec<Line<'_>> = words.map(|words| Line::from(format!(" {words}"))).collect();
     if let Some(first) = lines.first_mut() {
         *first = first.clone().patch_style(look.bold());

@@ -4,6 +4,8 @@
 mod app;
 mod ending;
 mod follow;
+#[cfg(test)]
+mod friday;
 mod join;
 #[cfg(test)]
 mod key_tests;
@@ -14,6 +16,8 @@ mod lobby_view;
 mod part;
 mod pick;
 mod run;
+#[cfg(test)]
+mod several_tests;
 #[cfg(test)]
 mod tests;
 #[cfg(test)]

@@ -1,10 +1,13 @@
-//! The part that a person takes: one game, or those of a tournament one after the other, with its lobby between them. Keys, messages and the time
-//! go in, what is to be done comes out; what happens in a game is in `app`, how a tournament stands in `lobby`. No terminal and no
-//! connection.
+//! The part that a person takes: one game, or those of a tournament one after the other, with its lobby between them. Where a ticket has more games
+//! at a time, one is on the screen, and one that asks comes to it as soon as that does not. Keys, messages and the time go in, what is to be
+//! done comes out; what happens in a game is in `app`, how a tournament stands in `lobby`. No terminal and no connection.
+
+use std::collections::VecDeque;
 
 use chefshat_client::v1::{self, seat_update::Update};
 use ratatui::crossterm::event::KeyCode;
 
+use super::super::numbers::counted;
 use super::super::terminal::screen::Key;
 use super::super::terminal::table::Table;
 use super::app::{App, Do, Input, Link};
@@ -53,8 +56,8 @@ pub(super) struct Part {
     pub(super) lobby: Option<Lobby>,
     /// The game on the screen.
     pub(super) game: Option<App>,
-    /// One that began while the result of that was shown.
-    next: Option<App>,
+    /// Those that wait for the screen, in the order in which they came to wait: while the result of another is shown, or another goes on.
+    waiting: VecDeque<App>,
     /// When the game on the screen ended.
     ended_ms: Option<u64>,
     /// The lobby is shown although a game goes on.
@@ -70,7 +73,7 @@ impl Part {
         Self {
             lobby: None,
             game,
-            next: None,
+            waiting: VecDeque::new(),
             ended_ms: None,
             peek: false,
             over: None,
@@ -138,7 +141,7 @@ impl Part {
     }
 
     fn apps(&mut self) -> impl Iterator<Item = &mut App> {
-        self.game.iter_mut().chain(&mut self.next)
+        self.game.iter_mut().chain(&mut self.waiting)
     }
 
     fn in_game(&mut self, game: &str, input: Input, now_ms: u64) -> Option<Do> {
@@ -164,37 +167,86 @@ impl Part {
         };
         let mut app = App::new(table, Some(seat));
         app.take(attached(), now_ms);
-        self.next = Some(app);
+        self.waiting.push_back(app);
     }
 
-    /// Lets the next game, or the lobby, take the place of a game that is over, when its result was to be seen long enough.
     fn go_on(&mut self, now_ms: u64) {
+        self.show(now_ms);
+        let others = self.others();
+        if let Some(game) = &mut self.game {
+            game.others = others;
+        }
+    }
+
+    /// Lets the next game, or the lobby, take the place of a game that is over, when its result was to be seen long enough; and one that asks
+    /// that of one that does not.
+    fn show(&mut self, now_ms: u64) {
         let Some(game) = &self.game else {
-            self.game = self.next.take();
+            self.game = self.take_next();
             self.peek &= self.game.is_none();
             return;
         };
-        if game.open.is_some() {
+        if game.open.is_some() || is_over(game) {
             self.peek = false;
         }
-        if self.lobby.is_none() || !is_over(game) {
+        if !is_over(game) {
+            if game.open.is_none()
+                && game.takes_keys()
+                && let Some(at) = self.first_to_ask()
+            {
+                let shown = std::mem::replace(&mut self.game, self.waiting.remove(at));
+                self.waiting.extend(shown);
+                self.peek = false;
+            }
+            return;
+        }
+        if self.lobby.is_none() {
             return;
         }
         let standing = self.lobby.as_ref().and_then(Lobby::in_short);
         if let Some(game) = &mut self.game {
             game.standing = standing;
-            game.then = match self.next {
-                Some(_) => "Your next game has begun. Enter goes to it",
-                None => "Enter: the standings",
+            game.then = match self.waiting.is_empty() {
+                false => "Another game of yours has begun. Enter goes to it",
+                true => "Enter: the standings",
             };
         }
         let ended = *self.ended_ms.get_or_insert(now_ms);
-        let asked = self.next.as_ref().is_some_and(|next| next.open.is_some());
+        let asked = self.first_to_ask().is_some();
         let long = if asked { SHORT_RESULT_MS } else { RESULT_MS };
         let reads = self.game.as_ref().is_some_and(|it| it.scroll.is_open());
         if now_ms.saturating_sub(ended) >= long && (asked || !reads) {
             self.dismiss();
         }
+    }
+
+    /// Which of the waiting games has asked for the longest time.
+    fn first_to_ask(&self) -> Option<usize> {
+        let asking = self.waiting.iter().enumerate();
+        let asking = asking.filter_map(|(at, app)| Some((app.asks_since()?, at)));
+        asking.min().map(|(_, at)| at)
+    }
+
+    /// The game that comes to the screen next: that which asks, else that which has waited longest.
+    fn take_next(&mut self) -> Option<App> {
+        let at = self.first_to_ask().unwrap_or(0);
+        self.waiting.remove(at)
+    }
+
+    /// What the waiting games are to the person who looks at another.
+    fn others(&self) -> Option<String> {
+        let going = || self.waiting.iter().filter(|app| !is_over(app));
+        let asking = going().filter(|app| app.asks_since().is_some()).count();
+        let (number, what) = match (asking, going().count()) {
+            (_, 0) => return None,
+            (0, waiting) => (waiting, "wait"),
+            (asking, _) => (asking, "ask"),
+        };
+        let end = if number == 1 { "s" } else { "" };
+        Some(format!(
+            "{} {what}{end}",
+            counted(number as u64, "other game")
+        ))
     }
 
     fn dismiss(&mut self) {
@@ -203,7 +255,7 @@ impl Part {
         }
         self.ended_ms = None;
         self.peek = false;
-        self.game = self.next.take();
+        self.game = self.take_next();
     }
 
     fn key(&mut self, key: Key, now_ms: u64) -> Option<(String, Do)> {

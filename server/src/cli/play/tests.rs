@@ -8,7 +8,7 @@ use super::super::terminal::look::Look;
 use super::super::terminal::screen::Key;
 use super::super::terminal::table::Table;
 use super::super::terminal::testing::{Dealt, as_kept, text};
-use super::app::{App, Dialog, Do, Input, Link};
+use super::app::{App, Do, Input, Link};
 use super::run::command;
 use super::view;
 
@@ -350,41 +350,6 @@ fn a_decision_taken_without_the_person_is_closed() {
     // The next question takes the words away.
     assert!(evening.until_asked());
     assert!(!evening.screen().contains("too late"));
-}
-
-#[test]
-fn leaving_asks_first() {
-    let mut evening = Evening::new(&shifts(1), 3);
-    assert_eq!(evening.press(KeyCode::Char('q')), None);
-    assert_eq!(evening.app.dialog, Some(Dialog::Leave));
-    assert_eq!(evening.press(KeyCode::Char('n')), None);
-    assert!(evening.app.dialog.is_none() && !evening.app.left);
-    evening.press(KeyCode::Esc);
-    assert_eq!(evening.press(KeyCode::Char('y')), Some(Do::Leave));
-    assert!(evening.app.left);
-    let mut evening = Evening::new(&shifts(1), 3);
-    let interrupted = evening.app.take(Input::Key(Key::Interrupt), 0);
-    assert_eq!(interrupted, Some(Do::Leave));
-}
-
-#[test]
-fn feelings_and_substitutes_have_their_keys() {
-    let mut evening = Evening::new(&shifts(1), 3);
-    evening.press(KeyCode::Char('e'));
-    assert!(evening.screen().contains("surprise"));
-    assert_eq!(evening.press(KeyCode::Char('3')), Some(Do::Express(2)));
-    assert_eq!(evening.press(KeyCode::Char('r')), None);
-    let substituted = v1::GameEvent {
-        kind: Some(v1::game_event::Kind::Substituted(v1::Substituted {
-            seat: 0,
-            built_in_agent: "random".into(),
-        })),
-        ..v1::GameEvent::default()
-    };
-    let events = vec![substituted];
-    evening.tell(Update::Events(v1::EventBatch { events }));
-    assert!(evening.screen().contains("Press r"));
-    assert_eq!(evening.press(KeyCode::Char('r')), Some(Do::Resume));
 }
 
 #[test]

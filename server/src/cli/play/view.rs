@@ -69,8 +69,11 @@ pub(super) fn draw(frame: &mut Frame<'_>, look: Look, part: &Part, now_ms: u64) 
 
 /// Draws a game.
 pub(super) fn draw_game(frame: &mut Frame<'_>, look: Look, app: &App, now_ms: u64) {
-    let status = app.link.words();
-    let Some(area) = draw_table(frame, look, &app.table, app.me, status, app.scroll, ROWS) else {
+    let mut status = app.link.words().to_owned();
+    if let Some(others) = &app.others {
+        status = format!("{others} · {status}");
+    }
+    let Some(area) = draw_table(frame, look, &app.table, app.me, &status, app.scroll, ROWS) else {
         return;
     };
     let [hand, asked, keys] = Layout::vertical([

@@ -12,7 +12,7 @@ pub(super) struct FilterArgs {
     /// Games that ended so.
     #[arg(long)]
     state: Option<EndArg>,
-    /// Games in which a participant, or the built-in agent of a seat, had this name.
+    /// Games in which a participant had this name, or the built-in agent of a seat is this.
     #[arg(
         long,
         value_name = "NAME",

@@ -2,7 +2,8 @@
 
 use chefshat_client::v1::{self, game_event::Kind};
 
-use super::super::narrator::{MAX_NAME, abort_reason, cards, clean, ordinal, reason, title};
+use super::super::narrator::{MAX_NAME, abort_reason, cards, clean, reason, title};
+use super::super::numbers::ordinal;
 use super::table::Table;
 
 /// A line of the story.

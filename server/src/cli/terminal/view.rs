@@ -7,8 +7,8 @@ use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, BorderType, Clear, Paragraph, Wrap};
 
-use super::super::narrator::{MAX_NAME, abort_reason, clean, columns, ordinal, title};
-use super::super::numbers::counted;
+use super::super::narrator::{MAX_NAME, abort_reason, clean, columns, title};
+use super::super::numbers::{counted, ordinal};
 use super::cards::fan;
 use super::log::{self, Scroll};
 use super::look::{Look, ingredient, kind};

@@ -10,10 +10,10 @@ use clap::Args;
 
 use super::super::agent::{outcome_in_words, outcome_json};
 use super::super::connect::{KindArg, Pass, ServerArg, WayIn};
-use super::super::narrator::ordinal;
 use super::super::numbers::counted;
 use super::super::remote::{MAX_PACE_MS, RemoteAgent, agent_kind, seed_for};
 use super::super::{CommandError, say};
+use super::tables::{NO_GAME_COUNTED, place_in_words};
 use super::words::state;
 
 /// Take part with a built-in agent, until the tournament is over.
@@ -134,15 +134,8 @@ impl Join {
             let state = state(end);
             say(serde_json::json!({"event": "over", "state": state, "standing": standing}))?;
         } else {
-            let place = match standing.place {
-                0 => "no game was counted".to_owned(),
-                place => format!(
-                    "{} of {participants}, score {} in {}",
-                    ordinal(place),
-                    standing.score,
-                    counted(standing.games.into(), "game"),
-                ),
-            };
+            let place = place_in_words(&standing, participants);
+            let place = place.as_deref().unwrap_or(NO_GAME_COUNTED);
             say(format_args!("the tournament is {}: {place}", state(end)))?;
         }
         Ok(match end {

@@ -12,7 +12,7 @@ use super::super::narrator::clean;
 use super::super::numbers::counted;
 use super::super::sheet::{heading, line};
 use super::super::{CommandError, say};
-use super::tables::{self, Field};
+use super::tables::{self, Field, NO_GAME_COUNTED};
 use super::words::{format_name, is_over, state};
 use super::{all_games, files};
 
@@ -91,7 +91,7 @@ fn text(results: &v1::GetTournamentResultsResponse) -> String {
     let has_counted = tables::has_counted(&results.standings);
     match (has_counted, is_over(&tournament)) {
         (false, false) => line(&mut text, "nothing has been played yet"),
-        (false, true) => line(&mut text, "no game was counted"),
+        (false, true) => line(&mut text, NO_GAME_COUNTED),
         (true, false) => line(&mut text, "these standings are not final"),
         (true, true) => {}
     }

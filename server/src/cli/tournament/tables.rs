@@ -4,7 +4,11 @@ use chefshat_client::v1;
 
 use super::super::board::rating_in_words;
 use super::super::narrator::clean;
+use super::super::numbers::{counted, ordinal};
 use super::super::sheet::{heading, percent, table};
+
+/// What is said of the standings before a game has counted.
+pub(in crate::cli) const NO_GAME_COUNTED: &str = "no game was counted";
 
 /// Longest name in a table.
 const MAX_NAME: usize = 20;
@@ -66,6 +70,19 @@ pub(super) fn kind_name(kind: v1::ParticipantKind) -> &'static str {
 /// Mean score of a game; 0 if there was none.
 pub(in crate::cli) fn mean_score(standing: &v1::TournamentStanding) -> f64 {
     a_game(standing.score, standing)
+}
+
+/// Where a participant stands among so many; `None` before a game has counted, when nobody has a place.
+pub(in crate::cli) fn place_in_words(
+    standing: &v1::TournamentStanding,
+    participants: usize,
+) -> Option<String> {
+    let place = (standing.place > 0).then(|| ordinal(standing.place))?;
+    Some(format!(
+        "{place} of {participants}, score {:.2} a game in {}",
+        mean_score(standing),
+        counted(standing.games.into(), "game"),
+    ))
 }
 
 fn a_game(sum: u64, standing: &v1::TournamentStanding) -> f64 {
@@ -234,6 +251,30 @@ mod tests {
             assert!(text.contains(words), "{words} is not in {text}");
         }
         assert!(!text.contains("Place"), "{text}");
+    }
+
+    #[test]
+    fn nobody_has_a_place_before_a_game_has_counted() {
+        let standing = |place, games| v1::TournamentStanding {
+            place,
+            games,
+            score: 5,
+            ..v1::TournamentStanding::default()
+        };
+        let table = [
+            (standing(0, 0), None),
+            (
+                standing(1, 1),
+                Some("1st of 8, score 5.00 a game in 1 game"),
+            ),
+            (
+                standing(3, 2),
+                Some("3rd of 8, score 2.50 a game in 2 games"),
+            ),
+        ];
+        for (standing, words) in table {
+            assert_eq!(place_in_words(&standing, 8).as_deref(), words);
+        }
     }
 
     #[test]

@@ -72,8 +72,14 @@ impl Watch {
         let room = match client.get_room(self.what.as_str()).await {
             Ok(room) => room,
             Err(error) if error.reason() == Some("ROOM_UNKNOWN") => {
-                let lines = client.record(self.what.as_str()).await.map_err(|error| {
-                    format!("{error}; neither a room nor a game has this id, `chefshat room list` and `chefshat records list` say which there are")
+                let lines = client.record(self.what.as_str()).await;
+                let lines = lines.map_err(|error| match error.reason() {
+                    Some("GAME_UNKNOWN") => CommandError::from(format!(
+                        "{:?} is no file, and on the server neither a room nor a game; `chefshat room list` and `chefshat records list` say which \
+                         there are",
+                        self.what
+                    )),
+                    _ => error.into(),
                 })?;
                 return Ok((of_record(lines)?, None));
             }

@@ -135,13 +135,17 @@ impl Forgetting {
         let Some(row) = row else {
             return Ok(Vec::new());
         };
-        let journal = journal_of(&mut self.0.writer, &row).await?;
-        let entries = journal.into_iter().flat_map(|(_, entries)| entries);
-        let names = entries.filter_map(|entry| match entry.change {
-            Change::Seated { participant, .. } => Some(participant.name),
-            _ => None,
-        });
-        Ok(names.collect())
+        let mut names = Vec::new();
+        for row in journal_of(&mut self.0.writer, &row).await? {
+            let seated = entries_of(&row)?
+                .into_iter()
+                .filter_map(|entry| match entry.change {
+                    Change::Seated { participant, .. } => Some(participant.name),
+                    _ => None,
+                });
+            names.extend(seated);
+        }
+        Ok(names)
     }
 
     /// Notes that the records have been written anew, and writes the database anew, so that nothing of what was there before is left in parts
@@ -221,11 +225,11 @@ async fn forget_game(
     Ok(taken_out)
 }
 
-/// The journal of a game, by rows in order: the numbers of the rows, and what each holds.
+/// The journal of a game, by rows in order. They are read one by one, with [`entries_of`]: a long game is much larger then.
 async fn journal_of(
     connection: &mut SqliteConnection,
     game: &SqliteRow,
-) -> Result<Vec<(i64, Vec<Entry>)>, ForgetError> {
+) -> Result<Vec<SqliteRow>, ForgetError> {
     let number: i64 = game.get("number");
     let last_row: Option<i64> = game.get("last_row");
     let rows = sqlx::query(match last_row {
@@ -244,17 +248,20 @@ async fn journal_of(
     .bind(number)
     .fetch_all(&mut *connection)
     .await?;
-    let read = |row: &SqliteRow| {
-        let mut entries = Vec::new();
-        form::read_entries(row.get("entries"), &mut entries).map_err(|problem| {
-            ForgetError::Unreadable {
-                what: format!("the journal of game number {number}"),
-                problem: problem.to_string(),
-            }
-        })?;
-        Ok((row.get("row"), entries))
-    };
-    rows.iter().map(read).collect()
+    Ok(rows)
+}
+
+/// What a row of a journal holds.
+fn entries_of(row: &SqliteRow) -> Result<Vec<Entry>, ForgetError> {
+    let mut entries = Vec::new();
+    form::read_entries(row.get("entries"), &mut entries).map_err(|problem| {
+        let row: i64 = row.get("row");
+        ForgetError::Unreadable {
+            what: format!("row {row} of the journal"),
+            problem: problem.to_string(),
+        }
+    })?;
+    Ok(entries)
 }
 
 /// Takes somebody out of the journal of a game, of which only the rows that change are written.
@@ -264,7 +271,8 @@ async fn forget_journal(
     who: &Pseudonym,
 ) -> Result<TakenOut, ForgetError> {
     let (mut own, mut all) = (OwnSeats::default(), TakenOut::default());
-    for (row, mut entries) in journal_of(connection, game).await? {
+    for row in journal_of(connection, game).await? {
+        let mut entries = entries_of(&row)?;
         let taken_out = forget_entries(&mut entries, &mut own, who);
         if taken_out == TakenOut::default() {
             continue;
@@ -275,7 +283,7 @@ async fn forget_journal(
             form::put_entry(entry, &mut bytes);
         }
         sqlx::query("UPDATE journal SET entries = $2 WHERE row = $1")
-            .bind(row)
+            .bind(row.get::<i64, _>("row"))
             .bind(bytes)
             .execute(&mut *connection)
             .await?;

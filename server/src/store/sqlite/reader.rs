@@ -31,7 +31,7 @@ macro_rules! list_query {
             " AND ($2 = 0 OR state = $2) AND ($3 = 0 OR origin = $3) AND ($4 = '' OR room_name = $4)
                AND created_at_ms >= $5 AND ($6 = 0 OR created_at_ms < $6)
                AND ($7 = 0 OR EXISTS (SELECT 1 FROM participants WHERE game = number AND kind = $7))
-               AND ($8 = '' OR number IN (SELECT game FROM participants WHERE name = $8 OR agent = $8))
+               AND ($8 = '' OR number IN (SELECT game FROM participants WHERE (name = $8 AND agent = '') OR agent = $8))
                AND NOT ($9 AND added)
              ORDER BY ",
             $order,

@@ -138,12 +138,20 @@ fn summary(header: &GameHeader) -> Box<v1::RecordSummary> {
         origin: v1::GameOrigin::Dealt.into(),
         created_at_ms: header.created_at_ms,
         ended_at_ms: header.created_at_ms + 1_000,
-        seats: vec![v1::Participant {
-            name: format!("player of {:?}", header.game_id.0[0]),
-            built_in_agent: format!("agent of {:?}", header.game_id.0[0]),
-            kind: v1::ParticipantKind::Robot.into(),
-            ..v1::Participant::default()
-        }],
+        seats: vec![
+            v1::Participant {
+                name: format!("player of {:?}", header.game_id.0[0]),
+                kind: v1::ParticipantKind::Robot.into(),
+                ..v1::Participant::default()
+            },
+            v1::Participant {
+                seat: 1,
+                name: format!("name of {:?}", header.game_id.0[0]),
+                built_in_agent: format!("agent of {:?}", header.game_id.0[0]),
+                kind: v1::ParticipantKind::Agent.into(),
+                ..v1::Participant::default()
+            },
+        ],
         ..v1::RecordSummary::default()
     })
 }

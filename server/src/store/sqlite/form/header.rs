@@ -103,7 +103,11 @@ pub(in crate::store::sqlite) fn header_from_bytes(bytes: &[u8]) -> Result<GameHe
         rules_version: form.rules_version,
         policy: convert::policy_from_proto(&form.policy.unwrap_or_default()).map_err(field)?,
         fills: convert::fills_from_proto(&form.seats, &rules).map_err(field)?,
-        called: convert::called_from_proto(&form.seats).map_err(field)?,
+        // Not looked at again: what is kept stays readable, whichever names are taken later.
+        called: (form.seats.into_iter().enumerate())
+            .filter(|(_, seat)| !seat.name.is_empty())
+            .map(|(seat, config)| (seat, config.name))
+            .collect(),
         recorded: BTreeMap::new(),
         start: convert::start_from_proto(&start, &actions, &rules).map_err(field)?,
         rules,

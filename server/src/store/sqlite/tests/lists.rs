@@ -52,6 +52,16 @@ async fn lists_are_filtered_and_paged() {
             9,
             vec![4],
         ),
+        // A built-in agent is itself, whatever it was called.
+        (
+            v1::RecordFilter {
+                participant: "name of 4".into(),
+                ..filter()
+            },
+            0,
+            9,
+            vec![],
+        ),
         (
             v1::RecordFilter {
                 participant: "player of".into(),

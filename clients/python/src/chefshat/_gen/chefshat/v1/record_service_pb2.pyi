@@ -39,7 +39,7 @@ class RecordFilter(_message.Message):
     state: _room_pb2.RoomState.ValueType
     """How the game ended: FINISHED or ABORTED; UNSPECIFIED: either way."""
     participant: _builtins.str
-    """Name of a participant, or of the built-in agent of a seat; empty: any."""
+    """Name of a participant, or of the built-in agent of a seat (which is itself whatever it was called); empty: any."""
     kind: _room_pb2.ParticipantKind.ValueType
     """A kind of participant of which there was at least one."""
     room_name: _builtins.str
@@ -175,7 +175,9 @@ class ListRecordsRequest(_message.Message):
     page_token: _builtins.str
     """`next_page_token` of the page before, or empty."""
     newest_first: _builtins.bool
-    """Newest first; the same for all pages of a list."""
+    """Newest first; the same for all pages of a list. The order is that in which the server began to keep the games: with durable games when
+    they were made, else when they ended.
+    """
     @_builtins.property
     def filter(self) -> Global___RecordFilter:
         """Which are wanted; unset: all."""

@@ -255,7 +255,9 @@ class SeatConfig(_message.Message):
     built_in_agent: _builtins.str
     """A built-in agent of the server: "random", "random_unmasked", "greedy" or "trained"."""
     name: _builtins.str
-    """Name to show for a built-in agent, 1..=64 characters; empty: its own. Whoever joins an open seat brings their own."""
+    """Name to show for a built-in agent, 1..=64 characters; empty: its own. Ratings and filters go by the agent whatever it is
+    called. Whoever joins an open seat brings a name: none is taken for it here.
+    """
     @_builtins.property
     def replay(self) -> Global___RecordedPlayer:
         """A built-in agent that plays what a recorded player played."""
@@ -342,8 +344,8 @@ Global___BranchPoint: _TypeAlias = BranchPoint  # noqa: Y015
 
 @_typing.final
 class RoomPolicy(_message.Message):
-    """Times, limits and manners of a room. In a request an unset field takes the standard value; in a response every field is set (but in the
-    settings of a tournament pace_ms, where it depends on who plays at a table).
+    """Times, limits and manners of a room. In a request an unset field takes the standard value; in a response every field is set, but for a
+    pace_ms that depends on who will play.
     """
 
     DESCRIPTOR: _descriptor.Descriptor
@@ -396,8 +398,8 @@ class RoomPolicy(_message.Message):
     """What the game outlives; standard DURABLE, or EPHEMERAL on a server that keeps games in memory alone and refuses DURABLE."""
     @_builtins.property
     def clocks(self) -> _containers.RepeatedCompositeFieldContainer[Global___KindClock]:
-        """Other times for participants of some kinds; each kind at most once. Where none are given, and neither decision_time_ms nor bank_ms, people
-        have the standard times for people.
+        """Other times for participants of some kinds; each kind at most once. People have the standard times for people unless a clock for them,
+        decision_time_ms or bank_ms is set.
         """
 
     def __init__(

@@ -85,7 +85,7 @@ class RoomServiceServicer:
 
     def ListRooms(self, request, context):
         """Rooms of the server, newest first: a page goes on with those made before the last one of the page before, so that rooms made meanwhile
-        do not come up. A page may hold fewer rooms than asked for and still have a next one. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED,
+        do not come up; page tokens hold until the server is started anew. A page may hold fewer rooms than asked for and still have a next one. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED,
         STATE_REFUSED).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)

@@ -43,7 +43,7 @@ class RoomServiceStub:
     """One room. NOT_FOUND (ROOM_UNKNOWN)."""
     ListRooms: _grpc.UnaryUnaryMultiCallable[_room_service_pb2.ListRoomsRequest, _room_service_pb2.ListRoomsResponse]
     """Rooms of the server, newest first: a page goes on with those made before the last one of the page before, so that rooms made meanwhile
-    do not come up. A page may hold fewer rooms than asked for and still have a next one. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED,
+    do not come up; page tokens hold until the server is started anew. A page may hold fewer rooms than asked for and still have a next one. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED,
     STATE_REFUSED).
     """
     JoinRoom: _grpc.UnaryUnaryMultiCallable[_room_service_pb2.JoinRoomRequest, _room_service_pb2.JoinRoomResponse]
@@ -69,7 +69,7 @@ class RoomServiceAsyncStub(RoomServiceStub):
     """One room. NOT_FOUND (ROOM_UNKNOWN)."""
     ListRooms: _aio.UnaryUnaryMultiCallable[_room_service_pb2.ListRoomsRequest, _room_service_pb2.ListRoomsResponse]  # type: ignore[assignment]
     """Rooms of the server, newest first: a page goes on with those made before the last one of the page before, so that rooms made meanwhile
-    do not come up. A page may hold fewer rooms than asked for and still have a next one. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED,
+    do not come up; page tokens hold until the server is started anew. A page may hold fewer rooms than asked for and still have a next one. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED,
     STATE_REFUSED).
     """
     JoinRoom: _aio.UnaryUnaryMultiCallable[_room_service_pb2.JoinRoomRequest, _room_service_pb2.JoinRoomResponse]  # type: ignore[assignment]
@@ -110,7 +110,7 @@ class RoomServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_room_service_pb2.ListRoomsResponse, _abc.Awaitable[_room_service_pb2.ListRoomsResponse]]:
         """Rooms of the server, newest first: a page goes on with those made before the last one of the page before, so that rooms made meanwhile
-        do not come up. A page may hold fewer rooms than asked for and still have a next one. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED,
+        do not come up; page tokens hold until the server is started anew. A page may hold fewer rooms than asked for and still have a next one. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED,
         STATE_REFUSED).
         """
 

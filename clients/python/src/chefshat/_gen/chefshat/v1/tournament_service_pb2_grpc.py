@@ -109,7 +109,7 @@ class TournamentServiceServicer:
 
     def ListTournaments(self, request, context):
         """Tournaments of the server, newest first: a page goes on with those made before the last one of the page before, so that tournaments made
-        meanwhile do not come up. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
+        meanwhile do not come up; page tokens hold until the server is started anew. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

@@ -42,7 +42,7 @@ class TournamentServiceStub:
     """One tournament. NOT_FOUND (TOURNAMENT_UNKNOWN)."""
     ListTournaments: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.ListTournamentsRequest, _tournament_service_pb2.ListTournamentsResponse]
     """Tournaments of the server, newest first: a page goes on with those made before the last one of the page before, so that tournaments made
-    meanwhile do not come up. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
+    meanwhile do not come up; page tokens hold until the server is started anew. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
     """
     JoinTournament: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.JoinTournamentRequest, _tournament_service_pb2.JoinTournamentResponse]
     """Joins and gives the ticket: attached to a Play or Watch stream it has the server seat the participant in each of its games.
@@ -87,7 +87,7 @@ class TournamentServiceAsyncStub(TournamentServiceStub):
     """One tournament. NOT_FOUND (TOURNAMENT_UNKNOWN)."""
     ListTournaments: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.ListTournamentsRequest, _tournament_service_pb2.ListTournamentsResponse]  # type: ignore[assignment]
     """Tournaments of the server, newest first: a page goes on with those made before the last one of the page before, so that tournaments made
-    meanwhile do not come up. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
+    meanwhile do not come up; page tokens hold until the server is started anew. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
     """
     JoinTournament: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.JoinTournamentRequest, _tournament_service_pb2.JoinTournamentResponse]  # type: ignore[assignment]
     """Joins and gives the ticket: attached to a Play or Watch stream it has the server seat the participant in each of its games.
@@ -147,7 +147,7 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_tournament_service_pb2.ListTournamentsResponse, _abc.Awaitable[_tournament_service_pb2.ListTournamentsResponse]]:
         """Tournaments of the server, newest first: a page goes on with those made before the last one of the page before, so that tournaments made
-        meanwhile do not come up. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
+        meanwhile do not come up; page tokens hold until the server is started anew. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
         """
 
     @_abc_1.abstractmethod
