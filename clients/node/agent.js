@@ -3,6 +3,7 @@
 // resumes where it broke off; with its ticket another process goes on in its place.
 import { randomInt } from "node:crypto";
 import { existsSync, readFileSync, renameSync, rmSync, writeFileSync } from "node:fs";
+import path from "node:path";
 import { setTimeout as sleep } from "node:timers/promises";
 import { fileURLToPath, pathToFileURL } from "node:url";
 import { parseArgs, promisify } from "node:util";
@@ -14,7 +15,7 @@ const FILES = ["room", "play", "tournament"].map((name) => `chefshat/v1/${name}_
 const FORM = { includeDirs: [PROTO], keepCase: true, longs: Number, enums: String, oneofs: true, defaults: true };
 export const protocol = grpc.loadPackageDefinition(loader.loadSync(FILES, FORM)).chefshat.v1;
 
-const NO_RESULT = "the game has no result";
+const MAX_GAMES = 64; // A participant may play so many games at a time.
 const MAX_FAILURES = 9; // Connections in a row that may bring nothing before the agent gives up.
 const connect = (Service, address) => new Service(address, grpc.credentials.createInsecure());
 
@@ -54,7 +55,7 @@ function takeSeat(ticket, about = {}) {
     refused: ({ message, reason }) => failed(`refused: ${message} (${reason})`),
     detached: ({ reason }) => {
       if (reason !== "DETACH_REASON_GAME_OVER") return failed(`the seat is lost (${reason})`);
-      if (!end.game_ended) return failed(`${NO_RESULT} (${end.game_aborted?.reason})`);
+      if (!end.game_ended) return { ...failed(`the game has no result (${end.game_aborted?.reason})`), over: true };
       return { ...about, seat, standings: end.game_ended.standings };
     },
   };
@@ -120,34 +121,86 @@ async function takePlace({ address, code, tournament, name, games }) {
  */
 export async function play({ ticket, ...way }) {
   const { participant, outcomes } = await playPlace(way.address, ticket ?? (await takePlace(way)));
-  if (participant !== undefined) return { participant, games: outcomes };
-  const [{ error, ...outcome }] = outcomes;
-  if (error) throw Object.assign(new Error(error), { over: error.startsWith(NO_RESULT) });
+  if (participant !== undefined) return { participant, games: outcomes.map(({ over, ...outcome }) => outcome) };
+  const [{ error, over, ...outcome }] = outcomes;
+  if (error) throw Object.assign(new Error(error), { over });
   return outcome;
 }
 
+/** Whether another process with this number runs. */
+function runs(pid) {
+  try {
+    return pid !== process.pid && process.kill(pid, 0); // One's own number was another's before, where a container counts anew.
+  } catch ({ code }) {
+    return code === "EPERM";
+  }
+}
+
+/**
+ * Does something with a ticket file alone: a lock beside it names the process. That of a process which is gone counts for nothing.
+ * A folder that nobody may write in needs none to go on with the ticket that is there.
+ */
+async function alone(file, use) {
+  const lock = file && beside(file, "lock");
+  const take = () => writeFileSync(lock, `${process.pid}`, { flag: "wx" });
+  if (!file) return use();
+  try {
+    take();
+  } catch (error) {
+    if (error.code !== "EEXIST" && existsSync(file)) return use();
+    if (error.code !== "EEXIST") throw error;
+    const pid = Number(readFileSync(lock, "utf8"));
+    if (runs(pid)) throw new Error(`another agent plays in the place of ${file}; if process ${pid} is none, remove ${lock}`);
+    rmSync(lock, { force: true });
+    take();
+  }
+  try {
+    return await use();
+  } finally {
+    try { rmSync(lock, { force: true }); } catch { /* It is nobody's any more, and counts for nothing. */ }
+  }
+}
+
+const beside = (file, what) => path.join(path.dirname(file), `.${path.basename(file)}.${what}`);
+const kept = (file) => (file && existsSync(file) ? readFileSync(file, "utf8").trim() : "");
+
 /** The ticket of the place to play in: that in the file, or of one that is taken now and then kept there, or at least told. */
 async function ticketOf(file, way) {
-  const kept = file && existsSync(file) ? readFileSync(file, "utf8").trim() : "";
-  if (kept) {
+  if (kept(file)) {
     console.error(`goes on in the place whose ticket is in ${file}`);
-    return kept;
+    return kept(file);
   }
   if (!way.code && !way.tournament) throw new Error("give --code, --tournament or the --ticket of a place that was taken before");
-  const part = `${file}.${process.pid}`;
+  const part = file && beside(file, "new");
   if (file) {
     rmSync(part, { force: true });
     writeFileSync(part, "", { flag: "wx", mode: 0o600 }); // Before the place is taken, and for its owner alone.
   }
   try {
     const ticket = await takePlace(way);
-    if (file) writeFileSync(part, `${ticket}\n`);
-    if (file) renameSync(part, file);
-    const how = file ? `it goes on in its place when it is started again: ${file} has its ticket` : `another goes on with --ticket ${ticket}`;
+    let how = `another goes on with --ticket ${ticket}`;
+    if (file) {
+      try {
+        writeFileSync(part, `${ticket}\n`);
+        renameSync(part, file);
+        how = `it goes on in its place when it is started again: ${file} has its ticket`;
+      } catch (error) { // The place is taken, and nobody else knows the ticket.
+        console.error(`warning: ${file} cannot keep the ticket: ${error.message}`);
+      }
+    }
     console.error(`should this agent end before its ${way.tournament ? "tournament" : "game"}, ${how}`);
     return ticket;
   } finally {
     if (file) rmSync(part, { force: true });
+  }
+}
+
+/** All is over: the file goes, unless another ticket is in it by now. */
+function forget(file, ticket) {
+  try {
+    if (kept(file) === ticket) rmSync(file, { force: true });
+  } catch (error) {
+    console.error(`warning: all is over, but its ticket is still kept: ${error.message}; remove ${file}`);
   }
 }
 
@@ -157,18 +210,18 @@ if (import.meta.url === pathToFileURL(process.argv[1] ?? "").href) {
   const where = { address: option("127.0.0.1:50051"), code: option(), tournament: option() };
   try {
     const { values } = parseArgs({ options: { ...where, ...own, name: option("Node"), games: option("1") } });
-    const { ticket, "ticket-file": file, ...way } = values;
-    if ([way.code, way.tournament, ticket].filter(Boolean).length > 1 || (ticket && file)) {
+    const { ticket: given, "ticket-file": file, ...way } = values;
+    if ([way.code, way.tournament, given].filter(Boolean).length > 1 || (given && file)) {
       throw new Error("give one of --code, --tournament and --ticket (or CHEFSHAT_TICKET); --ticket-file is for the first two");
     }
+    if (!/^\d{1,2}$/.test(way.games) || !(way.games >= 1 && way.games <= MAX_GAMES)) throw new Error(`--games is a number from 1 to ${MAX_GAMES}`);
     way.code ??= way.tournament ? undefined : process.env.CHEFSHAT_CODE;
-    const forget = () => { if (file) rmSync(file, { force: true }); }; // All is over.
-    const outcome = await play({ ...way, ticket: ticket || (await ticketOf(file, way)) }).catch((error) => {
-      if (error.over) forget();
-      throw error;
+    const outcome = await alone(file, async () => {
+      const ticket = given || (await ticketOf(file, way));
+      const end = () => { if (file) forget(file, ticket); };
+      return play({ ...way, ticket }).then((played) => { end(); return played; }, (error) => { if (error.over) end(); throw error; });
     });
     console.log(JSON.stringify(outcome));
-    forget();
   } catch (error) {
     console.error(`agent: ${error.details ?? error.message}`);
     process.exitCode = 1;

@@ -3,7 +3,8 @@
 import assert from "node:assert/strict";
 import { spawn } from "node:child_process";
 import { once } from "node:events";
-import { mkdtemp, readFile, readdir, rm, stat } from "node:fs/promises";
+import { mkdirSync } from "node:fs";
+import { mkdir, mkdtemp, readFile, readdir, rm, stat, writeFile } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { fileURLToPath } from "node:url";
@@ -12,6 +13,7 @@ import grpc from "@grpc/grpc-js";
 import { legalActions, play, protocol } from "../agent.js";
 
 const AGENT = fileURLToPath(new URL("../agent.js", import.meta.url));
+const BARE = { CHEFSHAT_TICKET: "", CHEFSHAT_CODE: "" }; // What stands where the tests run is not theirs.
 const STANDINGS = [{ seat: 2, points: 15, place: 1 }, { seat: 0, points: 9, place: 2 }];
 const servers = [];
 after(() => servers.forEach((server) => server.forceShutdown()));
@@ -19,10 +21,12 @@ after(() => servers.forEach((server) => server.forceShutdown()));
 /** A server whose n-th connection is met by the n-th of `connections`, each a function of the stream and its first message. */
 async function serve(...connections) {
   const joins = [];
+  const served = { joins, left: connections };
   const server = new grpc.Server();
   server.addService(protocol.RoomService.service, {
     JoinRoom: ({ request }, done) => {
       joins.push(request);
+      served.joining?.();
       if (request.join_code === "TABLE") done(null, { seat: 2, ticket: "a ticket" });
       else done({ code: grpc.status.PERMISSION_DENIED, details: "no room has this join code" });
     },
@@ -45,7 +49,8 @@ async function serve(...connections) {
     const bound = (error, number) => (error ? reject(error) : resolve(number));
     server.bindAsync("127.0.0.1:0", grpc.ServerCredentials.createInsecure(), bound);
   });
-  return { address: `127.0.0.1:${port}`, joins, left: connections };
+  served.address = `127.0.0.1:${port}`;
+  return served;
 }
 
 const ask = (decision_id, ...bytes) => ({ handle: 0, decision: { decision_id, action_mask: Buffer.from(bytes) } });
@@ -206,9 +211,16 @@ test("a newer connection in a tournament is an error, and no reason to connect a
   assert.equal(server.left.length, 0);
 });
 
+/** A folder for a test. */
+async function folderOf(context) {
+  const folder = await mkdtemp(join(tmpdir(), "chefshat-node-"));
+  context.after(() => rm(folder, { recursive: true }));
+  return folder;
+}
+
 /** Runs the agent as a process of its own; `started` is given it. */
 async function run(args, env = {}, started = () => {}) {
-  const agent = spawn(process.execPath, [AGENT, ...args], { env: { ...process.env, CHEFSHAT_TICKET: "", ...env } });
+  const agent = spawn(process.execPath, [AGENT, ...args], { env: { ...process.env, ...BARE, ...env } });
   started(agent);
   let [out, err] = ["", ""];
   agent.stdout.on("data", (part) => { out += part; });
@@ -260,8 +272,7 @@ for (const [how, args, env] of [["an argument", ["--ticket", "kept"], {}], ["the
 }
 
 test("a ticket is kept in a file while the place lasts: a process that was killed goes on when it is started again", async (context) => {
-  const folder = await mkdtemp(join(tmpdir(), "chefshat-node-"));
-  context.after(() => rm(folder, { recursive: true }));
+  const folder = await folderOf(context);
   const file = join(folder, "ticket");
   const tickets = [];
   let agent;
@@ -292,6 +303,72 @@ test("a ticket is kept in a file while the place lasts: a process that was kille
   }
 });
 
+test("a second agent with the same ticket file is refused, and one that is gone is in nobody's way", async (context) => {
+  const folder = await folderOf(context);
+  const file = join(folder, "ticket");
+  const tickets = [];
+  const args = (server) => ["--address", server.address, "--code", "TABLE", "--ticket-file", file];
+  let second;
+  const server = await serve(async (stream, read) => {
+    tickets.push((await read())[0].attach.ticket);
+    second = await run(args(server)); // While the first one plays.
+    stream.write({ updates: [attached, events(ended(1)), detached("GAME_OVER")] });
+  });
+  assert.equal((await run(args(server))).status, 0);
+  assert.equal(second.status, 1);
+  assert.match(second.err, /^agent: another agent plays in the place of .*ticket; if process \d+ is none, remove .*\.ticket\.lock\n$/);
+  assert.equal(server.joins.length, 1);
+  assert.deepEqual(await readdir(folder), []);
+
+  const gone = spawn(process.execPath, ["--eval", ""]);
+  await once(gone, "close");
+  await writeFile(join(folder, ".ticket.lock"), `${gone.pid}`);
+  await writeFile(join(folder, ".ticket.new"), "left behind");
+  server.left.push(ending(tickets));
+  assert.equal((await run(args(server))).status, 0);
+  assert.deepEqual([tickets.length, await readdir(folder)], [2, []]);
+});
+
+test("a ticket that cannot be kept is told, and the game is played", async (context) => {
+  const folder = await folderOf(context);
+  const file = join(folder, "ticket");
+  const server = await serve(async (stream, read) => {
+    await read();
+    stream.write({ updates: [attached, events(ended(1)), detached("GAME_OVER")] });
+  });
+  server.joining = () => mkdirSync(file); // After it was begun there is a folder in the file's place.
+  const { status, out, err } = await run(["--address", server.address, "--code", "TABLE", "--ticket-file", file]);
+  assert.equal(status, 0);
+  assert.deepEqual(JSON.parse(out), { seat: 2, standings: STANDINGS });
+  const [warning, told, left] = err.split("\n");
+  assert.match(warning, /^warning: .*ticket cannot keep the ticket: EISDIR/);
+  assert.equal(told, "should this agent end before its game, another goes on with --ticket a ticket");
+  assert.match(left, /^warning: all is over, but its ticket is still kept/);
+});
+
+test("a finished game is no error where the ticket cannot be removed; another's ticket is not removed", async (context) => {
+  const folder = await folderOf(context);
+  const file = join(folder, "ticket");
+  const server = await serve();
+  const args = ["--address", server.address, "--ticket-file", file];
+  for (const [meanwhile, left] of [
+    [async () => { await rm(file); await mkdir(file); }, /^goes on .*\nwarning: all is over, but its ticket is still kept: EISDIR.*\n$/],
+    [() => writeFile(file, "another's"), /^goes on .*\n$/],
+  ]) {
+    await rm(file, { recursive: true, force: true });
+    await writeFile(file, "kept");
+    server.left.push(async (stream, read) => {
+      await read();
+      await meanwhile();
+      stream.write({ updates: [attached, events(ended(1)), detached("GAME_OVER")] });
+    });
+    const { status, out, err } = await run(args);
+    assert.deepEqual([status, JSON.parse(out)], [0, { seat: 2, standings: STANDINGS }]);
+    assert.match(err, left);
+  }
+  assert.equal(await readFile(file, "utf8"), "another's");
+});
+
 test("the process says what is wrong and exits with 1", async () => {
   const { address } = await serve();
   const wrongCode = await run(["--address", address, "--code", "WRONG"]);
@@ -307,7 +384,11 @@ test("the process says what is wrong and exits with 1", async () => {
     assert.equal(status, 1);
     assert.match(err, /^agent: give one of --code, --tournament and --ticket/);
   }
-  const nothing = await run(["--address", address], { CHEFSHAT_CODE: "" });
+  for (const games of ["0", "65", "two", "1e1", ""]) {
+    const { status, err } = await run(["--address", address, "--tournament", "CUP", "--games", games]);
+    assert.deepEqual([status, err], [1, "agent: --games is a number from 1 to 64\n"]);
+  }
+  const nothing = await run(["--address", address]);
   assert.deepEqual([nothing.status, nothing.out], [1, ""]);
   assert.match(nothing.err, /^agent: give --code, --tournament or the --ticket/);
 

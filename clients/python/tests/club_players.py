@@ -113,6 +113,23 @@ class Present(Largest):
             opened.write(str(os.getpid()))
 
 
+class Slow(Present):
+    """Is never made."""
+
+    def __init__(self, name: str, file: str) -> None:
+        super().__init__(name, file)
+        time.sleep(3600)
+
+
+class Knowing(Largest):
+    """Writes what it could take its command's place with to a file."""
+
+    def __init__(self, name: str, file: str) -> None:
+        super().__init__(name)
+        with open(file, "w", encoding="utf-8") as opened:
+            opened.write(os.environ.get("CHEFSHAT_TICKET", "nothing"))
+
+
 class Babbling(Largest):
     """Prints what looks like answers, with Python and without, and asks for input that never comes."""
 

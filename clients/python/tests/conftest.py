@@ -12,6 +12,7 @@ from real_server import RealServer
 from stage import Stage, attached
 
 from chefshat.local_server import BINARY
+from chefshat.way_in import TICKET
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -20,6 +21,12 @@ def pytest_configure(config: pytest.Config) -> None:
         os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(config.cache.mkdir("jax")))
         os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
         os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES", "-1")
+
+
+@pytest.fixture(autouse=True)
+def no_ticket(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the tests run there may be a ticket; it is not theirs."""
+    monkeypatch.delenv(TICKET, raising=False)
 
 
 @pytest.fixture

@@ -1,6 +1,6 @@
 """A session on a stage: scripted responses in, requests out, and an agent that writes down what it is told. No tests of its own."""
 
-from chefshat import Agent, Decision, PlayOptions, SeatInfo, SeatResult, pb
+from chefshat import Agent, ChefsHatError, Decision, PlayOptions, SeatInfo, SeatResult, pb
 from chefshat.place import Ask
 from chefshat.session import PlaySession
 
@@ -34,6 +34,9 @@ class Scribe(Agent):
 
     def on_game_over(self, result: SeatResult) -> None:
         self.log.append(("over", result.finished))
+
+    def on_seat_lost(self, error: ChefsHatError) -> None:
+        self.log.append(("lost", error.reason))
 
 
 def attached(request_id: int = 1, seat: int = 0, next_sequence: int = 1) -> pb.SeatUpdate:

@@ -2,14 +2,16 @@
 
 import logging
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from test_decision import HAND, decision
 
-from chefshat import Decision, SeatResult, pb
+from chefshat import ChefsHatError, Decision, SeatResult, pb
 from chefshat.players_club import AgentError, AgentProcess, AgentSpec, PlayersClubAgent, RulesDoNotFit
+from chefshat.players_club.agent import Counts
 from chefshat.players_club.players import Players
 from chefshat.players_club.process import AgentLost, AgentRaised
 
@@ -38,13 +40,18 @@ class Puppet(AgentProcess):
 
 def seated(*script: object, seat: int = 2, attempts: int = 5) -> PlayersClubAgent:
     agent = PlayersClubAgent(Puppet(*script), attempts=attempts)
+    begin(agent, seat)
+    return agent
+
+
+def begin(agent: PlayersClubAgent, seat: int) -> None:
+    """Tells the agent that its game and the first Shift of it begin."""
     request = decision()
     request.seat_info.seat = seat
     agent.on_attached(request.seat_info)
     names = [pb.Participant(seat=seat, name=f"player {seat}") for seat in range(4)]
     agent.on_event(pb.GameEvent(game_started=pb.GameStarted(rules=RULES, seats=names, hand_size=17)))
     agent.on_event(pb.GameEvent(shift_started=pb.ShiftStarted(shift=1)))
-    return agent
 
 
 def asked(
@@ -80,7 +87,7 @@ def test_the_largest_of_the_numbers_counts() -> None:
     request = asked(0, 8, 199)
     assert agent.decide(request) == 8
     assert puppet(agent).asked == [("get_action", [pytest.approx(number) for number in request.classic_vector().tolist()])]
-    assert (agent.failures, agent.replaced) == (0, 0)
+    assert (agent.counts.failures, agent.counts.replaced) == (0, 0)
 
 
 def test_of_equal_numbers_the_first_counts_and_infinite_ones_are_numbers() -> None:
@@ -94,10 +101,10 @@ def test_an_illegal_choice_is_sent_and_asked_again_then_the_best_legal_one_is_ta
     stubborn = wanting(5, 8, 0)
     agent = seated(*[stubborn] * 4, wanting(0), attempts=3)
     assert decide_all(agent, [asked(0, 8, 199)] * 4) == [5, 5, 5, 8]
-    assert (agent.failures, agent.replaced) == (0, 1)
+    assert (agent.counts.failures, agent.counts.replaced) == (0, 1)
     # At another decision it may insist again, and change its mind.
     assert agent.decide(asked(0, 8, 199, number=10)) == 0
-    assert agent.replaced == 1
+    assert agent.counts.replaced == 1
 
 
 def test_the_last_attempt_that_the_room_grants_is_a_legal_one() -> None:
@@ -130,7 +137,7 @@ def test_where_there_is_no_answer_the_default_decision_is_taken(answer: object, 
     agent = seated(answer, answer)
     assert agent.decide(asked(0, 8, 199)) == 199
     assert agent.decide(asked(6, 8, number=10)) == 6
-    assert (agent.failures, agent.replaced) == (2, 2)
+    assert (agent.counts.failures, agent.counts.replaced) == (2, 2)
     expected = str(answer) if isinstance(answer, AgentError) else "200 numbers were expected"
     assert caplog.messages[0].startswith("Puppet: ")
     assert expected in caplog.messages[0]
@@ -140,7 +147,7 @@ def test_a_player_that_fails_always_is_told_of_a_few_times(caplog: pytest.LogCap
     caplog.set_level(logging.WARNING)
     agent = seated(*[None] * 20)
     decide_all(agent, [asked(0, number=number) for number in range(1, 21)])
-    assert agent.failures == 20
+    assert agent.counts.failures == 20
     assert len(caplog.messages) == 4
 
 
@@ -188,7 +195,7 @@ def test_a_card_that_is_not_held_is_sent_and_asked_for_again() -> None:
     assert decide_all(agent, [first, second, second]) == [T - 1 + 2, T - 1 + 3, T - 1 + 5]
     assert agent.decide(second) == T - 1 + 11
     assert [question[2] for question in puppet(agent).asked] == [2, 1, 1]
-    assert (agent.failures, agent.replaced) == (1, 1)
+    assert (agent.counts.failures, agent.counts.replaced) == (1, 1)
 
 
 @pytest.mark.parametrize("answer", [None, [11, 12, 12], [11, 0], [11, 13], ["11", "12"], [11.5, 2], AgentLost("gone")], ids=repr)
@@ -196,7 +203,7 @@ def test_where_no_cards_are_answered_the_default_is_given(answer: Any) -> None:
     agent = seated(answer, answer, seat=CHEF)
     assert agent.decide(gift(*HELD)) == T - 1 + 11
     assert agent.decide(gift(12, number=10)) == T - 1 + 12
-    assert (agent.failures, agent.replaced) == (2, 2)
+    assert (agent.counts.failures, agent.counts.replaced) == (2, 2)
 
 
 @pytest.mark.parametrize(("seat", "name"), [(CHEF, "Dinner served!"), (DISHWASHER, "It is food fight!")])
@@ -219,14 +226,63 @@ def test_games_of_other_sizes_are_refused() -> None:
         agent.on_event(pb.GameEvent(game_started=pb.GameStarted(rules=rules)))
 
 
-def test_every_game_at_a_time_has_a_process_and_each_goes_from_game_to_game() -> None:
-    players = Players(AgentSpec("club_players:Largest", "Ada"), 2, attempts=5)
+def club() -> Players:
+    """Two processes, neither of them started: who is seated needs none."""
+    return Players(AgentSpec("club_players:Largest", "Ada"), 2, attempts=5)
+
+
+SEAT = asked(0).seat_info
+
+
+def test_every_game_at_a_time_has_a_process_and_each_goes_from_game_to_game(caplog: pytest.LogCaptureFixture) -> None:
+    players = club()
     one, other = players.processes
-    seat = asked(0).seat_info
-    first, second = players.seat(seat), players.seat(seat)
+    first, second = players.seat(SEAT), players.seat(SEAT)
     assert (first._process, second._process) == (one, other)
     second.on_game_over(SeatResult("room", "game", 0))
-    assert players.seat(seat)._process is other
-    # One too many: it is the first game of which nobody has said yet that it is over.
-    assert players.seat(seat)._process is one
-    assert len(players.agents) == 4
+    assert players.seat(SEAT)._process is other
+    assert (players.crowded, caplog.text) == (0, "")
+    # One too many.
+    assert players.seat(SEAT)._process is one
+    assert players.crowded == 1
+    assert "no process is free" in caplog.text
+
+
+def test_a_process_whose_seat_is_lost_is_free_for_another_game() -> None:
+    players = club()
+    first, _ = players.seat(SEAT), players.seat(SEAT)
+    first.on_seat_lost(ChefsHatError("SUPERSEDED"))
+    assert players.seat(SEAT)._process is players.processes[0]
+    assert players.crowded == 0
+
+
+def test_a_process_that_has_been_given_up_is_seated_last() -> None:
+    players = club()
+    one, other = players.processes
+    one.close()
+    first = players.seat(SEAT)
+    assert (one.given_up, first._process) == (True, other)
+    assert players.seat(SEAT)._process is one
+    first.on_game_over(SeatResult("room", "game", 0))
+    assert players.seat(SEAT)._process is other
+    assert players.crowded == 0
+
+
+def test_what_was_not_the_player_s_own_is_counted_by_game_and_in_all() -> None:
+    players = club()
+    for process in players.processes:
+        process.close()
+    agents = [players.seat(SEAT) for _ in range(2)]
+    for agent in agents:
+        begin(agent, 2)
+        assert agent.decide(asked(0, 199)) == 199
+        assert agent.counts == Counts(failures=1, replaced=1)
+    assert players.counts == Counts(failures=2, replaced=2)
+
+
+def test_each_process_has_its_number_where_one_is_asked_for() -> None:
+    given = {"log_directory": "trained/{process}", "names": ["{process}"], "rate": 0.5}
+    players = Players(AgentSpec("a:B", "Ada", given, log=Path("log.{process}")), 2, attempts=5)
+    specs = [process.spec for process in players.processes]
+    assert [spec.arguments for spec in specs] == [{"log_directory": f"trained/{n}", "names": [n], "rate": 0.5} for n in "01"]
+    assert [spec.log for spec in specs] == [Path("log.0"), Path("log.1")]

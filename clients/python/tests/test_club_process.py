@@ -1,12 +1,16 @@
 """A player's own process: its answers, and everything that can go wrong with it."""
 
+import os
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import pytest
+from waiting import LIMIT_S, wait_until
 
 from chefshat.players_club.process import AgentError, AgentLost, AgentProcess, AgentRaised, AgentSpec
+from chefshat.way_in import TICKET
 
 TESTS = str(Path(__file__).parent)
 VECTOR = [0.0] * 28 + [1.0] + [0.0] * 196 + [1.0, 0.0, 1.0]
@@ -138,3 +142,25 @@ def test_a_closed_player_is_not_started_again(make: Make) -> None:
     with pytest.raises(AgentLost):
         process.call("get_action", VECTOR)
     assert process.restarts == 0
+
+
+def test_a_player_that_is_being_made_can_be_closed(make: Make, tmp_path: Path) -> None:
+    file = tmp_path / "pid"
+    process = make("Slow", arguments={"file": str(file)})
+    with ThreadPoolExecutor(1) as pool:
+        starting = pool.submit(process.start)
+        wait_until(lambda: file.exists() and file.read_text(), "the player is being made")
+        process.close()
+        with pytest.raises(AgentLost, match="died in making it"):
+            starting.result(LIMIT_S)
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(file.read_text()), 0)
+    with pytest.raises(AgentLost, match="has been given up"):
+        process.start()
+
+
+def test_a_player_is_not_told_the_ticket(make: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(TICKET, "secret")
+    file = tmp_path / "known"
+    make("Knowing", arguments={"file": str(file)}).start()
+    assert file.read_text() == "nothing"

@@ -7,7 +7,6 @@ import os
 import re
 import subprocess
 import sys
-import time
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -19,7 +18,8 @@ import polars
 import pyarrow
 import pyarrow.parquet
 import pytest
-from real_server import START_S, RealServer
+from real_server import RealServer
+from waiting import wait_until
 
 import chefshat
 from chefshat import Agent, Decision, RandomAgent, pb
@@ -169,10 +169,7 @@ def hosted(binary: Path, tmp_path_factory: pytest.TempPathFactory) -> Dataset:
         policy = pb.RoomPolicy(max_invalid_attempts=3)
         room = client.create_room("stubborn", rules=rules, policy=policy, seats=seats)
         client.play(Stubborn(), client.join_room(room.join_code, "Stubborn").ticket)
-        deadline = time.monotonic() + START_S
-        while len(list(records.glob("*.jsonl"))) < 2:
-            assert time.monotonic() < deadline, "the records of two finished games do not appear"
-            time.sleep(0.05)
+        wait_until(lambda: len(list(records.glob("*.jsonl"))) >= 2, "the records of two finished games are there")
     folder = tmp_path_factory.mktemp("hosted")
     export(binary, records, folder)
     return Dataset(folder, records)

@@ -6,12 +6,12 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
+from waiting import LIMIT_S, wait_until
 
 from chefshat import pb
 from chefshat.learn import checkpoint, deep_q, network, runs
@@ -19,8 +19,6 @@ from chefshat.learn.__main__ import main, parse
 from chefshat.learn.deep_q import DeepQConfig
 
 SMALL = {"hidden": [8], "batch_size": 4, "memory_size": 32}
-# Seconds to wait for what must happen: generous, because nothing is measured by it.
-WAIT_S = 300
 
 
 class Place:
@@ -51,15 +49,11 @@ def test_what_ctrl_c_ends_goes_on(
     command = [sys.executable, "-m", "chefshat.learn", *place.arguments(1_000_000, "--save-every", "1", "--seed", "5")]
     running = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     processes.append(running)
-    deadline = time.monotonic() + WAIT_S
     # The network is written last: both files are there while the training goes on.
-    while not place.out.exists():
-        assert running.poll() is None, running.communicate()
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
+    wait_until(place.out.exists, "the network is written", running)
     during = checkpoint.load(place.state)
     running.send_signal(signal.SIGINT)
-    _, said = running.communicate(timeout=WAIT_S)
+    _, said = running.communicate(timeout=LIMIT_S)
     assert running.returncode == 130, said
     assert "of 1,000,000 Shifts" in said
     assert "--resume goes on" in said

@@ -1,5 +1,6 @@
 """How refusals reach the caller, over a real connection, and how long the waits between attempts are."""
 
+import json
 import random
 import re
 
@@ -10,6 +11,7 @@ from proxy import Proxy
 
 import chefshat
 from chefshat import Backoff, ChefsHatError, aio
+from chefshat.errors import exit_code
 
 
 def test_a_refusal_carries_reason_metadata_and_code(fake: FakeServer) -> None:
@@ -77,3 +79,58 @@ def test_backoff_grows_up_to_its_bound() -> None:
         delays = [backoff.delay_s(failures, chance) for _ in range(100)]
         assert all(nominal / 2 <= delay <= nominal for delay in delays)
         assert len(set(delays)) > 90
+
+
+REFUSAL = ChefsHatError("ROOM_FULL", "no seat is free", {"room_id": "7"}, grpc.StatusCode.RESOURCE_EXHAUSTED)
+
+
+@pytest.mark.parametrize(
+    ("error", "line", "words"),
+    [
+        (
+            REFUSAL,
+            {"event": "error", "reason": "ROOM_FULL", "message": "no seat is free", "metadata": {"room_id": "7"}},
+            "error: ROOM_FULL: no seat is free\n",
+        ),
+        (
+            ChefsHatError("UNAVAILABLE"),
+            {"event": "error", "reason": "UNAVAILABLE", "message": "", "metadata": {}},
+            "error: UNAVAILABLE\n",
+        ),
+        (
+            OSError("there is no ticket in F"),
+            {"event": "error", "reason": "REFUSED", "message": "there is no ticket in F"},
+            "error: there is no ticket in F\n",
+        ),
+    ],
+    ids=["refusal", "no message", "file"],
+)
+def test_commands_tell_errors_in_words_or_as_json(
+    error: Exception, line: dict[str, object], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fails() -> int:
+        raise error
+
+    assert exit_code(fails, as_json=True) == 1
+    printed, said = capsys.readouterr()
+    assert (printed.count("\n"), json.loads(printed), said) == (1, line, "")
+    assert exit_code(fails, as_json=False) == 1
+    assert capsys.readouterr() == ("", words)
+
+
+def test_other_errors_are_told_where_a_command_names_them() -> None:
+    def fails() -> int:
+        raise ValueError("wrong")
+
+    assert exit_code(fails, ValueError, as_json=False) == 1
+    with pytest.raises(ValueError, match="wrong"):
+        exit_code(fails, as_json=False)
+
+
+@pytest.mark.parametrize(("words", "said"), [("", "interrupted\n"), ("a place is left", "interrupted; a place is left\n")])
+def test_ctrl_c_is_told_with_what_is_left(words: str, said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    def interrupted() -> int:
+        raise KeyboardInterrupt(*filter(None, [words]))
+
+    assert exit_code(interrupted, as_json=True) == 130
+    assert capsys.readouterr() == ("", said)

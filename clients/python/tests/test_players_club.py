@@ -6,24 +6,23 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import pytest
 from test_club_process import TESTS
+from waiting import LIMIT_S, wait_until
 
 import chefshat
 from chefshat import RandomAgent, pb
 from chefshat.players_club import AgentProcess, AgentSpec, PlayersClubAgent
 from chefshat.players_club.__main__ import main
 from chefshat.players_club.table import ACTIONS
+from chefshat.way_in import TICKET
 
 pytestmark = pytest.mark.server
 
-# Seconds a command may take before it counts as hanging.
-LIMIT_S = 120
 Info = dict[str, Any]
 
 
@@ -210,14 +209,33 @@ def test_a_command_that_is_interrupted_leaves_nobody_behind(
             [sys.executable, "-m", "chefshat.players_club", *options], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )
         processes.append(process)
-        while process.poll() is None and not client.get_room(made.room.room_id).seats[0].connected:
-            time.sleep(0.01)
+        wait_until(lambda: client.get_room(made.room.room_id).seats[0].connected, "the player is there", process)
     process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=LIMIT_S)
     assert said.endswith("interrupted; the place is the server's to fill until its ticket is used again\n")
     assert process.returncode == 130
     with pytest.raises(ProcessLookupError):
         os.kill(int((tmp_path / "pid").read_text()), 0)
+
+
+def test_a_command_that_is_interrupted_while_players_are_made_leaves_nobody_behind(
+    tmp_path: Path, processes: list["subprocess.Popen[str]"]
+) -> None:
+    given = json.dumps({"file": str(tmp_path / "pid.{process}")})
+    # They are ended because the command is, not because they take too long.
+    way = ["--server", "127.0.0.1:1", "--tournament", "X", "--games", "2", "--start-limit", "100000"]
+    options = [*way, "--agent", "club_players:Slow", "--path", TESTS, "--arguments", given]
+    process = subprocess.Popen([sys.executable, "-m", "chefshat.players_club", *options], stderr=subprocess.PIPE, text=True)
+    processes.append(process)
+    files = [tmp_path / f"pid.{number}" for number in range(2)]
+    wait_until(lambda: all(file.exists() and file.read_text() for file in files), "both players are being made", process)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=LIMIT_S)
+    # There was no place yet.
+    assert (process.returncode, said) == (130, "interrupted\n")
+    for file in files:
+        with pytest.raises(ProcessLookupError):
+            os.kill(int(file.read_text()), 0)
 
 
 def test_a_player_that_cannot_be_made_takes_no_seat(real_address: str, capsys: pytest.CaptureFixture[str]) -> None:
@@ -298,6 +316,25 @@ def test_a_player_takes_part_in_a_tournament_with_two_processes(
     assert all(game.rated for game in games)
 
 
+def test_who_goes_on_has_as_many_processes_as_were_said_when_the_place_was_taken(
+    real_address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with chefshat.Client(real_address) as client:
+        made = cup(client, pb.RuleSet(players=4, target_shifts=2))
+        joined = client.join_tournament(made.join_code, "Ada", max_games=2)
+    # Not with --games.
+    monkeypatch.setenv(TICKET, joined.ticket)
+    given = json.dumps({"log_file": str(tmp_path / "log.{process}")})
+    options = ["--server", real_address, "--agent", "club_players:Scribe", "--path", TESTS, "--json", "--arguments", given]
+    assert main(options) == 0
+    said = one_line(capsys)
+    assert [game["event"] for game in said["games"]] == ["finished"] * 6
+    assert said["crowded"] == 0
+    told = [(tmp_path / f"log.{number}").read_text().count('["update_game_over"]') for number in range(2)]
+    assert sum(told) == 6
+    assert all(told), "both play"
+
+
 def test_a_tournament_that_such_players_do_not_know_is_refused(real_address: str, capsys: pytest.CaptureFixture[str]) -> None:
     with chefshat.Client(real_address) as client:
         made = cup(client, pb.RuleSet(players=3))
@@ -328,11 +365,9 @@ def test_a_command_that_was_killed_goes_on_in_its_place(
             text=True,
         )
         processes.append(process)
-        while process.poll() is None and not stalls.exists():
-            time.sleep(0.01)
+        wait_until(stalls.exists, "the player stalls", process)
         process.kill()
         process.wait(LIMIT_S)
-        assert stalls.exists()
 
         again = [*way, "--arguments", json.dumps({"log_file": str(log)})]
         again[again.index("club_players:Stalling")] = "club_players:Scribe"

@@ -120,6 +120,8 @@ def test_a_superseded_seat_stops_and_the_others_play_on() -> None:
     assert [command.attach.ticket for command in stage.sent] == ["u"]
     with pytest.raises(ChefsHatError, match="SUPERSEDED"):
         stage.session.results()["t"].raise_for_error()
+    assert stage.log == [("attached", 0), ("lost", "SUPERSEDED")]
+    assert stage.scribes["u"].log == [("attached", 0)]
 
 
 def test_a_refused_ticket_stops_that_seat_alone() -> None:

@@ -1,7 +1,10 @@
 """How commands come by their places, and by the same places again after they were killed, on the fake server and the real one."""
 
+import errno
 import json
 import os
+import re
+import signal
 import stat
 import subprocess
 import sys
@@ -12,26 +15,18 @@ import pytest
 from fake_game import FakeGame, FakeSeat
 from fake_server import FakeServer
 from stalling import STALLS
+from waiting import LIMIT_S
 
 import chefshat
 from chefshat import ChefsHatError, RandomAgent, pb
 from chefshat import agent as command
-from chefshat.files import secret_file
 from chefshat.way_in import TICKET
 
 TESTS = Path(__file__).parent
-# Seconds a command may take before it counts as hanging.
-LIMIT_S = 120
 # Far longer than a test: who is killed comes back in time, however slow the machine is.
 PATIENT = pb.RoomPolicy(decision_time_ms=600_000)
 GAMES = 6
 Processes = list["subprocess.Popen[str]"]
-
-
-@pytest.fixture(autouse=True)
-def no_ticket(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where the tests run there may be a ticket; it is not theirs."""
-    monkeypatch.delenv(TICKET, raising=False)
 
 
 def new_room(client: chefshat.Client) -> pb.CreateRoomResponse:
@@ -61,17 +56,23 @@ def start(processes: Processes, *arguments: str, ticket: str = "") -> "subproces
     return processes[-1]
 
 
-def kill_when_it_stalls(process: "subprocess.Popen[str]") -> list[str]:
-    """Kills the command in the middle of a game. Returns what it had said by then, line by line."""
+def wait_until_it_stalls(process: "subprocess.Popen[str]") -> list[str]:
+    """Waits until the command is in the middle of a game. Returns what it had said by then, line by line."""
     assert process.stderr is not None
     said: list[str] = []
     for line in process.stderr:
         if line.strip() == STALLS:
-            process.kill()
-            process.wait(LIMIT_S)
             return said
         said.append(line)
     raise AssertionError(f"it never stalled: {said}")
+
+
+def kill_when_it_stalls(process: "subprocess.Popen[str]") -> list[str]:
+    """Kills the command in the middle of a game. Returns what it had said by then, line by line."""
+    said = wait_until_it_stalls(process)
+    process.kill()
+    process.wait(LIMIT_S)
+    return said
 
 
 def one_line(process: "subprocess.Popen[str]") -> dict[str, Any]:
@@ -101,7 +102,10 @@ def kill_and_go_on(address: str, way: list[str], processes: Processes, file: Pat
 
 
 @pytest.mark.parametrize("in_file", [False, True], ids=["printed", "in a file"])
-def test_a_command_that_was_killed_goes_on_in_its_seat(address: str, in_file: bool, tmp_path: Path, processes: Processes) -> None:
+def test_a_command_that_was_killed_goes_on_in_its_seat(
+    address: str, in_file: bool, tmp_path: Path, processes: Processes, request: pytest.FixtureRequest
+) -> None:
+    is_real = request.node.callspec.params["address"] == "real"
     with chefshat.Client(address) as client:
         room = new_room(client)
         way = ["--code", room.join_code, "--name", "Ada"]
@@ -109,8 +113,8 @@ def test_a_command_that_was_killed_goes_on_in_its_seat(address: str, in_file: bo
         lines = list(client.record(room.room.game_id))
     assert (told["event"], told["game_id"], told["seat"]) == ("finished", room.room.game_id, 1)
     decisions = [line.decision for line in lines if line.HasField("decision") and line.decision.seat == 1]
-    # The two of before it was killed are not among its own. The records of the fake server have none.
-    assert not decisions or len(decisions) == told["decisions"] + 2
+    # The two of before it was killed are not among its own. The records of the fake server have no decisions.
+    assert len(decisions) == (told["decisions"] + 2 if is_real else 0)
     assert all(decision.source == pb.DECISION_SOURCE_AGENT for decision in decisions)
 
 
@@ -170,7 +174,7 @@ def test_without_a_place_for_the_ticket_no_seat_is_taken(
         room = new_room(client)
         joining = ["--address", fake.address, "--code", room.join_code, "--name", "Ada", "--ticket-file"]
         assert command.main([*joining, str(tmp_path)]) == 1
-        assert "Is a directory" in capsys.readouterr().err
+        assert "is a folder: name a file in it" in capsys.readouterr().err
         assert command.main([*joining, str(tmp_path / "no such folder" / "ticket")]) == 1
         assert "no such folder" in capsys.readouterr().err
         assert client.get_room(room.room.room_id).seats[1].name == ""
@@ -181,17 +185,79 @@ def test_without_a_place_for_the_ticket_no_seat_is_taken(
     assert list(tmp_path.iterdir()) == [], "nothing is left of a file that got no ticket"
 
 
-def test_a_secret_replaces_what_stood_there(tmp_path: Path) -> None:
-    file = tmp_path / "secret"
-    file.write_text("old")
-    file.chmod(0o644)
-    with secret_file(file):
-        pass
-    assert file.read_text() == "old"
-    with secret_file(file) as keep:
-        keep("new")
-    assert (file.read_text(), stat.S_IMODE(file.stat().st_mode)) == ("new\n", 0o600)
-    assert list(tmp_path.iterdir()) == [file]
+@pytest.mark.parametrize("fails", ["fsync", "replace"])
+def test_a_ticket_that_cannot_be_kept_is_printed(
+    fails: str, fake: FakeServer, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(*{"fsync": (os, "fsync"), "replace": (Path, "replace")}[fails], full)
+    file = tmp_path / "ticket"
+    with chefshat.Client(fake.address) as client:
+        code = new_room(client).join_code
+    assert command.main(["--address", fake.address, "--code", code, "--name", "Ada", "--ticket-file", str(file)]) == 0
+    printed, said = capsys.readouterr()
+    assert "<- this agent" in printed
+    warning, ticket = said.splitlines()
+    assert warning == f"warning: {file} cannot keep the ticket: [Errno 28] No space left on device"
+    assert re.search(r"another goes on in its seat with --ticket \S+$", ticket)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_finished_game_is_no_error_where_the_ticket_cannot_be_removed(
+    fake: FakeServer, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "ticket"
+    with chefshat.Client(fake.address) as client:
+        file.write_text(client.join_room(new_room(client).join_code, "Ada").ticket)
+
+    def refuse(path: Path, missing_ok: bool = False) -> None:
+        raise PermissionError(errno.EACCES, "Permission denied", str(path))
+
+    monkeypatch.setattr(Path, "unlink", refuse)
+    assert command.main(["--address", fake.address, "--json", "--ticket-file", str(file)]) == 0
+    printed, said = capsys.readouterr()
+    assert json.loads(printed)["event"] == "finished"
+    assert f"warning: all is over, but its ticket is still kept: [Errno 13] Permission denied: '{file}'; remove {file}" in said
+
+
+def test_two_commands_do_not_share_a_ticket_file(
+    fake: FakeServer, tmp_path: Path, capsys: pytest.CaptureFixture[str], processes: Processes
+) -> None:
+    file = tmp_path / "ticket"
+    with chefshat.Client(fake.address) as client:
+        room = new_room(client)
+        joining = ["--address", fake.address, "--code", room.join_code, "--name", "Ada", "--ticket-file", str(file)]
+        first = start(processes, *joining, "--agent", "stalling:Stalling")
+        wait_until_it_stalls(first)
+        ticket = file.read_text()
+        assert command.main(joining) == 1
+        assert f"another command plays in the place of {file}" in capsys.readouterr().err
+        assert file.read_text() == ticket
+        # What held it is gone with its process.
+        first.kill()
+        first.wait(LIMIT_S)
+        assert command.main(joining) == 0
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_ticket_that_is_no_text_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "ticket"
+    file.write_bytes(b"\xff\xfe")
+    assert command.main(["--address", "127.0.0.1:1", "--ticket-file", str(file)]) == 1
+    assert f"error: {file} is no text, and so no ticket" in capsys.readouterr().err
+
+
+def test_ctrl_c_ends_a_command_with_130_and_says_what_becomes_of_its_place(fake: FakeServer, processes: Processes) -> None:
+    with chefshat.Client(fake.address) as client:
+        code = new_room(client).join_code
+    process = start(processes, "--address", fake.address, "--code", code, "--name", "Ada", "--agent", "stalling:Stalling")
+    wait_until_it_stalls(process)
+    process.send_signal(signal.SIGINT)
+    printed, said = process.communicate(timeout=LIMIT_S)
+    assert (process.returncode, printed) == (130, "")
+    assert said == "interrupted; the place is the server's to fill until its ticket is used again\n"
 
 
 def test_a_seat_s_ticket_is_no_participant_s(address: str) -> None:
@@ -219,7 +285,12 @@ def test_a_seat_s_ticket_is_no_participant_s(address: str) -> None:
         (["--code", "X", "--name", "Ada", "--stateless"], "", "--games and --stateless are for tournaments"),
         (["--tournament", "X", "--name", "Ada", "--seat", "1"], "", "--seat is for joining a room"),
         (["--ticket", "T", "--seat", "1"], "", "--seat is for joining a room"),
-        (["--tournament", "X", "--name", "Ada", "--games", "0"], "", "at least one game at a time"),
+        (["--tournament", "X", "--name", "Ada", "--games", "0"], "", "1 to 64 games at a time"),
+        (["--tournament", "X", "--name", "Ada", "--games", "10000000000"], "", "1 to 64 games at a time"),
+        (["--code", "X", "--name", "Ada", "--seat", "-1"], "", "seats are counted from 0, and no table has more than 6"),
+        (["--code", "X", "--name", "Ada", "--seat", "6"], "", "seats are counted from 0, and no table has more than 6"),
+        (["--ticket", "T", "--stateless"], "", "--stateless is said when joining"),
+        (["--ticket-file", "F", "--stateless"], "", "--stateless is said when joining"),
     ],
 )
 def test_ways_in_that_do_not_go_together_are_refused(

@@ -6,7 +6,6 @@ What an agent is stands in `agents`, how the command comes by its place in `way_
 import argparse
 import importlib
 import inspect
-import json
 import os
 import sys
 from collections.abc import Sequence
@@ -15,7 +14,7 @@ import chefshat
 from chefshat import outcome, way_in
 from chefshat.agents import Agent, RandomAgent
 from chefshat.decision import SeatInfo
-from chefshat.errors import ChefsHatError, failed
+from chefshat.errors import exit_code
 
 EXAMPLE = """examples:
   python -m chefshat.agent --address 127.0.0.1:50051 --code ABCDEF --name Ada --agent random --seed 7
@@ -26,7 +25,8 @@ EXAMPLE = """examples:
 A process that died is started again with the ticket that it printed, or with the same --ticket-file, and goes on in its place.
 Its agent is told the game from the beginning, but knows nothing else of before.
 
-exit code: 0 the game or tournament was finished, 1 it was refused, lost, aborted or closed, 2 the arguments are wrong
+exit code: 0 the game or tournament was finished, 1 it was refused, lost, aborted or closed, 2 the arguments are wrong,
+130 interrupted
 """
 
 
@@ -62,13 +62,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         made += 1
         return agents.pop() if agents else make_agent(options.agent, seed)
 
-    try:
+    def play() -> int:
         with chefshat.Client(options.address) as client:
-            played = way_in.take_part(client, way, make)
-    except (ChefsHatError, OSError) as error:
-        return failed(error, as_json=options.json)
-    print(json.dumps(outcome.as_json(played)) if options.json else outcome.as_table(played), flush=True)
-    return 0 if played.finished else 1
+            return outcome.report(way_in.take_part(client, way, make), as_json=options.json)
+
+    return exit_code(play, as_json=options.json)
 
 
 def make_agent(name: str, seed: int | None) -> Agent:

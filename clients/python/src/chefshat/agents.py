@@ -6,6 +6,7 @@ from collections.abc import Awaitable
 
 from chefshat import pb
 from chefshat.decision import Decision, SeatInfo
+from chefshat.errors import ChefsHatError
 from chefshat.result import SeatResult
 
 
@@ -46,6 +47,9 @@ class Agent(ABC):
 
     def on_game_over(self, result: SeatResult) -> None:
         """The seat's game is over, finished or aborted."""
+
+    def on_seat_lost(self, error: ChefsHatError) -> None:
+        """The seat is gone before its game was over, for good: nothing more is heard of it. In place of `on_game_over`."""
 
 
 class RandomAgent(Agent):

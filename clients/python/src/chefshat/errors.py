@@ -5,7 +5,7 @@ Wrong use of the package itself (a bad argument) raises ValueError or TypeError;
 
 import json
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 import grpc
 from google.rpc import error_details_pb2, status_pb2
@@ -13,6 +13,8 @@ from google.rpc import error_details_pb2, status_pb2
 from chefshat import pb
 
 DETAILS_KEY = "grpc-status-details-bin"
+#: Exit code of a command that Ctrl-C ended, as shells have it.
+INTERRUPTED = 130
 
 # The codes by their numbers on the wire.
 _CODES: dict[int, grpc.StatusCode] = {code.value[0]: code for code in grpc.StatusCode}
@@ -101,13 +103,38 @@ def _error_info(trailers: Iterable[tuple[str, str | bytes]]) -> tuple[str, dict[
     return "", {}
 
 
+def exit_code(command: Callable[[], int], *refusals: type[Exception], as_json: bool) -> int:
+    """Runs a command, and tells what it raises.
+
+    Args:
+        command: gives the exit code. A KeyboardInterrupt of its may say in words what is left.
+        refusals: what it may raise besides ChefsHatError and OSError, each with a message that says what to do.
+        as_json: see `failed`.
+
+    Returns:
+        Its exit code; 1 where it raised an error, 130 where Ctrl-C ended it.
+    """
+    told: tuple[type[Exception], ...] = (ChefsHatError, OSError, *refusals)
+    try:
+        return command()
+    except told as error:
+        return failed(error, as_json=as_json)
+    except KeyboardInterrupt as interrupt:
+        print("; ".join(["interrupted", *filter(None, [str(interrupt)])]), file=sys.stderr)
+        return INTERRUPTED
+
+
 def failed(error: Exception, *, as_json: bool) -> int:
-    """What a command says of an error: a line of JSON on standard output, or words on standard error. Returns its exit code."""
+    """What a command says of an error: a line of JSON on standard output, or words on standard error. Returns its exit code.
+
+    The line has `event` ("error"), `reason`, `message` and, of a refusal by the server, `metadata`: those of `ChefsHatError`. The
+    reason of another error is "REFUSED".
+    """
     if as_json:
         said: dict[str, object] = {"event": "error", "reason": "REFUSED", "message": str(error)}
         if isinstance(error, ChefsHatError):
             said.update(reason=error.reason, message=error.message, metadata=error.metadata)
-        print(json.dumps(said))
+        print(json.dumps(said), flush=True)
     else:
         print(f"error: {error}", file=sys.stderr)
     return 1

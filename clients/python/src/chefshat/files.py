@@ -1,8 +1,7 @@
-"""Files that are written whole or not at all: of any kind, records and secrets. Also what is said of a file that cannot be read."""
+"""Files that are written whole or not at all. Also what is said of one that cannot be read. A ticket's is in `ticket_file`."""
 
-import contextlib
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
 
 from google.protobuf import json_format
@@ -26,33 +25,6 @@ def write_whole(path: str | os.PathLike[str], data: bytes | str) -> None:
     except BaseException:
         unfinished.unlink(missing_ok=True)
         raise
-
-
-@contextlib.contextmanager
-def secret_file(path: str | os.PathLike[str]) -> Iterator[Callable[[str], None]]:
-    """Begins a file that its owner alone may read, before the secret is asked for that it shall keep.
-
-    Gives what puts the secret in it, and the file in place of what stands at `path`. Without that nothing is left of it. Raises
-    `OSError` if it cannot be begun, or not be written after all.
-    """
-    path = Path(path)
-    if path.is_dir():
-        raise IsADirectoryError(f"{path} is a folder: name a file in it")
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}")
-    unfinished.unlink(missing_ok=True)
-    descriptor = os.open(unfinished, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-    try:
-        with open(descriptor, "w", encoding="utf-8") as file:
-
-            def keep(secret: str) -> None:
-                file.write(f"{secret}\n")
-                file.flush()
-                os.fsync(file.fileno())
-                unfinished.replace(path)
-
-            yield keep
-    finally:
-        unfinished.unlink(missing_ok=True)
 
 
 def write_record(path: str | os.PathLike[str], lines: Iterable[pb.RecordLine]) -> None:

@@ -1,4 +1,4 @@
-"""What a message may hold: commands cut into requests, and annotations the server would not record.
+"""What a message may hold: commands cut into requests, annotations the server would not record, bounds on what may be asked for.
 
 A message the server finds too large ends the stream, and every seat on it would have to attach again only to send the same once
 more. So nothing of the kind is sent. What the commands mean is not here (see `session`).
@@ -17,6 +17,10 @@ MAX_REQUEST_BYTES = 32 * 1024
 MAX_ANNOTATIONS_BYTES = 4 * 1024
 # The protocol's bound on what a seat adds to the game seed.
 MAX_ENTROPY_BYTES = 32
+# The protocol's bound on the games of a tournament that a participant plays at a time.
+MAX_GAMES = 64
+# The largest table that the rules know.
+MAX_SEATS = 6
 # Upper bound of what a command adds to its request besides its own length: a tag and a length.
 _COMMAND_OVERHEAD_BYTES = 6
 

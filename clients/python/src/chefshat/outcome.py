@@ -3,7 +3,8 @@
 How the place was come by is in `way_in`; what is left of a single seat's game is in `result`.
 """
 
-from collections.abc import Sequence
+import json
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from chefshat import pb
@@ -32,12 +33,31 @@ class Played:
         return self.tournament.tournament.state == pb.TOURNAMENT_STATE_FINISHED
 
 
-def as_json(played: Played) -> dict[str, object]:
+def report(played: Played, *, as_json: bool, own: Mapping[str, object] | None = None, own_words: str = "") -> int:
+    """Prints what came of a place, as a line of JSON or a table.
+
+    Args:
+        played: what came of it.
+        as_json: whether a line of JSON is wanted.
+        own: what the line says besides, of the command's own.
+        own_words: the same as a line below the table.
+
+    Returns:
+        The exit code of a command whose only place it was: 0 if it was finished, else 1.
+    """
+    if as_json:
+        print(json.dumps({**plain(played), **(own or {})}), flush=True)
+    else:
+        print("\n".join([as_table(played), *filter(None, [own_words])]), flush=True)
+    return 0 if played.finished else 1
+
+
+def plain(played: Played) -> dict[str, object]:
     """What came of a place as plain values."""
     if played.tournament is None:
-        return _game_as_json(played.games[0])
+        return _game_plain(played.games[0])
     games = [
-        {**_game_as_json(result), **({"event": "error", "reason": result.error.reason} if result.error else {})}
+        {**_game_plain(result), **({"event": "error", "reason": result.error.reason} if result.error else {})}
         for result in played.games
     ]
     standings = played.tournament.standings
@@ -61,7 +81,7 @@ def as_table(played: Played) -> str:
     return _tournament_as_table(played.tournament, played.participant)
 
 
-def _game_as_json(result: SeatResult) -> dict[str, object]:
+def _game_plain(result: SeatResult) -> dict[str, object]:
     return {
         "event": "finished" if result.finished else "aborted",
         "abort_reason": result.abort_reason,

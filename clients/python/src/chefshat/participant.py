@@ -10,6 +10,7 @@ from chefshat import pb
 from chefshat.agents import Agent
 from chefshat.decision import SeatInfo
 from chefshat.errors import ChefsHatError
+from chefshat.requests import attach
 
 # Request id of a participant's attachment, far from those of seats.
 REQUEST_ID = 2**32 - 1
@@ -36,11 +37,19 @@ class Participant:
         self.over = False
         self.error: ChefsHatError | None = None
 
-    def enter(self, handle: int, entered: pb.Entered) -> None:
-        """The stream is attached to it."""
-        self.handle = handle
-        if self._on_entered is not None:
-            self._on_entered(entered)
+    def attach(self, delivery: pb.EventDelivery.ValueType) -> pb.SeatCommand:
+        """The command that attaches a new connection to it."""
+        self.handle = None
+        return attach(self.ticket, REQUEST_ID, 0, self.entropy, delivery)
+
+    def told(self, update: pb.SeatUpdate) -> None:
+        """What the server says on a handle that is no seat's."""
+        if update.HasField("entered"):
+            self.handle = update.handle
+            if self._on_entered is not None:
+                self._on_entered(update.entered)
+        elif update.HasField("detached") and update.handle == self.handle:
+            self._detached(update.detached.reason)
 
     def end(self, error: ChefsHatError | None = None) -> None:
         """It will be seated no more."""
@@ -48,7 +57,7 @@ class Participant:
         if not self.over:
             self.over, self.error = True, error
 
-    def detached(self, reason: pb.DetachReason.ValueType) -> None:
+    def _detached(self, reason: pb.DetachReason.ValueType) -> None:
         """The server has dismissed it."""
         if reason == pb.DETACH_REASON_TOURNAMENT_OVER:
             self.end()

@@ -5,7 +5,8 @@ from typing import NamedTuple
 from chefshat import pb
 from chefshat.agents import Agent
 from chefshat.decision import Decision, SeatInfo
-from chefshat.result import Standing
+from chefshat.errors import ChefsHatError
+from chefshat.result import SeatResult, Standing
 
 
 class Ask(NamedTuple):
@@ -59,6 +60,28 @@ class SeatPlace:
     def game_is_over(self) -> bool:
         """Whether the event that ends the game has been seen."""
         return bool(self.standings or self.abort_reason)
+
+    def finish(self, error: ChefsHatError | None) -> SeatResult:
+        """Nothing more will come: what is left of the game, with why it was lost if it was."""
+        self.asked = None
+        self.unacknowledged = None
+        self.answered = None
+        info = self.info
+        return SeatResult(
+            room_id=info.room_id if info else "",
+            game_id=info.game_id if info else "",
+            seat=info.seat if info else -1,
+            standings=self.standings,
+            reveal=self.reveal,
+            abort_reason=self.abort_reason,
+            decisions=self.decisions,
+            invalid=self.invalid,
+            late=self.late,
+            annotations_dropped=self.annotations_dropped,
+            reconnects=max(self.attachments - 1, 0),
+            entropy=self.entropy,
+            error=error,
+        )
 
     def is_seat(self, seat: int) -> bool:
         """Whether that is the number of this seat; it is not known before the seat has been attached."""

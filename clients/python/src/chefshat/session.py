@@ -132,8 +132,7 @@ class PlaySession:
             self._outbox.append(attach(place.ticket, place.request_id, place.last_sequence, place.entropy, delivery))
         participant = self._participant
         if participant is not None and not participant.over:
-            participant.handle = None
-            self._outbox.append(attach(participant.ticket, REQUEST_ID, 0, participant.entropy, delivery))
+            self._outbox.append(participant.attach(delivery))
 
     def lost(self, unasked: Iterable[Ask] = ()) -> None:
         """The connection is gone. Seats that have seen their game end are done; the others wait for `connected`.
@@ -254,10 +253,8 @@ class PlaySession:
                 self._outbox.append(pb.SeatCommand(handle=update.handle, detach=pb.Detach()))
                 message = "it is the ticket of a participant in a tournament, not of a seat: `play_tournament` plays with it"
                 self._finish(place, ChefsHatError("TICKET_OF_PARTICIPANT", message))
-        elif update.HasField("entered"):
-            participant.enter(update.handle, update.entered)
-        elif update.HasField("detached") and update.handle == participant.handle:
-            participant.detached(update.detached.reason)
+        else:
+            participant.told(update)
 
     def _seated(self, participant: Participant, attached: pb.Attached) -> SeatPlace:
         """The seat that the server has given a participant: one it has already, or a new one."""
@@ -394,26 +391,10 @@ class PlaySession:
             self._finish(place, ChefsHatError("DETACHED", "the seat has left the stream"))
 
     def _finish(self, place: SeatPlace, error: ChefsHatError | None = None) -> None:
-        info = place.info
-        place.asked = None
-        place.unacknowledged = None
-        place.answered = None
-        result = SeatResult(
-            room_id=info.room_id if info else "",
-            game_id=info.game_id if info else "",
-            seat=info.seat if info else -1,
-            standings=place.standings,
-            reveal=place.reveal,
-            abort_reason=place.abort_reason,
-            decisions=place.decisions,
-            invalid=place.invalid,
-            late=place.late,
-            annotations_dropped=place.annotations_dropped,
-            reconnects=max(place.attachments - 1, 0),
-            entropy=place.entropy,
-            error=error,
-        )
+        result = place.finish(error)
         del self._places[place.request_id]
         self._results[place.request_id] = (place.ticket, result)
         if error is None:
             place.agent.on_game_over(result)
+        else:
+            place.agent.on_seat_lost(error)

@@ -1,7 +1,7 @@
 """How a command comes by its place in a room or a tournament, and by the same place again after its process died.
 
-Here are the options that say so, the ticket, and the file that keeps it; also playing, until there is something to print. The
-commands are `agent`, `learn.play` and `players_club`; what they print is in `outcome`, how a game is played in `session`.
+Here are the options that say so, and playing, until there is something to print. The commands are `agent`, `learn.play` and
+`players_club`; what they print is in `outcome`, how a game is played in `session`, the file that keeps a ticket in `ticket_file`.
 """
 
 import argparse
@@ -17,9 +17,10 @@ from chefshat.agents import Agent
 from chefshat.client import Client
 from chefshat.decision import SeatInfo
 from chefshat.errors import ChefsHatError
-from chefshat.files import secret_file
+from chefshat.limits import MAX_GAMES, MAX_SEATS
 from chefshat.outcome import Played
 from chefshat.participant import MakeAgent
+from chefshat.ticket_file import TicketFile
 
 #: Environment variable that a ticket may stand in.
 TICKET = "CHEFSHAT_TICKET"
@@ -67,9 +68,11 @@ def add_options(parser: argparse.ArgumentParser, *, several_codes: bool = False)
         help="keep the ticket in this file, readable by you alone, until the game or tournament is over; if it is there already, "
         "go on in its place, so that the same command goes on after its process died",
     )
-    parser.add_argument("--seat", type=int, help="a certain seat of the room (the first free one unless given)")
+    parser.add_argument("--seat", type=int, help="a certain seat of the room, from 0 (the first free one unless given)")
     parser.add_argument(
-        "--games", type=int, help="games of a tournament to play at a time, 1 to 64 (1 unless given); with a ticket as before"
+        "--games",
+        type=int,
+        help=f"games of a tournament to play at a time, 1 to {MAX_GAMES} (1 unless given); with a ticket it is as many as before",
     )
     parser.add_argument(
         "--stateless", action="store_true", help="say that the agent remembers nothing from game to game (tournaments)"
@@ -99,8 +102,12 @@ def ways(parser: argparse.ArgumentParser, options: argparse.Namespace, *, needs_
         parser.error("--games and --stateless are for tournaments: give --tournament CODE in place of --code CODE")
     if options.seat is not None and not codes:
         parser.error("--seat is for joining a room, give it with --code: in a tournament the seats are drawn, a ticket has its own")
-    if options.games is not None and options.games < 1:
-        parser.error("--games: a participant plays at least one game at a time")
+    if options.stateless and options.tournament is None:
+        parser.error("--stateless is said when joining: give it with --tournament, the place of a ticket has been taken already")
+    if options.seat is not None and not 0 <= options.seat < MAX_SEATS:
+        parser.error(f"--seat: seats are counted from 0, and no table has more than {MAX_SEATS}")
+    if options.games is not None and not 1 <= options.games <= MAX_GAMES:
+        parser.error(f"--games: a participant plays 1 to {MAX_GAMES} games at a time")
     way = WayIn(
         tournament=options.tournament,
         ticket=ticket,
@@ -114,7 +121,12 @@ def ways(parser: argparse.ArgumentParser, options: argparse.Namespace, *, needs_
 
 
 def take_part(
-    client: Client, way: WayIn, make_agent: MakeAgent, *, check_rules: Callable[[pb.RuleSet], None] = lambda rules: None
+    client: Client,
+    way: WayIn,
+    make_agent: MakeAgent,
+    *,
+    check_rules: Callable[[pb.RuleSet], None] = lambda rules: None,
+    prepare: Callable[[int], None] | None = None,
 ) -> Played:
     """Takes the place, or goes on in it, and plays until its game or tournament is over.
 
@@ -123,15 +135,45 @@ def take_part(
         way: how the place is come by.
         make_agent: gives the agent of each game.
         check_rules: raises ValueError if the agent does not know games by these rules; asked when joining.
+        prepare: told, in a tournament and before its first game here, how many of its games the participant plays at a time. That
+            was said when the place was taken, and may be more than `way.games` where it is gone on in.
 
     Raises:
         ChefsHatError: the place was refused or lost, or the server stayed unreachable.
-        OSError: the file with the ticket cannot be read or written.
+        OSError: the file with the ticket cannot be read or begun, or another command plays in its place.
         ValueError: what `check_rules` raises.
+        KeyboardInterrupt: Ctrl-C. Where a place had been taken it says in words what becomes of that.
     """
-    ticket = way.ticket or _kept(way) or _join(client, way, check_rules)
+    with TicketFile(way.ticket_file) if way.ticket_file is not None else nullcontext() as file:
+        ticket = way.ticket or _kept(way, file) or _join(client, way, file, check_rules)
+        played = _play(client, way, ticket, make_agent, prepare)
+        if file is not None:
+            try:
+                file.forget()
+            except OSError as error:
+                print(f"warning: all is over, but its ticket is still kept: {error}; remove {file.path}", file=sys.stderr)
+        return played
+
+
+def _play(client: Client, way: WayIn, ticket: str, make_agent: MakeAgent, prepare: Callable[[int], None] | None) -> Played:
+    """Plays in the place that the ticket is of, until its game or tournament is over."""
     entered: list[pb.Entered] = []
+    prepared = prepare is None
     seats = 0
+
+    def enter(place: pb.Entered) -> None:
+        nonlocal prepared
+        entered.append(place)
+        if prepare is None or prepared:
+            return
+        try:
+            participants = client.get_tournament(place.tournament_id).participants
+        except ChefsHatError as error:
+            if not error.retryable:
+                raise
+            return  # The next connection asks again.
+        prepared = True
+        prepare(min(participants[place.participant].max_games, MAX_GAMES))
 
     def seated(seat: SeatInfo) -> Agent:
         nonlocal seats
@@ -141,68 +183,59 @@ def take_part(
         return make_agent(seat)
 
     try:
-        games = client.play_tournament(ticket, seated, on_entered=entered.append)
+        games = client.play_tournament(ticket, seated, on_entered=enter)
     except ChefsHatError as error:
         if error.reason == "TICKET_UNKNOWN" and way.ticket_file is not None:
             message = f"{error.message}; the ticket is that in {way.ticket_file}: remove the file to take another place"
             raise ChefsHatError(error.reason, message, error.metadata, error.code) from error
         raise
-    if entered:
-        last = entered[-1]
-        played = Played(games, client.tournament_results(last.tournament_id), last.participant)
-    else:
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt("the place is the server's to fill until its ticket is used again") from None
+    if not entered:
         games[0].raise_for_error()
-        played = Played(games)
-    if way.ticket_file is not None:
-        way.ticket_file.unlink(missing_ok=True)
-    return played
+        return Played(games)
+    last = entered[-1]
+    return Played(games, client.tournament_results(last.tournament_id), last.participant)
 
 
-def _kept(way: WayIn) -> str | None:
+def _kept(way: WayIn, file: TicketFile | None) -> str | None:
     """The ticket that is kept in the file; None if a place is to be taken first."""
-    file = way.ticket_file
     if file is None:
         return None
-    try:
-        ticket = file.read_text(encoding="utf-8").strip()
-    except FileNotFoundError:
-        ticket = ""
-    if ticket:
-        print(f"goes on in the place whose ticket is in {file}", file=sys.stderr)
-        return ticket
+    if file.ticket:
+        print(f"goes on in the place whose ticket is in {file.path}", file=sys.stderr)
+        return file.ticket
     if way.code is None and way.tournament is None:
-        raise FileNotFoundError(f"there is no ticket in {file}: give --code or --tournament to take a place")
+        raise FileNotFoundError(f"there is no ticket in {file.path}: give --code or --tournament to take a place")
     return None
 
 
-def _join(client: Client, way: WayIn, check_rules: Callable[[pb.RuleSet], None]) -> str:
+def _join(client: Client, way: WayIn, file: TicketFile | None, check_rules: Callable[[pb.RuleSet], None]) -> str:
     """Takes the place, and sees to it that the ticket is not lost with this process."""
-    file = way.ticket_file
-    # First the file, then the place: nobody waits for an agent that could not keep its ticket.
-    with secret_file(file) if file is not None else nullcontext() as keep:
-        if way.tournament is not None:
-            entrant = client.join_tournament(way.tournament, way.name, max_games=way.games, stateless=way.stateless)
-            ticket, rules = entrant.ticket, entrant.tournament.settings.rules
-            what, where = "its tournament", "place"
-            left = "its games in the tournament will be played without it"
-        else:
-            joined = client.join_room(way.code or "", way.name, seat=way.seat)
-            ticket, rules = joined.ticket, joined.room.rules
-            what, where = "its game", "seat"
-            # A seat that is not attached starts no game.
-            left = f"its seat {joined.seat} will be free again within two minutes"
-        try:
-            # Who has not joined cannot see what a code is of.
-            check_rules(rules)
-        except ValueError as error:
-            raise type(error)(f"{error}; {left}") from error
-        if keep is not None:
-            keep(ticket)
-    # Whoever has the ticket has the place: it is told to the one who started the agent alone.
-    if file is None:
-        games = f" --games {way.games}" if way.games > 1 else ""
-        how = f"another goes on in its {where} with --ticket {ticket}{games}"
+    if way.tournament is not None:
+        entrant = client.join_tournament(way.tournament, way.name, max_games=way.games, stateless=way.stateless)
+        ticket, rules = entrant.ticket, entrant.tournament.settings.rules
+        what, where = "its tournament", "place"
+        left = "its games in the tournament will be played without it"
     else:
-        how = f"it goes on in its {where} when it is started again: {file} has its ticket"
+        joined = client.join_room(way.code or "", way.name, seat=way.seat)
+        ticket, rules = joined.ticket, joined.room.rules
+        what, where = "its game", "seat"
+        # A seat that is not attached starts no game.
+        left = f"its seat {joined.seat} will be free again within two minutes"
+    try:
+        # Who has not joined cannot see what a code is of.
+        check_rules(rules)
+    except ValueError as error:
+        raise type(error)(f"{error}; {left}") from error
+    # Whoever has the ticket has the place: it is told to the one who started the agent alone.
+    how = f"another goes on in its {where} with --ticket {ticket}"
+    if file is not None:
+        try:
+            file.keep(ticket)
+            how = f"it goes on in its {where} when it is started again: {file.path} has its ticket"
+        except OSError as error:
+            # The place is taken, and nobody else knows the ticket.
+            print(f"warning: {file.path} cannot keep the ticket: {error}", file=sys.stderr)
     print(f"should this agent end before {what}, {how}", file=sys.stderr)
     return ticket

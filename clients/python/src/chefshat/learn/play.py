@@ -5,13 +5,12 @@ action, however it was trained. The command `python -m chefshat.learn play` take
 """
 
 import argparse
-import json
 
 import numpy as np
 import numpy.typing as npt
 
 from chefshat import Agent, Client, Decision, SeatInfo, outcome, pb, way_in
-from chefshat.errors import ChefsHatError, failed
+from chefshat.errors import exit_code
 from chefshat.learn import network
 from chefshat.learn.network import Network, NetworkFileError
 
@@ -75,14 +74,14 @@ class Row:
 def run(options: argparse.Namespace) -> int:
     """The command: plays one game in a room, or a tournament to its end, and prints the standings. Returns the exit code."""
     (way,) = way_in.ways(options.parser, options)
-    try:
+
+    def play() -> int:
         net = network.load(options.file)
         with Client(options.address) as client:
             played = way_in.take_part(client, way, lambda seat: NetworkAgent(net), check_rules=NetworkAgent(net).check_rules)
-    except (ChefsHatError, NetworkFileError, RulesDoNotFit, OSError) as error:
-        return failed(error, as_json=options.json)
-    print(json.dumps(outcome.as_json(played)) if options.json else outcome.as_table(played), flush=True)
-    return 0 if played.finished else 1
+            return outcome.report(played, as_json=options.json)
+
+    return exit_code(play, NetworkFileError, RulesDoNotFit, as_json=options.json)
 
 
 def _row(values: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:

@@ -8,13 +8,12 @@ import argparse
 import json
 import sys
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 from chefshat import Client, outcome, way_in
-from chefshat.errors import ChefsHatError, failed
-from chefshat.outcome import Played
+from chefshat.errors import exit_code
 from chefshat.players_club.agent import ATTEMPTS, RulesDoNotFit, check_rules
 from chefshat.players_club.players import Players
 from chefshat.players_club.process import AgentError, AgentSpec
@@ -30,7 +29,8 @@ EXAMPLE = """examples:
 
 The player runs with all your rights, like any program that you start. What it chooses illegally is sent, counted by the server as a
 wrong action, and the player is asked again. Where it raises, hangs or dies, the default decision of the rules is taken; a process
-that is gone is started anew at the next call. With --games N it plays in N processes, which know nothing of each other.
+that is gone is started anew at the next call. With --games N it plays in N processes, which know nothing of each other but have
+the same --arguments and --log: where these say {process}, each has its own number, from 0.
 
 If this command itself dies, another goes on in its place with the ticket that it printed, or with the same --ticket-file. The
 player is told the game from the beginning, but knows nothing else of before.
@@ -56,40 +56,31 @@ def main(arguments: Sequence[str] | None = None) -> int:
         restarts=options.restarts,
         log=options.log,
     )
-    try:
+
+    def play_all() -> int:
         # First the player, then the place: nobody waits for a player that cannot be made.
         with Players(spec, options.games or 1, attempts=options.attempts) as players, Client(options.address) as client:
-            finished = [play(client, players, way, as_json_line=options.json) for way in options.ways]
-            return 0 if all(finished) and not players.given_up else 1
-    except (ChefsHatError, AgentError, RulesDoNotFit, OSError) as error:
-        return failed(error, as_json=options.json)
-    except KeyboardInterrupt:
-        print("interrupted; the place is the server's to fill until its ticket is used again", file=sys.stderr)
-        return 130
+            codes = [play(client, players, way, as_json=options.json) for way in options.ways]
+            return max(*codes, int(players.given_up))
+
+    return exit_code(play_all, AgentError, RulesDoNotFit, as_json=options.json)
 
 
-def play(client: Client, players: Players, way: WayIn, *, as_json_line: bool) -> bool:
-    """Plays the game of one room, or a tournament. Returns whether it was finished."""
+def play(client: Client, players: Players, way: WayIn, *, as_json: bool) -> int:
+    """Plays the game of one room, or a tournament, and prints what came of it. Returns 0 if it was finished, else 1."""
     way = replace(way, name=way.name or players.name[:MAX_NAME])
-    before, restarts = len(players.agents), players.restarts
-    played = way_in.take_part(client, way, players.seat, check_rules=check_rules)
-    agents = players.agents[before:]
-    own = {
-        "failures": sum(agent.failures for agent in agents),
-        "replaced": sum(agent.replaced for agent in agents),
-        "restarts": players.restarts - restarts,
-    }
-    report(played, own, as_json_line=as_json_line)
-    return played.finished
+    before = own_counts(players)
+    played = way_in.take_part(client, way, players.seat, check_rules=check_rules, prepare=players.prepare)
+    own = {what: count - before[what] for what, count in own_counts(players).items()}
+    words = "{failures} failures of the player, {replaced} decisions taken for it, {restarts} restarts".format(**own)
+    if own["crowded"]:
+        words += ", {crowded} games begun with a process that had one already".format(**own)
+    return outcome.report(played, as_json=as_json, own=own, own_words=words)
 
 
-def report(played: Played, own: dict[str, int], *, as_json_line: bool) -> None:
-    """Prints how it ended and how much of it was the player's own."""
-    if as_json_line:
-        print(json.dumps({**outcome.as_json(played), **own}), flush=True)
-        return
-    print(outcome.as_table(played))
-    print("{failures} failures of the player, {replaced} decisions taken for it, {restarts} restarts".format(**own), flush=True)
+def own_counts(players: Players) -> dict[str, int]:
+    """What was not the player's own in all games so far."""
+    return {**asdict(players.counts), "restarts": players.restarts, "crowded": players.crowded}
 
 
 def parse(arguments: Sequence[str] | None) -> argparse.Namespace:

@@ -8,6 +8,7 @@ it and asks again, as often as the reference would; then the legal choice that t
 import logging
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TypeGuard
 
 import numpy as np
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from chefshat import pb
 from chefshat.agents import Agent
 from chefshat.decision import Decision, SeatInfo
+from chefshat.errors import ChefsHatError
 from chefshat.players_club.process import AgentError, AgentProcess
 from chefshat.players_club.table import ACTIONS, DINNER_SERVED, FACES, FOOD_FIGHT, JOKER, PASS, PLAYERS, Call, Table
 from chefshat.result import SeatResult
@@ -48,21 +50,34 @@ def check_rules(rules: pb.RuleSet) -> None:
         )
 
 
-class PlayersClubAgent(Agent):
-    """Plays one game with a player of the reference implementation. Another game with the same process takes another of these.
+@dataclass
+class Counts:
+    """What was not the player's own, in one game or many.
 
     Attributes:
         failures: how often the player raised, was lost, or answered with what is no answer.
         replaced: decisions that were taken for it, because it failed or chose nothing legal to the last.
-        over: whether its game is over, and the player has been told.
     """
 
-    def __init__(self, process: AgentProcess, *, attempts: int = ATTEMPTS) -> None:
+    failures: int = 0
+    replaced: int = 0
+
+
+class PlayersClubAgent(Agent):
+    """Plays one game with a player of the reference implementation. Another game with the same process takes another of these.
+
+    Attributes:
+        counts: of this game.
+        over: whether its game is over, and the player has been told, or its seat is lost.
+    """
+
+    def __init__(self, process: AgentProcess, *, attempts: int = ATTEMPTS, total: Counts | None = None) -> None:
         """Seats a player.
 
         Args:
             process: the player, started.
             attempts: how often an illegal choice is sent before a legal one is taken instead; the room's own limit holds too.
+            total: counted on with the game's own counts.
         """
         self._process = process
         self._attempts = attempts
@@ -72,8 +87,8 @@ class PlayersClubAgent(Agent):
         self._refused = 0
         # Cards the player has chosen that are still to be given.
         self._to_give: list[int] = []
-        self.failures = 0
-        self.replaced = 0
+        self.counts = Counts()
+        self._total = total or Counts()
         self.over = False
 
     def on_attached(self, seat: SeatInfo) -> None:
@@ -92,8 +107,12 @@ class PlayersClubAgent(Agent):
     def on_game_over(self, result: SeatResult) -> None:
         """Says how much of the game was the player's own."""
         self.over = True
-        if self.failures:
-            LOG.warning("%s failed %d times in this game", self._process.name, self.failures)
+        if self.counts.failures:
+            LOG.warning("%s failed %d times in this game", self._process.name, self.counts.failures)
+
+    def on_seat_lost(self, error: ChefsHatError) -> None:
+        """The player is free for another game. It is told nothing: the reference has no word for this."""
+        self.over = True
 
     def decide(self, request: Decision) -> int:
         """Asks the player, and again if its choice was illegal."""
@@ -186,14 +205,16 @@ class PlayersClubAgent(Agent):
                 self._failed(error)
 
     def _replaced(self, action: int) -> int:
-        self.replaced += 1
+        self.counts.replaced += 1
+        self._total.replaced += 1
         return action
 
     def _failed(self, why: object) -> None:
-        self.failures += 1
-        if self.failures <= TOLD:
+        self.counts.failures += 1
+        self._total.failures += 1
+        if self.counts.failures <= TOLD:
             LOG.warning("%s: %s", self._process.name, why)
-        if self.failures == TOLD:
+        if self.counts.failures == TOLD:
             LOG.warning("%s: further failures are counted, not told", self._process.name)
 
 

@@ -18,6 +18,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any, Self
 
+from chefshat.way_in import TICKET
+
 LOG = logging.getLogger("chefshat")
 
 HOST = Path(__file__).with_name("host.py")
@@ -111,14 +113,20 @@ class AgentProcess:
             )
         self._started = True
         spec = self.spec
-        running = _Running(spec.python, spec.log)
-        made = {"agent": spec.agent, "name": spec.name, "arguments": dict(spec.arguments), "paths": list(spec.paths)}
+        # Known before the agent is made, which may take long: `close` ends it in that too.
+        self._running = running = _Running(spec.python, spec.log)
+        arguments = {"agent": spec.agent, "name": spec.name, "arguments": dict(spec.arguments), "paths": list(spec.paths)}
         try:
-            said = running.call(START, made, spec.start_limit_s)
-        except AgentError as error:
+            if self._closed:
+                raise AgentLost("it has been closed")
+            said = running.call(START, arguments, spec.start_limit_s)
+        except BaseException as error:
+            self._running = None
             running.end()
-            raise type(error)(f"{spec.agent}: {error}") from error
-        self._running = running
+            if isinstance(error, AgentError):
+                raise type(error)(f"{spec.agent}: {error}") from error
+            raise
+        running.made = True
         self.name = str(said["name"]) if isinstance(said, dict) else spec.name
 
     def call(self, method: str, *arguments: object) -> object:
@@ -140,17 +148,23 @@ class AgentProcess:
             raise
 
     def close(self) -> None:
-        """Lets the process end by itself, or ends it. More than once does no harm."""
+        """Lets the process end by itself, or ends it: at once where the agent is still being made. More than once does no harm."""
         self._closed = True
         running, self._running = self._running, None
-        if running is not None:
+        if running is None:
+            return
+        if running.made:
             running.leave()
+        else:
+            running.end()
 
 
 class _Running:
     """A process and the two threads that read what it writes."""
 
     def __init__(self, python: str, log: Path | None) -> None:
+        #: Whether it has made its agent.
+        self.made = False
         self._calls = 0
         self._answers: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
         self._tail = b""
@@ -162,6 +176,8 @@ class _Running:
                 stdout=subprocess.PIPE,
                 stderr=subprocess.PIPE,
                 start_new_session=True,
+                # The place is the command's: what the agent brings along need not know how to take it.
+                env={name: value for name, value in os.environ.items() if name != TICKET},
             )
         except OSError as error:
             raise AgentLost(f"{python} cannot be started: {error.strerror or error}") from error

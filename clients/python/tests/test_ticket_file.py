@@ -1,0 +1,75 @@
+"""The file of a ticket: what is in it, who holds it, and what is left of it."""
+
+import os
+import stat
+from pathlib import Path
+
+import pytest
+
+from chefshat.ticket_file import TicketFile
+
+HELD = "another command plays in the place of"
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "ticket"
+
+
+def test_a_ticket_replaces_an_empty_file_and_is_its_owner_s_alone(path: Path) -> None:
+    path.write_text("\n")
+    path.chmod(0o644)
+    with TicketFile(path):
+        pass
+    assert path.read_text() == "\n"
+    with TicketFile(path) as file:
+        assert file.ticket == ""
+        file.keep("new")
+        assert (path.read_text(), stat.S_IMODE(path.stat().st_mode)) == ("new\n", 0o600)
+        assert list(path.parent.iterdir()) == [path]
+    with TicketFile(path) as file:
+        assert file.ticket == "new"
+        file.forget()
+    assert list(path.parent.iterdir()) == []
+
+
+def test_one_at_a_time_holds_the_file_before_and_after_there_is_a_ticket(path: Path) -> None:
+    with TicketFile(path) as file:
+        with pytest.raises(BlockingIOError, match=HELD), TicketFile(path):
+            pass
+        file.keep("mine")
+        with pytest.raises(BlockingIOError, match=HELD), TicketFile(path):
+            pass
+    with TicketFile(path) as file, pytest.raises(BlockingIOError, match=HELD), TicketFile(path):
+        pass
+    with TicketFile(path) as file:
+        assert file.ticket == "mine"
+
+
+def test_what_a_killed_command_left_behind_is_taken_and_not_shown(path: Path) -> None:
+    left = path.with_name(".ticket.new")
+    left.write_text("half of a longer ticket")
+    left.chmod(0o644)
+    with TicketFile(path) as file:
+        assert file.ticket == ""
+        file.keep("mine")
+        assert (path.read_text(), stat.S_IMODE(path.stat().st_mode)) == ("mine\n", 0o600)
+    assert list(path.parent.iterdir()) == [path]
+
+
+def test_another_s_ticket_is_not_removed(path: Path) -> None:
+    with TicketFile(path) as file:
+        file.keep("mine")
+        path.write_text("another's")
+        file.forget()
+        assert path.read_text() == "another's"
+        path.unlink()
+        file.forget()
+
+
+def test_a_link_is_not_followed_to_where_a_ticket_would_be_seen(path: Path) -> None:
+    elsewhere = path.with_name("elsewhere")
+    elsewhere.write_text("")
+    os.symlink(elsewhere, path.with_name(".ticket.new"))
+    with pytest.raises(OSError, match="symbolic link"), TicketFile(path):
+        pass
