@@ -119,8 +119,22 @@ impl Client {
         let mut service = RoomServiceClient::new(self.channel());
         let request = v1::GetRoomRequest {
             room_id: room_id.into(),
+            join_code: String::new(),
         };
         let response = service.get_room(request).await?.into_inner();
+        response.room.ok_or_else(|| Error::incomplete("room"))
+    }
+
+    /// Gives back a seat before the game begins: others can take it, and its ticket opens nothing any more.
+    ///
+    /// # Errors
+    /// `TICKET_UNKNOWN`, `GAME_STARTED` or `GAME_OVER`.
+    pub async fn leave_room(&self, ticket: impl Into<String>) -> Result<v1::Room, Error> {
+        let mut service = RoomServiceClient::new(self.channel());
+        let request = v1::LeaveRoomRequest {
+            ticket: ticket.into(),
+        };
+        let response = service.leave_room(request).await?.into_inner();
         response.room.ok_or_else(|| Error::incomplete("room"))
     }
 

@@ -41,6 +41,7 @@ impl Client {
     ) -> Result<v1::Tournament, Error> {
         let request = v1::GetTournamentRequest {
             tournament_id: tournament_id.into(),
+            join_code: String::new(),
         };
         let response = service(self).get_tournament(request).await?.into_inner();
         one(response.tournament)

@@ -1,7 +1,7 @@
 // How the page is built (into dist/, which the server embeds), served while it is worked on, and tested.
 
 import { readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
-import { join } from "node:path";
+import { join, resolve } from "node:path";
 import { fileURLToPath } from "node:url";
 import { constants, gzipSync } from "node:zlib";
 import type { Plugin } from "vite";
@@ -22,7 +22,7 @@ function packed(): Plugin {
     name: "chefshat-packed",
     apply: "build",
     configResolved(config) {
-      dist = join(config.root, config.build.outDir);
+      dist = resolve(config.root, config.build.outDir);
     },
     generateBundle() {
       for (const old of ["assets", "index.html", "index.html.gz"])

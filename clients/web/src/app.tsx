@@ -23,6 +23,7 @@ const pages: Pages = {
   watch: async () => (await import("./table/WatchPage")).WatchPage,
   replay: async () => (await import("./replay/ReplayPage")).ReplayPage,
   tournaments: async () => (await import("./tournaments/TournamentsPage")).TournamentsPage,
+  newTournament: async () => (await import("./tournaments/NewTournament")).NewTournament,
   tournament: async () => (await import("./tournaments/TournamentPage")).TournamentPage,
   leaderboard: async () => (await import("./people/LeaderboardPage")).LeaderboardPage,
   person: async () => (await import("./people/PersonPage")).PersonPage,

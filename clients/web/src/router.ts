@@ -12,6 +12,7 @@ export type Route =
   | { page: "watch"; roomId: string }
   | { page: "replay"; gameId: string }
   | { page: "tournaments" }
+  | { page: "newTournament" }
   | { page: "tournament"; tournamentId: string }
   | { page: "leaderboard" }
   | { page: "person"; name: string }
@@ -51,7 +52,7 @@ export function routeOf(path: string): Route {
     case "replay":
       return { page: "replay", gameId: second };
     case "tournaments":
-      return { page: "tournament", tournamentId: second };
+      return second === "new" ? { page: "newTournament" } : { page: "tournament", tournamentId: second };
     case "people":
       return { page: "person", name: second };
     default:
@@ -72,6 +73,8 @@ export function pathOf(route: Route): string {
       return `/watch/${encodeURIComponent(route.roomId)}`;
     case "replay":
       return `/replay/${encodeURIComponent(route.gameId)}`;
+    case "newTournament":
+      return "/tournaments/new";
     case "tournament":
       return `/tournaments/${encodeURIComponent(route.tournamentId)}`;
     case "person":

@@ -13,6 +13,16 @@ export function recall(name: string): string | null {
   }
 }
 
+/** What `take` makes of the JSON object kept under a name, or null: another version may have kept another. */
+export function recallObject<T>(name: string, take: (kept: Record<string, unknown>) => T | null): T | null {
+  try {
+    const kept: unknown = JSON.parse(recall(name) ?? "null");
+    return typeof kept === "object" && kept !== null ? take({ ...kept }) : null;
+  } catch {
+    return null;
+  }
+}
+
 /** Keeps a value under a name; null forgets it. */
 export function remember(name: string, value: string | null): void {
   if (value === null) fallback.delete(name);

@@ -1,14 +1,12 @@
-// Lists: all pages are asked for, up to a bound; what of the log is said; which seats the links of a study are for.
+// Lists: all pages are asked for, up to a bound; which seats the links of a study are for.
 
 import { create } from "@bufbuild/protobuf";
 import { beforeAll, expect, test } from "vitest";
-import { allPages } from "../src/api/pages";
+import { type AskPage, allPages, countWords, firstOf } from "../src/api/pages";
 import { freeForPeople, placed } from "../src/experiment/places";
 import { AnswerResultSchema, AnswerStatus } from "../src/gen/chefshat/v1/decision_pb";
 import { ParticipantKind, ParticipantSchema } from "../src/gen/chefshat/v1/room_pb";
 import { setLanguage } from "../src/i18n";
-import { worthSaying } from "../src/table/model/log";
-import type { Happening, LogLine } from "../src/table/model/state";
 import { answerWords } from "../src/table/words";
 
 beforeAll(() => setLanguage("en"));
@@ -27,19 +25,32 @@ test.each([
   expect(await allPages(ask, most)).toEqual(expected);
 });
 
-test("a connection that comes and goes takes one line, and expressions can be left out", () => {
-  const happenings: Happening[] = [
-    { kind: "lost", seat: 1 },
-    { kind: "back", seat: 1 },
-    { kind: "expressed", seat: 2, label: "joy" },
-    { kind: "lost", seat: 1 },
-    { kind: "lost", seat: 0 },
-    { kind: "back", seat: 1 },
-  ];
-  const log: LogLine[] = happenings.map((happening, sequence) => ({ sequence, happening }));
-  const sequences = (expressions: boolean) => worthSaying(log, expressions).map(({ sequence }) => sequence);
-  expect(sequences(true)).toEqual([1, 2, 3, 4, 5]);
-  expect(sequences(false)).toEqual([3, 4, 5]);
+test.each([
+  [1, [0], true, 1],
+  [3, [0, 1, 2], true, 2],
+  [4, [0, 1, 2, 3], true, 3],
+  [5, [0, 1, 2, 3, 4], false, 3],
+  [12, [0, 1, 2, 3, 4], false, 3],
+])(
+  "of five things in pages of two the first %i are shown, and no page is asked for that is not needed",
+  async (count, items, more, asked) => {
+    const tokens: string[] = [];
+    const ask: AskPage<number> = async ({ pageSize, pageToken }) => {
+      tokens.push(pageToken);
+      const from = Number(pageToken);
+      const size = Math.min(pageSize, 2);
+      return {
+        items: [0, 1, 2, 3, 4].slice(from, from + size),
+        nextPageToken: from + size < 5 ? String(from + size) : "",
+      };
+    };
+    expect(await firstOf(ask, count, new AbortController().signal)).toEqual({ items, more });
+    expect(tokens.length).toBe(asked);
+  },
+);
+
+test("what is not counted to its end says so", () => {
+  expect([countWords(12, true), countWords(12, false)]).toEqual(["12+", "12"]);
 });
 
 test("links are for seats that people can take, and stay with those who have sat down", () => {

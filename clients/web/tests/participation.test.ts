@@ -49,7 +49,7 @@ test("a room is asked for until it is there, over the one stream", async () => {
   const room = create(GetRoomResponseSchema, { room: { roomId: "room1" } });
   const ask = vi.spyOn(roomApi, "getRoom").mockRejectedValueOnce(away).mockRejectedValueOnce(away);
   ask.mockResolvedValue(room);
-  const part = startParticipation("ticket");
+  const part = startParticipation("ticket", false);
   await vi.advanceTimersByTimeAsync(10_000);
   expect(ask).toHaveBeenCalledTimes(3);
   expect(watch).toHaveBeenCalledTimes(1);
@@ -64,7 +64,7 @@ test("who has been superseded asks no more and does not take the place back", as
     [5_000, superseded],
   ]);
   const ask = vi.spyOn(roomApi, "getRoom").mockRejectedValue(away);
-  const part = startParticipation("ticket");
+  const part = startParticipation("ticket", false);
   await vi.advanceTimersByTimeAsync(5_000);
   expect(part.presence.value).toBe("superseded");
   const asked = ask.mock.calls.length;
@@ -82,7 +82,7 @@ test("a room that is gone is not asked for again", async () => {
     [0, seated],
   ]);
   const ask = vi.spyOn(roomApi, "getRoom").mockRejectedValue(new ConnectError("gone", Code.NotFound));
-  const part = startParticipation("ticket");
+  const part = startParticipation("ticket", false);
   await vi.advanceTimersByTimeAsync(10_000);
   expect(ask).toHaveBeenCalledTimes(1);
   expect(part.game.value).toBeUndefined();

@@ -3,8 +3,15 @@
 import { create } from "@bufbuild/protobuf";
 import { expect, test } from "vitest";
 import { RecordSummarySchema } from "../src/gen/chefshat/v1/record_service_pb";
-import { ParticipantKind, RoomState } from "../src/gen/chefshat/v1/room_pb";
-import { ownGame, sum } from "../src/people/games";
+import {
+  GameOrigin,
+  type Participant,
+  ParticipantKind,
+  RecordedPlayerSchema,
+  RoomState,
+} from "../src/gen/chefshat/v1/room_pb";
+import { setLanguage } from "../src/i18n";
+import { ownGame, sum, unratedBecause } from "../src/people/games";
 import { ratingRange, ratingWords } from "../src/people/rating";
 
 /** A game of Rosa, two built-in agents called greedy, and somebody who took the agent's name. */
@@ -41,8 +48,37 @@ test("games without a result do not count", () => {
   expect(sum([])).toEqual({ games: 0, wins: 0, meanPlace: 0 });
 });
 
-test("a rating is said with how far it may be off", () => {
+test("a rating is said with how far it may be off, in the digits of the language", async () => {
   const rating = { mean: 30, deviation: 2.5, games: 7 } as Parameters<typeof ratingWords>[0];
   expect(ratingWords(rating)).toBe("30.0 ± 4.9");
+  await setLanguage("it");
+  expect(ratingWords(rating)).toBe("30,0 ± 4,9");
+  await setLanguage("en");
   expect(ratingRange(rating)).toEqual({ from: 25.1, to: 34.9 });
+});
+
+test("a game that counts for no rating says why", () => {
+  const rated = create(RecordSummarySchema, {
+    state: RoomState.FINISHED,
+    origin: GameOrigin.DEALT,
+    seats: [
+      { seat: 0, builtInAgent: "greedy", name: "greedy" },
+      { seat: 1, name: "Rosa", kind: ParticipantKind.HUMAN },
+      { seat: 2, name: "Rosa", kind: ParticipantKind.AGENT },
+      { seat: 3, name: "greedy", kind: ParticipantKind.AGENT },
+    ],
+  });
+  expect(unratedBecause(rated)).toBeNull();
+  const changed = (fields: Partial<typeof rated>) => unratedBecause({ ...rated, ...fields });
+  const seatsWith = (seat: number, fields: Partial<Participant>) =>
+    rated.seats.map((one) => (one.seat === seat ? { ...one, ...fields } : one));
+  const why = [
+    changed({ substituted: true }),
+    changed({ added: true }),
+    changed({ origin: GameOrigin.FIXED_SEED }),
+    changed({ seats: seatsWith(2, { kind: ParticipantKind.HUMAN }) }),
+    changed({ seats: seatsWith(0, { replay: create(RecordedPlayerSchema, { gameId: "g" }) }) }),
+    changed({ state: RoomState.ABORTED }),
+  ];
+  expect(why).toEqual(["substituted", "added", "notDealt", "twice", "recorded", null]);
 });

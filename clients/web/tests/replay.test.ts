@@ -3,15 +3,21 @@
 import { expect, test } from "vitest";
 import { DecisionKind } from "../src/gen/chefshat/v1/decision_pb";
 import { decidingFor, seenWith } from "../src/replay/eyes";
-import { filmOf } from "../src/replay/frames";
+import { type Film, type Frame, filmOf } from "../src/replay/frames";
 import { legalActions } from "../src/table/model/actions";
+import { applyEvent } from "../src/table/model/reduce";
 import { RECORDS, recorded } from "./record";
+
+/** All moments of a film, in order. */
+function framesOf(film: Film): Frame[] {
+  return Array.from({ length: film.length }, (_, number) => film.at(number));
+}
 
 test.each(RECORDS)("%s: every decision is open once, at a table where it is that seat's turn", (name) => {
   const lines = recorded(name);
   const film = filmOf(lines);
   const taken = lines.filter(({ line }) => line.case === "decision").length;
-  const open = film.frames.filter((frame) => frame.open);
+  const open = framesOf(film).filter((frame) => frame.open);
   expect(film.decisions).toBe(taken);
   expect(open.map((frame) => frame.open)).toEqual(
     lines.flatMap(({ line }) => (line.case === "decision" ? [line.value] : [])),
@@ -22,11 +28,11 @@ test.each(RECORDS)("%s: every decision is open once, at a table where it is that
     if (kind === DecisionKind.TURN && frame.table.turn > 1) expect(frame.table.next).toBe(seat);
   }
   expect(film.shifts.length).toBeGreaterThan(1);
-  expect(film.frames.at(-1)?.table.phase).toBe("gameOver");
+  expect(film.at(film.length - 1).table.phase).toBe("gameOver");
 });
 
 test.each(RECORDS)("%s: eyes see their own hand and no other, and no gift between others", (name) => {
-  for (const frame of filmOf(recorded(name)).frames) {
+  for (const frame of framesOf(filmOf(recorded(name)))) {
     for (const eyes of [0, 1, "none"] as const) {
       const { seats, log } = seenWith(frame.table, eyes);
       for (const { seat, hand, received } of seats) {
@@ -44,3 +50,33 @@ test.each(RECORDS)("%s: eyes see their own hand and no other, and no gift betwee
     }
   }
 });
+
+test.each(RECORDS)(
+  "%s: whichever moment is looked at after which, its table is that of all events from the beginning",
+  (name) => {
+    const lines = recorded(name);
+    // Every table is kept, so that each is what the one before and its event make.
+    const film = filmOf(lines, 1);
+    const events = lines.flatMap(({ line }) => (line.case === "event" ? [line.value] : []));
+    let table = events.slice(0, 1).reduce(applyEvent, film.at(0).table);
+    const tables = Array.from({ length: film.length }, (_, number) => {
+      table = events
+        .filter(({ sequence }) => Number(sequence) < film.at(number).table.nextSequence)
+        .reduce(applyEvent, table);
+      return table;
+    });
+    expect(tables.at(-1)?.nextSequence).toBe(Number(events.at(-1)?.sequence) + 1);
+    for (const keptEvery of [2, 7, 200, 100_000]) {
+      const sparse = filmOf(lines, keptEvery);
+      expect(sparse.length).toBe(film.length);
+      // To and fro through all of them: 101 is a prime and divides neither length.
+      for (let step = 0; step < sparse.length; step += 1) {
+        const number = (step * 101) % sparse.length;
+        const frame = sparse.at(number);
+        expect(frame.table).toEqual(tables[number]);
+        expect(frame.open).toBe(film.at(number).open);
+        expect(frame.decisions).toBe(film.at(number).decisions);
+      }
+    }
+  },
+);

@@ -5,16 +5,8 @@ import { expect, test } from "vitest";
 import { ParticipantKind } from "../src/gen/chefshat/v1/room_pb";
 import { CreateRoomRequestSchema } from "../src/gen/chefshat/v1/room_service_pb";
 import { Opening, PassScope, RuleSetSchema } from "../src/gen/chefshat/v1/rules_pb";
-import {
-  MAX_NAME,
-  newForm,
-  quickGame,
-  type RoomForm,
-  requestOf,
-  unreadable,
-  withPlayers,
-  withPreset,
-} from "../src/lobby/room-form";
+import { gameProblems, withPreset } from "../src/lobby/game-form";
+import { MAX_NAME, newForm, quickGame, type RoomForm, requestOf, withPlayers } from "../src/lobby/room-form";
 
 const AGENTS = ["random", "greedy", "trained"];
 const form = (changed: Partial<RoomForm> = {}): RoomForm => ({ ...newForm(AGENTS), ...changed });
@@ -34,6 +26,7 @@ test("a new form seats a person against the strongest agents there are", () => {
 test("clocks are asked for in milliseconds, own ones with a comma as well", () => {
   const own = asked({ clock: "own", decisionSeconds: "2,5", bankSeconds: "30", paceSeconds: "0.25" }).policy;
   expect([own?.decisionTimeMs, own?.bankMs, own?.paceMs]).toEqual([2500, 30_000, 250]);
+  expect(asked({ spectators: false, spectatorDelay: "soon" }).policy?.spectatorDelayDecisions).toBe(0);
   const relaxed = asked({ clock: "relaxed", decisionSeconds: "nonsense" }).policy;
   expect([relaxed?.decisionTimeMs, relaxed?.bankMs]).toEqual([60_000, 300_000]);
 });
@@ -59,7 +52,7 @@ test("a preset fills every field that it has", () => {
     maxIdlePizzas: 4,
     maxTurns: 500,
   });
-  const rules = asked(withPreset(form(), preset)).rules;
+  const rules = asked(withPreset(form(), preset, 4)).rules;
   expect(rules).toEqual(preset);
 });
 
@@ -71,15 +64,32 @@ test("other numbers of seats keep the first ones and forget points that no longe
   expect(withPlayers(form(), 2).seats).toEqual(form().seats.slice(0, 2));
 });
 
-test.each<[Partial<RoomForm>, string[]]>([
-  [{}, []],
-  [{ faces: "many", target: "-1" }, ["faces", "target"]],
-  [{ clock: "own", decisionSeconds: "" }, ["decisionSeconds"]],
-  [{ clock: "relaxed", decisionSeconds: "" }, []],
-  [{ points: "5, three" }, ["points"]],
-  [{ paceSeconds: "1.2.3" }, ["paceSeconds"]],
-])("of %j the fields %j are not understood", (changed, fields) => {
-  expect(unreadable(form(changed))).toEqual(fields);
+test.each<[Partial<RoomForm>, object]>([
+  [{}, {}],
+  [
+    { faces: "many", target: "-1", jokers: "1.5", maxTimeouts: "0", points: "5, 3, banana, 0" },
+    {
+      faces: "notANumber",
+      target: { bounds: [1, 4_294_967_295] },
+      jokers: "notWhole",
+      maxTimeouts: { bounds: [1, 1000] },
+      points: "notPoints",
+    },
+  ],
+  [{ faces: "99" }, { faces: { bounds: [4, 15] } }],
+  [{ clock: "own", decisionSeconds: "" }, { decisionSeconds: "notANumber" }],
+  [{ clock: "own", bankSeconds: "-1" }, { bankSeconds: { bounds: [0, 86_400] } }],
+  [{ clock: "relaxed", decisionSeconds: "" }, {}],
+  [{ points: "5, 3, -1, 0" }, { points: "notPoints" }],
+  [{ points: "5, 3, 1" }, { points: { places: 4 } }],
+  [{ points: "5, 3, 4, 0" }, { points: "rising" }],
+  [{ points: "0 0 0 0" }, { points: "rising" }],
+  [{ points: " 3, 2;1 0 " }, {}],
+  [{ paceSeconds: "1.2.3" }, { paceSeconds: "notANumber" }],
+  [{ paceSeconds: "61" }, { paceSeconds: { bounds: [0, 60] } }],
+  [{ spectators: false, spectatorDelay: "soon" }, {}],
+])("of %j is wrong, all at once: %j", (changed, problems) => {
+  expect(gameProblems(form(changed), 4)).toEqual(problems);
 });
 
 test("the name of a quick game is as long as names may be", () => {

@@ -12,6 +12,7 @@ const ROUTES: [string, Route][] = [
   ["/watch/0123", { page: "watch", roomId: "0123" }],
   ["/replay/4567", { page: "replay", gameId: "4567" }],
   ["/tournaments", { page: "tournaments" }],
+  ["/tournaments/new", { page: "newTournament" }],
   ["/tournaments/89ab", { page: "tournament", tournamentId: "89ab" }],
   ["/leaderboard", { page: "leaderboard" }],
   ["/people/Dr.%20R%C3%B6sa%2FII", { page: "person", name: "Dr. Rösa/II" }],

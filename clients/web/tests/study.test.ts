@@ -3,6 +3,8 @@
 import { expect, test } from "vitest";
 import {
   filledIn,
+  finishedBy,
+  finishedIn,
   holderOf,
   languageOf,
   questionnaire,
@@ -12,7 +14,8 @@ import {
   studyIn,
   studyOf,
 } from "../src/experiment/study";
-import { forgetAll } from "../src/store";
+import { leaveSeat } from "../src/lobby/seat";
+import { forgetAll, remember } from "../src/store";
 import { asksForTimes } from "../src/table/acting";
 
 const full: Study = {
@@ -64,8 +67,12 @@ test.each([
   expect(languageOf(search)).toBe(expected);
 });
 
-test("name and room are filled into the address of a questionnaire, well encoded", () => {
-  expect(filledIn(full.after, "Rosa & Ben", "01ab")).toBe("https://forms.example/after?id=Rosa%20%26%20Ben&room=01ab");
+test.each([
+  [full.after, { name: "Rosa & Ben", room: "01ab" }, "https://forms.example/after?id=Rosa%20%26%20Ben&room=01ab"],
+  ["https://a.example/{tournament}/{name}", { name: "P07", tournament: "89cd" }, "https://a.example/89cd/P07"],
+  ["https://a.example/{tournament}/{room}?{name}", { name: "" }, "https://a.example//?"],
+])("into %j is filled what is known, well encoded (%#)", (address, blanks, expected) => {
+  expect(filledIn(address, blanks)).toBe(expected);
 });
 
 test("a study is kept with its room, and times are sent only where it asks for them", () => {
@@ -84,4 +91,23 @@ test.each([
   [{ ...full, name: "" }, "unclear"],
 ] as const)("whose the seat is that P07 took on this device (%#)", (study, holder) => {
   expect(holderOf(study, "P07")).toBe(holder);
+});
+
+test("of a study that is over the questionnaire is kept for the link that led to it, until everything is forgotten", () => {
+  remember("code.BCDF2345", "room");
+  for (const name of ["P07", "P08"]) {
+    rememberStudy("room", { ...full, name });
+    leaveSeat("room");
+    remember("code.BCDF2345", "room");
+  }
+  rememberStudy("room", { ...full, name: "P09", after: "" });
+  leaveSeat("room");
+  expect(studyIn("room")).toBeNull();
+  const one = { name: "P08", roomId: "room", after: full.after };
+  expect(finishedBy("BCDF2345", "P08")).toEqual([one]);
+  expect(finishedBy("BCDF2345", "").length).toBe(2);
+  expect(finishedIn("room").length).toBe(2);
+  expect([finishedBy("BCDF2345", "P09"), finishedBy("ZZZZ2345", "P08"), finishedIn("other")]).toEqual([[], [], []]);
+  forgetAll();
+  expect(finishedIn("room")).toEqual([]);
 });

@@ -8,6 +8,7 @@ import { DetachReason, type SeatUpdate, SeatUpdateSchema } from "../src/gen/chef
 import { ParticipantKind } from "../src/gen/chefshat/v1/room_pb";
 import { Role } from "../src/gen/chefshat/v1/rules_pb";
 import { maskOf } from "../src/table/model/actions";
+import { giftOf } from "../src/table/model/demand";
 import { applyUpdate, type LiveState, startLive } from "../src/table/model/live";
 import { legalMoves } from "../src/table/model/picking";
 import { emptyTable } from "../src/table/model/state";
@@ -23,7 +24,7 @@ const told = (live: LiveState, ...updates: Init[]) => {
 const PASS = 199;
 const OWN = 0;
 const start = () => told(startLive(firstTable("Rosa")), { case: "attached", value: { seat: OWN } });
-const decision = (id: bigint, kind = DecisionKind.TURN): Init => ({
+const decision = (id: bigint, kind = DecisionKind.TURN, gave = new Uint8Array()): Init => ({
   case: "decision",
   value: {
     decisionId: id,
@@ -43,6 +44,7 @@ const decision = (id: bigint, kind = DecisionKind.TURN): Init => ({
       roles: Uint8Array.of(1, 2, 4, 5),
       points: [5n, 3n, 1n, 0n],
       played: new Uint8Array(12),
+      gave,
     },
   },
 });
@@ -92,6 +94,22 @@ describe("an open decision", () => {
     const giving = told(start(), decision(8n, DecisionKind.EXCHANGE));
     expect(giving.decision?.hand).toHaveLength(4);
     expect(giving.table.seats[OWN]?.hand).toHaveLength(9);
+  });
+
+  test("says which card of how many the Chef gives, unless the hand is so small that the other may have less to give", () => {
+    const table = open.table;
+    const hand = open.decision?.hand ?? [];
+    expect(giftOf(table, OWN, { hand, given: 0 })).toEqual({ number: 1, of: 2 });
+    expect(giftOf(table, OWN, { hand: hand.slice(1), given: 1 })).toEqual({ number: 2, of: 2 });
+    expect(giftOf(table, OWN, { hand: hand.slice(1), given: 0 })).toBeUndefined();
+    // The Sous-Chef gives one.
+    expect(giftOf(table, 1, { hand, given: 0 })).toBeUndefined();
+  });
+
+  test("of an exchange knows what has been given, a turn does not", () => {
+    const gave = (kind: DecisionKind) => decision(8n, kind, Uint8Array.of(0, 1));
+    expect(told(start(), gave(DecisionKind.EXCHANGE)).decision?.given).toBe(1);
+    expect(told(start(), gave(DecisionKind.TURN)).decision?.given).toBe(0);
   });
 });
 

@@ -156,6 +156,13 @@ impl RoomService for Rooms {
         answer
     }
 
+    async fn leave_room(
+        &self,
+        request: Request<v1::LeaveRoomRequest>,
+    ) -> Result<Response<v1::LeaveRoomResponse>, Status> {
+        self.server.clone().leave_room(request.into_inner()).await
+    }
+
     async fn close_room(
         &self,
         request: Request<v1::CloseRoomRequest>,

@@ -9,7 +9,7 @@ use tonic::{Code, Request, Response, Status};
 use super::new_room::new_room;
 use super::pages;
 use super::recorded::Recorded;
-use super::status::{self, Refusal, field, room_unknown};
+use super::status::{self, Refusal, field, room_unknown, ticket_unknown};
 use crate::convert;
 use crate::ids::{Id, Token};
 use crate::room::{Handle, JoinRequest};
@@ -34,6 +34,18 @@ impl RoomCalls {
 
     fn find(&self, room_id: &str) -> Result<Handle, Status> {
         find(&self.rooms, room_id)
+    }
+
+    /// The room of a join code; where an id is given too, it must be this room's.
+    fn find_by_code(&self, room_id: &str, join_code: &str) -> Result<Handle, Status> {
+        if room_id.is_empty() {
+            return self.rooms.by_code(join_code).ok_or_else(join_code_wrong);
+        }
+        let handle = self.find(room_id)?;
+        match self.rooms.code_is(handle.id(), join_code) {
+            true => Ok(handle),
+            false => Err(join_code_wrong()),
+        }
     }
 }
 
@@ -64,7 +76,11 @@ impl RoomService for RoomCalls {
         &self,
         request: Request<v1::GetRoomRequest>,
     ) -> Result<Response<v1::GetRoomResponse>, Status> {
-        let handle = self.find(&request.into_inner().room_id)?;
+        let request = request.into_inner();
+        let handle = match request.join_code.as_str() {
+            "" => self.find(&request.room_id)?,
+            code => self.find_by_code(&request.room_id, code)?,
+        };
         let room = handle.describe().await.map_err(Refusal::from)?;
         Ok(Response::new(v1::GetRoomResponse { room: Some(room) }))
     }
@@ -112,29 +128,12 @@ impl RoomService for RoomCalls {
         if self.rooms.is_shutting_down() {
             return Err(status::shutting_down());
         }
-        let handle = if request.room_id.is_empty() {
-            self.rooms
-                .by_code(&request.join_code)
-                .ok_or_else(join_code_wrong)?
-        } else {
-            let handle = self.find(&request.room_id)?;
-            if !self.rooms.code_is(handle.id(), &request.join_code) {
-                return Err(join_code_wrong());
-            }
-            handle
-        };
+        let handle = self.find_by_code(&request.room_id, &request.join_code)?;
         let kind = convert::kind_from_proto("kind", request.kind)
             .map_err(|problem| field("KIND_REFUSED", &problem))?
             .unwrap_or(ParticipantKind::Agent);
-        // Says which room it is: who has its code can ask for it without a name, and look at the seats before choosing one.
-        let name = convert::name_to_show("name", &request.name, 1).map_err(|problem| {
-            let metadata = [
-                ("field", problem.field),
-                ("room_id", &handle.id().to_string()),
-            ];
-            let words = problem.to_string();
-            status::status(Code::InvalidArgument, "NAME_REFUSED", words, metadata)
-        })?;
+        let name = convert::name_to_show("name", &request.name, 1)
+            .map_err(|problem| field("NAME_REFUSED", &problem))?;
         let joined = handle
             .join(JoinRequest {
                 name,
@@ -149,6 +148,17 @@ impl RoomService for RoomCalls {
             seat: seat_number(joined.seat),
             ticket: joined.ticket.word(),
         }))
+    }
+
+    async fn leave_room(
+        &self,
+        request: Request<v1::LeaveRoomRequest>,
+    ) -> Result<Response<v1::LeaveRoomResponse>, Status> {
+        let ticket = Token::parse(&request.into_inner().ticket).ok_or_else(ticket_unknown)?;
+        let handle = self.rooms.get(ticket.room).ok_or_else(ticket_unknown)?;
+        let left = handle.leave(ticket.secret).await.map_err(Refusal::from)?;
+        let room = left.ok_or_else(ticket_unknown)?.map_err(Refusal::from)?;
+        Ok(Response::new(v1::LeaveRoomResponse { room: Some(room) }))
     }
 
     async fn close_room(

@@ -8,7 +8,7 @@ use chefshat_records::convert::FieldProblem;
 use tonic::{Code, Status};
 use tonic_types::{ErrorDetails, StatusExt as _};
 
-use crate::room::core::{ExpressError, JoinError};
+use crate::room::core::{ExpressError, JoinError, LeaveError};
 use crate::room::{RoomGone, SpectateError};
 use crate::rooms::CreateError;
 
@@ -175,6 +175,21 @@ impl From<JoinError> for Refusal {
             JoinError::GameOver => (Code::FailedPrecondition, "GAME_OVER"),
         };
         Self(status(code, reason, error.to_string(), []))
+    }
+}
+
+impl From<LeaveError> for Refusal {
+    fn from(error: LeaveError) -> Self {
+        let reason = match error {
+            LeaveError::GameStarted => "GAME_STARTED",
+            LeaveError::GameOver => "GAME_OVER",
+        };
+        Self(status(
+            Code::FailedPrecondition,
+            reason,
+            error.to_string(),
+            [],
+        ))
     }
 }
 

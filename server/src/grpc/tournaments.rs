@@ -63,6 +63,23 @@ impl TournamentCalls {
         (Id::parse(id).and_then(|id| self.tournaments.get(id))).ok_or_else(unknown)
     }
 
+    /// The tournament of a join code; where an id is given too, it must be this tournament's.
+    fn find_by_code(&self, id: &str, join_code: &str) -> Result<Arc<Hosted>, Status> {
+        let hosted = match id {
+            "" => self.tournaments.by_code(join_code),
+            id => Some(self.find(id)?)
+                .filter(|hosted| crate::ids::normal_code(join_code) == hosted.join_code()),
+        };
+        hosted.ok_or_else(|| {
+            status(
+                Code::PermissionDenied,
+                "JOIN_CODE_WRONG",
+                "no tournament here has this join code; ask its owner for it",
+                [("field", "join_code")],
+            )
+        })
+    }
+
     fn find_own(&self, id: &str, owner_token: &str) -> Result<Arc<Hosted>, Status> {
         let hosted = self.find(id)?;
         if hosted.is_owner(owner_token) {
@@ -114,7 +131,11 @@ impl TournamentService for TournamentCalls {
         &self,
         request: Request<v1::GetTournamentRequest>,
     ) -> Result<Response<v1::GetTournamentResponse>, Status> {
-        let hosted = self.find(&request.into_inner().tournament_id)?;
+        let request = request.into_inner();
+        let hosted = match request.join_code.as_str() {
+            "" => self.find(&request.tournament_id)?,
+            code => self.find_by_code(&request.tournament_id, code)?,
+        };
         let tournament = Some(hosted.describe());
         Ok(Response::new(v1::GetTournamentResponse { tournament }))
     }
@@ -152,28 +173,9 @@ impl TournamentService for TournamentCalls {
         let kind = convert::kind_from_proto("kind", request.kind)
             .map_err(|problem| field("KIND_REFUSED", &problem))?
             .unwrap_or(ParticipantKind::Agent);
-        let hosted = match request.tournament_id.as_str() {
-            "" => self.tournaments.by_code(&request.join_code),
-            id => Some(self.find(id)?)
-                .filter(|hosted| crate::ids::normal_code(&request.join_code) == hosted.join_code()),
-        };
-        let hosted = hosted.ok_or_else(|| {
-            status(
-                Code::PermissionDenied,
-                "JOIN_CODE_WRONG",
-                "no tournament here has this join code; ask its owner for it",
-                [("field", "join_code")],
-            )
-        })?;
-        // As in a room: who has the code can ask for the tournament without a name.
-        let name = convert::name_to_show("name", &request.name, 1).map_err(|problem| {
-            let metadata = [
-                ("field", problem.field),
-                ("tournament_id", &hosted.id().to_string()),
-            ];
-            let words = problem.to_string();
-            status(Code::InvalidArgument, "NAME_REFUSED", words, metadata)
-        })?;
+        let hosted = self.find_by_code(&request.tournament_id, &request.join_code)?;
+        let name = convert::name_to_show("name", &request.name, 1)
+            .map_err(|problem| field("NAME_REFUSED", &problem))?;
         if !hosted.admits(kind) {
             return Err(status(
                 Code::FailedPrecondition,

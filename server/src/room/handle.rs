@@ -9,7 +9,7 @@ use chefshat_proto::v1::{self, SpectatorServiceWatchResponse};
 use tokio::sync::{mpsc, oneshot};
 use tokio::time::Instant;
 
-use super::core::{ConnectionId, ExpressError, JoinError};
+use super::core::{ConnectionId, ExpressError, JoinError, LeaveError};
 use super::delivery::Wishes;
 use crate::ids::{Id, Token};
 use crate::outbox::{OnSpace, Outbox};
@@ -137,6 +137,10 @@ pub(super) enum Message {
     ),
     Describe(oneshot::Sender<v1::Room>),
     Close([u8; 32], oneshot::Sender<Option<v1::Room>>),
+    Leave(
+        [u8; 32],
+        oneshot::Sender<Option<Result<v1::Room, LeaveError>>>,
+    ),
     Abort(AbortReason),
     PutDown,
     Space,
@@ -245,6 +249,17 @@ impl Handle {
     /// The room is gone.
     pub async fn describe(&self) -> Result<v1::Room, RoomGone> {
         self.ask(Message::Describe).await
+    }
+
+    /// Gives a seat back; `None` if the ticket is not of this room.
+    ///
+    /// # Errors
+    /// The room is gone, or (inside) why the seat cannot be given back.
+    pub async fn leave(
+        &self,
+        secret: [u8; 32],
+    ) -> Result<Option<Result<v1::Room, LeaveError>>, RoomGone> {
+        self.ask(|reply| Message::Leave(secret, reply)).await
     }
 
     /// Closes the room; `None` if the token is not its owner's.

@@ -1,8 +1,10 @@
 //! Who is let in, and what those who are not are told.
 
-use chefshat_proto::v1::{self, seat_update::Update};
-use chefshat_tests::{StreamSeat, TestServer, one_shift, room_of_four};
+use chefshat_proto::v1::{self, room_service_client::RoomServiceClient, seat_update::Update};
+use chefshat_tests::{StreamSeat, TestServer, attach_all, first_to_hear, one_shift, room_of_four};
 use tonic::Code;
+
+use crate::records::reason;
 
 fn join(code: &str) -> v1::JoinRoomRequest {
     v1::JoinRoomRequest {
@@ -148,4 +150,80 @@ async fn only_its_owner_closes_a_room() {
         Update::Detached(detached) => assert_eq!(detached.reason(), v1::DetachReason::GameOver),
         other => panic!("not detached, but {other:?}"),
     }
+}
+
+#[tokio::test]
+async fn who_was_given_a_code_can_look_before_joining() {
+    let server = TestServer::start().await;
+    let client = server.client().await;
+    let created = client
+        .create_room(v1::CreateRoomRequest::default())
+        .await
+        .expect("the room is made");
+    let room = created.room.expect("a room");
+    let mut service = RoomServiceClient::new(server.channel().await);
+    let mut look = async |room_id: &str, code: &str| {
+        let request = v1::GetRoomRequest {
+            room_id: room_id.into(),
+            join_code: code.into(),
+        };
+        let found = service.get_room(request).await;
+        found
+            .map(|found| found.into_inner().room.expect("a room").room_id)
+            .map_err(|status| (status.code(), reason(&status)))
+    };
+    let code = &created.join_code;
+    assert_eq!(
+        look("", &code.to_lowercase()).await,
+        Ok(room.room_id.clone())
+    );
+    assert_eq!(look(&room.room_id, code).await, Ok(room.room_id.clone()));
+    let wrong = Err((Code::PermissionDenied, "JOIN_CODE_WRONG".to_owned()));
+    assert_eq!(look("", "WRONG").await, wrong);
+    assert_eq!(look(&room.room_id, "WRONG").await, wrong);
+    let unknown = Err((Code::NotFound, "ROOM_UNKNOWN".to_owned()));
+    assert_eq!(look("", "").await, unknown);
+}
+
+#[tokio::test]
+async fn a_seat_can_be_given_back_until_the_game_begins() {
+    let server = TestServer::start().await;
+    let client = server.client().await;
+    let created = client
+        .create_room(v1::CreateRoomRequest::default())
+        .await
+        .expect("the room is made");
+    let mut tickets = Vec::new();
+    for _ in 0..4 {
+        let joined = client.join(join(&created.join_code)).await;
+        tickets.push(joined.expect("a seat is free").ticket);
+    }
+    // One that is attached is told; one that never was is not.
+    let mut attached = StreamSeat::attached(server.channel().await, &tickets[1]).await;
+    for seat in [1, 2] {
+        let room = client.leave_room(&*tickets[seat]).await.expect("it waits");
+        assert_eq!(room.seats[seat].name, "");
+        let error = client.leave_room(&*tickets[seat]).await;
+        assert_eq!(
+            error.expect_err("it has left").reason(),
+            Some("TICKET_UNKNOWN")
+        );
+    }
+    let Update::Detached(told) = attached.next().await else {
+        panic!("the stream still has the seat");
+    };
+    assert_eq!(told.reason(), v1::DetachReason::Requested);
+    for seat in [1, 2] {
+        let again = client.join(join(&created.join_code)).await;
+        let again = again.expect("the seat is free again");
+        assert_eq!(again.seat, u32::try_from(seat).expect("small"));
+        tickets[seat] = again.ticket;
+    }
+    let mut seats = attach_all(&server, &tickets).await;
+    let (_, to_play) = first_to_hear(&mut seats).await;
+    let error = client.leave_room(&*tickets[to_play]).await;
+    assert_eq!(
+        error.expect_err("it has begun").reason(),
+        Some("GAME_STARTED")
+    );
 }

@@ -88,7 +88,7 @@ async fn import(
     Ok(imported.record.expect("a summary"))
 }
 
-fn reason(status: &Status) -> String {
+pub(crate) fn reason(status: &Status) -> String {
     status
         .get_details_error_info()
         .map(|info| info.reason)

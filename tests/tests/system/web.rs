@@ -40,7 +40,10 @@ async fn a_seat_plays_over_grpc_web_on_the_same_port() {
     let mut rooms = RoomServiceClient::with_origin(web.clone(), origin.clone());
     let room_id = created.room.expect("a room").room_id;
     let room = rooms
-        .get_room(v1::GetRoomRequest { room_id })
+        .get_room(v1::GetRoomRequest {
+            room_id,
+            ..v1::GetRoomRequest::default()
+        })
         .await
         .expect("the server answers")
         .into_inner();

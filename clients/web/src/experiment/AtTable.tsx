@@ -1,12 +1,7 @@
-// A study at the table: what is left out is left out, and when the game is over the last questionnaire is offered.
+// A study at the table: when the game is over its last questionnaire is offered. What is left out is in hiding.ts.
 
-import { useEffect } from "preact/hooks";
-import { t } from "../i18n";
-import { Notice } from "../parts/Notice";
-import { setHidden } from "./hiding";
-import { QuestionnaireLink } from "./QuestionnaireLink";
-import { hostOf, studyIn } from "./study";
-import "./experiment.css";
+import { AfterStudy } from "./AfterStudy";
+import { studyIn } from "./study";
 
 interface AtTableProps {
   roomId: string;
@@ -17,22 +12,6 @@ interface AtTableProps {
 /** What a study adds to the banner of a table; nothing where this device takes part in none. */
 export function AtTable({ roomId, over }: AtTableProps) {
   const study = studyIn(roomId);
-  const hide = study?.hide.join(" ") ?? "";
-  useEffect(() => {
-    setHidden(study?.hide ?? []);
-    return () => setHidden([]);
-  }, [hide]);
   if (!study || !over) return null;
-  const words = t().experiment.after;
-  return (
-    <Notice kind="good">
-      <strong>{words.title}.</strong>{" "}
-      {study.after && (
-        <>
-          {words.text(hostOf(study.after))}{" "}
-          <QuestionnaireLink address={study.after} name={study.name} roomId={roomId} />
-        </>
-      )}
-    </Notice>
-  );
+  return <AfterStudy after={study.after} blanks={{ name: study.name, room: roomId }} />;
 }

@@ -1,27 +1,49 @@
-// The way of a study's participant to the table, one step after the other: what is agreed to, a questionnaire, the seat.
+// The way of a study's participant to the table or into the tournament, one step after the other: what is agreed to, a questionnaire, the
+// name. How the seat or place is taken is for the page of the invitation.
 
 import { useState } from "preact/hooks";
 import { inWords } from "../api/faults";
 import { t } from "../i18n";
 import { MAX_NAME } from "../lobby/room-form";
-import { lastName, takeSeat } from "../lobby/seat";
+import { lastName } from "../lobby/seat";
 import { Button } from "../parts/Button";
 import { TextField } from "../parts/Field";
 import { Notice } from "../parts/Notice";
-import { navigate } from "../router";
 import { remember } from "../store";
 import { QuestionnaireLink } from "./QuestionnaireLink";
-import { hostOf, languageOf, rememberStudy, type Study } from "./study";
+import { hostOf, rememberStudy, type Study } from "./study";
 import "./experiment.css";
+
+interface StudyJoinProps {
+  study: Study;
+  /** What it is that one comes into. */
+  what: "room" | "tournament";
+  /** Takes the seat, or the place in a tournament, under a name; gives the id of the room or tournament. */
+  take: (name: string) => Promise<string>;
+  /** Whether somebody there has a name that a participant chooses; the server says so of tournaments. */
+  isTaken?: (name: string) => boolean;
+  /** Goes there. */
+  arrive: (id: string) => void;
+}
 
 type Step = "consent" | "declined" | "before" | "seat";
 
 /** The page of an invitation to a study. */
-export function StudyJoin({ code, study }: { code: string; study: Study }) {
+export function StudyJoin(props: StudyJoinProps) {
+  const { study } = props;
   const words = t().experiment.join;
   const afterConsent: Step = study.before ? "before" : "seat";
   const [step, setStep] = useState<Step>(study.consent ? "consent" : afterConsent);
-  if (step === "declined") return <p class="sheet study">{words.declined}</p>;
+  if (step === "declined") {
+    return (
+      <section class="sheet study">
+        <p>{words.declined}</p>
+        <Button look="quiet" onClick={() => setStep("consent")}>
+          {words.reconsider}
+        </Button>
+      </section>
+    );
+  }
   return (
     <section class="sheet study">
       <h1>{words.title}</h1>
@@ -45,58 +67,59 @@ export function StudyJoin({ code, study }: { code: string; study: Study }) {
           <h2>{words.before}</h2>
           <p>{words.beforeText(hostOf(study.before))}</p>
           <p class="study-ways">
-            <QuestionnaireLink address={study.before} name={study.name} roomId="" />
+            <QuestionnaireLink address={study.before} blanks={{ name: study.name }} />
             <Button onClick={() => setStep("seat")}>{words.done}</Button>
           </p>
         </>
       )}
-      {step === "seat" && <TakeSeat code={code} study={study} />}
+      {step === "seat" && <Come {...props} />}
     </section>
   );
 }
 
-function TakeSeat({ code, study }: { code: string; study: Study }) {
+function Come({ study, what, take, isTaken, arrive }: StudyJoinProps) {
   const words = t().experiment.join;
   const [name, setName] = useState(study.name);
   const [missing, setMissing] = useState(false);
   const [busy, setBusy] = useState(false);
   const [fault, setFault] = useState("");
-  const sit = async (event: Event) => {
+  const taken = study.name === "" && (isTaken?.(name) ?? false);
+  const come = async (event: Event) => {
     event.preventDefault();
     setMissing(name.trim() === "");
-    if (name.trim() === "") return;
+    if (name.trim() === "" || taken) return;
     setBusy(true);
     setFault("");
     const before = lastName();
     try {
-      const room = await takeSeat(code, name, study.seat);
+      const id = await take(name);
       // The next one at this device is somebody else.
       remember("name", before === "" ? null : before);
-      rememberStudy(room.roomId, { ...study, name: name.trim() });
-      navigate({ page: "room", roomId: room.roomId }, { replace: true, search: languageOf(location.search) });
+      rememberStudy(id, { ...study, name: name.trim() });
+      arrive(id);
     } catch (thrown) {
       setFault(inWords(thrown));
       setBusy(false);
     }
   };
   return (
-    <form class="study" onSubmit={sit}>
+    <form class="study" onSubmit={come}>
       {study.name === "" && (
         <TextField
           label={t().lobby.join.name}
-          hint={t().lobby.join.nameHint}
+          hint={what === "room" ? t().lobby.join.nameHint : t().tournaments.join.nameHint}
           value={name}
           onText={setName}
           maxLength={MAX_NAME}
           autoComplete="off"
-          fault={missing ? t().lobby.join.nameMissing : undefined}
+          fault={taken ? t().lobby.join.nameTaken(name.trim()) : missing ? t().lobby.join.nameMissing : undefined}
         />
       )}
-      <p class="soft">{words.recorded}</p>
+      <p class="soft">{words.recorded[what]}</p>
       {study.times && <p class="soft">{words.timed}</p>}
       {fault && <Notice kind="fault">{fault}</Notice>}
       <Button look="main" type="submit" busy={busy}>
-        {words.sitDown}
+        {words.come[what]}
       </Button>
     </form>
   );

@@ -1,14 +1,17 @@
-// The form that makes links for the participants of a study, for whoever made the room. Nothing is sent anywhere: it only writes addresses.
+// The form that makes links for the participants of a study, for whoever made the room or the tournament. It only writes addresses; where each
+// participant is to play in a room of their own, OwnRooms.tsx makes those.
 
 import { useId, useState } from "preact/hooks";
 import { CALL_LIMIT_MS, roomApi } from "../api/client";
 import { usePolled } from "../api/poll";
+import type { Room } from "../gen/chefshat/v1/room_pb";
 import { type Language, languages, t } from "../i18n";
-import { CopyLine } from "../lobby/Invite";
-import { invitation } from "../lobby/seat";
 import { CheckField, Field, SelectField, TextField } from "../parts/Field";
 import { Notice } from "../parts/Notice";
-import { freeForPeople, placed } from "./places";
+import { LinkList } from "./LinkList";
+import { OwnRooms } from "./OwnRooms";
+import { MAX_PARTICIPANTS, participantsIn } from "./participants";
+import { freeForPeople, type Place, placed } from "./places";
 import { HIDEABLE, type Hideable, questionnaire, searchOf } from "./study";
 import "./experiment.css";
 
@@ -16,23 +19,33 @@ import "./experiment.css";
 const EVERY_MS = 5_000;
 
 interface StudyLinksProps {
-  roomId: string;
-  code: string;
+  /** The address that invites, to which each link adds what it fixes. */
+  address: string;
 }
 
-/** The form, folded away; the room's seats are asked for once it has been opened. */
-export function StudyLinks(props: StudyLinksProps) {
+/** The form, folded away: for a room, whose seats are asked for once it has been opened, or for a tournament. */
+export function StudyLinks({ address, roomId }: StudyLinksProps & { roomId?: string }) {
   const [opened, setOpened] = useState(false);
   return (
     <details class="study-links" onToggle={() => setOpened(true)}>
       <summary>{t().experiment.links.title}</summary>
-      {opened && <StudyForm {...props} />}
+      {opened && (roomId ? <RoomStudyForm roomId={roomId} address={address} /> : <StudyForm address={address} />)}
     </details>
   );
 }
 
-function StudyForm({ roomId, code }: StudyLinksProps) {
+function RoomStudyForm({ roomId, address }: StudyLinksProps & { roomId: string }) {
+  const ask = async (signal: AbortSignal) =>
+    (await roomApi.getRoom({ roomId }, { signal, timeoutMs: CALL_LIMIT_MS })).room ?? null;
+  const room = usePolled(ask, EVERY_MS, roomId).value;
+  return room ? <StudyForm address={address} room={room} /> : <p class="soft">{t().common.loading}</p>;
+}
+
+/** Where there are no seats to choose among, as in a tournament, none are given. */
+function StudyForm({ address, room }: StudyLinksProps & { room?: Room }) {
   const words = t().experiment.links;
+  const seats = room?.seats;
+  const [where, setWhere] = useState<"here" | "own">("here");
   const [names, setNames] = useState("");
   const [seat, setSeat] = useState("any");
   const [lang, setLang] = useState<Language | "">("");
@@ -42,49 +55,66 @@ function StudyForm({ roomId, code }: StudyLinksProps) {
   const [before, setBefore] = useState("");
   const [after, setAfter] = useState("");
   const group = useId();
-  const given = names.split("\n").flatMap((name) => name.trim() || []);
-  const ask = async (signal: AbortSignal) =>
-    (await roomApi.getRoom({ roomId }, { signal, timeoutMs: CALL_LIMIT_MS })).room?.seats ?? [];
-  const seats = usePolled(ask, EVERY_MS, roomId).value ?? [];
-  const free = freeForPeople(seats);
-  const places = placed(seats, given.length === 0 ? [""] : given, seat === "any" ? 0 : Number(seat));
-  const links = places.map(({ name, seat: own }) => ({
-    name,
-    address:
-      invitation(code) +
-      searchOf(
-        {
-          name,
-          seat: seat === "any" ? undefined : own,
-          times,
-          hide,
-          consent,
-          before: questionnaire(before),
-          after: questionnaire(after),
-        },
-        lang,
-      ),
-  }));
+  const given = participantsIn(names);
+  const tooMany = given.length > MAX_PARTICIPANTS;
+  const wanted = given.length === 0 ? [""] : given.slice(0, MAX_PARTICIPANTS);
+  const free = seats && freeForPeople(seats);
+  const places: Partial<Place>[] = seats
+    ? placed(seats, wanted, seat === "any" ? 0 : Number(seat))
+    : wanted.map((name) => ({ name }));
+  const linkTo = (name: string, to: string, own: number | undefined) => {
+    const study = {
+      name,
+      seat: seat === "any" ? undefined : own,
+      times,
+      hide,
+      consent,
+      before: questionnaire(before),
+      after: questionnaire(after),
+    };
+    const asked = searchOf(study, lang).slice(1);
+    return asked === "" ? to : `${to}${to.includes("?") ? "&" : "?"}${asked}`;
+  };
+  const links = places.map(({ name = "", seat: own }) => {
+    return { name, address: linkTo(name, address, own), roomId: room?.roomId ?? "" };
+  });
   const addressFault = (address: string) =>
     address !== "" && questionnaire(address) === "" ? words.notAnAddress : undefined;
   return (
     <div class="study">
-      <p class="soft">{words.text}</p>
-      <Field label={words.names} hint={words.namesHint}>
+      <p class="soft">{seats ? words.text : words.tournamentText}</p>
+      {room && (
+        <SelectField
+          label={words.where}
+          value={where}
+          options={[
+            { value: "here", label: words.here },
+            { value: "own", label: words.own.label },
+          ]}
+          onPick={setWhere}
+        />
+      )}
+      <Field
+        label={words.names}
+        hint={where === "own" ? words.own.namesHint : words.namesHint}
+        fault={tooMany ? words.tooManyNames(MAX_PARTICIPANTS) : undefined}
+      >
         {(joined) => (
           <textarea {...joined} rows={3} value={names} onInput={(event) => setNames(event.currentTarget.value)} />
         )}
       </Field>
       <div class="study-two">
-        <SelectField
-          label={words.seat}
-          value={seat}
-          options={[
-            { value: "any", label: words.anySeat },
-            ...free.map((number) => ({ value: String(number), label: String(number) })),
-          ]}
-          onPick={setSeat}
-        />
+        {free && (
+          <SelectField
+            label={where === "own" ? words.own.seat : words.seat}
+            value={seat}
+            options={[
+              { value: "any", label: words.anySeat },
+              ...free.map((number) => ({ value: String(number), label: String(number) })),
+            ]}
+            onPick={setSeat}
+          />
+        )}
         <SelectField
           label={words.language}
           value={lang}
@@ -107,7 +137,7 @@ function StudyForm({ roomId, code }: StudyLinksProps) {
         ))}
       </fieldset>
       <CheckField label={words.times} hint={words.timesHint} checked={times} onCheck={setTimes} />
-      <Field label={words.consent} hint={words.consentHint}>
+      <Field label={words.consent} hint={seats ? words.consentHint : words.consentTournamentHint}>
         {(joined) => (
           <textarea {...joined} rows={4} value={consent} onInput={(event) => setConsent(event.currentTarget.value)} />
         )}
@@ -121,16 +151,24 @@ function StudyForm({ roomId, code }: StudyLinksProps) {
       />
       <TextField
         label={words.after}
-        hint={words.afterHint}
+        hint={seats ? words.afterHint : words.afterTournamentHint}
         value={after}
         onText={setAfter}
         fault={addressFault(after)}
       />
-      <h3>{words.result}</h3>
-      {places.length < given.length && <Notice kind="hint">{words.tooMany(places.length)}</Notice>}
-      {links.map(({ name, address }) => (
-        <CopyLine key={name} label={name || words.everybody} text={address} />
-      ))}
+      {room && where === "own" ? (
+        <OwnRooms
+          room={room}
+          names={given.slice(0, MAX_PARTICIPANTS)}
+          linkTo={(name, to) => linkTo(name, to, Number(seat))}
+        />
+      ) : (
+        <>
+          <h3>{words.result}</h3>
+          {places.length < given.length && <Notice kind="hint">{words.tooMany(places.length)}</Notice>}
+          <LinkList links={links} />
+        </>
+      )}
     </div>
   );
 }

@@ -1,8 +1,8 @@
 // A study as a link carries it: who takes part, in which seat, what is left out at the table, what is asked before and after. Nothing of it
-// goes to the server but the name and, where the link says so, times as annotations. On this device it is kept with the seat, so that a
-// reload does not lose it.
+// goes to the server but the name and, where the link says so, times as annotations. On this device it is kept with the seat, or with the place
+// in a tournament, so that a reload does not lose it; and of one that is over its last questionnaire, so that the link leads to that again.
 
-import { recall, remember } from "../store";
+import { recall, recallObject, remember, remembered } from "../store";
 
 /** Parts of the table that a study may leave out. */
 export const HIDEABLE = ["log", "lookup", "expressions", "played", "pages"] as const;
@@ -75,9 +75,19 @@ export function questionnaire(address: string | null): string {
   }
 }
 
-/** The address of a questionnaire for one participant: {name} and {room} filled in. */
-export function filledIn(address: string, name: string, roomId: string): string {
-  return address.replaceAll("{name}", encodeURIComponent(name)).replaceAll("{room}", encodeURIComponent(roomId));
+/** What is filled into the address of a questionnaire, each empty while it is not known. */
+export interface Blanks {
+  readonly name: string;
+  readonly room?: string;
+  readonly tournament?: string;
+}
+
+/** The address of a questionnaire for one participant: {name}, {room} and {tournament} filled in. */
+export function filledIn(address: string, { name, room = "", tournament = "" }: Blanks): string {
+  return address
+    .replaceAll("{name}", encodeURIComponent(name))
+    .replaceAll("{room}", encodeURIComponent(room))
+    .replaceAll("{tournament}", encodeURIComponent(tournament));
 }
 
 /** Whose questionnaire it is, to be said before it is opened. */
@@ -92,14 +102,53 @@ export function holderOf(study: Study | null, name: string): "reader" | "another
   return study.name === name ? "reader" : "another";
 }
 
-/** Keeps a study with the seat that was taken for it. */
-export function rememberStudy(roomId: string, study: Study): void {
-  remember(`study.${roomId}`, searchOf(study, ""));
-  remember(`timed.${roomId}`, study.times ? "1" : null);
+/** Keeps a study with the seat that was taken for it in a room, or with the place in a tournament. */
+export function rememberStudy(id: string, study: Study): void {
+  remember(`study.${id}`, searchOf(study, ""));
+  remember(`timed.${id}`, study.times ? "1" : null);
 }
 
-/** The study that this device takes part in, in a room. */
-export function studyIn(roomId: string): Study | null {
-  const kept = recall(`study.${roomId}`);
+/** The study that this device takes part in, in a room or a tournament. */
+export function studyIn(id: string): Study | null {
+  const kept = recall(`study.${id}`);
   return kept === null ? null : studyOf(kept);
+}
+
+/** The questionnaire after a study's game that is over, of one who has left the table. */
+export interface Finished {
+  readonly name: string;
+  readonly roomId: string;
+  readonly after: string;
+}
+
+/** Keeps the last questionnaire of the study in a room, before its seat is forgotten; nothing if there is none. */
+export function rememberFinished(roomId: string, code: string): void {
+  const study = studyIn(roomId);
+  if (!study?.after) return;
+  const finished: Finished = { name: study.name, roomId, after: study.after };
+  remember(`${FINISHED}${code}.${study.name}`, JSON.stringify(finished));
+}
+
+/** The questionnaires after games that this device took part in by the links with this code; of one participant, or with an empty name of all. */
+export function finishedBy(code: string, name: string): Finished[] {
+  return allFinished(`${FINISHED}${code}.`).filter((finished) => name === "" || finished.name === name);
+}
+
+/** The questionnaires after the game of a room. */
+export function finishedIn(roomId: string): Finished[] {
+  return allFinished(FINISHED).filter((finished) => finished.roomId === roomId);
+}
+
+const FINISHED = "finished.";
+
+function allFinished(beginning: string): Finished[] {
+  return [...remembered().keys()].flatMap((key) => {
+    if (!key.startsWith(beginning)) return [];
+    const finished = recallObject(key, ({ name, roomId, after }) =>
+      typeof name === "string" && typeof roomId === "string" && typeof after === "string"
+        ? { name, roomId, after: questionnaire(after) }
+        : null,
+    );
+    return finished === null || finished.after === "" ? [] : [finished];
+  });
 }

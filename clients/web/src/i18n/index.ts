@@ -26,6 +26,17 @@ export function t(): Texts {
   return texts.value;
 }
 
+/** A number with so many digits after the point, or comma, of the language in use. */
+export function decimal(value: number, digits: number): string {
+  const options = { minimumFractionDigits: digits, maximumFractionDigits: digits };
+  return new Intl.NumberFormat(language.value, options).format(value);
+}
+
+/** How dates are written where the reader is, if the browser says so for the page's language. */
+export function dateLocale(): string {
+  return navigator.languages.find((one) => one.startsWith(language.value)) ?? language.value;
+}
+
 /** Chooses the language to begin with and loads its texts. */
 export async function startLanguage(): Promise<void> {
   const asked = new URLSearchParams(location.search).get("lang");

@@ -14,6 +14,19 @@ export function plurals(language: string): (count: number, forms: Forms) => stri
     (rules.select(count) === "one" ? forms.one : forms.other).replaceAll("#", digits.format(count));
 }
 
+/** A function from milliseconds to words: in seconds, minutes or hours, whichever is whole enough. */
+export function durations(
+  language: string,
+  forms: Record<"second" | "minute" | "hour", Forms>,
+): (ms: number) => string {
+  const plural = plurals(language);
+  return (ms) => {
+    if (ms >= 3_600_000) return plural(Math.round(ms / 3_600_000), forms.hour);
+    if (ms >= 120_000) return plural(Math.round(ms / 60_000), forms.minute);
+    return plural(ms / 1000, forms.second);
+  };
+}
+
 /** A function from a number to its ordinal, by the ends that the language's ordinal rules name. */
 export function ordinals(
   language: string,

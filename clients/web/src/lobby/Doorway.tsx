@@ -1,21 +1,22 @@
 // A room for those who have no seat in it: who sits there, how to get in, how to watch; for whoever made it, how to invite others and
 // how to close it. The table itself is in table/, which shows this to who has no ticket.
 
-import { useState } from "preact/hooks";
 import { CALL_LIMIT_MS, roomApi } from "../api/client";
-import { inWords, wordsOf } from "../api/faults";
+import { wordsOf } from "../api/faults";
 import { usePolled } from "../api/poll";
-import { ParticipantKind, type Room, RoomState } from "../gen/chefshat/v1/room_pb";
+import { freeForPeople } from "../experiment/places";
+import { type Room, RoomState } from "../gen/chefshat/v1/room_pb";
 import { t } from "../i18n";
-import { Button, ButtonLink } from "../parts/Button";
+import { ButtonLink } from "../parts/Button";
 import { Notice } from "../parts/Notice";
 import { pathOf } from "../router";
 import { HostInvite } from "./Invite";
 import { NameForm } from "./Join";
 import { JoinForm } from "./JoinForm";
 import { RoomStateChip, rulesInShort } from "./RoomCard";
-import { isFree, isOpen } from "./rooms";
+import { isForAgents, isOpen } from "./rooms";
 import { Seats } from "./Seats";
+import { Sure } from "./Sure";
 import { closeRoom, hostedRoom } from "./seat";
 import "./doorway.css";
 
@@ -52,6 +53,11 @@ export function Doorway({ roomId }: { roomId: string }) {
         {fault && <Notice kind="fault">{wordsOf(fault)}</Notice>}
       </section>
       {room.state === RoomState.WAITING && room.tournamentId === "" && <WayIn room={room} />}
+      {[RoomState.WAITING, RoomState.PLAYING].includes(room.state) && hostedRoom(roomId) && (
+        <Sure label={words.close} act={() => closeRoom(roomId)}>
+          {room.state === RoomState.WAITING ? words.closeSure : words.closePlaying}
+        </Sure>
+      )}
     </div>
   );
 }
@@ -60,19 +66,16 @@ export function Doorway({ roomId }: { roomId: string }) {
 function WayIn({ room }: { room: Room }) {
   const words = t().lobby.door;
   const hosted = hostedRoom(room.roomId);
-  const seatForPeople = room.seats.some(
-    (seat) => isFree(seat) && [ParticipantKind.UNSPECIFIED, ParticipantKind.HUMAN].includes(seat.reservedFor),
-  );
+  const seatForPeople = freeForPeople(room.seats).length > 0;
   return (
     <>
       {seatForPeople && (
         <section class="sheet doorway-part">
           <h2>{words.sitDown}</h2>
-          {hosted ? <NameForm code={hosted.joinCode} /> : <JoinForm />}
+          {hosted ? <NameForm code={hosted.joinCode} room={room} /> : <JoinForm />}
         </section>
       )}
-      {isOpen(room) && <HostInvite roomId={room.roomId} />}
-      {hosted && <CloseRoom roomId={room.roomId} />}
+      {isOpen(room) && <HostInvite roomId={room.roomId} forAgents={isForAgents(room.seats)} />}
     </>
   );
 }
@@ -87,33 +90,6 @@ function DoorwayLinks({ room }: { room: Room }) {
       {!over && room.policy?.spectators && (
         <ButtonLink href={pathOf({ page: "watch", roomId: room.roomId })}>{words.watch}</ButtonLink>
       )}
-    </div>
-  );
-}
-
-function CloseRoom({ roomId }: { roomId: string }) {
-  const words = t().lobby.door;
-  const [sure, setSure] = useState(false);
-  const [fault, setFault] = useState<string | null>(null);
-  const close = () => {
-    closeRoom(roomId).catch((error: unknown) => setFault(inWords(error)));
-  };
-  return (
-    <div class="doorway-close">
-      {sure ? (
-        <>
-          <span>{words.closeSure}</span>
-          <Button onClick={close}>{words.close}</Button>
-          <Button look="quiet" onClick={() => setSure(false)}>
-            {t().common.cancel}
-          </Button>
-        </>
-      ) : (
-        <Button look="quiet" onClick={() => setSure(true)}>
-          {words.close}
-        </Button>
-      )}
-      {fault && <Notice kind="fault">{fault}</Notice>}
     </div>
   );
 }

@@ -1,4 +1,4 @@
-// How others come into a room: the join code to read out, the address to send, and the same as a picture to point a phone at.
+// How others come into a room or a tournament: the join code to read out, the address to send, and the same as a picture to point a phone at.
 
 import { useMemo, useState } from "preact/hooks";
 import { encode } from "uqr";
@@ -6,63 +6,79 @@ import { StudyLinks } from "../experiment/StudyLinks";
 import { t } from "../i18n";
 import { announce } from "../parts/Announcer";
 import { Button } from "../parts/Button";
+import { Notice } from "../parts/Notice";
 import { hostedRoom, invitation } from "./seat";
 import "./invite.css";
 
 /** White around the picture, in its squares: readers need four. */
 const QR_MARGIN = 4;
 
-/** The invitation to the room with this join code. */
-export function Invite({ code }: { code: string }) {
+interface InviteProps {
+  title: string;
+  code: string;
+  /** What is sent, and what the picture says. */
+  address: string;
+  /** What brings an agent from a terminal, and what this is for; undefined where there is no place for one. */
+  agent: { label: string; command: string } | undefined;
+}
+
+/** An invitation to a room or a tournament. */
+export function Invite({ title, code, address, agent }: InviteProps) {
   const words = t().lobby.invite;
-  const address = invitation(code);
   return (
     <section class="invite">
       <div class="invite-words">
-        <h2>{words.title}</h2>
+        <h2>{title}</h2>
         <p>{words.text}</p>
         <CopyLine label={words.code} text={code} large />
         <CopyLine label={words.link} text={address} />
-        <CopyLine label={words.agent} text={agentCommand(code)} mono />
+        {agent && <CopyLine label={agent.label} text={agent.command} mono />}
       </div>
       <QrCode text={address} label={words.qr} />
+      {isThisMachine(location.hostname) && (
+        <div class="invite-here">
+          <Notice kind="hint">
+            <span>
+              {words.thisMachine} <code>chefshat serve --listen 0.0.0.0:{location.port || "80"}</code>
+              {words.thenOpen}
+            </span>
+          </Notice>
+        </div>
+      )}
     </section>
   );
 }
 
-/** The invitation, for whoever made the room; nothing for all others. */
-export function HostInvite({ roomId }: { roomId: string }) {
-  const hosted = hostedRoom(roomId);
-  return (
-    hosted && (
-      <section class="sheet host-invite">
-        <Invite code={hosted.joinCode} />
-        <StudyLinks roomId={roomId} code={hosted.joinCode} />
-      </section>
-    )
-  );
+/** Whether an address with this host leads to nothing but the machine on which it is opened. */
+export function isThisMachine(host: string): boolean {
+  return host === "localhost" || host.endsWith(".localhost") || host === "[::1]" || /^127(\.\d+){3}$/.test(host);
 }
 
-/** What seats an agent from a terminal. */
-function agentCommand(code: string): string {
-  return `chefshat agent greedy --server ${location.origin} --code ${code}`;
+/** The invitation, for whoever made the room; nothing for all others. */
+export function HostInvite({ roomId, forAgents }: { roomId: string; forAgents: boolean }) {
+  const hosted = hostedRoom(roomId);
+  if (!hosted) return null;
+  const { joinCode: code } = hosted;
+  const words = t().lobby.invite;
+  const command = `chefshat agent greedy --server ${location.origin} --code ${code}`;
+  return (
+    <section class="sheet host-invite">
+      <Invite
+        title={words.title}
+        code={code}
+        address={invitation(code)}
+        agent={forAgents ? { label: words.agent, command } : undefined}
+      />
+      <StudyLinks roomId={roomId} address={invitation(code)} />
+    </section>
+  );
 }
 
 /** Something to copy, with its label. */
 export function CopyLine(props: { label: string; text: string; large?: boolean; mono?: boolean }) {
   const { label, text, large = false, mono = false } = props;
   const words = t().common;
-  const [copied, setCopied] = useState(false);
-  const copy = async () => {
-    // Without a secure origin a browser has no clipboard; the text can be marked by hand.
-    await navigator.clipboard?.writeText(text).then(
-      () => {
-        setCopied(true);
-        announce(words.copied);
-      },
-      () => undefined,
-    );
-  };
+  const { copied, copy } = useCopying(text);
   return (
     <div class="invite-line">
       <span class="soft small">{label}</span>
@@ -71,7 +87,7 @@ export function CopyLine(props: { label: string; text: string; large?: boolean; 
       ) : (
         <span class={large ? "invite-code" : "invite-link"}>{text}</span>
       )}
-      {navigator.clipboard && (
+      {copy && (
         <Button onClick={copy}>
           {copied ? `✓ ${words.copied}` : words.copy}
           <span class="only-heard"> {label}</span>
@@ -79,6 +95,21 @@ export function CopyLine(props: { label: string; text: string; large?: boolean; 
       )}
     </div>
   );
+}
+
+/** How a text is copied, and whether it has been; without a secure origin a browser has no clipboard, but the text can be marked by hand. */
+export function useCopying(text: string): { copied: boolean; copy: (() => void) | undefined } {
+  const [copied, setCopied] = useState("");
+  const clipboard: Clipboard | undefined = navigator.clipboard;
+  const copy = () =>
+    void clipboard?.writeText(text).then(
+      () => {
+        setCopied(text);
+        announce(t().common.copied);
+      },
+      () => undefined,
+    );
+  return { copied: text !== "" && copied === text, copy: clipboard && copy };
 }
 
 /** A text as a QR code: black on white by dark as well, as readers want it. */

@@ -1,4 +1,4 @@
-// Where a join code is typed in, or pasted as the whole address of an invitation.
+// Where a join code is typed in, or the whole address of an invitation is pasted, to a room or to a tournament.
 
 import { useState } from "preact/hooks";
 import { t } from "../i18n";
@@ -15,6 +15,8 @@ export function JoinForm() {
   const [missing, setMissing] = useState(false);
   const go = (event: Event) => {
     event.preventDefault();
+    const tournament = tournamentIn(code);
+    if (tournament) return navigate({ page: "tournament", tournamentId: tournament.id }, { search: tournament.search });
     const typed = codeIn(code);
     setMissing(typed === "");
     if (typed !== "") navigate({ page: "join", code: typed });
@@ -39,4 +41,10 @@ export function JoinForm() {
 export function codeIn(typed: string): string {
   const address = /\/join\/([^/?#\s]+)/.exec(typed);
   return canonical(address?.[1] ?? typed);
+}
+
+/** The tournament whose invitation was pasted, with what the address says besides; null if it is none. */
+export function tournamentIn(typed: string): { id: string; search: string } | null {
+  const address = /\/tournaments\/([0-9a-f]+)(\?\S*)?$/.exec(typed.trim());
+  return address?.[1] ? { id: address[1], search: address[2] ?? "" } : null;
 }

@@ -1,17 +1,16 @@
 // Making a room: who plays, by which rules, how fast, what happens to those who are late, who may watch. What most people never
 // change is folded away. What the form holds and asks for is in room-form.ts.
 
-import { useEffect, useState } from "preact/hooks";
-import { faultOf, wordsOf } from "../api/faults";
-import { serverInfo } from "../api/server";
-import type { RuleSet } from "../gen/chefshat/v1/rules_pb";
+import { type Offered, useOffered } from "../api/server";
 import { t } from "../i18n";
 import { Button } from "../parts/Button";
-import { TextField } from "../parts/Field";
+import { SelectField, TextField } from "../parts/Field";
 import { Notice } from "../parts/Notice";
 import { navigate } from "../router";
-import { ClockFields, FaultFields, RuleFields, WatchFields } from "./RoomFields";
-import { type FieldName, fieldOf, MAX_NAME, newForm, type RoomForm, requestOf, unreadable } from "./room-form";
+import { type FieldFaults, useFilling } from "./filling";
+import { ClockFields, FaultFields, RuleFields, WatchFields, wordsOfProblems } from "./GameFields";
+import { gameProblems } from "./game-form";
+import { type FieldName, MAX_NAME, newForm, ROOM_FIELDS, type RoomForm, requestOf } from "./room-form";
 import { SeatFields } from "./SeatFields";
 import { makeRoom } from "./seat";
 import "./new-room.css";
@@ -19,30 +18,16 @@ import "./new-room.css";
 /** What a part of the form gets: the form, the faults of its fields, and how to change it. */
 export interface FormProps {
   form: RoomForm;
-  faults: Partial<Record<FieldName, string>>;
+  faults: FieldFaults<FieldName>;
   change: (changed: Partial<RoomForm>) => void;
-}
-
-/** What the server can host. */
-export interface Offered {
-  presets: RuleSet[];
-  agents: string[];
 }
 
 /** The page. */
 export function NewRoom() {
-  const words = t().lobby.make;
-  const [offered, setOffered] = useState<Offered | null>(null);
-  const [fault, setFault] = useState<string | null>(null);
-  useEffect(() => {
-    serverInfo().then(
-      ({ presets, builtInAgents }) => setOffered({ presets, agents: builtInAgents }),
-      (error: unknown) => setFault(wordsOf(faultOf(error))),
-    );
-  }, []);
+  const { offered, fault } = useOffered();
   return (
     <section class="new-room">
-      <h1>{words.title}</h1>
+      <h1>{t().lobby.make.title}</h1>
       {fault && <Notice kind="fault">{fault}</Notice>}
       {offered && <RoomFormView offered={offered} />}
     </section>
@@ -51,42 +36,19 @@ export function NewRoom() {
 
 function RoomFormView({ offered }: { offered: Offered }) {
   const words = t().lobby.make;
-  const [form, setForm] = useState(() => newForm(offered.agents));
-  const [faults, setFaults] = useState<FormProps["faults"]>({});
-  const [refusal, setRefusal] = useState<string | null>(null);
-  const [busy, setBusy] = useState(false);
-  const [open, setOpen] = useState(false);
-  const change = (changed: Partial<RoomForm>) => {
-    setForm((before) => ({ ...before, ...changed }));
-    setFaults((before) => Object.fromEntries(Object.entries(before).filter(([field]) => !(field in changed))));
-  };
-  const refuse = (refused: FormProps["faults"], words: string) => {
-    setFaults(refused);
-    setRefusal(words);
-    setOpen(true);
-  };
-  const submit = async (event: Event) => {
-    event.preventDefault();
-    const bad = unreadable(form);
-    if (bad.length > 0) {
-      refuse(Object.fromEntries(bad.map((field) => [field, words.notANumber])), words.lookAgain);
-      return;
-    }
-    setBusy(true);
-    setRefusal(null);
-    try {
+  const filling = useFilling(() => newForm(offered.agents), {
+    check: (form) => wordsOfProblems<FieldName>(gameProblems(form, form.seats.length)),
+    fields: ROOM_FIELDS,
+    send: async (form) => {
       const { room } = await makeRoom(requestOf(form));
       navigate({ page: "room", roomId: room.roomId });
-    } catch (error) {
-      setBusy(false);
-      const fault = faultOf(error);
-      const field = fieldOf(fault.metadata.field ?? "");
-      refuse(field ? { [field]: fault.message } : {}, field ? words.lookAgain : wordsOf(fault));
-    }
-  };
+    },
+  });
+  const { form, faults, change } = filling;
   const parts = { form, faults, change };
+  const aborts = ["allLost", "anyLost", "never"] as const;
   return (
-    <form class="new-room-form" onSubmit={submit} noValidate>
+    <form class="new-room-form" onSubmit={filling.submit} noValidate>
       <section class="sheet new-room-part">
         <TextField
           label={words.name}
@@ -103,20 +65,31 @@ function RoomFormView({ offered }: { offered: Offered }) {
         <h2>{words.clock}</h2>
         <ClockFields {...parts} />
       </section>
-      <details class="sheet new-room-part" open={open} onToggle={(event) => setOpen(event.currentTarget.open)}>
+      <details
+        class="sheet new-room-part"
+        open={filling.unfolded}
+        onToggle={(event) => filling.unfold(event.currentTarget.open)}
+      >
         <summary>
           <h2>{words.more}</h2>
         </summary>
         <h3>{words.rules}</h3>
-        <RuleFields {...parts} presets={offered.presets} />
+        <RuleFields {...parts} players={form.seats.length} presets={offered.presets} />
         <h3>{words.faults}</h3>
-        <FaultFields {...parts} agents={offered.agents} />
+        <FaultFields {...parts} agents={offered.agents}>
+          <SelectField
+            label={words.fault.abort}
+            value={form.abort}
+            options={aborts.map((value) => ({ value, label: words.fault.aborts[value] }))}
+            onPick={(abort) => change({ abort })}
+          />
+        </FaultFields>
         <h3>{words.watching}</h3>
         <WatchFields {...parts} />
       </details>
-      {refusal && <Notice kind="fault">{refusal}</Notice>}
+      {filling.refusal && <Notice kind="fault">{filling.refusal}</Notice>}
       <div>
-        <Button look="main" type="submit" busy={busy}>
+        <Button look="main" type="submit" busy={filling.busy}>
           {words.submit}
         </Button>
       </div>

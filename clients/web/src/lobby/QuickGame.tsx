@@ -1,16 +1,15 @@
-// One press from the lobby to the table: a room with three built-in agents, clocks without hurry, and the person on the first seat.
+// One press from the lobby to the table: a room with three built-in agents, the relaxed clock, and the person on the first seat.
 
 import { useState } from "preact/hooks";
 import { inWords } from "../api/faults";
-import { serverInfo } from "../api/server";
 import { t } from "../i18n";
 import { Button, ButtonLink } from "../parts/Button";
 import { Drawing, faceDrawing } from "../parts/Drawing";
 import { TextField } from "../parts/Field";
 import { Notice } from "../parts/Notice";
-import { navigate } from "../router";
-import { MAX_NAME, quickGame } from "./room-form";
-import { lastName, makeRoom, takeSeat } from "./seat";
+import { playNow } from "./play-now";
+import { MAX_NAME } from "./room-form";
+import { lastName } from "./seat";
 import "./quick-game.css";
 
 /** The tile. */
@@ -24,11 +23,7 @@ export function QuickGame() {
     setBusy(true);
     setFault(null);
     try {
-      const { builtInAgents } = await serverInfo();
-      const player = name.trim() || words.guest;
-      const { joinCode } = await makeRoom(quickGame(words.roomOf(player), builtInAgents));
-      const room = await takeSeat(joinCode, player);
-      navigate({ page: "room", roomId: room.roomId });
+      await playNow(name);
     } catch (error) {
       setFault(inWords(error));
       setBusy(false);
@@ -60,6 +55,7 @@ export function QuickGame() {
         </Button>
       </form>
       {fault && <Notice kind="fault">{fault}</Notice>}
+      <p class="small">{t().lobby.make.clocks.hints.relaxed}</p>
       <p>
         <ButtonLink href="/tutorial" look="quiet">
           {words.learn}

@@ -1,10 +1,10 @@
 // One room of the lobby's lists: its name, where it stands, who sits there, what one can do.
 
-import { type Room, RoomState } from "../gen/chefshat/v1/room_pb";
+import { ParticipantKind, type Room, RoomState } from "../gen/chefshat/v1/room_pb";
 import { t } from "../i18n";
 import { ButtonLink } from "../parts/Button";
 import { pathOf } from "../router";
-import { isOpen } from "./rooms";
+import { clockOfPeople, isOpen } from "./rooms";
 import { Seats } from "./Seats";
 import { heldSeat, hostedRoom } from "./seat";
 import "./room-card.css";
@@ -78,8 +78,17 @@ export function rulesInShort(room: Room): string {
   const stop = room.rules?.stop;
   if (stop?.case === "targetPoints") parts.push(words.toPoints(stop.value));
   if (stop?.case === "targetShifts") parts.push(words.shifts(stop.value));
-  const decisionTimeMs = room.policy?.decisionTimeMs;
-  if (decisionTimeMs !== undefined) parts.push(words.decisionTime(decisionTimeMs));
+  const withPeople = room.seats.some(({ kind, reservedFor, builtInAgent }) => {
+    return (
+      builtInAgent === "" &&
+      (kind || reservedFor) !== ParticipantKind.AGENT &&
+      (kind || reservedFor) !== ParticipantKind.ROBOT
+    );
+  });
+  if (room.policy) {
+    const clock = withPeople ? clockOfPeople(room.policy).decisionTimeMs : room.policy.decisionTimeMs;
+    parts.push(words.decisionTime(clock ?? 0));
+  }
   if (room.tournamentId) parts.push(words.ofTournament);
   return parts.join(" · ");
 }

@@ -1,41 +1,59 @@
 // The tournaments that one can join or follow, in the lobby: a line each. Their own pages are in tournaments/.
 
+import { firstOf } from "../api/pages";
 import { usePolled } from "../api/poll";
 import { type Tournament, TournamentState } from "../gen/chefshat/v1/tournament_pb";
 import { t } from "../i18n";
+import { ButtonLink } from "../parts/Button";
 import { pathOf } from "../router";
-import { listTournaments } from "../tournaments/list";
+import { tournamentsIn } from "../tournaments/list";
+import { formatWord, madeWords } from "../tournaments/words";
 import "./tournament-strip.css";
 
 /** How often the list is asked for, milliseconds. */
 const EVERY_MS = 6000;
-/** Tournaments shown. */
+/** Tournaments shown: those that one can join before those that are being played. */
 const SHOWN = 6;
 
-/** The section; nothing where there is no tournament to join or follow. */
+/** The section. */
 export function TournamentStrip() {
   const words = t().lobby.tournaments;
-  const { value: tournaments } = usePolled(listOpen, EVERY_MS, "tournaments");
-  if (!tournaments || tournaments.length === 0) return null;
+  const { value: found } = usePolled(listCurrent, EVERY_MS, "tournaments");
+  if (!found) return null;
   return (
     <section class="lobby-section">
       <h2>{words.title}</h2>
+      {found.length === 0 && <p class="soft">{words.none}</p>}
       <ul class="tournament-strip">
-        {tournaments.slice(0, SHOWN).map(({ tournamentId, settings, state, gamesOver, games }) => (
-          <li key={tournamentId}>
-            <a class="sheet" href={pathOf({ page: "tournament", tournamentId })}>
-              <b>{settings?.name}</b>
-              <span class="soft">{state === TournamentState.OPEN ? words.open : words.playing(gamesOver, games)}</span>
+        {found.map((tournament) => (
+          <li key={tournament.tournamentId}>
+            <a class="sheet" href={pathOf({ page: "tournament", tournamentId: tournament.tournamentId })}>
+              <b>{tournament.settings?.name}</b>
+              <span class="soft">
+                {tournament.state === TournamentState.OPEN
+                  ? words.open
+                  : words.playing(tournament.gamesOver, tournament.games)}
+              </span>
+              <span class="soft small">
+                {formatWord(tournament)} · {madeWords(tournament)}
+              </span>
             </a>
           </li>
         ))}
       </ul>
-      {tournaments.length > SHOWN && <a href="/tournaments">{words.all}</a>}
+      <div class="tournament-strip-ways">
+        <ButtonLink href={pathOf({ page: "newTournament" })}>{t().organise.link}</ButtonLink>
+        <ButtonLink href={pathOf({ page: "tournaments" })} look="quiet">
+          {words.all}
+        </ButtonLink>
+      </div>
     </section>
   );
 }
 
-async function listOpen(signal: AbortSignal): Promise<Tournament[]> {
-  const found = await listTournaments(signal);
-  return found.filter(({ state }) => state === TournamentState.OPEN || state === TournamentState.PLAYING);
+async function listCurrent(signal: AbortSignal): Promise<Tournament[]> {
+  const [open, playing] = await Promise.all(
+    [TournamentState.OPEN, TournamentState.PLAYING].map((state) => firstOf(tournamentsIn(state), SHOWN, signal)),
+  );
+  return [...(open?.items ?? []), ...(playing?.items ?? [])].slice(0, SHOWN);
 }

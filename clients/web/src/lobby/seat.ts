@@ -3,9 +3,10 @@
 
 import type { MessageInitShape } from "@bufbuild/protobuf";
 import { CALL_LIMIT_MS, roomApi } from "../api/client";
+import { rememberFinished } from "../experiment/study";
 import { ParticipantKind, type Room } from "../gen/chefshat/v1/room_pb";
 import type { CreateRoomRequestSchema } from "../gen/chefshat/v1/room_service_pb";
-import { recall, remember, remembered } from "../store";
+import { recall, recallObject, remember, remembered } from "../store";
 
 /** A seat that this device has taken. */
 export interface HeldSeat {
@@ -22,22 +23,35 @@ export interface HostedRoom {
 
 /** The seat that this device has in a room, if any. */
 export function heldSeat(roomId: string): HeldSeat | null {
-  return parsed(`seat.${roomId}`, (value) =>
+  return recallObject(`seat.${roomId}`, (value) =>
     typeof value.ticket === "string" && typeof value.seat === "number" && typeof value.name === "string"
       ? { ticket: value.ticket, seat: value.seat, name: value.name }
       : null,
   );
 }
 
-/** Forgets a seat and all that was kept with it: its room is gone or its game over, or it was given up. */
+/** Forgets a seat and all that was kept with it: its room is gone, or it was given up. */
 export function giveUpSeat(roomId: string): void {
   for (const kept of ["seat", "study", "timed"]) remember(`${kept}.${roomId}`, null);
-  for (const [name, value] of remembered()) if (name.startsWith("code.") && value === roomId) remember(name, null);
+  for (const name of codesOf(roomId)) remember(name, null);
+}
+
+/** Gives a seat back to others before the game begins, and forgets it. */
+export async function giveBackSeat(roomId: string): Promise<void> {
+  const held = heldSeat(roomId);
+  if (held) await roomApi.leaveRoom({ ticket: held.ticket }, { timeoutMs: CALL_LIMIT_MS });
+  giveUpSeat(roomId);
+}
+
+/** Forgets a seat whose game is over, but for what a study still asks of its participant. */
+export function leaveSeat(roomId: string): void {
+  for (const name of codesOf(roomId)) rememberFinished(roomId, name.slice(CODE.length));
+  giveUpSeat(roomId);
 }
 
 /** The secrets of a room if this device made it. */
 export function hostedRoom(roomId: string): HostedRoom | null {
-  return parsed(`hosted.${roomId}`, (value) =>
+  return recallObject(`hosted.${roomId}`, (value) =>
     typeof value.joinCode === "string" && typeof value.ownerToken === "string"
       ? { joinCode: value.joinCode, ownerToken: value.ownerToken }
       : null,
@@ -46,7 +60,7 @@ export function hostedRoom(roomId: string): HostedRoom | null {
 
 /** The room that this device has a seat in by this code, if any: who opens an invitation again goes back to the seat. */
 export function roomOfCode(code: string): string | null {
-  const roomId = recall(`code.${canonical(code)}`);
+  const roomId = recall(CODE + canonical(code));
   return roomId !== null && heldSeat(roomId) ? roomId : null;
 }
 
@@ -64,7 +78,7 @@ export async function takeSeat(code: string, name: string, seat?: number): Promi
   const room = saidRoom(joined.room);
   const held: HeldSeat = { ticket: joined.ticket, seat: joined.seat, name: name.trim() };
   remember(`seat.${room.roomId}`, JSON.stringify(held));
-  remember(`code.${canonical(code)}`, room.roomId);
+  remember(CODE + canonical(code), room.roomId);
   remember("name", name.trim());
   return room;
 }
@@ -91,6 +105,13 @@ export function lastName(): string {
   return recall("name") ?? "";
 }
 
+const CODE = "code.";
+
+/** Under which names the codes are kept that led to a room. */
+function codesOf(roomId: string): string[] {
+  return [...remembered()].flatMap(([name, value]) => (name.startsWith(CODE) && value === roomId ? name : []));
+}
+
 /** A join code as the server writes it: capitals, nothing between them. */
 export function canonical(code: string): string {
   return code.replaceAll(/[\s-]/g, "").toUpperCase();
@@ -104,14 +125,4 @@ export function invitation(code: string): string {
 function saidRoom(room: Room | undefined): Room {
   if (!room) throw new Error("the server did not say which room it is");
   return room;
-}
-
-/** What was kept under a name, if it has the form it should have: another version may have kept another. */
-function parsed<T>(name: string, take: (value: Record<string, unknown>) => T | null): T | null {
-  try {
-    const value: unknown = JSON.parse(recall(name) ?? "null");
-    return typeof value === "object" && value !== null ? take({ ...value }) : null;
-  } catch {
-    return null;
-  }
 }

@@ -73,7 +73,7 @@ function links(): { href: string; label: string; pages: Route["page"][] }[] {
   const words = t().common.nav;
   return [
     { href: "/", label: words.lobby, pages: ["lobby", "new", "join"] },
-    { href: "/tournaments", label: words.tournaments, pages: ["tournaments", "tournament"] },
+    { href: "/tournaments", label: words.tournaments, pages: ["tournaments", "tournament", "newTournament"] },
     { href: "/leaderboard", label: words.leaderboard, pages: ["leaderboard", "person"] },
     { href: "/tutorial", label: words.tutorial, pages: ["tutorial"] },
   ];
@@ -98,6 +98,8 @@ function pageName(here: Route): string {
     case "tournaments":
     case "tournament":
       return words.common.nav.tournaments;
+    case "newTournament":
+      return words.organise.title;
     case "leaderboard":
       return words.common.nav.leaderboard;
     case "person":

@@ -7,11 +7,13 @@ import { usePolled } from "../api/poll";
 import { ParticipantKind } from "../gen/chefshat/v1/room_pb";
 import type { GetLeaderboardResponse } from "../gen/chefshat/v1/tournament_service_pb";
 import { t } from "../i18n";
+import { ButtonLink } from "../parts/Button";
 import { SelectField } from "../parts/Field";
 import { KindBadge } from "../parts/KindBadge";
 import { Notice } from "../parts/Notice";
 import { PersonName } from "../tournaments/PersonName";
 import { ratingRange, ratingWords } from "./rating";
+import { WhichAreRated } from "./WhichAreRated";
 import "./people.css";
 
 /** How often it is asked for, milliseconds. */
@@ -59,9 +61,27 @@ export function LeaderboardPage() {
         {value && <p class="soft people-games">{words.ratedGames(Number(value.games))}</p>}
       </div>
       {fault && <Notice kind="fault">{wordsOf(fault)}</Notice>}
-      {value?.rated.length === 0 && <p class="sheet">{words.none}</p>}
-      {value && value.rated.length > 0 && <Lines board={value} />}
+      {value?.rated.length === 0 && <Nobody anybody={Number(value.games) > 0} />}
+      {value && value.rated.length > 0 && (
+        <>
+          <Lines board={value} />
+          <WhichAreRated />
+        </>
+      )}
     </div>
+  );
+}
+
+/** What to do where there are no lines: other filters, or the first game. */
+function Nobody({ anybody }: { anybody: boolean }) {
+  const words = t().people;
+  if (anybody) return <p class="sheet">{words.noneOfThese}</p>;
+  return (
+    <section class="sheet people-none">
+      <p>{words.none}</p>
+      <WhichAreRated open />
+      <ButtonLink href="/">{words.toLobby}</ButtonLink>
+    </section>
   );
 }
 

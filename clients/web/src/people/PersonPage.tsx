@@ -1,28 +1,38 @@
 // One participant: its rating, what its games add up to, and the games, each with a link to its replay.
 
 import { wordsOf } from "../api/faults";
+import { type Beginning, countWords, useShown } from "../api/pages";
 import { usePolled } from "../api/poll";
 import type { PageProps } from "../app";
+import type { RecordSummary } from "../gen/chefshat/v1/record_service_pb";
 import type { Rated } from "../gen/chefshat/v1/tournament_pb";
-import { language, t } from "../i18n";
+import { dateLocale, decimal, t } from "../i18n";
 import { nameOf } from "../lobby/rooms";
 import { KindBadge } from "../parts/KindBadge";
+import { MoreButton } from "../parts/MoreButton";
 import { Notice } from "../parts/Notice";
 import { pathOf } from "../router";
 import { PersonName } from "../tournaments/PersonName";
-import { askPerson, type OwnGame, SHOWN_GAMES, sum } from "./games";
+import { gamesOf, type OwnGame, ratedAs, sum, unratedBecause } from "./games";
 import { ratingRange, ratingWords } from "./rating";
+import { WhichAreRated } from "./WhichAreRated";
 import "./people.css";
 
 /** How often it is asked for, milliseconds. */
 const EVERY_MS = 60_000;
+/** Games shown at first, and more at a time. */
+const AT_A_TIME = 50;
 
 /** The page. */
 export function PersonPage({ route }: PageProps<"person">) {
   const { name } = route;
   const words = t().people.person;
-  const { value, fault } = usePolled((signal) => askPerson(name, signal), EVERY_MS, name);
-  const self = value?.games[0]?.record.seats[value.games[0].seat];
+  const shown = useShown(gamesOf(name), AT_A_TIME, EVERY_MS, name);
+  const rated = usePolled((signal) => ratedAs(name, signal), EVERY_MS, name);
+  const { list } = shown;
+  const fault = shown.fault ?? rated.fault;
+  const last = list?.items[0];
+  const self = last?.record.seats[last.seat];
   return (
     <div class="people">
       <header class="person-head">
@@ -30,15 +40,16 @@ export function PersonPage({ route }: PageProps<"person">) {
         {self && <KindBadge kind={self.kind} builtIn={self.builtInAgent} />}
       </header>
       {fault && <Notice kind="fault">{wordsOf(fault)}</Notice>}
-      {!value && !fault && <p class="soft">{t().common.loading}</p>}
-      {value && value.games.length === 0 && value.rated.length === 0 && <p class="sheet">{words.none}</p>}
-      {value && value.games.length > 0 && (
+      {!list && !fault && <p class="soft">{t().common.loading}</p>}
+      {list?.items.length === 0 && <p class="sheet">{words.none}</p>}
+      {list && list.items.length > 0 && (
         <>
-          <Facts rated={value.rated} games={value.games} />
-          <section class="sheet">
+          <Facts rated={rated.value} games={list} />
+          <section class="sheet person-played">
             <h2>{words.played}</h2>
-            <Games games={value.games.slice(0, SHOWN_GAMES)} />
-            {value.games.length > SHOWN_GAMES && <p class="soft">{words.newest(SHOWN_GAMES)}</p>}
+            <WhichAreRated />
+            <Games games={list.items} />
+            <MoreButton shown={shown} what={words.played} />
           </section>
           {self?.builtInAgent === "" && <p class="soft small">{words.sameName}</p>}
         </>
@@ -50,18 +61,20 @@ export function PersonPage({ route }: PageProps<"person">) {
   );
 }
 
-function Facts({ rated, games }: { rated: readonly Rated[]; games: readonly OwnGame[] }) {
+/** What a participant is worth, and what its games add up to as far as they are known. */
+function Facts({ rated, games }: { rated: readonly Rated[] | null; games: Beginning<OwnGame> }) {
   const words = t().people.person;
-  const all = sum(games);
+  const all = sum(games.items);
+  const of = games.more ? words.ofNewest(games.items.length) : "";
   return (
     <dl class="person-facts">
-      {rated.map((line) => (
+      {rated?.map((line) => (
         <Rating key={`${line.kind} ${line.builtIn}`} line={line} />
       ))}
-      {rated.length === 0 && <Fact label={words.rating} value="–" text={words.unrated} />}
-      <Fact label={words.games} value={String(all.games)} />
-      <Fact label={words.wins} value={String(all.wins)} />
-      {all.games > 0 && <Fact label={words.meanPlace} value={all.meanPlace.toFixed(2)} />}
+      {rated?.length === 0 && <Fact label={words.rating} value="–" text={words.unrated} wide />}
+      <Fact label={words.games} value={countWords(all.games, games.more)} />
+      <Fact label={words.wins} value={String(all.wins)} text={of} />
+      {all.games > 0 && <Fact label={words.meanPlace} value={decimal(all.meanPlace, 2)} text={of} />}
     </dl>
   );
 }
@@ -70,13 +83,14 @@ function Rating({ line }: { line: Rated }) {
   const words = t().people.person;
   if (!line.rating) return null;
   const { from, to } = ratingRange(line.rating);
-  const text = `${words.rated(line.place)}. ${words.ratingRange(from.toFixed(1), to.toFixed(1))}`;
-  return <Fact label={words.rating} value={ratingWords(line.rating)} text={text} />;
+  const text = `${words.rated(line.place)}. ${words.ratingRange(decimal(from, 1), decimal(to, 1))}`;
+  return <Fact label={words.rating} value={ratingWords(line.rating)} text={text} wide />;
 }
 
-function Fact({ label, value, text = "" }: { label: string; value: string; text?: string }) {
+function Fact(props: { label: string; value: string; text?: string; wide?: boolean }) {
+  const { label, value, text = "", wide = false } = props;
   return (
-    <div class={`sheet ${text ? "person-fact-wide" : ""}`}>
+    <div class={`sheet ${wide ? "person-fact-wide" : ""}`}>
       <dt class="soft">{label}</dt>
       <dd>
         <b class="number">{value}</b>
@@ -86,9 +100,10 @@ function Fact({ label, value, text = "" }: { label: string; value: string; text?
   );
 }
 
-/** How dates are written where the reader is, if the browser says so for the page's language. */
-function dateLocale(): string {
-  return navigator.languages.find((one) => one.startsWith(language.value)) ?? language.value;
+/** That a game counts for no rating, and why. */
+function NotRated({ record }: { record: RecordSummary }) {
+  const why = unratedBecause(record);
+  return why && ` · ${t().people.notRated(t().people.unrated[why])}`;
 }
 
 function Games({ games }: { games: readonly OwnGame[] }) {
@@ -134,7 +149,7 @@ function Games({ games }: { games: readonly OwnGame[] }) {
                 </a>{" "}
                 <span class="soft small">
                   {record.roomName}
-                  {record.added && ` · ${words.added}`}
+                  <NotRated record={record} />
                 </span>
               </td>
             </tr>

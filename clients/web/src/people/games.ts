@@ -1,18 +1,13 @@
 // The games of one participant, from the server's records: found by name, newest first, with what they add up to.
 
 import { CALL_LIMIT_MS, recordApi, tournamentApi } from "../api/client";
-import { allPages } from "../api/pages";
+import type { AskPage } from "../api/pages";
 import type { RecordSummary } from "../gen/chefshat/v1/record_service_pb";
-import { type Participant, RoomState } from "../gen/chefshat/v1/room_pb";
+import { GameOrigin, type Participant, RoomState } from "../gen/chefshat/v1/room_pb";
 import type { Rated } from "../gen/chefshat/v1/tournament_pb";
 
-const PAGE_SIZE = 100;
-/** Pages of records that are asked for at most. They come oldest first, so that all are needed to know the newest. */
-const MAX_PAGES = 50;
 /** Lines of the leaderboard that are searched. */
 const MAX_LINES = 1000;
-/** Games shown. */
-export const SHOWN_GAMES = 100;
 
 /** What a participant did in a game. */
 export interface OwnGame {
@@ -31,31 +26,26 @@ export interface Sum {
   readonly meanPlace: number;
 }
 
-/** Everything the page of a participant shows. */
-export interface Person {
-  /** Of the leaderboard: more than one where kinds differ. */
-  readonly rated: readonly Rated[];
-  /** Newest first. */
-  readonly games: readonly OwnGame[];
+/** Asks for the games of a participant, newest first. */
+export function gamesOf(name: string): AskPage<OwnGame> {
+  return async (page, signal) => {
+    const asked = { filter: { participant: name }, newestFirst: true, ...page };
+    const { records, nextPageToken } = await recordApi.listRecords(asked, { signal, timeoutMs: CALL_LIMIT_MS });
+    return { items: records.flatMap((record) => ownGame(record, name) ?? []), nextPageToken };
+  };
 }
 
-/** Asks for a participant. */
-export async function askPerson(name: string, signal: AbortSignal): Promise<Person> {
-  const call = { signal, timeoutMs: CALL_LIMIT_MS };
-  const board = tournamentApi.getLeaderboard({ limit: MAX_LINES }, call);
-  const records = await allPages(async (pageToken) => {
-    const answer = await recordApi.listRecords({ filter: { participant: name }, pageSize: PAGE_SIZE, pageToken }, call);
-    return { items: answer.records, nextPageToken: answer.nextPageToken };
-  }, MAX_PAGES);
-  const games = records.flatMap((record) => ownGame(record, name) ?? []);
-  const rated = (await board).rated.filter((line) => line.name === name);
-  return { rated, games: games.reverse() };
+/** Asks for a participant's lines of the leaderboard: more than one where kinds differ. */
+export async function ratedAs(name: string, signal: AbortSignal): Promise<Rated[]> {
+  const board = await tournamentApi.getLeaderboard({ limit: MAX_LINES }, { signal, timeoutMs: CALL_LIMIT_MS });
+  return board.rated.filter((line) => line.name === name);
 }
 
 /** What the participant of a name did in a game: at its first seat if it has several. */
 export function ownGame(record: RecordSummary, name: string): OwnGame | undefined {
   const own =
-    record.seats.find((seat) => seat.name === name) ?? record.seats.find((seat) => seat.builtInAgent === name);
+    record.seats.find((seat) => seat.name === name && seat.builtInAgent === "") ??
+    record.seats.find((seat) => seat.builtInAgent === name);
   if (!own) return undefined;
   const standing =
     record.state === RoomState.FINISHED ? record.standings.find(({ seat }) => seat === own.seat) : undefined;
@@ -66,6 +56,22 @@ export function ownGame(record: RecordSummary, name: string): OwnGame | undefine
     points: standing && Number(standing.points),
     others: record.seats.filter(({ seat }) => seat !== own.seat),
   };
+}
+
+/** Why a game with a result counts for no rating. */
+export type Unrated = "added" | "notDealt" | "recorded" | "substituted" | "twice";
+
+/** Why a game counts for no rating, as docs/ratings.md says; null if it does, and of one that was aborted. */
+export function unratedBecause(record: RecordSummary): Unrated | null {
+  if (record.state !== RoomState.FINISHED) return null;
+  if (record.added) return "added";
+  if (record.origin !== GameOrigin.DEALT) return "notDealt";
+  if (record.seats.some(({ replay }) => replay !== undefined)) return "recorded";
+  if (record.substituted) return "substituted";
+  const participants = record.seats.map(({ kind, name, builtInAgent }) => {
+    return builtInAgent ? `built-in ${builtInAgent}` : `${kind} ${name}`;
+  });
+  return new Set(participants).size < participants.length ? "twice" : null;
 }
 
 /** What games add up to. */

@@ -1,13 +1,14 @@
 // Ratings as they are shown: a mean, and how far it may be off.
 
 import type { Rating } from "../gen/chefshat/v1/tournament_pb";
+import { decimal } from "../i18n";
 
 /** The skill is within so many deviations of the mean with a confidence of 95%. */
 const NINETY_FIVE = 1.96;
 
 /** The mean and the half width of the range of 95%. */
 export function ratingWords(rating: Rating): string {
-  return `${rating.mean.toFixed(1)} ± ${(NINETY_FIVE * rating.deviation).toFixed(1)}`;
+  return `${decimal(rating.mean, 1)} ± ${decimal(NINETY_FIVE * rating.deviation, 1)}`;
 }
 
 /** The two ends of the range of 95%. */

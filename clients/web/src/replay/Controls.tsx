@@ -10,6 +10,9 @@ import type { Film, Frame } from "./frames";
 export const SPEEDS = [0.5, 1, 2, 4, 8] as const;
 export type Speed = (typeof SPEEDS)[number];
 
+/** Beginnings of Shifts that are marked; more of them would be a bar. */
+const MOST_MARKS = 60;
+
 interface ControlsProps {
   film: Film;
   frame: Frame;
@@ -25,7 +28,7 @@ interface ControlsProps {
 
 export function Controls({ film, frame, at, playing, speed, eyes, onGo, onPlaying, onSpeed, onEyes }: ControlsProps) {
   const words = t().replay;
-  const last = film.frames.length - 1;
+  const last = film.length - 1;
   const shift = film.shifts.findLast((start) => start.frame <= at);
   return (
     <section class="replay" aria-label={words.controls}>
@@ -53,7 +56,7 @@ export function Controls({ film, frame, at, playing, speed, eyes, onGo, onPlayin
             onInput={(event) => onGo(Number(event.currentTarget.value))}
           />
           <span class="replay-marks" aria-hidden="true">
-            {film.shifts.map((start) => (
+            {film.shifts.slice(0, film.shifts.length > MOST_MARKS ? 0 : undefined).map((start) => (
               <i
                 key={start.shift}
                 style={{ insetInlineStart: `${((start.frame / Math.max(1, last)) * 100).toFixed(2)}%` }}

@@ -1,6 +1,6 @@
 // A record played back at the table, with all hands or with somebody's eyes, and the look-up table of every turn.
 
-import { useEffect, useState } from "preact/hooks";
+import { useEffect, useMemo, useState } from "preact/hooks";
 import { recordApi } from "../api/client";
 import { inWords } from "../api/faults";
 import type { PageProps } from "../app";
@@ -11,13 +11,13 @@ import { Faulty } from "../parts/Faulty";
 import { useAnnounced } from "../table/following";
 import { legalActions, moveOf } from "../table/model/actions";
 import { lookupOf } from "../table/model/lookup";
-import { emptyTable, type TableState } from "../table/model/state";
+import type { TableState } from "../table/model/state";
 import { LookupTable } from "../table/view/LookupTable";
 import { TableView } from "../table/view/TableView";
 import { distinctName, moveWords } from "../table/words";
 import { Controls, type Speed } from "./Controls";
 import { decidingFor, type Eyes, seenWith } from "./eyes";
-import { type Film, type Frame, filmOf } from "./frames";
+import { type Film, filmOf } from "./frames";
 import "./replay.css";
 
 /** How long a moment is seen at a speed of 1. */
@@ -25,8 +25,6 @@ const MOMENT_MS = 1000;
 
 /** A shorter time would be said as 0.0 s. */
 const SHOWN_SECONDS = 0.05;
-
-const NO_FRAME: Frame = { table: emptyTable(), open: undefined, decisions: 0 };
 
 /** The page. */
 export function ReplayPage({ route }: PageProps<"replay">) {
@@ -49,7 +47,7 @@ export function ReplayPage({ route }: PageProps<"replay">) {
   }, [gameId]);
   if (fault) return <Faulty title={t().replay.title} words={fault} />;
   if (!film) return <p class="soft">{t().common.loading}</p>;
-  if (film.frames.length === 0) return <Faulty title={t().replay.title} words={t().replay.empty} />;
+  if (film.length === 0) return <Faulty title={t().replay.title} words={t().replay.empty} />;
   return <Playback film={film} />;
 }
 
@@ -58,7 +56,7 @@ function Playback({ film }: { film: Film }) {
   const [playing, setPlaying] = useState(false);
   const [speed, setSpeed] = useState<Speed>(1);
   const [eyes, setEyes] = useState<Eyes>("all");
-  const last = film.frames.length - 1;
+  const last = film.length - 1;
   useEffect(() => {
     if (!playing) return;
     if (at >= last) {
@@ -69,7 +67,7 @@ function Playback({ film }: { film: Film }) {
     return () => clearTimeout(timer);
   }, [playing, at, speed, last]);
 
-  const frame = film.frames[Math.min(at, last)] ?? NO_FRAME;
+  const frame = useMemo(() => film.at(at), [film, at]);
   const table = seenWith(frame.table, eyes);
   const next = decidingFor(frame, eyes);
   useAnnounced(table, undefined, undefined);
@@ -140,9 +138,6 @@ function lookupAt(table: TableState, open: Pick<DecisionRequest, "actionMask"> &
 /** The moment that the address asks for with ?decision=N, or that of the first cards. */
 function firstFrame(film: Film): number {
   const asked = Number(new URLSearchParams(location.search).get("decision"));
-  if (asked >= 1) {
-    const found = film.frames.findIndex((frame) => frame.decisions >= asked - 1);
-    if (found >= 0) return found;
-  }
-  return film.shifts[0]?.frame ?? 0;
+  const found = asked >= 1 ? film.after(asked - 1) : undefined;
+  return found ?? film.shifts[0]?.frame ?? 0;
 }

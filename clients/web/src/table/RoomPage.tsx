@@ -4,15 +4,21 @@ import { useEffect, useState } from "preact/hooks";
 import { CALL_LIMIT_MS, roomApi } from "../api/client";
 import { faultOf, wordsOf } from "../api/faults";
 import type { PageProps } from "../app";
+import { AfterRoom } from "../experiment/AfterStudy";
 import { AtTable } from "../experiment/AtTable";
+import { useHiding } from "../experiment/hiding";
+import { studyIn } from "../experiment/study";
+import { ParticipantKind } from "../gen/chefshat/v1/room_pb";
 import { t } from "../i18n";
+import { Again } from "../lobby/Again";
 import { Doorway } from "../lobby/Doorway";
 import { HostInvite } from "../lobby/Invite";
-import { giveUpSeat, heldSeat } from "../lobby/seat";
+import { Leaving } from "../lobby/Leaving";
+import { giveUpSeat, heldSeat, hostedRoom, leaveSeat } from "../lobby/seat";
 import { Button } from "../parts/Button";
 import { Faulty } from "../parts/Faulty";
 import { Notice } from "../parts/Notice";
-import { type TableState, tableFromRoom } from "./model/state";
+import { isTaken, type SeatState, type TableState, tableFromRoom } from "./model/state";
 import { Seated } from "./Seated";
 import { type Session, startSession } from "./session";
 
@@ -22,6 +28,8 @@ export function RoomPage({ route }: PageProps<"room">) {
   const [table, setTable] = useState<TableState | undefined>(undefined);
   const [session, setSession] = useState<Session | undefined>(undefined);
   const [fault, setFault] = useState("");
+  // For the whole page, from its loading on: not for a part of it, of which the table has others than the waiting room.
+  useHiding(studyIn(roomId));
 
   useEffect(() => {
     let left = false;
@@ -37,7 +45,7 @@ export function RoomPage({ route }: PageProps<"room">) {
         setSession(started);
       } catch (thrown) {
         const fault = faultOf(thrown);
-        if (fault.reason === "ROOM_UNKNOWN") giveUpSeat(roomId);
+        if (fault.reason === "ROOM_UNKNOWN") leaveSeat(roomId);
         if (!left) setFault(wordsOf(fault));
       }
     };
@@ -46,8 +54,8 @@ export function RoomPage({ route }: PageProps<"room">) {
     return () => {
       left = true;
       started?.stop();
-      // A reload goes on with the last page of a study; who leaves it is done, and the next at this device finds nothing.
-      if (started && isOver(started.live.peek().table)) giveUpSeat(roomId);
+      // A reload goes on with the last page of a study; who leaves it is done, and finds its questionnaire by the link again.
+      if (started && isOver(started.live.peek().table)) leaveSeat(roomId);
     };
   }, [roomId]);
 
@@ -61,14 +69,28 @@ export function RoomPage({ route }: PageProps<"room">) {
     setSession(undefined);
   }, [vacated]);
 
-  if (fault) return <Faulty title={t().table.title} words={fault} />;
+  const after = <AfterRoom roomId={roomId} />;
+  if (fault) {
+    return (
+      <>
+        {after}
+        <Faulty title={t().table.title} words={fault} />
+      </>
+    );
+  }
   if (!table) return <p class="soft">{t().common.loading}</p>;
-  return session ? <Held session={session} /> : <Doorway roomId={roomId} />;
+  if (session) return <Held session={session} />;
+  return (
+    <>
+      {after}
+      <Doorway roomId={roomId} />
+    </>
+  );
 }
 
 /** The table from the seat that this device holds. */
 function Held({ session }: { session: Session }) {
-  const { table } = session.live.value;
+  const { table, own } = session.live.value;
   const { roomId } = table;
   const banner = (
     <>
@@ -76,7 +98,36 @@ function Held({ session }: { session: Session }) {
       <AtTable roomId={roomId} over={isOver(table)} />
     </>
   );
-  return <Seated acting={session} banner={banner} below={<HostInvite roomId={roomId} />} />;
+  const waiting = table.phase === "waiting";
+  const others = table.seats.some((seat) => isTaken(seat) && seat.seat !== own && seat.builtIn === "");
+  const leaving = (
+    <Leaving
+      roomId={roomId}
+      playing={!waiting}
+      others={others}
+      policy={table.policy}
+      look={waiting ? "button" : "tool"}
+    />
+  );
+  return (
+    <Seated
+      acting={session}
+      banner={banner}
+      tools={!isOver(table) && leaving}
+      onward={!others && hostedRoom(roomId) && !studyIn(roomId) && <Again roomId={roomId} />}
+      below={
+        <>
+          <HostInvite roomId={roomId} forAgents={table.seats.some(isForAgent)} />
+          {leaving}
+        </>
+      }
+    />
+  );
+}
+
+/** Whether an agent may still take the seat. */
+function isForAgent(seat: SeatState): boolean {
+  return !isTaken(seat) && [ParticipantKind.UNSPECIFIED, ParticipantKind.AGENT].includes(seat.reservedFor);
 }
 
 function isOver({ phase }: TableState): boolean {

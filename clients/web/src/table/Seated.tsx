@@ -11,12 +11,16 @@ import { WaitingRoom } from "./view/WaitingRoom";
 interface SeatedProps {
   acting: Acting;
   banner?: ComponentChildren;
+  /** Beside the tools of the table. */
+  tools?: ComponentChildren;
+  /** The next step once the game is over. */
+  onward?: ComponentChildren;
   /** Below the seats while the room waits. */
   below?: ComponentChildren;
 }
 
 /** The table from a seat. */
-export function Seated({ acting, banner, below }: SeatedProps) {
+export function Seated({ acting, banner, tools, onward, below }: SeatedProps) {
   const { table, own, decision } = acting.live.value;
   useAnnounced(table, own, decision);
   if (table.phase === "waiting") {
@@ -35,6 +39,8 @@ export function Seated({ acting, banner, below }: SeatedProps) {
       sending={acting.sending.value !== undefined}
       trouble={acting.trouble.value}
       banner={banner}
+      tools={tools}
+      onward={onward}
       caption={table.roomName}
       onAnswer={acting.answer}
       onExpress={(label) => acting.express(gesture(label))}

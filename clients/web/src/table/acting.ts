@@ -14,9 +14,12 @@ import { answerWords } from "./words";
 /** Name of the annotation that holds how long the person took, in whole milliseconds by the person's own clock. */
 export const PERSON_TIME_KEY = "person_decision_time_ms";
 
-/** Whether decisions in a room are sent with the time that the person took, measured here: only where the host of an experiment asked for it. */
-export function asksForTimes(roomId: string): boolean {
-  return recall(`timed.${roomId}`) !== null;
+/**
+ * Whether decisions in a room or a tournament are sent with the time that the person took, measured here: only where the host of an experiment
+ * asked for it.
+ */
+export function asksForTimes(id: string): boolean {
+  return recall(`timed.${id}`) !== null;
 }
 
 /** How often an answer that did not get through is sent again while its decision is open. */
@@ -39,9 +42,8 @@ export interface Acting {
   resume(): void;
 }
 
-/** Begins to act with a seat's ticket. */
-export function startActing(ticket: string, table: TableState, seat: number): Acting {
-  const timed = asksForTimes(table.roomId);
+/** Begins to act with a seat's ticket; `timed` if decisions are sent with the time that the person took. */
+export function startActing(ticket: string, table: TableState, seat: number, timed: boolean): Acting {
   const live = signal(startLive(table, seat));
   const sending = signal<number | undefined>(undefined);
   const trouble = signal("");

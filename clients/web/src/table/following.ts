@@ -1,15 +1,16 @@
 // What goes with what happens at a table: it is read out to those who listen, and heard. Whoever catches up with a game after a reload is not
 // told all of it again.
 
-import { useEffect, useRef } from "preact/hooks";
+import { useEffect, useMemo, useRef } from "preact/hooks";
 import { hidden } from "../experiment/hiding";
 import { DecisionKind } from "../gen/chefshat/v1/decision_pb";
 import { t } from "../i18n";
 import { announce } from "../parts/Announcer";
 import { demandOf } from "./model/demand";
 import type { OpenDecision } from "./model/live";
-import { worthSaying } from "./model/log";
+import { isPresence, worthSaying } from "./model/log";
 import type { TableState } from "./model/state";
+import { tellPresence } from "./presence";
 import { play, soundOf } from "./sounds";
 import { nowHeading } from "./view/Now";
 import { spokenLine } from "./words";
@@ -20,6 +21,10 @@ const MOST_AT_ONCE = 14;
 /** Announces what happens, with sounds, for as long as the table is drawn. */
 export function useAnnounced(table: TableState, own: number | undefined, decision: OpenDecision | undefined): void {
   const heard = useRef<number | undefined>(undefined);
+  const seen = useRef(table);
+  seen.current = table;
+  const presence = useMemo(() => tellPresence((line) => announce(spokenLine(seen.current, line))), []);
+  useEffect(() => presence.stop, []);
   const last = table.log.at(-1)?.sequence ?? 0;
   useEffect(() => {
     const before = heard.current;
@@ -28,7 +33,10 @@ export function useAnnounced(table: TableState, own: number | undefined, decisio
     const fresh = table.log.filter(({ sequence }) => sequence > before);
     if (fresh.length > MOST_AT_ONCE) return;
     const said = worthSaying(fresh, !hidden.peek().includes("expressions"));
-    for (const line of said) announce(spokenLine(table, line));
+    for (const line of said) {
+      if (isPresence(line)) presence.hear(line);
+      else announce(spokenLine(table, line));
+    }
     const sounds = said.flatMap((line) => soundOf(line) ?? []);
     // Together they would be a noise: the last is heard, and it is the most telling.
     const sound = sounds.at(-1);
@@ -37,7 +45,7 @@ export function useAnnounced(table: TableState, own: number | undefined, decisio
   useEffect(() => {
     if (!decision) return;
     play("yourTurn");
-    announce(`${nowHeading({ table, own, deciding: decision.kind, next: own })}. ${demandWords(table, decision)}`);
+    announce(`${nowHeading({ table, own, decision, next: own })}. ${demandWords(table, decision)}`);
   }, [decision?.id]);
 }
 

@@ -5,7 +5,7 @@ import { type Signal, signal } from "@preact/signals";
 import { playApi } from "../api/client";
 import { type Following, follow } from "../api/follow";
 import type { HeldSeat } from "../lobby/seat";
-import { type Acting, startActing } from "./acting";
+import { type Acting, asksForTimes, startActing } from "./acting";
 import type { TableState } from "./model/state";
 
 export interface Session extends Acting {
@@ -18,7 +18,7 @@ export interface Session extends Acting {
 /** Sits down on a seat. */
 export function startSession(held: HeldSeat, table: TableState): Session {
   const { ticket } = held;
-  const acting = startActing(ticket, table, held.seat);
+  const acting = startActing(ticket, table, held.seat, asksForTimes(table.roomId));
   const { live } = acting;
 
   const attach = () =>

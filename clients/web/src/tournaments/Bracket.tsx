@@ -13,16 +13,18 @@ interface BracketProps {
   mine?: number | undefined;
   /** For a wall: without links. */
   large?: boolean;
+  /** The first round that is drawn. */
+  from?: number;
 }
 
 /** The bracket. */
-export function Bracket({ tournament, games, mine, large = false }: BracketProps) {
+export function Bracket({ tournament, games, mine, large = false, from = 1 }: BracketProps) {
   const words = t().tournaments;
   const rounds = bracket(tournament, games);
   if (rounds.length === 0) return <p class="soft">{words.games.none}</p>;
   return (
-    <ol class={`bracket ${large ? "bracket-large" : ""}`} style={{ "--rounds": rounds.length }}>
-      {rounds.map((round) => (
+    <ol class={`bracket ${large ? "bracket-large" : ""}`} style={{ "--rounds": rounds.length - from + 1 }}>
+      {rounds.slice(from - 1).map((round) => (
         <li key={round.round} class="bracket-round">
           <h3>{isFinal(rounds, round) ? words.final : words.round(round.round)}</h3>
           <ol class="bracket-tables">

@@ -1,5 +1,6 @@
 // Where a game of a tournament can be seen: live while it is being played, as a replay once it counts.
 
+import { hidden } from "../experiment/hiding";
 import { type Tournament, type TournamentGame, TournamentGameState } from "../gen/chefshat/v1/tournament_pb";
 import { t } from "../i18n";
 import { pathOf } from "../router";
@@ -17,9 +18,16 @@ export function GameLink({ tournament, game, several }: GameLinkProps) {
   const number = several ? ` ${game.number}` : "";
   const which = words.games.of(`${words.round(game.round)}, ${words.table(game.table)}`, game.number);
   const heard = <span class="only-heard"> {which}</span>;
+  // A study may leave out the ways to other pages.
+  const linked = !hidden.value.includes("pages");
   switch (game.state) {
     case TournamentGameState.COUNTED:
-      return (
+      return !linked ? (
+        <span class="soft">
+          {words.games.over}
+          {number}
+        </span>
+      ) : (
         <a href={pathOf({ page: "replay", gameId: game.gameId })}>
           {words.games.replay}
           {number}
@@ -27,7 +35,7 @@ export function GameLink({ tournament, game, several }: GameLinkProps) {
         </a>
       );
     case TournamentGameState.PLAYING:
-      return tournament.settings?.policy?.spectators && game.roomId !== "" ? (
+      return linked && tournament.settings?.policy?.spectators && game.roomId !== "" ? (
         <a href={pathOf({ page: "watch", roomId: game.roomId })}>
           <span aria-hidden="true">▶ </span>
           {words.games.watch}

@@ -2,7 +2,6 @@
 
 import { useState } from "preact/hooks";
 import { inWords } from "../api/faults";
-import { ParticipantKind } from "../gen/chefshat/v1/room_pb";
 import type { Tournament } from "../gen/chefshat/v1/tournament_pb";
 import { t } from "../i18n";
 import { MAX_NAME } from "../lobby/room-form";
@@ -10,23 +9,24 @@ import { lastName } from "../lobby/seat";
 import { Button } from "../parts/Button";
 import { TextField } from "../parts/Field";
 import { Notice } from "../parts/Notice";
-import { type HeldPlace, takePlace } from "./place";
+import { hostedTournament } from "./hosting";
+import { takePlace } from "./place";
+import { isForPeople } from "./words";
 
 interface JoinTournamentProps {
   tournament: Tournament;
-  onJoined: (held: HeldPlace) => void;
+  onJoined: () => void;
 }
 
 /** The form. */
 export function JoinTournament({ tournament, onJoined }: JoinTournamentProps) {
   const words = t().tournaments.join;
-  const [code, setCode] = useState(new URLSearchParams(location.search).get("code") ?? "");
+  const [code, setCode] = useState(() => codeOf(tournament));
   const [name, setName] = useState(lastName());
   const [tried, setTried] = useState(false);
   const [busy, setBusy] = useState(false);
   const [fault, setFault] = useState("");
-  const kinds = tournament.settings?.kinds ?? [];
-  if (kinds.length > 0 && !kinds.includes(ParticipantKind.HUMAN)) return <p class="soft">{words.notForPeople}</p>;
+  if (!isForPeople(tournament)) return <p class="soft">{words.notForPeople}</p>;
   const join = async (event: Event) => {
     event.preventDefault();
     setTried(true);
@@ -34,7 +34,8 @@ export function JoinTournament({ tournament, onJoined }: JoinTournamentProps) {
     setBusy(true);
     setFault("");
     try {
-      onJoined(await takePlace(tournament.tournamentId, code, name));
+      await takePlace(tournament.tournamentId, code, name);
+      onJoined();
     } catch (thrown) {
       setFault(inWords(thrown));
       setBusy(false);
@@ -67,4 +68,9 @@ export function JoinTournament({ tournament, onJoined }: JoinTournamentProps) {
       </Button>
     </form>
   );
+}
+
+/** The join code as far as it is known here: a link has brought it, or this device has made the tournament. */
+function codeOf({ tournamentId }: Tournament): string {
+  return new URLSearchParams(location.search).get("code") ?? hostedTournament(tournamentId)?.joinCode ?? "";
 }

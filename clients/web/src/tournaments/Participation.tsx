@@ -4,12 +4,15 @@
 import type { ComponentChildren } from "preact";
 import { useEffect, useState } from "preact/hooks";
 import { wordsOf } from "../api/faults";
+import { AfterStudy } from "../experiment/AfterStudy";
+import { useHiding } from "../experiment/hiding";
+import { studyIn } from "../experiment/study";
 import { TournamentState } from "../gen/chefshat/v1/tournament_pb";
 import { t } from "../i18n";
 import { announce } from "../parts/Announcer";
 import { Button } from "../parts/Button";
 import { Notice } from "../parts/Notice";
-import type { Acting } from "../table/acting";
+import { type Acting, asksForTimes } from "../table/acting";
 import { Seated } from "../table/Seated";
 import { gameOf, isEnded } from "./course";
 import type { Heard } from "./following";
@@ -25,29 +28,44 @@ interface ParticipationProps {
 
 /** The page as a participant sees it. */
 export function Participation({ held, heard, children }: ParticipationProps) {
+  const { tournamentId } = heard.tournament;
   const ended = isEnded(heard.tournament);
   const [part, setPart] = useState<Part | undefined>(undefined);
   useEffect(() => {
+    // One that ends meanwhile is heard of on the stream, after the end of the participant's own game.
     if (ended) return;
-    const started = startParticipation(held.ticket);
+    const started = startParticipation(held.ticket, asksForTimes(tournamentId));
     setPart(started);
     return () => started.stop();
-  }, [held.ticket, ended]);
+  }, [held.ticket]);
+  const study = studyIn(tournamentId);
+  useHiding(study);
+  const after = study && ended && (
+    <AfterStudy after={study.after} blanks={{ name: held.name, tournament: tournamentId }} named />
+  );
   const game = part?.game.value;
   const [left, setLeft] = useState<Acting | undefined>(undefined);
   useEffect(() => {
     if (game) announce(t().tournaments.part.begins(placeWords(heard, game)));
   }, [game]);
   const banner = part && <Banner part={part} />;
-  if (game && game !== left) {
+  // The tournament was closed while its game was open.
+  const gone = part?.presence.value === "over" && game && !isOverThere(game);
+  if (game && game !== left && !gone) {
     return (
       <Seated
         acting={game}
         banner={
           <>
             {banner}
-            <GameBanner game={game} onBack={() => setLeft(game)} />
+            {after}
+            <GameBanner game={game} />
           </>
+        }
+        onward={
+          <Button look="main" onClick={() => setLeft(game)}>
+            {t().tournaments.part.back}
+          </Button>
         }
       />
     );
@@ -55,13 +73,16 @@ export function Participation({ held, heard, children }: ParticipationProps) {
   return (
     <>
       {banner}
-      <OwnState held={held} heard={heard}>
-        {game && !isOverThere(game) && (
-          <Button look="main" onClick={() => setLeft(undefined)}>
-            {t().tournaments.part.toGame}
-          </Button>
-        )}
-      </OwnState>
+      {after}
+      {!after && (
+        <OwnState held={held} heard={heard}>
+          {game && !gone && !isOverThere(game) && (
+            <Button look="main" onClick={() => setLeft(undefined)}>
+              {t().tournaments.part.toGame}
+            </Button>
+          )}
+        </OwnState>
+      )}
       {children}
     </>
   );
@@ -101,20 +122,10 @@ function Banner({ part }: { part: Part }) {
   return link.value === "lost" ? <Notice kind="fault">{words.lost}</Notice> : null;
 }
 
-/** Within a game: how to come back to the tournament, and to one's own seat after a substitute has played. */
-function GameBanner({ game, onBack }: { game: Acting; onBack: () => void }) {
-  const over = isOverThere(game);
+/** Within a game: how to come back to one's own seat after a substitute has played. */
+function GameBanner({ game }: { game: Acting }) {
   const { substituted } = game.live.value;
-  if (over) {
-    return (
-      <Notice kind="good">
-        <Button look="main" onClick={onBack}>
-          {t().tournaments.part.back}
-        </Button>
-      </Notice>
-    );
-  }
-  if (!substituted) return null;
+  if (!substituted || isOverThere(game)) return null;
   return (
     <Notice kind="hint">
       {t().table.link.substituted}{" "}

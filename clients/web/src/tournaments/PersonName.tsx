@@ -1,5 +1,6 @@
 // The name of a participant, leading to its page.
 
+import { hidden } from "../experiment/hiding";
 import { pathOf } from "../router";
 
 interface PersonNameProps {
@@ -12,7 +13,8 @@ interface PersonNameProps {
 
 /** The name. */
 export function PersonName({ name, builtIn = "", linked = true }: PersonNameProps) {
-  if (!linked) return <b class="person-name">{name}</b>;
+  // A study may leave out the ways to other pages.
+  if (!linked || hidden.value.includes("pages")) return <b class="person-name">{name}</b>;
   return (
     <a class="person-name" href={pathOf({ page: "person", name: builtIn || name })}>
       {name}

@@ -1,4 +1,4 @@
-// A round robin or Swiss tournament as rounds of tables: the newest round open, the others folded. Each line is a game.
+// A round robin or Swiss tournament as rounds of tables: the newest round open, the others folded; and the tables of one round, for a wall.
 
 import {
   type Tournament,
@@ -15,30 +15,20 @@ interface RoundsProps {
   tournament: Tournament;
   games: readonly TournamentGame[];
   mine?: number | undefined;
-  /** For a wall: the newest round alone, without links. */
-  large?: boolean;
 }
 
 /** The rounds, newest first. */
-export function Rounds({ tournament, games, mine, large = false }: RoundsProps) {
+export function Rounds({ tournament, games, mine }: RoundsProps) {
   const words = t().tournaments;
   const rounds = playedRounds(games).reverse();
   const newest = rounds.find(({ round }) => round === tournament.round) ?? rounds[0];
   if (!newest) return <p class="soft">{words.games.none}</p>;
-  if (large) {
-    return (
-      <section class="rounds-one rounds-large">
-        <h2>{words.round(newest.round)}</h2>
-        <Tables {...{ tournament, mine, large }} tables={newest.tables} />
-      </section>
-    );
-  }
   return (
     <div class="rounds">
       {rounds.map(({ round, tables }) => (
         <details key={round} class="sheet rounds-one" open={round === newest.round}>
           <summary>{words.round(round)}</summary>
-          <Tables {...{ tournament, tables, mine, large }} />
+          <Tables {...{ tournament, tables, mine }} />
         </details>
       ))}
     </div>
@@ -49,10 +39,9 @@ interface TablesProps {
   tournament: Tournament;
   tables: readonly PlayedTable[];
   mine: number | undefined;
-  large: boolean;
 }
 
-function Tables({ tournament, tables, mine, large }: TablesProps) {
+function Tables({ tournament, tables, mine }: TablesProps) {
   const words = t().tournaments;
   return (
     <ul class="rounds-tables">
@@ -67,13 +56,55 @@ function Tables({ tournament, tables, mine, large }: TablesProps) {
                     <Seat key={seat.participant} {...{ tournament, game, seat }} mine={seat.participant === mine} />
                   ))}
                 </ol>
-                {!large && <GameLink tournament={tournament} game={game} several={games.length > 1} />}
+                <GameLink tournament={tournament} game={game} several={games.length > 1} />
               </li>
             ))}
           </ul>
         </li>
       ))}
     </ul>
+  );
+}
+
+/** Tables for a wall: of each the game that is being played, else its newest result. */
+export function TablesOnWall({ tournament, tables }: Omit<TablesProps, "mine">) {
+  const words = t().tournaments;
+  return (
+    <ol class="wall-tables">
+      {tables.map(({ table, games }) => {
+        const game = ofTheMoment(games);
+        if (!game) return null;
+        const playing = game.state === TournamentGameState.PLAYING;
+        return (
+          <li key={table} class={playing ? "wall-playing" : ""}>
+            <h3>
+              {words.table(table)}
+              {games.length > 1 && ` · ${words.game(game.number)}`}
+              {playing && (
+                <>
+                  <span aria-hidden="true"> ▶</span>
+                  <span class="only-heard"> {words.games.playing}</span>
+                </>
+              )}
+            </h3>
+            <ol>
+              {byPlace(game).map((seat) => (
+                <Seat key={seat.participant} {...{ tournament, game, seat }} mine={false} />
+              ))}
+            </ol>
+          </li>
+        );
+      })}
+    </ol>
+  );
+}
+
+/** The game of a table that is of interest just now. */
+function ofTheMoment(games: readonly TournamentGame[]): TournamentGame | undefined {
+  return (
+    games.find(({ state }) => state === TournamentGameState.PLAYING) ??
+    games.findLast(({ state }) => state === TournamentGameState.COUNTED) ??
+    games[0]
   );
 }
 

@@ -1,16 +1,21 @@
-// The standings of a tournament, as a table; before the first game, who takes part. And how sure the order is, in words.
+// The standings of a tournament, as a table, and how sure the order is, in words. Before its beginning there is Entrants.tsx instead.
 
 import {
   type OrderConfidence,
   type Tournament,
   TournamentFormat,
   type TournamentStanding,
+  TournamentState,
 } from "../gen/chefshat/v1/tournament_pb";
 import { t } from "../i18n";
 import { KindBadge } from "../parts/KindBadge";
+import { ratingWords } from "../people/rating";
 import { gradeOf, isEnded, nameOf, participantOf } from "./course";
 import { PersonName } from "./PersonName";
 import "./standings.css";
+
+/** Lines that leave room for two rows each, on a wall. */
+const FEW = 5;
 
 interface StandingsProps {
   tournament: Tournament;
@@ -26,9 +31,9 @@ export function Standings({ tournament, standings, mine, large = false }: Standi
   const words = t().tournaments.standings;
   const knockout = tournament.settings?.format === TournamentFormat.KNOCKOUT;
   const players = tournament.settings?.rules?.players ?? 4;
-  const caption = isEnded(tournament) ? words.final : words.title;
+  const caption = tournament.state === TournamentState.FINISHED ? words.final : words.title;
   return (
-    <table class={`standings ${large ? "standings-large" : ""}`}>
+    <table class={`standings ${standings.length > FEW ? "standings-long" : ""}`}>
       <caption class="only-heard">{caption}</caption>
       <thead>
         <tr>
@@ -43,11 +48,11 @@ export function Standings({ tournament, standings, mine, large = false }: Standi
           <th scope="col" title={words.scoreHint}>
             {words.score}
           </th>
-          <th scope="col" class="standings-minor">
-            {words.points}
-          </th>
           {!large && (
             <>
+              <th scope="col" class="standings-minor">
+                {words.points}
+              </th>
               <th scope="col" class="standings-minor">
                 {words.places}
               </th>
@@ -62,7 +67,7 @@ export function Standings({ tournament, standings, mine, large = false }: Standi
         {standings.map((standing) => (
           <tr key={standing.participant} class={standing.participant === mine ? "standings-mine" : ""}>
             <td class={`number standings-place ${standing.place === 1 && standing.games > 0 ? "standings-first" : ""}`}>
-              {standing.place}
+              {standing.place || "–"}
             </td>
             <th scope="row" class="standings-name">
               <Who tournament={tournament} standing={standing} large={large} />
@@ -72,13 +77,15 @@ export function Standings({ tournament, standings, mine, large = false }: Standi
             <td class="number">
               <b>{String(standing.score)}</b>
             </td>
-            <td class="number standings-minor">{String(standing.points)}</td>
             {!large && (
               <>
+                <td class="number standings-minor">{String(standing.points)}</td>
                 <td class="number standings-minor">
                   <Places places={standing.places} count={players} />
                 </td>
-                <td class="number standings-minor">{ratingWords(standing)}</td>
+                <td class="number standings-minor">
+                  {standing.rating && standing.rating.games > 0 ? ratingWords(standing.rating) : "–"}
+                </td>
               </>
             )}
           </tr>
@@ -117,10 +124,6 @@ function Places({ places, count }: { places: readonly number[]; count: number })
       <span class="only-heard">{t().tournaments.standings.placesWords(all)}</span>
     </>
   );
-}
-
-function ratingWords({ rating }: TournamentStanding): string {
-  return rating && rating.games > 0 ? `${rating.mean.toFixed(1)} ± ${(1.96 * rating.deviation).toFixed(1)}` : "–";
 }
 
 /** For each two who follow one another, how sure their order is. */

@@ -1,25 +1,31 @@
-// One tournament, as it goes on: where it stands, the standings, the bracket or the rounds. Who has joined here plays here. With ?wall it is
-// drawn for a wall.
+// One tournament, as it goes on: where it stands, the standings, the bracket or the rounds. Who has joined here plays here, who has made it
+// here begins it here. With ?wall it is drawn for a wall.
 
 import type { ComponentChildren } from "preact";
 import { useState } from "preact/hooks";
 import { wordsOf } from "../api/faults";
 import type { PageProps } from "../app";
+import { hidden, useHiding } from "../experiment/hiding";
+import { StudyJoin } from "../experiment/StudyJoin";
+import { holderOf, languageOf, type Study, studyOf } from "../experiment/study";
 import { TournamentFormat, TournamentState } from "../gen/chefshat/v1/tournament_pb";
 import { t } from "../i18n";
-import { ButtonLink } from "../parts/Button";
+import { Button, ButtonLink } from "../parts/Button";
 import { Notice } from "../parts/Notice";
 import { pathOf } from "../router";
 import { Bracket } from "./Bracket";
 import { isEnded } from "./course";
+import { Entrants } from "./Entrants";
 import { type FollowedTournament, type Heard, MAX_GAMES, useConfidence, useGames, useTournament } from "./following";
 import { JoinTournament } from "./JoinTournament";
+import { Organiser } from "./Organiser";
 import { Participation } from "./Participation";
-import { type HeldPlace, heldPlace } from "./place";
+import { type HeldPlace, heldPlace, takePlace } from "./place";
 import { Rounds } from "./Rounds";
 import { Confidence, Standings } from "./Standings";
 import { Wall } from "./Wall";
-import { dealsWords, inShort, StateChip } from "./words";
+import { dealsWords, inShort, playWords, StateChip } from "./words";
+import "../lobby/join.css";
 import "./tournaments.css";
 
 /** The page. */
@@ -53,18 +59,62 @@ function Followed({ followed }: { followed: FollowedTournament }) {
 /** The page for a visitor, or for a participant. */
 function Visited({ heard }: { heard: Heard }) {
   const { tournament } = heard;
-  const [held, setHeld] = useState<HeldPlace | null>(() => heldPlace(tournament.tournamentId));
-  if (held) {
+  const { tournamentId } = tournament;
+  const [held, setHeld] = useState<HeldPlace | null>(() => heldPlace(tournamentId));
+  const [another, setAnother] = useState(false);
+  const invited = inviteIn(location.search);
+  useHiding(invited?.study ?? null);
+  const holder = another ? "another" : holderOf(invited?.study ?? null, held?.name ?? "");
+  const open = tournament.state === TournamentState.OPEN;
+  const arrive = () => {
+    // The link has been followed: a reload goes on with the place that was taken.
+    history.replaceState(null, "", location.pathname + languageOf(location.search));
+    setHeld(heldPlace(tournamentId));
+    setAnother(false);
+  };
+  if (held && holder === "reader") {
     return (
       <Participation held={held} heard={heard}>
-        <Course heard={heard} mine={held.participant} />
+        <Course heard={heard} mine={held.participant}>
+          <Organiser tournament={tournament} />
+        </Course>
       </Participation>
     );
   }
+  if (held && holder === "unclear") return <Whose name={held.name} onSame={arrive} onOther={() => setAnother(true)} />;
+  if (open && invited?.study) {
+    const take = (name: string) => takePlace(tournamentId, invited.code, name);
+    return <StudyJoin study={invited.study} what="tournament" take={take} arrive={arrive} />;
+  }
   return (
     <Course heard={heard} mine={undefined}>
-      {tournament.state === TournamentState.OPEN && <JoinTournament tournament={tournament} onJoined={setHeld} />}
+      <Organiser tournament={tournament} />
+      {open && <JoinTournament tournament={tournament} onJoined={arrive} />}
+      {!open && invited && !isEnded(tournament) && (
+        <Notice kind="hint">{t().faults.byReason.TOURNAMENT_STARTED}</Notice>
+      )}
     </Course>
+  );
+}
+
+/** The join code that an address brings, and the study that it is for; null without a code. */
+function inviteIn(search: string): { code: string; study: Study | null } | null {
+  const code = new URLSearchParams(search).get("code");
+  return code ? { code, study: studyOf(search) } : null;
+}
+
+/** Asks who is at this device, where a link names nobody and somebody has followed it already. */
+function Whose({ name, onSame, onOther }: { name: string; onSame: () => void; onOther: () => void }) {
+  const words = t().experiment.join;
+  return (
+    <section class="sheet join-page">
+      <h1>{words.title}</h1>
+      <p>{words.takenPlace(name)}</p>
+      <Button look="main" onClick={onSame}>
+        {words.goOn(name)}
+      </Button>
+      <Button onClick={onOther}>{words.anotherPlace}</Button>
+    </section>
   );
 }
 
@@ -91,23 +141,32 @@ function Course({ heard, mine, children }: CourseProps) {
           <p>
             <StateChip tournament={tournament} /> <span class="soft">{inShort(tournament)}</span>
           </p>
+          {tournament.round === 0 && !isEnded(tournament) && (
+            <ul class="tournament-play">
+              {playWords(tournament).map((words) => (
+                <li key={words}>{words}</li>
+              ))}
+            </ul>
+          )}
           {deals && <p class="soft small">{deals}</p>}
         </div>
-        <ButtonLink href={`${pathOf({ page: "tournament", tournamentId: tournament.tournamentId })}?wall`}>
-          {words.wall.open}
-        </ButtonLink>
+        {!hidden.value.includes("pages") && (
+          <ButtonLink href={`${pathOf({ page: "tournament", tournamentId: tournament.tournamentId })}?wall`}>
+            {words.wall.open}
+          </ButtonLink>
+        )}
       </header>
       {children}
       <section class="sheet tournament-part">
         <h2>{standingsTitle(heard)}</h2>
-        {standings.length === 0 ? (
-          <p class="soft">{words.standings.none}</p>
+        {tournament.round === 0 ? (
+          <Entrants tournament={tournament} mine={mine} />
         ) : (
           <Standings tournament={tournament} standings={standings} mine={mine} />
         )}
       </section>
       <Confidence tournament={tournament} confidence={confidence} />
-      {tournament.state !== TournamentState.OPEN && (
+      {tournament.round > 0 && (
         <section class="tournament-part">
           <h2>{knockout ? words.games.bracket : words.games.title}</h2>
           {knockout ? (
@@ -124,6 +183,6 @@ function Course({ heard, mine, children }: CourseProps) {
 
 function standingsTitle({ tournament }: Heard): string {
   const words = t().tournaments.standings;
-  if (tournament.state === TournamentState.OPEN) return words.field;
-  return isEnded(tournament) ? words.final : words.title;
+  if (tournament.round === 0) return words.field;
+  return tournament.state === TournamentState.FINISHED ? words.final : words.title;
 }

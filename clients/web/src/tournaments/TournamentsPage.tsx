@@ -1,47 +1,65 @@
 // The tournaments of the server: those that can be joined, those that are being played, those that are over.
 
 import { wordsOf } from "../api/faults";
-import { usePolled } from "../api/poll";
+import { countWords, type Shown, useShown } from "../api/pages";
 import { type Tournament, TournamentState } from "../gen/chefshat/v1/tournament_pb";
 import { t } from "../i18n";
+import { ButtonLink } from "../parts/Button";
+import { MoreButton } from "../parts/MoreButton";
 import { Notice } from "../parts/Notice";
 import { pathOf } from "../router";
-import { isEnded } from "./course";
-import { listTournaments } from "./list";
-import { inShort, StateChip } from "./words";
+import { tournamentsIn } from "./list";
+import { inShort, madeWords, StateChip } from "./words";
 import "./tournaments.css";
 
-/** How often the list is asked for, milliseconds. */
+/** How often the lists are asked for, milliseconds. */
 const EVERY_MS = 4_000;
+/** And those that are over, milliseconds: nobody waits for them. */
+const OVER_EVERY_MS = 20_000;
+/** Tournaments of one kind shown at first, and more at a time. */
+const AT_A_TIME = 12;
 
 /** The page. */
 export function TournamentsPage() {
   const words = t().tournaments;
-  const { value, fault } = usePolled(listTournaments, EVERY_MS, "tournaments");
-  const tournaments = value ?? [];
-  const inState = (state: TournamentState) => tournaments.filter((tournament) => tournament.state === state);
+  const { sections } = words;
+  const open = useShown(tournamentsIn(TournamentState.OPEN), AT_A_TIME, EVERY_MS, "open");
+  const playing = useShown(tournamentsIn(TournamentState.PLAYING), AT_A_TIME, EVERY_MS, "playing");
+  const finished = useShown(tournamentsIn(TournamentState.FINISHED), AT_A_TIME, OVER_EVERY_MS, "finished");
+  const closed = useShown(tournamentsIn(TournamentState.CLOSED), AT_A_TIME, OVER_EVERY_MS, "closed");
+  const all = [open, playing, finished, closed];
+  const fault = all.find((shown) => shown.fault)?.fault;
+  const known = all.every(({ list }) => list !== null);
+  const none = known && all.every(({ list }) => list?.items.length === 0);
   return (
     <div class="tournaments">
-      <h1>{words.title}</h1>
+      <header class="tournaments-head">
+        <h1>{words.title}</h1>
+        <ButtonLink href={pathOf({ page: "newTournament" })} look={none ? "main" : "plain"}>
+          {t().organise.link}
+        </ButtonLink>
+      </header>
       {fault && <Notice kind="fault">{wordsOf(fault)}</Notice>}
-      {value === null && !fault && <p class="soft">{t().common.loading}</p>}
-      {value?.length === 0 && <p class="sheet">{words.none}</p>}
-      <Section title={words.sections.open} tournaments={inState(TournamentState.OPEN)} />
-      <Section title={words.sections.playing} tournaments={inState(TournamentState.PLAYING)} />
-      <Section title={words.sections.over} tournaments={tournaments.filter(isEnded)} />
+      {!known && !fault && <p class="soft">{t().common.loading}</p>}
+      {none && <p class="sheet">{words.none}</p>}
+      <Section title={sections.open} shown={open} />
+      <Section title={sections.playing} shown={playing} />
+      <Section title={sections.over} shown={finished} />
+      <Section title={sections.closed} shown={closed} />
     </div>
   );
 }
 
-function Section({ title, tournaments }: { title: string; tournaments: readonly Tournament[] }) {
-  if (tournaments.length === 0) return null;
+function Section({ title, shown }: { title: string; shown: Shown<Tournament> }) {
+  const { list } = shown;
+  if (list === null || list.items.length === 0) return null;
   return (
     <section class="tournaments-section">
       <h2>
-        {title} <span class="soft number">{tournaments.length}</span>
+        {title} <span class="soft number">{countWords(list.items.length, list.more)}</span>
       </h2>
       <ul class="tournaments-list">
-        {tournaments.map((tournament) => (
+        {list.items.map((tournament) => (
           <li key={tournament.tournamentId}>
             <a
               class="sheet tournaments-card"
@@ -49,11 +67,14 @@ function Section({ title, tournaments }: { title: string; tournaments: readonly 
             >
               <b>{tournament.settings?.name}</b>
               <StateChip tournament={tournament} />
-              <span class="soft small">{inShort(tournament)}</span>
+              <span class="soft small">
+                {inShort(tournament)} · {madeWords(tournament)}
+              </span>
             </a>
           </li>
         ))}
       </ul>
+      <MoreButton shown={shown} what={title} />
     </section>
   );
 }

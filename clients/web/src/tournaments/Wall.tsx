@@ -1,34 +1,36 @@
-// A tournament for a wall: nothing but its name, the standings and the tables of the moment, as large as the wall allows. Standings that do
-// not fit are shown a part at a time.
+// A tournament for a wall: nothing but its name, the standings and the tables of the moment, as large as the wall allows; before its beginning
+// who has joined. What does not fit is shown a part at a time.
 
+import type { ComponentChildren } from "preact";
 import { useEffect, useState } from "preact/hooks";
 import { TournamentFormat } from "../gen/chefshat/v1/tournament_pb";
 import { t } from "../i18n";
 import { Drawing } from "../parts/Drawing";
 import { pathOf } from "../router";
 import { Bracket } from "./Bracket";
+import { bracket, playedRounds } from "./course";
+import { Entrants } from "./Entrants";
+import { useFit } from "./fit";
 import { type Heard, useGames } from "./following";
-import { Rounds } from "./Rounds";
+import { TablesOnWall } from "./Rounds";
 import { Standings } from "./Standings";
-import { inShort, StateChip } from "./words";
+import { inShort, playWords, StateChip } from "./words";
 import "./wall.css";
 
 /** Lines of the standings that are read at a time. */
 const LINES = 10;
-/** How long each part of longer standings stays, milliseconds. */
+/** Tables that are read at a time. */
+const TABLES = 12;
+/** Tables of a round with which a bracket can be read: of larger rounds the tables stand side by side. */
+const BRACKET_TABLES = 4;
+/** How long each part stays, milliseconds. */
 const EVERY_MS = 9_000;
 
 /** The wall. */
 export function Wall({ heard }: { heard: Heard }) {
-  const { tournament, standings } = heard;
+  const { tournament } = heard;
   const words = t().tournaments;
-  const games = useGames(heard);
   useWithoutFrame();
-  const parts = Math.max(1, Math.ceil(standings.length / LINES));
-  const part = useTurning(parts);
-  const from = part * LINES;
-  const shown = standings.slice(from, from + LINES);
-  const knockout = tournament.settings?.format === TournamentFormat.KNOCKOUT;
   return (
     <div class="wall">
       <header class="wall-head">
@@ -41,20 +43,81 @@ export function Wall({ heard }: { heard: Heard }) {
           <span class="only-heard">{words.wall.close}</span>
         </a>
       </header>
-      <section class="wall-standings">
-        <Standings tournament={tournament} standings={shown} large />
-        {parts > 1 && <p class="soft number">{words.wall.more(from + 1, from + shown.length)}</p>}
+      {tournament.round === 0 ? (
+        <section class="wall-part wall-field">
+          <h2>{words.standings.field}</h2>
+          <Fitted>
+            <Entrants tournament={tournament} large />
+          </Fitted>
+          <p class="wall-play">{playWords(tournament).join(" · ")}</p>
+        </section>
+      ) : (
+        <Played heard={heard} />
+      )}
+    </div>
+  );
+}
+
+/** The standings and the tables, once it has begun. */
+function Played({ heard }: { heard: Heard }) {
+  const { tournament, standings } = heard;
+  const words = t().tournaments;
+  const lines = useParts(standings, LINES);
+  return (
+    <>
+      <section class="wall-part wall-standings">
+        <h2>
+          {words.standings.title}
+          {lines.several && <span class="soft number"> {words.wall.more(lines.from, lines.to)}</span>}
+        </h2>
+        <Fitted>
+          <Standings tournament={tournament} standings={lines.shown} large />
+        </Fitted>
       </section>
-      <section class="wall-games">
-        {knockout ? (
-          <>
-            <h2 class="only-heard">{words.games.bracket}</h2>
-            <Bracket tournament={tournament} games={games} large />
-          </>
-        ) : (
-          <Rounds tournament={tournament} games={games} large />
-        )}
+      <Tables heard={heard} />
+    </>
+  );
+}
+
+/** The tables of the moment: those of the round, or what is left of a bracket. */
+function Tables({ heard }: { heard: Heard }) {
+  const { tournament } = heard;
+  const words = t().tournaments;
+  const games = useGames(heard);
+  const rounds = playedRounds(games);
+  const newest = rounds.find(({ round }) => round === tournament.round) ?? rounds.at(-1);
+  const tables = useParts(newest?.tables ?? [], TABLES);
+  const knockout = tournament.settings?.format === TournamentFormat.KNOCKOUT;
+  if (knockout && newest && newest.tables.length <= BRACKET_TABLES) {
+    const first = bracket(tournament, games).find((round) => round.tables.length <= BRACKET_TABLES)?.round ?? 1;
+    return (
+      <section class="wall-part">
+        <h2>{words.games.bracket}</h2>
+        <Fitted>
+          <Bracket tournament={tournament} games={games} from={first} large />
+        </Fitted>
       </section>
+    );
+  }
+  return (
+    <section class="wall-part">
+      <h2>
+        {newest && words.round(newest.round)}
+        {tables.several && <span class="soft number"> · {words.wall.tables(tables.from, tables.to)}</span>}
+      </h2>
+      <Fitted>
+        <TablesOnWall tournament={tournament} tables={tables.shown} />
+      </Fitted>
+    </section>
+  );
+}
+
+/** A place whose writing is as large as it can be. */
+function Fitted({ children }: { children: ComponentChildren }) {
+  const box = useFit<HTMLDivElement>();
+  return (
+    <div ref={box} class="wall-fitted">
+      {children}
     </div>
   );
 }
@@ -69,13 +132,17 @@ function useWithoutFrame(): void {
   }, []);
 }
 
-/** The number of the part to show, one after the other. */
-function useTurning(parts: number): number {
+/** A part of a list, one after the other, each of about the same length and none longer than `most`. */
+function useParts<Item>(all: readonly Item[], most: number) {
+  const parts = Math.max(1, Math.ceil(all.length / most));
+  const length = Math.ceil(all.length / parts);
   const [turn, setTurn] = useState(0);
   useEffect(() => {
     if (parts < 2) return;
     const timer = setInterval(() => setTurn((before) => before + 1), EVERY_MS);
     return () => clearInterval(timer);
   }, [parts]);
-  return turn % parts;
+  const begin = (turn % parts) * length;
+  const shown = all.slice(begin, begin + length);
+  return { shown, several: parts > 1, from: begin + 1, to: begin + shown.length };
 }

@@ -1,19 +1,14 @@
 // The tournaments of the server, newest first.
 
 import { CALL_LIMIT_MS, tournamentApi } from "../api/client";
-import { allPages } from "../api/pages";
-import type { Tournament } from "../gen/chefshat/v1/tournament_pb";
+import type { AskPage } from "../api/pages";
+import type { Tournament, TournamentState } from "../gen/chefshat/v1/tournament_pb";
 
-const PAGE_SIZE = 100;
-/** Pages that are asked for at most. The newest come last, so that all are needed to know them. */
-const MAX_PAGES = 100;
-
-/** Asks for the tournaments of the server. */
-export async function listTournaments(signal: AbortSignal): Promise<Tournament[]> {
-  const call = { signal, timeoutMs: CALL_LIMIT_MS };
-  const found = await allPages(async (pageToken) => {
-    const answer = await tournamentApi.listTournaments({ pageSize: PAGE_SIZE, pageToken }, call);
-    return { items: answer.tournaments, nextPageToken: answer.nextPageToken };
-  }, MAX_PAGES);
-  return found.reverse();
+/** Asks for the tournaments in a state. */
+export function tournamentsIn(state: TournamentState): AskPage<Tournament> {
+  return async (page, signal) => {
+    const call = { signal, timeoutMs: CALL_LIMIT_MS };
+    const { tournaments, nextPageToken } = await tournamentApi.listTournaments({ state, ...page }, call);
+    return { items: tournaments, nextPageToken };
+  };
 }

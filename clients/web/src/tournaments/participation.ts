@@ -36,8 +36,8 @@ interface Seated {
   waiting: SeatUpdate[];
 }
 
-/** Takes part with a participant's ticket. */
-export function startParticipation(ticket: string): Participation {
+/** Takes part with a participant's ticket; `timed` if its decisions are sent with the time that the person took. */
+export function startParticipation(ticket: string, timed: boolean): Participation {
   const presence = signal<Presence>("coming");
   const game = signal<Acting | undefined>(undefined);
   let stopped = false;
@@ -71,7 +71,7 @@ export function startParticipation(ticket: string): Participation {
         rooms.delete(attached.roomId);
         return;
       }
-      const acting = startActing(attached.ticket, tableFromRoom(room), attached.seat);
+      const acting = startActing(attached.ticket, tableFromRoom(room), attached.seat, timed);
       batch(() => {
         acting.hear(seated.waiting);
         game.value = acting;

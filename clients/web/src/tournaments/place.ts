@@ -4,7 +4,7 @@
 import { CALL_LIMIT_MS, tournamentApi } from "../api/client";
 import { ParticipantKind } from "../gen/chefshat/v1/room_pb";
 import { canonical } from "../lobby/seat";
-import { recall, remember } from "../store";
+import { recallObject, remember } from "../store";
 
 /** A place in a tournament that this device has taken. */
 export interface HeldPlace {
@@ -15,27 +15,22 @@ export interface HeldPlace {
 
 /** The place that this device has in a tournament, if any. */
 export function heldPlace(tournamentId: string): HeldPlace | null {
-  try {
-    const kept: unknown = JSON.parse(recall(`tournament.${tournamentId}`) ?? "null");
-    if (typeof kept !== "object" || kept === null) return null;
-    const { ticket, participant, name }: Partial<Record<keyof HeldPlace, unknown>> = kept;
-    return typeof ticket === "string" && typeof participant === "number" && typeof name === "string"
+  return recallObject(`tournament.${tournamentId}`, ({ ticket, participant, name }) =>
+    typeof ticket === "string" && typeof participant === "number" && typeof name === "string"
       ? { ticket, participant, name }
-      : null;
-  } catch {
-    // Another version kept something else.
-    return null;
-  }
+      : null,
+  );
 }
 
-/** Joins as a person. */
-export async function takePlace(tournamentId: string, code: string, name: string): Promise<HeldPlace> {
+/** Joins as a person; without an id the tournament that the code finds. Gives the tournament's id. */
+export async function takePlace(tournamentId: string, code: string, name: string): Promise<string> {
   const joined = await tournamentApi.joinTournament(
     { tournamentId, joinCode: canonical(code), name: name.trim(), kind: ParticipantKind.HUMAN },
     { timeoutMs: CALL_LIMIT_MS },
   );
-  const held = { ticket: joined.ticket, participant: joined.participant, name: name.trim() };
-  remember(`tournament.${tournamentId}`, JSON.stringify(held));
+  const id = joined.tournament?.tournamentId ?? tournamentId;
+  const held: HeldPlace = { ticket: joined.ticket, participant: joined.participant, name: name.trim() };
+  remember(`tournament.${id}`, JSON.stringify(held));
   remember("name", held.name);
-  return held;
+  return id;
 }

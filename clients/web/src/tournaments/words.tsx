@@ -1,7 +1,9 @@
 // What a tournament is and where it stands, in words, with a sign beside the word that does not need its colour.
 
+import { ParticipantKind } from "../gen/chefshat/v1/room_pb";
 import { type Tournament, TournamentDeals, TournamentFormat, TournamentState } from "../gen/chefshat/v1/tournament_pb";
-import { t } from "../i18n";
+import { dateLocale, t } from "../i18n";
+import { clockOfPeople } from "../lobby/rooms";
 
 /** Where a tournament stands, by sign and word. */
 export function StateChip({ tournament }: { tournament: Tournament }) {
@@ -35,6 +37,43 @@ export function inShort(tournament: Tournament): string {
   return parts.join(" · ");
 }
 
+/** When it was made: of two with one name that tells them apart. */
+export function madeWords({ createdAtMs }: Tournament): string {
+  const dates = new Intl.DateTimeFormat(dateLocale(), { dateStyle: "medium", timeStyle: "short" });
+  return t().tournaments.made(dates.format(Number(createdAtMs)));
+}
+
+/** How it will be played, as far as it is known before it begins: when that is, how often one plays, how much time people have. */
+export function playWords(tournament: Tournament): string[] {
+  const words = t().tournaments.play;
+  const { settings } = tournament;
+  if (!settings) return [];
+  const parts = [settings.startWhenJoined ? words.beginsAt(settings.startWhenJoined) : words.beginsByHand];
+  if (settings.format === TournamentFormat.KNOCKOUT) parts.push(words.knockout(settings.gamesPerPairing));
+  else parts.push(words.rounds(settings.rounds, settings.gamesPerPairing));
+  const stop = settings.rules?.stop;
+  if (stop?.case === "targetPoints") parts.push(words.toPoints(stop.value));
+  if (stop?.case === "targetShifts") parts.push(words.shifts(stop.value));
+  if (settings.policy && isForPeople(tournament)) {
+    const { decisionTimeMs, bankMs } = clockOfPeople(settings.policy);
+    parts.push(words.clock(decisionTimeMs, bankMs));
+  }
+  return parts;
+}
+
+/** Whether people may join: with rotated deals only those may who remember nothing. */
+export function isForPeople({ settings }: Tournament): boolean {
+  const kinds = settings?.kinds ?? [];
+  if (settings?.deals === TournamentDeals.ROTATED) return false;
+  return kinds.length === 0 || kinds.includes(ParticipantKind.HUMAN);
+}
+
+/** Whether agents may join. */
+export function isForAgents({ settings }: Tournament): boolean {
+  const kinds = settings?.kinds ?? [];
+  return kinds.length === 0 || kinds.includes(ParticipantKind.AGENT);
+}
+
 /** What has to be known of the deals; undefined if every game is dealt anew. */
 export function dealsWords(tournament: Tournament): string | undefined {
   const words = t().tournaments.deals;
@@ -48,7 +87,8 @@ export function dealsWords(tournament: Tournament): string | undefined {
   }
 }
 
-function formatWord(tournament: Tournament): string {
+/** Who plays whom, in a word. */
+export function formatWord(tournament: Tournament): string {
   const words = t().tournaments.formats;
   switch (tournament.settings?.format) {
     case TournamentFormat.ROUND_ROBIN:

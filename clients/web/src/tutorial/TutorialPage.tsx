@@ -1,9 +1,13 @@
 // A short Shift that teaches the rules: the lessons one after the other at a table of its own, without a server.
 
 import { useEffect, useState } from "preact/hooks";
+import { inWords } from "../api/faults";
 import { t } from "../i18n";
+import { playNow } from "../lobby/play-now";
+import { lastName } from "../lobby/seat";
 import { announce } from "../parts/Announcer";
 import { Button, ButtonLink } from "../parts/Button";
+import { Notice } from "../parts/Notice";
 import { useAnnounced } from "../table/following";
 import { actionOf } from "../table/model/actions";
 import { type Card, without } from "../table/model/cards";
@@ -78,14 +82,41 @@ export function TutorialPage() {
             </Button>
           )}
           {ready && at === LESSONS.length - 1 && (
-            <ButtonLink look="main" href="/">
-              {words.toLobby}
-            </ButtonLink>
+            <>
+              <PlayNow />
+              <ButtonLink look="quiet" href="/">
+                {words.toLobby}
+              </ButtonLink>
+            </>
           )}
         </section>
       }
       onAnswer={goOn}
     />
+  );
+}
+
+/** A first game of one's own, without the way over the lobby. */
+function PlayNow() {
+  const [busy, setBusy] = useState(false);
+  const [fault, setFault] = useState("");
+  const play = async () => {
+    setBusy(true);
+    setFault("");
+    try {
+      await playNow(lastName());
+    } catch (thrown) {
+      setFault(inWords(thrown));
+      setBusy(false);
+    }
+  };
+  return (
+    <>
+      {fault && <Notice kind="fault">{fault}</Notice>}
+      <Button look="main" busy={busy} onClick={() => void play()}>
+        {t().tutorial.play}
+      </Button>
+    </>
   );
 }
 
@@ -98,6 +129,7 @@ function openDecision({ lesson, table, actions }: Progress, asked: NonNullable<L
     kind: asked.kind,
     legal: asked.moves.filter((move) => holds(hand, move)).map((move) => actionOf(move, table.faces)),
     hand,
+    given: given.length,
     timeLeftMs: 0,
     bankLeftMs: 0,
     receivedAtMs: 0,

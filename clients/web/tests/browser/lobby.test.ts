@@ -2,7 +2,12 @@
 
 import type { Browser } from "playwright-core";
 import { afterAll, beforeAll, expect, test } from "vitest";
+import { sitDown } from "./play";
+import { newRoom } from "./rooms";
 import { person, Server, startBrowser } from "./stage";
+
+/** More rooms than the lobby shows at first, fewer than twice as many. */
+const MANY = 14;
 
 let server: Server;
 let browser: Browser;
@@ -44,27 +49,108 @@ test("a room is made, and who opens its invitation takes the seat kept for a per
   expect([...host.faults, ...guest.faults]).toEqual([]);
 });
 
-test("a rule that the server refuses is marked at its field", async () => {
+test("of many rooms the newest are shown, and more when they are asked for", async () => {
+  const { page } = await person(browser);
+  for (let number = 1; number <= MANY; number += 1)
+    await newRoom(server, { name: `Table ${number}`, seats: ["person", "person", "random", "random"] });
+  await page.goto(`${server.url}/`);
+  const section = page.locator(".lobby-section").filter({ hasText: "Rooms with free seats" });
+  const cards = section.locator(".room-card");
+  await section.getByText("12+").waitFor();
+  expect(await cards.count()).toBe(12);
+  expect(await cards.first().textContent()).toContain(`Table ${MANY}`);
+  expect(await section.getByRole("heading", { name: "Table 1", exact: true }).count()).toBe(0);
+  await section.getByRole("button", { name: "Show more" }).click();
+  await section.getByRole("heading", { name: "Table 1", exact: true }).waitFor();
+  expect(await cards.count()).toBeGreaterThanOrEqual(MANY);
+});
+
+test("what cannot be accepted is marked at its field, all of it at once", async () => {
   const { page } = await person(browser);
   await page.goto(`${server.url}/new`);
   await page.getByText("Rules, faults and watching").click();
+  const invalid = () => page.locator('[aria-invalid="true"]').count();
   await page.getByLabel("Faces").fill("99");
+  await page.getByLabel("Jokers").fill("many");
+  await page.getByLabel("Points by place").fill("5, banana");
+  await page.getByRole("button", { name: "Make the room" }).click();
+  await page.getByText("Something cannot be accepted").waitFor();
+  await page.getByText("It must be from 4 to 15.").waitFor();
+  await page.getByText("Type a number here.").waitFor();
+  await page.getByText("Type whole numbers from 0 on with commas between them").waitFor();
+  expect(await invalid()).toBe(3);
+  // What only the server can tell is marked as well: so few cards cannot be dealt to so many.
+  await page.getByLabel("Players").selectOption("6");
+  await page.getByLabel("Faces").fill("4");
+  await page.getByLabel("Jokers").fill("0");
+  await page.getByLabel("Points by place").fill("");
   await page.getByRole("button", { name: "Make the room" }).click();
   await page.getByText("Something cannot be accepted").waitFor();
   expect(await page.getByLabel("Faces").getAttribute("aria-invalid")).toBe("true");
-  await page.getByLabel("Faces").fill("many");
-  await page.getByRole("button", { name: "Make the room" }).click();
-  await page.getByText("This is no number.").waitFor();
 });
 
 test("a wrong code and an address that names nothing are answered in words", async () => {
   const { page } = await person(browser, { locale: "it-IT" });
   await page.goto(`${server.url}/join/22222222`);
-  await page.getByLabel("Il tuo nome").fill("Rosa");
-  await page.getByRole("button", { name: "Siediti" }).click();
-  await page.getByText("Nessuna stanza ha questo codice. Ricontrollalo.").waitFor();
+  await page.getByText("Nessuna stanza e nessun torneo in cui si possa entrare ha questo codice.").waitFor();
+  expect(await page.getByLabel("Il tuo nome").count()).toBe(0);
   await page.goto(`${server.url}/nowhere/at/all`);
   await page.getByRole("heading", { name: "Questa pagina non esiste" }).waitFor();
+});
+
+test("an invitation says which room it is for, and which names are taken there", async () => {
+  const { code } = await newRoom(server, { name: "Sunday table", seats: ["person", "person", "greedy", "random"] });
+  const [ada, other] = [await person(browser), await person(browser)];
+  await sitDown(ada.page, server, code, "Ada");
+  await other.page.goto(`${server.url}/join/${code}`);
+  await other.page.getByRole("heading", { name: "Sunday table" }).waitFor();
+  await other.page.getByRole("listitem").filter({ hasText: "Ada" }).getByText("person", { exact: true }).waitFor();
+  await other.page.getByLabel("Your name").fill("ada ");
+  await other.page.getByText("Somebody at this table is called ada already.").waitFor();
+  await other.page.getByRole("button", { name: "Sit down" }).click();
+  expect(new URL(other.page.url()).pathname).toBe(`/join/${code}`);
+  await other.page.getByLabel("Your name").fill("Ben");
+  await other.page.getByRole("button", { name: "Sit down" }).click();
+  await other.page.waitForURL(/\/rooms\//);
+  expect([...ada.faults, ...other.faults]).toEqual([]);
+});
+
+test("who leaves before the game gives the seat back, during it is told what becomes of it, and who made the room can end it", async () => {
+  const host = await person(browser);
+  await host.page.goto(`${server.url}/new`);
+  await host.page.getByLabel("Name of the room").fill("To be left");
+  await host.page.getByLabel("Seat 1").selectOption({ label: "Free for a person" });
+  await host.page.getByRole("button", { name: "Make the room" }).click();
+  // No seat is free for an agent; and this address is this machine's alone.
+  await host.page.getByText("Only this machine can open this address.").waitFor();
+  expect(await host.page.getByText("For an agent, in a terminal").count()).toBe(0);
+  await host.page.getByLabel("Your name").fill("Mia");
+  await host.page.getByRole("button", { name: "Sit down" }).click();
+  await host.page.getByRole("button", { name: "Leave or close the room…" }).click();
+  await host.page.getByText("Your seat becomes free for somebody else.").waitFor();
+  const room = host.page.url();
+  await host.page.getByRole("button", { name: "Leave", exact: true }).click();
+  await host.page.waitForURL(`${server.url}/`);
+  const card = host.page.locator(".room-card").filter({ hasText: "To be left" });
+  await card.waitFor();
+  expect(await card.getByText("Mia").count()).toBe(0);
+  await host.page.goto(room);
+  await host.page.getByRole("button", { name: "Sit down" }).click();
+  await host.page.getByRole("button", { name: "Leave or close the room…" }).waitFor();
+  const code = (await host.page.locator(".invite-code").textContent()) ?? "";
+
+  const guest = await person(browser);
+  await sitDown(guest.page, server, code, "Rosa");
+  await guest.page.getByRole("button", { name: "Leave…" }).click();
+  await guest.page.getByText("after 3 that are lost so in a row, the agent “random” plays for you").waitFor();
+  expect(await guest.page.getByRole("button", { name: "End the game" }).count()).toBe(0);
+  await guest.page.getByRole("button", { name: "Stay" }).click();
+
+  await host.page.getByRole("button", { name: "Leave…" }).click();
+  await host.page.getByRole("button", { name: "End the game" }).click();
+  for (const { page } of [host, guest]) await page.getByText("The room was closed by its owner.").waitFor();
+  expect(await host.page.getByRole("button", { name: "Leave…" }).count()).toBe(0);
+  expect([...host.faults, ...guest.faults]).toEqual([]);
 });
 
 test("language and look are chosen and kept", async () => {

@@ -93,6 +93,9 @@ export async function tabTo(page: Page, wanted: (on: Focus) => boolean, key = "T
   throw new Error(`not to be reached with ${key}; the focus is on "${(await focus(page)).label}"`);
 }
 
+/** What the hand is called, which has the focus itself after a decision, on none of its cards. */
+export const HAND = "Your hand";
+
 /** Takes the decision with the keyboard: along the hand with the arrow keys, a card with the space bar, Enter to play. */
 export const byKeys: Way = async (page) => {
   if (await page.locator('[data-action="decline"]').isVisible()) {
@@ -102,7 +105,7 @@ export const byKeys: Way = async (page) => {
   const ready = page.locator(
     '[data-action="play"][aria-disabled="false"], [data-action="give"][aria-disabled="false"]',
   );
-  const onHand = (on: Focus) => on.card !== "";
+  const onHand = (on: Focus) => on.card !== "" || on.label === HAND;
   if (!onHand(await focus(page))) await tabTo(page, onHand, (await focus(page)).action ? "Shift+Tab" : "Tab");
   await page.keyboard.press("End");
   const cards = await page.locator(".hand-card").count();

@@ -27,6 +27,9 @@ interface Wanted {
   shifts?: number;
   /** Fewer than 11 for a short Shift. */
   faces?: number;
+  /** The second Shift to begin with instead of a first deal: a hand for each seat, by face, a joker being one more than the faces. The top face
+   * of the last hand that has it is the Golden card; in the Shift before the first seat was last. */
+  hands?: readonly (readonly number[])[];
   /** A game that counts for the leaderboard, and so is dealt by chance; otherwise the deals are always the same. */
   rated?: boolean;
   policy?: Partial<Pick<RoomPolicy, "paceMs" | "spectatorDelayDecisions" | "spectatorsSeeHands">>;
@@ -39,10 +42,17 @@ export async function newRoom(server: Server, wanted: Wanted): Promise<{ roomId:
     rules: { preset: "paper", faces: wanted.faces ?? 11, stop: { case: "targetShifts", value: wanted.shifts ?? 1 } },
     seats: wanted.seats.map((who) => ({ filledBy: filledBy(who) })),
     policy: { decisionTimeMs: 600_000, paceMs: 0, spectators: true, ...wanted.policy },
+    ...(wanted.hands && { start: { case: "scripted" as const, value: secondShift(wanted.hands, wanted.faces ?? 11) } }),
     ...(wanted.rated ? {} : { gameSeed: new Uint8Array(32).fill(7) }),
   });
   if (!room) throw new Error("the server did not say which room it made");
   return { roomId: room.roomId, code: joinCode };
+}
+
+function secondShift(dealt: readonly (readonly number[])[], top: number) {
+  const golden = dealt.findLastIndex((cards) => cards.includes(top));
+  const hands = dealt.map((cards, seat) => ({ seat, cards: cards.toSorted((a, b) => a - b), golden: seat === golden }));
+  return { shift: 2, hands, lastOrder: [...dealt.keys()].slice(1).concat(0) };
 }
 
 function filledBy(who: string) {

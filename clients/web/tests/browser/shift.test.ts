@@ -3,7 +3,7 @@
 
 import type { Browser, Page } from "playwright-core";
 import { afterAll, beforeAll, expect, test } from "vitest";
-import { byClicks, byKeys, focus, playOn, sitDown, tabTo } from "./play";
+import { byClicks, byKeys, focus, HAND, nextDecision, playOn, sitDown, tabTo } from "./play";
 import { agent, gameOf, newRoom, recordOf } from "./rooms";
 import { person, Server, startBrowser } from "./stage";
 
@@ -61,6 +61,64 @@ test("a person plays a whole Shift with the keyboard alone, and hears every turn
   await tabTo(page, (on) => on.label === "See the game again");
   await page.keyboard.press("Enter");
   await page.waitForURL(/\/replay\//);
+  expect(faults).toEqual([]);
+});
+
+test("Food Fight and both gifts of the Chef are decided by keys, and no card goes that was not chosen", async () => {
+  const { roomId, code } = await newRoom(server, {
+    seats: ["person", ...OPPONENTS],
+    faces: 7,
+    shifts: 2,
+    hands: [
+      [8, 8, 4, 5, 6, 7, 7],
+      [1, 2, 2, 5, 5, 6, 7],
+      [3, 3, 4, 5, 6, 6, 7],
+      [3, 4, 4, 5, 6, 7, 7],
+    ],
+  });
+  const { page, faults } = await person(browser);
+  await sitDown(page, server, code, "Rosa");
+  const picked = page.locator('.hand-card[aria-pressed="true"]');
+  const inNoCard = async () => {
+    await expect.poll(() => focus(page)).toMatchObject({ label: HAND, card: "" });
+    for (const key of ["Enter", "Space", "Enter"]) await page.keyboard.press(key);
+    expect(await picked.count()).toBe(0);
+  };
+
+  await page.locator('[data-action="declare"]').waitFor();
+  await tabTo(page, (on) => on.action === "declare");
+  await page.keyboard.press("Enter");
+
+  await page.getByRole("heading", { name: "You give card 1 of 2" }).waitFor();
+  const first = await nextDecision(page);
+  await inNoCard();
+  await page.keyboard.press("ArrowRight");
+  expect((await focus(page)).card).toBe("4");
+  await page.keyboard.press("Space");
+  await page.keyboard.press("Enter");
+
+  await page.getByRole("heading", { name: "You give card 2 of 2" }).waitFor();
+  const second = await nextDecision(page, first);
+  await inNoCard();
+  // The next card is the one to the right of where the last one was.
+  await page.keyboard.press("ArrowRight");
+  expect((await focus(page)).card).toBe("5");
+  await page.keyboard.press("Enter");
+  expect((await focus(page)).pressed).toBe(true);
+  await page.keyboard.press("Enter");
+
+  const turn = await nextDecision(page, second);
+  expect(turn).toBeDefined();
+  expect((await focus(page)).label).toBe(HAND);
+  const taken = await playOn(page, byKeys, async () => expect((await focus(page)).label).not.toBe(""));
+  await expectEnd(page, roomId, 3 + taken);
+  const record = await recordOf(server, await gameOf(server, roomId));
+  const gave = record.flatMap(({ line }) =>
+    line.case === "event" && line.value.kind.case === "cardsExchanged" && line.value.kind.value.giver === 0
+      ? [[...line.value.kind.value.cards]]
+      : [],
+  );
+  expect(gave).toEqual([[4, 5]]);
   expect(faults).toEqual([]);
 });
 

@@ -1,10 +1,11 @@
 // A study by its links: the host makes them, a participant agrees, fills in a questionnaire, plays under the name and in the seat that the
 // link says, sees what the link says, and the times measured at the page go with the decisions. And what a link cannot do.
 
+import { readFileSync } from "node:fs";
 import type { Browser } from "playwright-core";
 import { afterAll, beforeAll, expect, test } from "vitest";
 import { byClicks, playOn } from "./play";
-import { gameOf, newRoom, recordOf } from "./rooms";
+import { agent, clientsOf, gameOf, newRoom, recordOf } from "./rooms";
 import { person, Server, startBrowser } from "./stage";
 
 /** As docs/playing.md names it. */
@@ -56,6 +57,27 @@ test("a participant's link leads from the consent to the table, and to the quest
   const after = page.getByRole("link", { name: "Apri il questionario" });
   expect(await after.getAttribute("href")).toBe(`https://forms.example/after?id=P07&room=${roomId}`);
   expect(await page.locator("html").getAttribute("lang")).toBe("it");
+  // The link leads back to it, also once the table was left for another page, until everything is forgotten.
+  await page.goto(link.href);
+  await page.waitForURL(/\/rooms\//);
+  await after.waitFor();
+  await page.evaluate(() => {
+    const away = document.body.appendChild(document.createElement("a"));
+    away.href = "/leaderboard?lang=it";
+    away.click();
+  });
+  await page.getByRole("heading", { name: "Classifica" }).waitFor();
+  expect(await page.evaluate(() => Object.keys(localStorage).filter((key) => key.includes("seat.")))).toEqual([]);
+  await page.goto(link.href);
+  await page.getByRole("heading", { name: "Hai partecipato a questo studio" }).waitFor();
+  expect(await after.getAttribute("href")).toBe(`https://forms.example/after?id=P07&room=${roomId}`);
+  await page.goto(`${server.url}/?lang=it`);
+  await page.getByRole("button", { name: "Impostazioni" }).click();
+  await page.getByRole("button", { name: "Dimentica tutto su questo dispositivo" }).click();
+  await page.getByRole("button", { name: "Dimentica", exact: true }).click();
+  await page.waitForURL(`${server.url}/`);
+  await page.goto(link.href);
+  await page.getByRole("button", { name: "Ho letto e acconsento" }).waitFor();
 
   const lines = (await recordOf(server, await gameOf(server, roomId))).map(({ line }) => line);
   const header = lines.flatMap((line) => (line.case === "header" ? line.value : []))[0];
@@ -73,6 +95,58 @@ test("who does not agree does not sit down", async () => {
   await page.getByRole("button", { name: "I do not agree" }).click();
   await page.getByText("You do not take part. Nothing was stored; you can close this page.").waitFor();
   expect(await page.evaluate(() => localStorage.length)).toBe(0);
+  // It was a slip: without loading the page again.
+  await page.getByRole("button", { name: "Read it again" }).click();
+  await page.getByRole("button", { name: "I have read this and agree" }).click();
+  await page.getByRole("button", { name: "Sit down at the table" }).waitFor();
+});
+
+test("what a study leaves out is left out from its first page to the end of the game, also after a reload", async () => {
+  const { code } = await newRoom(server, { seats: ["person", "agent", "random", "random"] });
+  const { page, faults } = await person(browser);
+  const hide = "log lookup expressions played pages";
+  // From the first moment at which something is left out on, whether anything of it was ever shown again.
+  await page.addInitScript(() => {
+    let last: string | undefined;
+    const look = () => {
+      const now = document.documentElement.dataset.hide;
+      if (last !== undefined && now !== last) Object.assign(window, { slipped: true });
+      last ??= now;
+    };
+    const seen = { subtree: true, attributes: true, attributeFilter: ["data-hide"] };
+    new MutationObserver(look).observe(document, seen);
+  });
+  const parts = [".header-nav", ".log", ".tool-lookup", ".tool-leave", ".expressions", ".played", ".result-links"];
+  const isLeftOut = async () => {
+    expect(await page.locator("html").getAttribute("data-hide")).toBe(hide);
+    for (const part of parts)
+      for (const found of await page.locator(part).all()) expect(await found.isVisible()).toBe(false);
+    expect(await page.evaluate(() => "slipped" in window)).toBe(false);
+  };
+  const asked = new URLSearchParams({ name: "P09", hide: hide.replaceAll(" ", ","), consent: "Read this." });
+  await page.goto(`${server.url}/join/${code}?${asked}`);
+  await page.getByText("Read this.").waitFor();
+  await isLeftOut();
+  await page.getByRole("button", { name: "I have read this and agree" }).click();
+  await page.getByRole("button", { name: "Sit down at the table" }).click();
+  await page.getByText("(you)").waitFor();
+  await isLeftOut();
+  await page.reload();
+  await page.getByText("(you)").waitFor();
+  await isLeftOut();
+  const done = agent(server, "greedy", code, "Greta");
+  const taken = await playOn(page, byClicks, async (already) => {
+    await isLeftOut();
+    if (already === 1) await page.reload().then(() => page.locator("[data-decision]").waitFor());
+  });
+  expect(taken).toBeGreaterThan(1);
+  expect(await done).toBe(0);
+  expect(await page.locator(".result").isVisible()).toBe(true);
+  await isLeftOut();
+  await page.reload();
+  await page.locator(".result").waitFor();
+  await isLeftOut();
+  expect(faults).toEqual([]);
 });
 
 test("at one device one participant after the other takes a seat of their own", async () => {
@@ -105,6 +179,53 @@ test("the host of a room makes links for its participants", async () => {
   const link = await page.getByText(/name=P02&seat=1&hide=log&after=/).textContent();
   expect(new URL(link ?? "").searchParams.get("after")).toBe("https://forms.example/{name}");
   expect(faults).toEqual([]);
+});
+
+test("each participant gets a room of their own like the one at hand, with all links in one list", async () => {
+  const { page, faults } = await person(browser);
+  await page.goto(`${server.url}/new`);
+  await page.getByLabel("Name of the room").fill("Lab");
+  await page.getByText("Rules, faults and watching").click();
+  await page.getByLabel("Faces").fill("7");
+  await page.getByRole("button", { name: "Make the room" }).click();
+  await page.getByText("Links for a study").click();
+  await page.getByLabel("They play").selectOption("own");
+  await page.getByText("Say above who takes part.").waitFor();
+  await page.getByLabel("Participants, one a line").fill("P01-P03");
+  await page.getByLabel("what happened").check();
+  await page.getByRole("button", { name: "Make 3 rooms" }).click();
+  await page.getByText(/name=P03&hide=log/).waitFor();
+  const [table] = await Promise.all([
+    page.waitForEvent("download"),
+    page.getByRole("button", { name: "Download as a table (CSV)" }).click(),
+  ]);
+  const lines = readFileSync(await table.path(), "utf8")
+    .trim()
+    .split("\r\n");
+  expect(lines[0]).toBe("name,link,room_id");
+  const rows = lines.slice(1).map((line) => line.split(","));
+  expect(rows.map(([name]) => name)).toEqual(["P01", "P02", "P03"]);
+  expect(new Set(rows.map(([, , roomId]) => roomId)).size).toBe(3);
+  for (const [name, link, roomId] of rows) {
+    const { room } = await clientsOf(server).rooms.getRoom({ roomId: roomId ?? "" });
+    expect([room?.name, room?.rules?.faces]).toEqual([`Lab · ${name}`, 7]);
+    expect(room?.seats.map(({ builtInAgent }) => builtInAgent)).toEqual(["", "trained", "greedy", "random"]);
+    expect(link).toContain(`name=${name}&hide=log`);
+  }
+  // They stay listed, and none is made twice.
+  await page.reload();
+  await page.getByText("Links for a study").click();
+  await page.getByLabel("They play").selectOption("own");
+  await page.getByText("name=P02", { exact: false }).waitFor();
+  await page.getByLabel("Participants, one a line").fill("P01-P04");
+  await page.getByRole("button", { name: "Make 1 room" }).waitFor();
+
+  const participant = await person(browser);
+  await participant.page.goto(rows[1]?.[1] ?? "");
+  await participant.page.getByRole("button", { name: "Sit down at the table" }).click();
+  await participant.page.waitForURL(new RegExp(`/rooms/${rows[1]?.[2]}`));
+  await participant.page.locator("[data-decision]").waitFor();
+  expect([...faults, ...participant.faults]).toEqual([]);
 });
 
 test("a link without a name asks whose the seat is that this device has, and a seat that was vacated keeps nobody from the room", async () => {

@@ -29,7 +29,7 @@ async function newTournament(rounds: number): Promise<{ id: string; code: string
       format: TournamentFormat.SWISS,
       rounds,
       rules: { preset: "paper", stop: { case: "targetShifts", value: 1 } },
-      policy: { decisionTimeMs: 600_000, spectators: true },
+      policy: { decisionTimeMs: 600_000, paceMs: 0, spectators: true },
       builtInAgents: ["greedy", "random", "random"],
       startWhenJoined: 4,
     },

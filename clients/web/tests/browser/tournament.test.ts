@@ -40,7 +40,9 @@ test("a tournament's page follows it from the first participant to the final sta
   await page.goto(`${server.url}/tournaments/${tournament.tournamentId}`);
   await page.getByRole("heading", { name: "Spring cup" }).waitFor();
   const rows = page.locator(".standings tbody tr");
-  await expect.poll(() => rows.count()).toBe(3);
+  // Before its beginning nobody has a place.
+  await expect.poll(() => page.locator(".entrants li").count()).toBe(3);
+  expect(await rows.count()).toBe(0);
   expect(await page.getByText("Gustav").count()).toBe(0);
 
   const args = ["--server", server.url, "--agent", "greedy", "--name", "Gustav", "--code", joinCode];
@@ -55,5 +57,57 @@ test("a tournament's page follows it from the first participant to the final sta
   expect(shown).toEqual(standings.map(({ score }) => String(score)));
   expect(await rows.filter({ hasText: "Gustav" }).locator(".number").allInnerTexts()).toContain("3");
   expect(loads).toBe(1);
+  expect(faults).toEqual([]);
+});
+
+test.each([
+  ["one table", TournamentFormat.SWISS, 4, 0.05],
+  ["two tables", TournamentFormat.SWISS, 8, 0.035],
+  ["a bracket", TournamentFormat.KNOCKOUT, 8, 0.03],
+  ["many tables", TournamentFormat.SWISS, 40, 0.025],
+])("a wall with %s is as large as the screen, and nothing of it out of sight", async (_, format, count, least) => {
+  const { tournaments } = clientsOf(server);
+  const make = async (startWhenJoined: number) => {
+    const settings = {
+      name: "On the wall",
+      format,
+      rounds: format === TournamentFormat.SWISS ? 1 : 0,
+      rules: { preset: "paper", faces: 8, stop: { case: "targetShifts" as const, value: 1 } },
+      builtInAgents: Array<string>(count).fill("greedy"),
+      startWhenJoined,
+    };
+    return (await tournaments.createTournament({ settings })).tournament?.tournamentId ?? "";
+  };
+  const [open, over] = [await make(0), await make(count)];
+  const { page, faults } = await person(browser);
+  for (const [width, height] of [
+    [1280, 720],
+    [1920, 1080],
+    [3840, 2160],
+  ] as const) {
+    await page.setViewportSize({ width, height });
+    for (const [id, ready] of [
+      [open, ".entrants"],
+      [over, ".standings"],
+    ]) {
+      await page.goto(`${server.url}/tournaments/${id}?wall`);
+      await page
+        .locator(".wall-fitted")
+        .locator(ready ?? "")
+        .waitFor();
+      if (id === over) await page.getByText("finished").first().waitFor();
+      const places = await page.locator(".wall-fitted").evaluateAll((boxes) =>
+        boxes.map((box) => ({
+          size: Number.parseFloat(getComputedStyle(box).fontSize),
+          fits: box.scrollHeight <= box.clientHeight && box.scrollWidth <= box.clientWidth,
+          written: box.textContent !== "",
+        })),
+      );
+      expect(places.length).toBe(id === over ? 2 : 1);
+      for (const place of places) expect(place).toMatchObject({ fits: true, written: true });
+      expect(places[0]?.size).toBeGreaterThan(least * height);
+      expect(await page.evaluate(() => document.documentElement.scrollHeight <= window.innerHeight)).toBe(true);
+    }
+  }
   expect(faults).toEqual([]);
 });

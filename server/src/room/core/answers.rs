@@ -45,6 +45,19 @@ pub enum JoinError {
     GameOver,
 }
 
+/// Why a seat cannot be given back.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum LeaveError {
+    /// The game has begun.
+    #[error(
+        "the game of this room has begun; the seat stays yours, and a substitute plays for it when you are gone"
+    )]
+    GameStarted,
+    /// The game has ended.
+    #[error("the game of this room is over; there is nothing to leave")]
+    GameOver,
+}
+
 /// Why an expression is not taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum ExpressError {

@@ -23,7 +23,11 @@ impl Core {
                     .push(at, Happening::Seated(*seat, participant.clone()));
             }
             Change::Vacated(seat) => {
-                self.seats[seat.index()].participant = None;
+                let state = &mut self.seats[seat.index()];
+                state.participant = None;
+                state.connection = None;
+                state.away = false;
+                state.entropy = Vec::new();
                 self.log.push(at, Happening::Vacated(*seat));
             }
             Change::Started { entropy } => self.begin(at, entropy),

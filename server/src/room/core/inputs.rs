@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use chefshat_engine::{ActionError, Seat};
 
-use super::answers::{AnswerInput, Answered, ExpressError, JoinError, Verdict};
+use super::answers::{AnswerInput, Answered, ExpressError, JoinError, LeaveError, Verdict};
 use super::{
     ConnectionId, Core, MAX_ANNOTATION_BYTES, MAX_ANNOTATION_BYTES_PER_GAME, MAX_CONNECTION_EVENTS,
     MAX_EXPRESSIONS_PER_SEAT, State,
@@ -72,6 +72,20 @@ impl Core {
             },
         );
         Ok(seat)
+    }
+
+    /// Gives a seat back before the game begins.
+    ///
+    /// # Errors
+    /// The game has begun.
+    pub fn leave(&mut self, now: Duration, seat: Seat) -> Result<(), LeaveError> {
+        match self.state {
+            State::Waiting => {}
+            State::Playing => return Err(LeaveError::GameStarted),
+            State::Finished | State::Aborted(_) => return Err(LeaveError::GameOver),
+        }
+        self.commit(now, Change::Vacated(seat));
+        Ok(())
     }
 
     /// Seats a participant before anybody is told of the room.

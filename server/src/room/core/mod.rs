@@ -18,7 +18,9 @@ use std::time::Duration;
 use chefshat_arena::BuiltInAgent;
 use chefshat_engine::{Action, Decision, Event, Game, Mask, Observation, Seat, Viewer};
 
-pub use answers::{AnswerInput, Answered, ExpressError, JoinError, SeatStanding, Verdict};
+pub use answers::{
+    AnswerInput, Answered, ExpressError, JoinError, LeaveError, SeatStanding, Verdict,
+};
 
 pub use revive::BadJournal;
 

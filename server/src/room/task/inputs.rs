@@ -62,6 +62,18 @@ impl Task {
                     answer(reply, None);
                 }
             }
+            Message::Leave(secret, reply) => match self.core.seat_of_ticket(&secret) {
+                Some(seat) => {
+                    let left = self.core.leave(self.now, seat);
+                    if left.is_ok()
+                        && let Some(mut attachment) = self.attachments[seat.index()].take()
+                    {
+                        attachment.detach(v1::DetachReason::Requested);
+                    }
+                    self.releases.push(Release::Left(reply, left));
+                }
+                None => answer(reply, None),
+            },
             Message::Abort(reason) => self.core.abort(self.now, reason),
             Message::PutDown => self.put_down = true,
             Message::Space => {}

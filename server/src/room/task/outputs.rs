@@ -13,7 +13,7 @@ use super::Task;
 use crate::convert;
 use crate::grpc::status;
 use crate::outbox::HandStamp;
-use crate::room::core::{ConnectionId, JoinError, State};
+use crate::room::core::{ConnectionId, JoinError, LeaveError, State};
 use crate::room::delivery::{Attachment, is_urgent};
 use crate::room::handle::{Acted, AttachRequest, Joined, SpectateError, SpectateRequest};
 use crate::room::spectators::{MAX_SPECTATORS, Spectator};
@@ -35,6 +35,10 @@ pub(super) enum Release {
     Refuse(Seat, ConnectionId, v1::Refused),
     Acted(oneshot::Sender<Option<Acted>>, Acted),
     Closed(oneshot::Sender<Option<v1::Room>>),
+    Left(
+        oneshot::Sender<Option<Result<v1::Room, LeaveError>>>,
+        Result<(), LeaveError>,
+    ),
     Describe(oneshot::Sender<v1::Room>),
     Spectate(
         Box<SpectateRequest>,
@@ -106,6 +110,9 @@ impl Task {
             }
             Release::Acted(reply, acted) => answer(reply, Some(acted)),
             Release::Closed(reply) => answer(reply, Some(convert::describe(&self.core))),
+            Release::Left(reply, left) => {
+                answer(reply, Some(left.map(|()| convert::describe(&self.core))));
+            }
             Release::Describe(reply) => answer(reply, convert::describe(&self.core)),
             Release::Spectate(request, reply) => answer(reply, self.spectate(*request)),
         }

@@ -21,7 +21,7 @@ export const common = {
     looks: { system: "As the system", light: "Light", dark: "Dark" },
     forget: "Forget everything on this device",
     forgetSure:
-      "Your seats, places in tournaments, the rooms you made, your name and settings? You cannot come back to them.",
+      "Your seats, places in tournaments, the rooms and tournaments you made, your name and settings? You cannot come back to them.",
     forgetDo: "Forget it",
   },
   kinds: { agent: "agent", human: "person", robot: "robot", builtIn: "built-in agent", open: "free" },
@@ -53,6 +53,7 @@ export const common = {
   copied: "Copied",
   loading: "Loading…",
   more: "More",
+  showMore: "Show more",
   pageNotLoaded: "This page could not be loaded. Check the connection, then load it again.",
   notFound: { title: "There is no such page", text: "The address names nothing here.", link: "To the lobby" },
 };

@@ -1,6 +1,7 @@
 // English texts of experiment/.
 
 import { plurals } from "../plural";
+import { time } from "./time";
 
 const plural = plurals("en");
 
@@ -18,23 +19,37 @@ export const experiment = {
     beforeText: (host: string) => `It opens in a window of its own, at ${host}. Come back here afterwards.`,
     open: "Open the questionnaire",
     done: "I have filled it in",
+    reconsider: "Read it again",
+    gone: "This link leads nowhere any more: its room has been closed, or its game is over. Ask whoever sent it to you.",
     taken: (name: string) => `Somebody has sat down with this link on this device already, as ${name}.`,
     goOn: (name: string) => `Go on as ${name}`,
     another: "Take another seat",
-    sitDown: "Sit down at the table",
-    recorded:
-      "The game is recorded: the name above, your decisions and how long they take, and the expressions you show. Nothing else is.",
+    takenPlace: (name: string) => `Somebody has joined with this link on this device already, as ${name}.`,
+    anotherPlace: "Join as somebody else",
+    come: { room: "Sit down at the table", tournament: "Join the tournament" },
+    recorded: {
+      room: "The game is recorded: the name above, your decisions and how long they take, and the expressions you show. Nothing else is.",
+      tournament:
+        "The games are recorded: the name above, your decisions and how long they take, and the expressions you show. Nothing else is. Stay on this page: your games begin here by themselves.",
+    },
+    over: "You have taken part in this study",
     timed: "How long you take is measured on this device too and recorded with your decisions.",
   },
   after: {
     title: "Thank you for playing",
     text: (host: string) => `One last thing: a questionnaire at ${host}.`,
+    whose: (name: string) => `It is for ${name}.`,
   },
   links: {
     title: "Links for a study",
     text: "A link that fixes who takes part, in which seat and language, and what they see. Everything stands in the link itself; the server keeps none of it.",
+    tournamentText:
+      "A link that fixes who takes part, in which language, and what they see in every game. Everything stands in the link itself; the server keeps none of it.",
+    where: "They play",
+    here: "all in this room",
     names: "Participants, one a line",
-    namesHint: "Pseudonyms such as P07. Empty: each chooses a name.",
+    namesHint: "Pseudonyms such as P07, or P01-P20 for twenty. Empty: each chooses a name.",
+    tooManyNames: (most: number) => `No more than ${most} at a time: the rest is left out.`,
     seat: "Seat of the first; the others follow",
     anySeat: "any free seat",
     language: "Language",
@@ -51,16 +66,38 @@ export const experiment = {
     timesHint: "As an annotation of each decision, apart from the server’s own measurement.",
     consent: "Consent text",
     consentHint: "They must agree to it before they sit down. Plain text.",
+    consentTournamentHint: "They must agree to it before they join. Plain text.",
     before: "Address of a questionnaire before",
     after: "Address of a questionnaire after",
     beforeHint: "https://…; {name} is filled in if it is fixed.",
     afterHint: "https://…; {name} and {room} are filled in.",
+    afterTournamentHint: "Offered when the tournament is over. https://…; {name} and {tournament} are filled in.",
     notAnAddress: "This is no address that begins with https:// or http://.",
     tooMany: (seats: number) =>
       plural(seats, {
         one: "There are more names than seats: # seat is there for them.",
         other: "There are more names than seats: # seats are there for them.",
       }),
+    own: {
+      label: "each in a room of their own like this one",
+      namesHint: "Pseudonyms such as P07, or P01-P20 for twenty: a room is made for each.",
+      seat: "Their seat",
+      text: "Each room gets the rules, the times and the agents of this one. This device keeps what it needs to close them; their links stay listed here.",
+      barred: {
+        seed: "This room’s deals are fixed, by a seed that nobody is told: the other rooms are dealt by chance.",
+        hands: "This room begins with given hands, which are not known here: no other room can be made like it.",
+      },
+      wait: "Each room waits",
+      waitHint: "If the participant has not come by then, the room is closed and the link leads nowhere.",
+      time,
+      namesMissing: "Say above who takes part.",
+      make: (count: number) => plural(count, { one: "Make # room", other: "Make # rooms" }),
+      making: (made: number, all: number) => `${made} of ${all} rooms are made…`,
+      keptMade: (made: number, missing: number) =>
+        `${made} are made and listed below; ${missing} are still to be made.`,
+    },
+    copyAll: "Copy all",
+    download: "Download as a table (CSV)",
     result: "Links",
     everybody: "everybody",
   },

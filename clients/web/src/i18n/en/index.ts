@@ -4,13 +4,14 @@ import { common } from "./common";
 import { experiment } from "./experiment";
 import { faults } from "./faults";
 import { lobby } from "./lobby";
+import { organise } from "./organise";
 import { people } from "./people";
 import { replay } from "./replay";
 import { table } from "./table";
 import { tournaments } from "./tournaments";
 import { tutorial } from "./tutorial";
 
-export const en = { common, experiment, faults, lobby, people, replay, table, tournaments, tutorial };
+export const en = { common, experiment, faults, lobby, organise, people, replay, table, tournaments, tutorial };
 
 /** The form of a language's texts. */
 export type Texts = typeof en;

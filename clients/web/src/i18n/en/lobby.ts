@@ -1,14 +1,9 @@
 // English texts of lobby/.
 
 import { plurals } from "../plural";
+import { time } from "./time";
 
 const plural = plurals("en");
-const seconds = (ms: number) =>
-  ms >= 3_600_000
-    ? plural(Math.round(ms / 3_600_000), { one: "# hour", other: "# hours" })
-    : ms >= 120_000
-      ? plural(Math.round(ms / 60_000), { one: "# minute", other: "# minutes" })
-      : plural(ms / 1000, { one: "# second", other: "# seconds" });
 
 export const lobby = {
   title: "Lobby",
@@ -19,6 +14,7 @@ export const lobby = {
     guest: "Guest",
     roomOf: (name: string) => `${name}’s table`,
     start: "Play now",
+    again: "Play again",
     learn: "New here? Learn it in three minutes",
   },
   join: {
@@ -30,16 +26,16 @@ export const lobby = {
     name: "Your name",
     nameHint: "Everybody at the table sees it.",
     nameMissing: "Say how the others shall call you.",
+    nameTaken: (name: string) => `Somebody at this table is called ${name} already. Choose another name.`,
     sitDown: "Sit down",
   },
   rooms: {
     waiting: "Rooms with free seats",
     noneWaiting: "No room is waiting for players. Make one and invite others.",
     playing: "Being played now",
-    nonePlaying: "Nobody is playing right now.",
+    nonePlaying: "Nobody is playing right now. “Play now” begins a game at once.",
     over: "Just over",
     unnamed: "Room without a name",
-    showAll: (count: number) => `Show all ${count}`,
     watch: "Watch",
     replay: "Replay",
     join: "Join",
@@ -49,7 +45,7 @@ export const lobby = {
     states: { waiting: "waiting", playing: "playing", finished: "finished", aborted: "aborted" },
     toPoints: (points: number) => plural(points, { one: "to # point", other: "to # points" }),
     shifts: (shifts: number) => plural(shifts, { one: "# Shift", other: "# Shifts" }),
-    decisionTime: (ms: number) => `${seconds(ms)} a decision`,
+    decisionTime: (ms: number) => `${time(ms)} a decision`,
     ofTournament: "in a tournament",
   },
   seats: {
@@ -62,6 +58,7 @@ export const lobby = {
     title: "Tournaments",
     open: "Open to join",
     playing: (over: number, games: number) => `Playing: ${over} of ${games} games`,
+    none: "No tournament is open or being played. Make one and invite people and agents.",
     all: "All tournaments",
   },
   invite: {
@@ -71,13 +68,40 @@ export const lobby = {
     link: "Address",
     agent: "For an agent, in a terminal",
     qr: "QR code of the address",
+    thisMachine: "Only this machine can open this address. For others, start the server with",
+    thenOpen: " and open this page by this machine’s name or address: then they are in the link and in the picture.",
   },
   door: {
     sitDown: "Sit down",
     toLobby: "To the lobby",
     close: "Close the room",
     closeSure: "Nobody can play in it any more.",
+    closePlaying: "The game ends for everybody, without a result.",
     aborted: "The game ended without a result.",
+  },
+  leaving: {
+    leave: "Leave…",
+    leaveOrClose: "Leave or close the room…",
+    title: "Leave the table?",
+    waiting: "Your seat becomes free for somebody else. To come back you need the invitation again.",
+    substituted: (timeouts: number, substitute: string) =>
+      `The game goes on. Each of your decisions waits until its time is over; ${plural(timeouts, {
+        one: "after one that is lost so",
+        other: "after # that are lost so in a row",
+      })}, the agent “${substitute}” plays for you.`,
+    givenUp: (timeouts: number) =>
+      `The game goes on. Each of your decisions waits until its time is over; ${plural(timeouts, {
+        one: "after one that is lost so",
+        other: "after # that are lost so in a row",
+      })}, the game ends without a result.`,
+    back: "You can come back and play on at any time: the lobby leads to your seat, from this device.",
+    backUntilThen: "Until then you can come back: the lobby leads to your seat, from this device.",
+    closeWaiting: "You made this room. If you close it, nobody can play in it any more.",
+    closePlaying: "You made this room. If you end the game, it ends for everybody, without a result.",
+    stay: "Stay",
+    doIt: "Leave",
+    close: "Close the room",
+    end: "End the game",
   },
   make: {
     title: "Make a room",
@@ -161,8 +185,16 @@ export const lobby = {
       hands: "Spectators see all hands",
       handsHint: "Only with a delay of 1 or more",
     },
-    notANumber: "This is no number.",
-    lookAgain: "Something cannot be accepted; it is marked above.",
+    problems: {
+      notANumber: "Type a number here.",
+      notWhole: "Type a whole number here.",
+      notPoints: "Type whole numbers from 0 on with commas between them, for instance 5, 3, 1, 0.",
+      rising: "The first place must bring something, and no place more than the one before it.",
+      places: (places: number) => `Type a number for each place: ${places} of them.`,
+      from: (from: number) => `It must be ${from} or more.`,
+      between: (from: number, to: number) => `It must be from ${from} to ${to}.`,
+    },
+    lookAgain: "Something cannot be accepted: all of it is marked above.",
     submit: "Make the room",
   },
 };

@@ -1,6 +1,6 @@
 // English texts of table/.
 
-import { AbortReason } from "../../gen/chefshat/v1/room_pb";
+import { AbortReason, ParticipantKind } from "../../gen/chefshat/v1/room_pb";
 import { plurals } from "../plural";
 
 const plural = plurals("en");
@@ -78,6 +78,7 @@ export const table = {
     wait: "The others decide",
     waitExchange: "The cards have been dealt",
     youGive: "You give a card",
+    youGiveOf: (number: number, of: number) => `You give card ${number} of ${of}`,
     youMayDeclare: "You hold both jokers",
     face: "face",
     cards: (count: number) => plural(count, { one: "card", other: "cards" }),
@@ -88,7 +89,6 @@ export const table = {
     nothing: "Nothing is rarer: only a pass.",
     opens: "Opens the Shift and may not pass.",
     opensMayPass: "Opens the Shift.",
-    played: "Played in this Shift",
     giveTo: (name: string) => `The exchange: pick a card for ${name}.`,
     give: "The exchange: pick a card to give.",
     foodFight: "Food Fight would turn all roles around: you would be Chef.",
@@ -96,6 +96,7 @@ export const table = {
     finished: (place: string) => `You have finished ${place}.`,
     outOfPizza: "You have passed: out until the next pizza.",
   },
+  played: { title: "Played in this Shift", allOut: "all are out" },
   actions: {
     label: "Your decision",
     play: "Play",
@@ -166,6 +167,7 @@ export const table = {
     count: (count: number) => plural(count, { one: "# legal action", other: "# legal actions" }),
     chosen: "taken",
     groups: "Rows: faces. Columns: cards of the face; within each column without a joker, with one, with two.",
+    signs: "What the signs mean",
     none: "No turn is open. The table is shown for your own turns.",
   },
   aborted: {
@@ -213,7 +215,23 @@ export const table = {
   room: {
     seats: "Seats",
     waiting: (count: number) => plural(count, { one: "# seat is still free", other: "# seats are still free" }),
+    away: (count: number) => plural(count, { one: "# is still to connect", other: "# are still to connect" }),
     begins: "The game begins as soon as all seats are taken and connected.",
+    ready: "ready",
+    here: "here",
+    notHere: "sat down, but not connected",
+    waitsFor: {
+      [ParticipantKind.UNSPECIFIED]: "waits for anybody: a person, a robot or an agent",
+      [ParticipantKind.HUMAN]: "waits for a person",
+      [ParticipantKind.ROBOT]: "waits for a robot",
+      [ParticipantKind.AGENT]: "waits for an agent",
+    },
+    ways: "How others come in",
+    invited: "Whoever made the room invites the others, with an address or a join code.",
+    assigned: "The tournament seats its participants. Nobody else can come in.",
+    byCode: "Who was given a join code takes a free seat with it.",
+    toJoin: "I have a join code",
+    invite: "The invitation is below.",
   },
   watch: { viewer: "as spectators see it" },
 };

@@ -1,27 +1,48 @@
 // English texts of tournaments/.
 
 import { plurals } from "../plural";
+import { time } from "./time";
 
 const plural = plurals("en");
 
 export const tournaments = {
   title: "Tournaments",
-  none: "There is no tournament yet. Whoever hosts the server makes one with “chefshat tournament create”.",
-  sections: { open: "Open to join", playing: "Being played", over: "Over" },
+  none: "There is no tournament yet. Make one, send its address to people and agents, and watch the standings here.",
+  sections: { open: "Open to join", playing: "Being played", over: "Over", closed: "Closed before their end" },
   states: { open: "open to join", playing: "being played", finished: "finished", closed: "closed early" },
-  formats: { knockout: "knockout", roundRobin: "round robin", swiss: "Swiss" },
+  formats: { knockout: "Knockout", roundRobin: "Round robin", swiss: "Swiss" },
   deals: {
     same: "All tables of a round are dealt alike; what could tell the deals stays closed until the round is over.",
     rotated: "Every table plays each deal once for each seat.",
   },
   participants: (count: number) => plural(count, { one: "# participant", other: "# participants" }),
+  made: (date: string) => `made ${date}`,
   gamesOver: (over: number, games: number) => `${over} of ${plural(games, { one: "# game", other: "# games" })} over`,
   roundOf: (round: number, rounds: number) => `round ${round} of ${rounds}`,
   round: (round: number) => `Round ${round}`,
   final: "Final",
   table: (table: number) => `Table ${table}`,
   game: (number: number) => `game ${number}`,
-  wall: { open: "For a wall", close: "Leave the wall view", more: (from: number, to: number) => `${from} to ${to}` },
+  wall: {
+    open: "For a wall",
+    close: "Leave the wall view",
+    more: (from: number, to: number) => `${from} to ${to}`,
+    tables: (from: number, to: number) => `tables ${from} to ${to}`,
+  },
+  play: {
+    beginsAt: (count: number) => `Begins by itself with ${count} participants`,
+    beginsByHand: "Begins when its organiser says so",
+    knockout: (games: number) =>
+      `${plural(games, { one: "# game a round", other: "# games a round" })} at tables of four; the first two go on`,
+    rounds: (rounds: number, games: number) =>
+      rounds === 0
+        ? `As many rounds as suit the number of participants, of ${plural(games, { one: "# game", other: "# games" })} each`
+        : `${plural(rounds, { one: "# round", other: "# rounds" })} of ${plural(games, { one: "# game", other: "# games" })}`,
+    toPoints: (points: number) => plural(points, { one: "A game goes to # point", other: "A game goes to # points" }),
+    shifts: (shifts: number) => plural(shifts, { one: "A game is # Shift", other: "A game is # Shifts" }),
+    clock: (decisionMs: number, bankMs: number) =>
+      `People have ${time(decisionMs)} for each decision${bankMs > 0 ? ` and ${time(bankMs)} beyond that over a game` : ""}`,
+  },
   standings: {
     title: "Standings",
     final: "Final standings",
@@ -48,6 +69,7 @@ export const tournaments = {
     bracket: "Bracket",
     due: "not yet called",
     playing: "being played",
+    over: "over",
     void: "given up",
     watch: "Watch",
     replay: "Replay",

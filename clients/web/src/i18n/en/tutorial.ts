@@ -6,7 +6,8 @@ export const tutorial = {
   step: (step: number, all: number) => `${step} / ${all}`,
   next: "Go on",
   watch: "The others play…",
-  toLobby: "Play a game",
+  play: "Play a game now",
+  toLobby: "To the lobby",
   notThis: "Good idea for later; the lesson asks for something else now.",
   lessons: {
     cards:

@@ -21,7 +21,8 @@ export const common: Texts["common"] = {
     look: "Aspetto",
     looks: { system: "Come il sistema", light: "Chiaro", dark: "Scuro" },
     forget: "Dimentica tutto su questo dispositivo",
-    forgetSure: "I tuoi posti, i tornei, le stanze create, il nome e le impostazioni? Non potrai tornarci.",
+    forgetSure:
+      "I tuoi posti, le iscrizioni ai tornei, le stanze e i tornei creati, il nome e le impostazioni? Non potrai tornarci.",
     forgetDo: "Dimentica",
   },
   kinds: { agent: "agente", human: "persona", robot: "robot", builtIn: "agente incorporato", open: "libero" },
@@ -53,6 +54,7 @@ export const common: Texts["common"] = {
   copied: "Copiato",
   loading: "Caricamento…",
   more: "Altri",
+  showMore: "Mostra altro",
   pageNotLoaded: "Non è stato possibile caricare questa pagina. Controlla la connessione e ricarica.",
   notFound: { title: "Questa pagina non esiste", text: "L’indirizzo non porta a nulla.", link: "Alla sala" },
 };

@@ -5,10 +5,11 @@ import { common } from "./common";
 import { experiment } from "./experiment";
 import { faults } from "./faults";
 import { lobby } from "./lobby";
+import { organise } from "./organise";
 import { people } from "./people";
 import { replay } from "./replay";
 import { table } from "./table";
 import { tournaments } from "./tournaments";
 import { tutorial } from "./tutorial";
 
-export const it: Texts = { common, experiment, faults, lobby, people, replay, table, tournaments, tutorial };
+export const it: Texts = { common, experiment, faults, lobby, organise, people, replay, table, tournaments, tutorial };

@@ -2,14 +2,9 @@
 
 import type { Texts } from "../en";
 import { plurals } from "../plural";
+import { time } from "./time";
 
 const plural = plurals("it");
-const seconds = (ms: number) =>
-  ms >= 3_600_000
-    ? plural(Math.round(ms / 3_600_000), { one: "# ora", other: "# ore" })
-    : ms >= 120_000
-      ? plural(Math.round(ms / 60_000), { one: "# minuto", other: "# minuti" })
-      : plural(ms / 1000, { one: "# secondo", other: "# secondi" });
 
 export const lobby: Texts["lobby"] = {
   title: "Sala",
@@ -20,6 +15,7 @@ export const lobby: Texts["lobby"] = {
     guest: "Ospite",
     roomOf: (name) => `Il tavolo di ${name}`,
     start: "Gioca subito",
+    again: "Gioca ancora",
     learn: "Prima volta? Impara in tre minuti",
   },
   join: {
@@ -31,16 +27,16 @@ export const lobby: Texts["lobby"] = {
     name: "Il tuo nome",
     nameHint: "Lo vedono tutti al tavolo.",
     nameMissing: "Scrivi come devono chiamarti gli altri.",
+    nameTaken: (name) => `A questo tavolo qualcuno si chiama già ${name}. Scegli un altro nome.`,
     sitDown: "Siediti",
   },
   rooms: {
     waiting: "Stanze con posti liberi",
     noneWaiting: "Nessuna stanza aspetta giocatori. Creane una e invita gli altri.",
     playing: "Partite in corso",
-    nonePlaying: "In questo momento non gioca nessuno.",
+    nonePlaying: "In questo momento non gioca nessuno. Con «Gioca subito» ne comincia una.",
     over: "Appena finite",
     unnamed: "Stanza senza nome",
-    showAll: (count) => `Mostra tutte: ${count}`,
     watch: "Guarda",
     replay: "Rivedi",
     join: "Entra",
@@ -50,7 +46,7 @@ export const lobby: Texts["lobby"] = {
     states: { waiting: "in attesa", playing: "in gioco", finished: "finita", aborted: "interrotta" },
     toPoints: (points) => plural(points, { one: "a # punto", other: "a # punti" }),
     shifts: (shifts) => plural(shifts, { one: "# Shift", other: "# Shift" }),
-    decisionTime: (ms) => `${seconds(ms)} per decisione`,
+    decisionTime: (ms) => `${time(ms)} per decisione`,
     ofTournament: "in un torneo",
   },
   seats: {
@@ -63,6 +59,7 @@ export const lobby: Texts["lobby"] = {
     title: "Tornei",
     open: "Iscrizioni aperte",
     playing: (over, games) => `In corso: ${over} partite su ${games}`,
+    none: "Nessun torneo è aperto o in corso. Creane uno e invita persone e agenti.",
     all: "Tutti i tornei",
   },
   invite: {
@@ -72,13 +69,40 @@ export const lobby: Texts["lobby"] = {
     link: "Indirizzo",
     agent: "Per un agente, in un terminale",
     qr: "Codice QR dell’indirizzo",
+    thisMachine: "Questo indirizzo si apre solo su questa macchina. Perché altri possano entrare, avvia il server con",
+    thenOpen: " e apri questa pagina con il nome o l’indirizzo della macchina: così stanno nel link e nell’immagine.",
   },
   door: {
     sitDown: "Siediti",
     toLobby: "Alla sala",
     close: "Chiudi la stanza",
     closeSure: "Nessuno potrà più giocarci.",
+    closePlaying: "La partita finisce per tutti, senza risultato.",
     aborted: "La partita è finita senza risultato.",
+  },
+  leaving: {
+    leave: "Lascia…",
+    leaveOrClose: "Lascia o chiudi la stanza…",
+    title: "Lasci il tavolo?",
+    waiting: "Il tuo posto torna libero per qualcun altro. Per tornare ti serve di nuovo l’invito.",
+    substituted: (timeouts, substitute) =>
+      `La partita continua. Ogni tua decisione aspetta finché scade il tempo; ${plural(timeouts, {
+        one: "dopo una persa così",
+        other: "dopo # perse così di seguito",
+      })} gioca per te l’agente «${substitute}».`,
+    givenUp: (timeouts) =>
+      `La partita continua. Ogni tua decisione aspetta finché scade il tempo; ${plural(timeouts, {
+        one: "dopo una persa così",
+        other: "dopo # perse così di seguito",
+      })} la partita finisce senza risultato.`,
+    back: "Puoi tornare a giocare in ogni momento: dalla sala, su questo dispositivo, si arriva al tuo posto.",
+    backUntilThen: "Fino ad allora puoi tornare: dalla sala, su questo dispositivo, si arriva al tuo posto.",
+    closeWaiting: "Questa stanza è tua. Se la chiudi, nessuno potrà più giocarci.",
+    closePlaying: "Questa stanza è tua. Se fai finire la partita, finisce per tutti, senza risultato.",
+    stay: "Resta",
+    doIt: "Lascia",
+    close: "Chiudi la stanza",
+    end: "Fai finire la partita",
   },
   make: {
     title: "Crea una stanza",
@@ -162,8 +186,16 @@ export const lobby: Texts["lobby"] = {
       hands: "Il pubblico vede tutte le carte",
       handsHint: "Solo con un ritardo di almeno 1",
     },
-    notANumber: "Questo non è un numero.",
-    lookAgain: "Qualcosa non può essere accettato; è segnato sopra.",
+    problems: {
+      notANumber: "Scrivi qui un numero.",
+      notWhole: "Scrivi qui un numero intero.",
+      notPoints: "Scrivi numeri interi da 0 in su, separati da virgole, per esempio 5, 3, 1, 0.",
+      rising: "Il primo posto deve valere qualcosa, e nessun posto più di quello prima.",
+      places: (places) => `Scrivi un numero per ogni posto: in tutto ${places}.`,
+      from: (from) => `Deve essere almeno ${from}.`,
+      between: (from, to) => `Deve essere da ${from} a ${to}.`,
+    },
+    lookAgain: "Qualcosa non può essere accettato: tutto è segnato sopra.",
     submit: "Crea la stanza",
   },
 };

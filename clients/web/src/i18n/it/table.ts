@@ -1,6 +1,6 @@
 // Italian texts of table/.
 
-import { AbortReason } from "../../gen/chefshat/v1/room_pb";
+import { AbortReason, ParticipantKind } from "../../gen/chefshat/v1/room_pb";
 import type { Texts } from "../en";
 import { plurals } from "../plural";
 
@@ -78,6 +78,7 @@ export const table: Texts["table"] = {
     wait: "Decidono gli altri",
     waitExchange: "Le carte sono distribuite",
     youGive: "Dai una carta",
+    youGiveOf: (number, of) => `Dai la carta ${number} di ${of}`,
     youMayDeclare: "Hai tutti e due i jolly",
     face: "valore",
     cards: (count) => plural(count, { one: "carta", other: "carte" }),
@@ -88,7 +89,6 @@ export const table: Texts["table"] = {
     nothing: "Niente è più raro: si può solo passare.",
     opens: "Apre lo Shift e non può passare.",
     opensMayPass: "Apre lo Shift.",
-    played: "Giocate in questo Shift",
     giveTo: (name) => `Lo scambio: scegli una carta per ${name}.`,
     give: "Lo scambio: scegli una carta da dare.",
     foodFight: "Food Fight invertirebbe tutti i ruoli: saresti Chef.",
@@ -96,6 +96,7 @@ export const table: Texts["table"] = {
     finished: (place) => `Hai finito ${place}.`,
     outOfPizza: "Hai passato: fuori fino alla prossima pizza.",
   },
+  played: { title: "Giocate in questo Shift", allOut: "tutte uscite" },
   actions: {
     label: "La tua decisione",
     play: "Gioca",
@@ -166,6 +167,7 @@ export const table: Texts["table"] = {
     count: (count) => plural(count, { one: "# azione permessa", other: "# azioni permesse" }),
     chosen: "scelta",
     groups: "Righe: valori. Colonne: carte di quel valore; in ogni colonna senza jolly, con uno, con due.",
+    signs: "Che cosa dicono i segni",
     none: "Nessun turno è aperto. La tabella si vede nei tuoi turni.",
   },
   aborted: {
@@ -213,7 +215,23 @@ export const table: Texts["table"] = {
   room: {
     seats: "Posti",
     waiting: (count) => plural(count, { one: "# posto è ancora libero", other: "# posti sono ancora liberi" }),
+    away: (count) => plural(count, { one: "# deve ancora collegarsi", other: "# devono ancora collegarsi" }),
     begins: "La partita comincia quando tutti i posti sono presi e connessi.",
+    ready: "c’è",
+    here: "c’è",
+    notHere: "al posto, ma non connesso",
+    waitsFor: {
+      [ParticipantKind.UNSPECIFIED]: "aspetta chiunque: una persona, un robot o un agente",
+      [ParticipantKind.HUMAN]: "aspetta una persona",
+      [ParticipantKind.ROBOT]: "aspetta un robot",
+      [ParticipantKind.AGENT]: "aspetta un agente",
+    },
+    ways: "Come entrano gli altri",
+    invited: "Chi ha aperto la stanza invita gli altri, con un indirizzo o un codice d’ingresso.",
+    assigned: "Il torneo assegna i posti ai suoi partecipanti. Nessun altro può entrare.",
+    byCode: "Chi ha ricevuto un codice d’ingresso prende con quello un posto libero.",
+    toJoin: "Ho un codice d’ingresso",
+    invite: "L’invito è qui sotto.",
   },
   watch: { viewer: "come la vede il pubblico" },
 };

@@ -2,27 +2,49 @@
 
 import type { Texts } from "../en";
 import { plurals } from "../plural";
+import { time } from "./time";
 
 const plural = plurals("it");
 
 export const tournaments: Texts["tournaments"] = {
   title: "Tornei",
-  none: "Non c’è ancora nessun torneo. Chi ospita il server ne crea uno con «chefshat tournament create».",
-  sections: { open: "Iscrizioni aperte", playing: "In corso", over: "Conclusi" },
+  none: "Non c’è ancora nessun torneo. Creane uno, manda l’indirizzo a persone e agenti, e segui qui la classifica.",
+  sections: { open: "Iscrizioni aperte", playing: "In corso", over: "Conclusi", closed: "Chiusi prima della fine" },
   states: { open: "iscrizioni aperte", playing: "in corso", finished: "finito", closed: "chiuso in anticipo" },
-  formats: { knockout: "a eliminazione", roundRobin: "all’italiana", swiss: "svizzero" },
+  formats: { knockout: "A eliminazione", roundRobin: "All’italiana", swiss: "Svizzero" },
   deals: {
     same: "Tutti i tavoli di un turno ricevono le stesse carte; ciò che le rivelerebbe resta chiuso fino alla fine del turno.",
     rotated: "Ogni tavolo gioca ogni distribuzione una volta per posto.",
   },
   participants: (count) => plural(count, { one: "# partecipante", other: "# partecipanti" }),
+  made: (date) => `creato il ${date}`,
   gamesOver: (over, games) => `${over} di ${plural(games, { one: "# partita", other: "# partite" })} concluse`,
   roundOf: (round, rounds) => `turno ${round} di ${rounds}`,
   round: (round) => `Turno ${round}`,
   final: "Finale",
   table: (table) => `Tavolo ${table}`,
   game: (number) => `partita ${number}`,
-  wall: { open: "Per una parete", close: "Esci dalla vista a parete", more: (from, to) => `da ${from} a ${to}` },
+  wall: {
+    open: "Per una parete",
+    close: "Esci dalla vista a parete",
+    more: (from, to) => `da ${from} a ${to}`,
+    tables: (from, to) => `tavoli da ${from} a ${to}`,
+  },
+  play: {
+    beginsAt: (count) => `Comincia da solo con ${count} partecipanti`,
+    beginsByHand: "Comincia quando lo decide chi organizza",
+    knockout: (games) =>
+      `${plural(games, { one: "# partita per turno", other: "# partite per turno" })} a tavoli da quattro; i primi due vanno avanti`,
+    rounds: (rounds, games) =>
+      rounds === 0
+        ? `Tanti turni quanti ne servono ai partecipanti, di ${plural(games, { one: "# partita", other: "# partite" })} ciascuno`
+        : `${plural(rounds, { one: "# turno", other: "# turni" })} di ${plural(games, { one: "# partita", other: "# partite" })}`,
+    toPoints: (points) =>
+      plural(points, { one: "Una partita arriva a # punto", other: "Una partita arriva a # punti" }),
+    shifts: (shifts) => plural(shifts, { one: "Una partita è di # Shift", other: "Una partita è di # Shift" }),
+    clock: (decisionMs, bankMs) =>
+      `Le persone hanno ${time(decisionMs)} per ogni decisione${bankMs > 0 ? ` e ${time(bankMs)} in più in tutta la partita` : ""}`,
+  },
   standings: {
     title: "Classifica",
     final: "Classifica finale",
@@ -49,6 +71,7 @@ export const tournaments: Texts["tournaments"] = {
     bracket: "Tabellone",
     due: "non ancora chiamata",
     playing: "in corso",
+    over: "conclusa",
     void: "abbandonata",
     watch: "Guarda",
     replay: "Rivedi",

@@ -8,7 +8,8 @@ export const tutorial: Texts["tutorial"] = {
   step: (step, all) => `${step} / ${all}`,
   next: "Avanti",
   watch: "Giocano gli altri…",
-  toLobby: "Gioca una partita",
+  play: "Gioca subito una partita",
+  toLobby: "Alla sala",
   notThis: "Buona idea per dopo; adesso la lezione chiede altro.",
   lessons: {
     cards:

@@ -1,9 +1,10 @@
-// What a play must be at the open turn, as the rules say it: for words and for marking what the rules would allow. What a seat may really do
-// stands in the mask that the server sends.
+// What is asked for at the open turn, or in the exchange, as the rules say it: for words and for marking what the rules would allow. What a seat
+// may really do stands in the mask that the server sends.
 
-import { Opening } from "../../gen/chefshat/v1/rules_pb";
+import { Opening, Role } from "../../gen/chefshat/v1/rules_pb";
 import type { Move } from "./actions";
 import { type Card, countOf, faceOf } from "./cards";
+import type { OpenDecision } from "./live";
 import type { TableState } from "./state";
 
 /** What a play must be. */
@@ -23,6 +24,21 @@ export function demandOf(table: TableState): Demand {
   const first = board[0];
   if (!first) return { kind: "anything" };
   return { kind: "beat", face: (faceOf(first) ?? table.faces + 1) - 1, size: board.length };
+}
+
+/** Cards that the Chef gives and gets. */
+const CHEFS_GIFTS = 2;
+
+/** Which card of how many is to be given, where it is more than one. */
+export function giftOf(
+  table: TableState,
+  own: number | undefined,
+  { hand, given }: Pick<OpenDecision, "hand" | "given">,
+): { number: number; of: number } | undefined {
+  if (own === undefined || table.seats[own]?.role !== Role.CHEF) return undefined;
+  // From a hand smaller than this the Dishwasher may have fewer cards to give than two, jokers apart, and the Chef gives as many.
+  if (hand.length + given < CHEFS_GIFTS + table.jokers) return undefined;
+  return { number: given + 1, of: CHEFS_GIFTS };
 }
 
 /** Whether the rules allow a move at such a turn to a hand that holds its cards; whether passing is allowed they do not say here. */

@@ -18,6 +18,8 @@ export interface OpenDecision {
   readonly legal: readonly number[];
   /** The hand it is decided from, in order. */
   readonly hand: readonly Card[];
+  /** Cards that have been given before, in an exchange that is not complete. */
+  readonly given: number;
   /** Milliseconds that were left of the decision's own time when the request came. */
   readonly timeLeftMs: number;
   /** Milliseconds that were left in the bank when the request came. */
@@ -144,6 +146,7 @@ function withDecision(live: LiveState, request: DecisionRequest, nowMs: number):
     kind: request.kind,
     legal: legalActions(request.actionMask),
     hand,
+    given: request.kind === DecisionKind.EXCHANGE ? (seen?.gave.reduce((sum, count) => sum + count, 0) ?? 0) : 0,
     timeLeftMs: request.timeLeftMs,
     bankLeftMs: request.bankLeftMs,
     receivedAtMs: nowMs,

@@ -25,6 +25,8 @@ interface ActionBarProps {
   sending: boolean;
   /** A reason or trouble that is to be seen instead of the standing hint. */
   remark: string;
+  /** Whether less is allowed than the rules would: a lesson. */
+  taught: boolean;
   /** Milliseconds of a whole decision; 0: no clock. */
   wholeMs: number;
   onAnswer: (action: number) => void;
@@ -86,7 +88,7 @@ function giftWord({ decision, picked }: ActionBarProps, move: Move): string {
   return card ? cardWord(card) : moveWords(move);
 }
 
-function hint({ table, own, decision, moves, picked, move, sending }: ActionBarProps): string {
+function hint({ table, own, decision, moves, picked, move, sending, taught }: ActionBarProps): string {
   const words = t().table.actions;
   if (sending) return words.sending;
   if (!decision) return table.phase === "pizza" || table.phase === "dealt" ? words.notYourTurn : "";
@@ -100,7 +102,7 @@ function hint({ table, own, decision, moves, picked, move, sending }: ActionBarP
   }
   if (moves.every((legal) => legal.kind === "pass")) return words.onlyPass;
   if (!mayPass && table.turn === 1) return words.noPass;
-  if (!mayPass) return table.board.length === 0 ? words.mustPlay : words.pickMust;
+  if (!mayPass) return table.board.length === 0 && !taught ? words.mustPlay : words.pickMust;
   return words.pick;
 }
 

@@ -1,6 +1,8 @@
-// The reader's own cards, to be picked. All cards can be reached with the arrow keys; those that cannot be picked now say why instead.
+// The reader's own cards, to be picked. All cards can be reached with the arrow keys; those that cannot be picked now say why instead. The row
+// itself can have the focus too, on no card: it is there after a play, until an arrow key chooses a card.
 
-import { useLayoutEffect, useRef, useState } from "preact/hooks";
+import type { RefObject } from "preact";
+import { useState } from "preact/hooks";
 import { t } from "../../i18n";
 import { announce } from "../../parts/Announcer";
 import { Card } from "../../parts/Card";
@@ -9,6 +11,8 @@ import type { Picked } from "../model/picking";
 import { cardWord } from "../words";
 
 interface HandProps {
+  /** The row, for those who put the focus there. */
+  row: RefObject<HTMLDivElement | null>;
   cards: readonly CardValue[];
   picked: Picked;
   /** Cards received in the exchange, marked until the first play. */
@@ -29,22 +33,33 @@ interface HandProps {
 /** How much of a card stays to be seen beside the next one of its stack, as a share of its width; hand.css says the same. */
 const STRIP = 0.5;
 
-export function Hand(props: HandProps) {
-  const { cards, picked, received, refusal } = props;
-  const [focus, setFocus] = useState(0);
-  const row = useRef<HTMLDivElement>(null);
-  const inside = useRef(false);
-  const current = Math.min(focus, Math.max(0, cards.length - 1));
+/** Up to so many widths of a card a hand lies in one row on a phone. */
+const ONE_ROW_UNITS = 7.5;
 
-  // A card that is played takes the keyboard's focus with it: it goes on at the card that comes after.
-  useLayoutEffect(() => {
-    if (!inside.current || document.activeElement !== document.body) return;
-    row.current?.querySelectorAll<HTMLElement>(".hand-card")[current]?.focus();
-  }, [cards.length]);
+/** How wide stacks beside each other are, in widths of a card and without the gaps. */
+function widthOf(runs: readonly (readonly CardValue[])[]): number {
+  return runs.reduce((width, stack) => width + 1 + (stack.length - 1) * STRIP, 0);
+}
+
+/** The wider of the two rows that stacks lie in where they are split most evenly. */
+function fullerHalf(runs: readonly (readonly CardValue[])[]): readonly (readonly CardValue[])[] {
+  const splits = runs.map((_, index) => {
+    const [upper, lower] = [runs.slice(0, index), runs.slice(index)];
+    return widthOf(upper) > widthOf(lower) ? upper : lower;
+  });
+  return splits.reduce((best, next) => (widthOf(next) < widthOf(best) ? next : best), runs);
+}
+
+export function Hand(props: HandProps) {
+  const { row, cards, picked, received, refusal } = props;
+  const [focus, setFocus] = useState(0);
+  const last = cards.length - 1;
+  const current = Math.min(focus, Math.max(0, last));
 
   const go = (index: number) => {
-    setFocus(index);
-    row.current?.querySelectorAll<HTMLElement>(".hand-card")[index]?.focus();
+    const to = Math.max(0, Math.min(last, index));
+    setFocus(to);
+    row.current?.querySelectorAll<HTMLElement>(".hand-card")[to]?.focus();
   };
   const choose = (index: number) => {
     setFocus(index);
@@ -54,42 +69,49 @@ export function Hand(props: HandProps) {
     announce(reason);
   };
   const onKeyDown = (event: KeyboardEvent) => {
-    const last = cards.length - 1;
+    // On no card: the next one to the right is that which stands where the last one went from.
+    const onNone = event.target === row.current;
+    const pick = () => (onNone ? announce(t().table.hand.help) : choose(current));
     const steps: Record<string, () => void> = {
-      ArrowRight: () => go(Math.min(last, current + 1)),
-      ArrowLeft: () => go(Math.max(0, current - 1)),
+      ArrowRight: () => go(onNone ? focus : current + 1),
+      ArrowLeft: () => go((onNone ? focus : current) - 1),
       Home: () => go(0),
       End: () => go(last),
       Escape: props.onPutBack,
       Enter: () => {
-        if (!props.onPlay()) choose(current);
+        if (!props.onPlay()) return pick();
+        setFocus(Math.min(current, ...picked));
+        row.current?.focus({ preventScroll: true });
       },
-      " ": () => choose(current),
+      " ": pick,
     };
     const step = steps[event.key];
     if (!step || event.ctrlKey || event.metaKey || event.altKey) return;
     event.preventDefault();
-    step();
+    // A key held down picks and plays no more than once.
+    if (!event.repeat || event.key.startsWith("Arrow")) step();
   };
 
   const runs = stacks(cards);
-  const style = { "--stacks": runs.length, "--units": runs.length + (cards.length - runs.length) * STRIP };
+  const units = widthOf(runs);
+  const half = fullerHalf(runs);
+  const style = {
+    "--stacks": runs.length,
+    "--units": units,
+    "--half-stacks": half.length,
+    "--half-units": widthOf(half),
+  };
   let index = -1;
   return (
     <div
-      class="hand"
+      class={`hand ${units <= ONE_ROW_UNITS ? "hand-short" : ""}`}
       role="toolbar"
       aria-label={props.label}
       aria-describedby="hand-help"
       style={style}
       ref={row}
+      tabIndex={-1}
       onKeyDown={onKeyDown}
-      onFocusIn={() => {
-        inside.current = true;
-      }}
-      onFocusOut={(event) => {
-        if (event.relatedTarget) inside.current = false;
-      }}
     >
       <p id="hand-help" class="only-heard">
         {t().table.hand.help}

@@ -1,6 +1,5 @@
 // What happened at the table, the newest at the end. It is read out line by line by the announcer, not by this list.
 
-import { useEffect, useRef } from "preact/hooks";
 import { hidden } from "../../experiment/hiding";
 import { t } from "../../i18n";
 import { SeatNumber } from "../../parts/SeatNumber";
@@ -9,31 +8,28 @@ import type { TableState } from "../model/state";
 import { happeningWords, nameOf } from "../words";
 
 export function Log({ table }: { table: TableState }) {
-  const list = useRef<HTMLOListElement>(null);
-  const last = table.log.at(-1)?.sequence;
-  useEffect(() => {
-    if (list.current) list.current.scrollTop = list.current.scrollHeight;
-  }, [last]);
   return (
     <section class="log sheet" aria-label={t().table.log.title}>
       <h2>{t().table.log.title}</h2>
       {/* biome-ignore lint/a11y/noNoninteractiveTabindex: what scrolls must be reached with the keyboard */}
-      <ol ref={list} tabIndex={0}>
-        {worthSaying(table.log, !hidden.value.includes("expressions")).map((line) => {
-          const { seat, text } = happeningWords(table, line.happening);
-          return (
-            <li key={line.sequence} class={seat === undefined ? "log-aside" : ""}>
-              {seat !== undefined && (
-                <>
-                  <SeatNumber seat={seat} />
-                  <strong>{nameOf(table, seat)}</strong>{" "}
-                </>
-              )}
-              {text}
-            </li>
-          );
-        })}
-      </ol>
+      <div class="log-lines" tabIndex={0}>
+        <ol>
+          {worthSaying(table.log, !hidden.value.includes("expressions")).map((line) => {
+            const { seat, text } = happeningWords(table, line.happening);
+            return (
+              <li key={line.sequence} class={seat === undefined ? "log-aside" : ""}>
+                {seat !== undefined && (
+                  <>
+                    <SeatNumber seat={seat} />
+                    <strong>{nameOf(table, seat)}</strong>{" "}
+                  </>
+                )}
+                {text}
+              </li>
+            );
+          })}
+        </ol>
+      </div>
     </section>
   );
 }

@@ -61,26 +61,36 @@ export function LookupTable({ lookup, taken }: LookupTableProps) {
               </tr>
             ))}
           </tbody>
+          {/* What is no play of a face has a row of its own below all faces. */}
+          <tbody class="lookup-others">
+            {lookup.others.map((cell) => (
+              <tr key={cell.action}>
+                <th scope="row">
+                  {cell.move.kind === "pass" ? <span aria-hidden="true">–</span> : <Drawing name="joker" />}
+                  <span class="only-heard">{cell.move.kind === "pass" ? words.pass : words.loneJoker}</span>
+                </th>
+                <td colSpan={faces}>
+                  <Sign cell={cell} taken={cell.action === taken} />{" "}
+                  <span aria-hidden="true">{cell.move.kind === "pass" ? words.pass : words.loneJoker}</span>
+                </td>
+              </tr>
+            ))}
+          </tbody>
         </table>
       </section>
-      <p class="lookup-others">
-        {lookup.others.map((cell) => (
-          <span key={cell.action}>
-            <Sign cell={cell} taken={cell.action === taken} />{" "}
-            {cell.move.kind === "pass" ? words.pass : words.loneJoker}
-          </span>
-        ))}
-      </p>
-      <ul class="lookup-key">
-        {STATES.map((state) => (
-          <li key={state}>
-            <span class={`lookup-cell lookup-${state}`} aria-hidden="true">
-              {SIGNS[state]}
-            </span>{" "}
-            {words[state]}
-          </li>
-        ))}
-      </ul>
+      <section class="lookup-key">
+        <h3>{words.signs}</h3>
+        <ul>
+          {STATES.map((state) => (
+            <li key={state}>
+              <span class={`lookup-cell lookup-${state}`} aria-hidden="true">
+                {SIGNS[state]}
+              </span>{" "}
+              {words[state]}
+            </li>
+          ))}
+        </ul>
+      </section>
     </div>
   );
 }

@@ -1,23 +1,21 @@
-// What the table waits for: whose decision is open and what a play must be, to be read from afar, and what has been played of each face.
+// What the table waits for: whose decision is open and what a play must be, to be read from afar.
 
 import { DecisionKind } from "../../gen/chefshat/v1/decision_pb";
 import { Role } from "../../gen/chefshat/v1/rules_pb";
 import { t } from "../../i18n";
-import { demandOf } from "../model/demand";
+import { demandOf, giftOf } from "../model/demand";
+import type { OpenDecision } from "../model/live";
 import type { TableState } from "../model/state";
 import { distinctName, headingWords } from "../words";
 import "./now.css";
 import { SeatNumber } from "../../parts/SeatNumber";
 
-/** On a phone what was played is folded away at first. */
-const PHONE = "(max-width: 44rem)";
-
 interface NowProps {
   table: TableState;
   /** The reader's seat, if there is one. */
   own: number | undefined;
-  /** The kind of the reader's own open decision. */
-  deciding: DecisionKind | undefined;
+  /** The reader's own open decision. */
+  decision: Pick<OpenDecision, "kind" | "hand" | "given"> | undefined;
   /** Whose decision is open, as far as the reader may know. */
   next: number | undefined;
   /** Of which kind that decision is; undefined: a turn. */
@@ -27,33 +25,36 @@ interface NowProps {
 }
 
 export function Now(props: NowProps) {
-  const { table, own, deciding, next, kind } = props;
+  const { table, own, decision, next, kind } = props;
+  const deciding = decision?.kind;
   const words = t().table.now;
   const asked = deciding ?? kind ?? DecisionKind.TURN;
   const turn = asked === DecisionKind.TURN && next !== undefined;
   return (
-    <section class="now sheet" aria-label={nowHeading(props)}>
+    <section class="now" aria-label={nowHeading(props)}>
       <h2 class="now-heading">
         {next !== undefined && next !== own && <SeatNumber seat={next} />}
         {nowHeading(props)}
       </h2>
       {turn && <Demands table={table} mayPass={props.mayPass ?? false} />}
-      {deciding === DecisionKind.EXCHANGE && <p>{giftWords(table, own)}</p>}
+      {deciding === DecisionKind.EXCHANGE && <p class="now-gift">{giftWords(table, own)}</p>}
       {deciding === DecisionKind.SPECIAL_ACTION && (
         <p>{own !== undefined && table.seats[own]?.role === Role.DISHWASHER ? words.foodFight : words.dinner}</p>
       )}
       {!turn && next === undefined && <OwnState table={table} own={own} />}
-      <Played table={table} />
     </section>
   );
 }
 
 /** Who decides, in a few words. */
-export function nowHeading({ table, own, deciding, next, kind }: NowProps): string {
+export function nowHeading({ table, own, decision, next, kind }: NowProps): string {
   const words = t().table.now;
+  const deciding = decision?.kind;
   switch (deciding) {
-    case DecisionKind.EXCHANGE:
-      return words.youGive;
+    case DecisionKind.EXCHANGE: {
+      const gift = decision && giftOf(table, own, decision);
+      return gift ? words.youGiveOf(gift.number, gift.of) : words.youGive;
+    }
     case DecisionKind.SPECIAL_ACTION:
       return words.youMayDeclare;
     case DecisionKind.TURN:
@@ -124,31 +125,4 @@ export function giftWords(table: TableState, own: number | undefined): string {
   const partner = role === Role.CHEF ? Role.DISHWASHER : role === Role.SOUS_CHEF ? Role.WAITER : undefined;
   const seat = table.seats.find((other) => other.role === partner && partner !== undefined);
   return seat ? words.giveTo(distinctName(table, seat.seat)) : words.give;
-}
-
-/** How many cards of each face have been played in this Shift, of how many in the deck. */
-function Played({ table }: { table: TableState }) {
-  if (table.played.length === 0) return null;
-  const cells = table.played.map((count, index) => ({
-    name: index < table.faces ? String(index + 1) : "J",
-    count,
-    all: index < table.faces ? index + 1 : table.jokers,
-  }));
-  return (
-    <details class="played" open={!matchMedia(PHONE).matches}>
-      <summary>{t().table.now.played}</summary>
-      <ul>
-        {cells
-          .filter(({ all }) => all > 0)
-          .map(({ name, count, all }) => (
-            <li key={name} class={`number ${count === 0 ? "soft" : ""} ${count === all ? "played-out" : ""}`}>
-              <b>{name}</b>{" "}
-              <span>
-                {count}/{all}
-              </span>
-            </li>
-          ))}
-      </ul>
-    </details>
-  );
 }

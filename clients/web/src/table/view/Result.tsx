@@ -1,5 +1,6 @@
-// How a Shift or the game ended, over the pizza: everybody by place, with points.
+// How a Shift or the game ended, over the pizza: everybody by place, with points, and the ways on from there.
 
+import type { ComponentChildren } from "preact";
 import { t } from "../../i18n";
 import { ButtonLink } from "../../parts/Button";
 import { SeatNumber } from "../../parts/SeatNumber";
@@ -10,18 +11,42 @@ import "./result.css";
 interface ResultProps {
   table: TableState;
   own: number | undefined;
-  /** Links away from the table once the game is over; not in a replay. */
+  /** Ways on once the game is over; not in a replay. */
   links?: boolean;
+  /** The next step, before all links. */
+  onward?: ComponentChildren;
 }
 
 /** The result that is to be seen now: of the game once it is over, of the last Shift until the next one is under way. */
-export function Result({ table, own, links = true }: ResultProps) {
-  if (table.phase === "gameOver") return <GameResult table={table} own={own} links={links} />;
-  if (table.phase === "aborted") return <Aborted table={table} links={links} />;
+export function Result({ table, own, links = true, onward }: ResultProps) {
+  const ways = links && <Ways table={table} onward={onward} />;
+  if (table.phase === "gameOver") return <GameResult table={table} own={own} ways={ways} />;
+  if (table.phase === "aborted") return <Aborted table={table} ways={ways} />;
   if (table.result && table.phase !== "pizza") {
     return <ShiftTable table={table} result={table.result} />;
   }
   return null;
+}
+
+/** One main step, and links. A game without a result has no record. */
+function Ways({ table, onward }: Pick<ResultProps, "table" | "onward">) {
+  const words = t().table.result;
+  const ended = table.phase === "gameOver";
+  return (
+    <div class="result-ways">
+      {onward}
+      <span class="result-links">
+        {ended && (
+          <ButtonLink href={`/replay/${table.gameId}`} look={onward ? "plain" : "main"}>
+            {words.replay}
+          </ButtonLink>
+        )}
+        <ButtonLink href="/" look={onward || ended ? "plain" : "main"}>
+          {words.lobby}
+        </ButtonLink>
+      </span>
+    </div>
+  );
 }
 
 function ShiftTable({ table, result }: { table: TableState; result: ShiftResult }) {
@@ -52,7 +77,12 @@ function ShiftTable({ table, result }: { table: TableState; result: ShiftResult 
   );
 }
 
-function GameResult({ table, own, links }: Required<ResultProps>) {
+interface EndProps {
+  table: TableState;
+  ways: ComponentChildren;
+}
+
+function GameResult({ table, own, ways }: EndProps & Pick<ResultProps, "own">) {
   const words = t().table.result;
   const winner = table.standings[0]?.seat;
   return (
@@ -74,32 +104,19 @@ function GameResult({ table, own, links }: Required<ResultProps>) {
           ))}
         </tbody>
       </table>
-      {links && (
-        <p class="result-links">
-          <ButtonLink href={`/replay/${table.gameId}`} look="main">
-            {words.replay}
-          </ButtonLink>
-          <ButtonLink href="/">{words.lobby}</ButtonLink>
-        </p>
-      )}
+      {ways}
     </section>
   );
 }
 
 /** A game without a result: why, and the way on. */
-function Aborted({ table, links }: { table: TableState; links: boolean }) {
+function Aborted({ table, ways }: EndProps) {
   const words = t().table;
   return (
     <section class="result sheet" aria-label={words.heading.aborted}>
       <h2>{words.heading.aborted}</h2>
       <p>{words.aborted[table.abortReason]}</p>
-      {links && (
-        <p class="result-links">
-          <ButtonLink href="/" look="main">
-            {words.result.lobby}
-          </ButtonLink>
-        </p>
-      )}
+      {ways}
     </section>
   );
 }
@@ -108,7 +125,7 @@ interface RowProps {
   table: TableState;
   seat: number;
   place: number;
-  children: preact.ComponentChildren;
+  children: ComponentChildren;
 }
 
 function Row({ table, seat, place, children }: RowProps) {

@@ -149,6 +149,9 @@ function Cards({ seat }: { seat: SeatState }) {
   return (
     <div class="seat-cards">
       <span class="seat-count number">{count}</span>
+      <span class="seat-deck number" aria-hidden="true">
+        {seat.cardsLeft}
+      </span>
       <div class="seat-backs" aria-hidden="true">
         {Array.from({ length: Math.min(MOST_BACKS, seat.cardsLeft) }, (_, index) => (
           <Card key={index} card={undefined} />

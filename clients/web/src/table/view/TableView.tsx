@@ -7,6 +7,7 @@ import { DecisionKind } from "../../gen/chefshat/v1/decision_pb";
 import { t } from "../../i18n";
 import type { Label } from "../expressions";
 import { actionOf } from "../model/actions";
+import type { Card } from "../model/cards";
 import type { OpenDecision } from "../model/live";
 import { canPick, legalMoves, type Picked, pickedMove, reasonAgainst, toggle } from "../model/picking";
 import type { TableState } from "../model/state";
@@ -14,14 +15,19 @@ import { headingWords, nameOf, reasonWords } from "../words";
 import { ActionBar } from "./ActionBar";
 import { Board } from "./Board";
 import { Hand } from "./Hand";
+import { useKeptFocus } from "./kept-focus";
 import { Log } from "./Log";
 import { Now } from "./Now";
+import { Played } from "./Played";
 import { Result } from "./Result";
 import { SeatPanel } from "./SeatPanel";
 import { Expressions, type ShownTurn, Tools } from "./Tools";
 import "./table.css";
 import "./seats.css";
 import "./hand.css";
+import "./phone.css";
+import "./low.css";
+import "./landscape.css";
 
 interface TableViewProps {
   table: TableState;
@@ -46,6 +52,10 @@ interface TableViewProps {
   replayed?: boolean;
   /** The name of the room or record. */
   caption?: string;
+  /** The next step once the game is over, before the links. */
+  onward?: ComponentChildren;
+  /** Beside the table's own tools. */
+  tools?: ComponentChildren;
   /** Below the table: the controls of a replay. */
   children?: ComponentChildren;
   onAnswer?: (action: number) => void;
@@ -54,19 +64,28 @@ interface TableViewProps {
 
 const NOTHING: Picked = new Set();
 
+/** Where the game stands is broken between its parts, neither before a number nor before a dot. */
+const INSIDE = / (?=[\d·])/g;
+const NO_BREAK = "\u00a0";
+
 export function TableView(props: TableViewProps) {
   const { table, own, decision, sending = false } = props;
-  const [picked, setPicked] = useState<Picked>(NOTHING);
+  // What is picked is picked for one decision: at the next one it is nothing, from the first moment on.
+  const [choice, setChoice] = useState<{ id: bigint | undefined; picked: Picked }>({ id: undefined, picked: NOTHING });
+  const picked = decision && choice.id === decision.id ? choice.picked : NOTHING;
+  const setPicked = (picked: Picked) => setChoice({ id: decision?.id, picked });
   const [remark, setRemark] = useState("");
   const lastTurn = useRef<ShownTurn | undefined>(undefined);
-  useEffect(() => {
-    setPicked(NOTHING);
-    setRemark("");
-  }, [decision?.id]);
+  useEffect(() => setRemark(""), [decision?.id]);
   if (decision?.kind === DecisionKind.TURN) lastTurn.current = { table, decision };
+  const row = useRef<HTMLDivElement>(null);
+  const keepFocus = useKeptFocus(row);
 
   const mine = own === undefined ? undefined : table.seats[own];
-  const hand = decision?.hand ?? mine?.hand ?? [];
+  // A card that was given has left the hand, though the table's own hand has it until the exchange is complete and told.
+  const gave = useRef<{ of: unknown; hand: readonly Card[] } | undefined>(undefined);
+  const left = gave.current && gave.current.of === mine?.hand ? gave.current.hand : mine?.hand;
+  const hand = decision?.hand ?? left ?? [];
   const moves = decision ? legalMoves(decision.legal, table.faces) : [];
   const move = pickedMove(hand, picked, moves);
   const next = props.next ?? (decision ? own : table.next);
@@ -89,6 +108,9 @@ export function TableView(props: TableViewProps) {
   };
   const answer = (action: number) => {
     setRemark("");
+    if (decision?.kind === DecisionKind.EXCHANGE) {
+      gave.current = { of: mine?.hand, hand: hand.filter((_, index) => !picked.has(index)) };
+    }
     props.onAnswer?.(action);
   };
   const wholeMs = props.untimed ? 0 : (table.policy?.decisionTimeMs ?? 0);
@@ -96,28 +118,33 @@ export function TableView(props: TableViewProps) {
   const handLabel = props.replayed && mine ? t().table.hand.of(nameOf(table, mine.seat)) : t().table.hand.label;
 
   return (
-    <div class={`table table-of-${table.seats.length} ${mine ? "table-own" : "table-watched"}`}>
+    <div class={`table table-of-${table.seats.length} ${mine ? "table-own" : "table-watched"}`} {...keepFocus}>
       <header class="table-head">
-        <h1>{headingWords(table)}</h1>
+        <h1>{headingWords(table).replace(INSIDE, NO_BREAK)}</h1>
         {props.caption && <p class="soft table-caption">{props.caption}</p>}
-        <Tools turn={lastTurn.current} lookup={mine !== undefined && !props.replayed} />
+        <Tools turn={lastTurn.current} lookup={mine !== undefined && !props.replayed}>
+          {props.tools}
+        </Tools>
       </header>
-      {props.banner}
+      <div class="table-banner">{props.banner}</div>
       <Seats table={table} own={own} next={next} kind={kind} />
       <div class="middle">
         <Log table={table} />
         <div class="centre">
           <Board table={table} />
-          <Result table={table} own={own} links={!props.replayed} />
+          <Result table={table} own={own} links={!props.replayed} onward={props.onward} />
         </div>
-        <Now
-          table={table}
-          own={own}
-          deciding={decision?.kind}
-          next={next}
-          kind={kind}
-          mayPass={moves.some((legal) => legal.kind === "pass")}
-        />
+        <div class="side sheet">
+          <Now
+            table={table}
+            own={own}
+            decision={decision}
+            next={next}
+            kind={kind}
+            mayPass={moves.some((legal) => legal.kind === "pass")}
+          />
+          <Played table={table} />
+        </div>
       </div>
       {mine ? (
         <section
@@ -125,54 +152,53 @@ export function TableView(props: TableViewProps) {
           aria-label={handLabel}
           data-decision={decision && String(decision.id)}
         >
-          <div class="own-head">
-            <SeatPanel
-              table={table}
-              seat={mine}
-              own={!props.replayed}
-              deciding={next === own}
-              kind={kind}
-              cards={false}
+          <SeatPanel
+            table={table}
+            seat={mine}
+            own={!props.replayed}
+            deciding={next === own}
+            kind={kind}
+            cards={false}
+          />
+          {/* Before the hand, so that from the cards the buttons are one tab further. */}
+          {props.onExpress && <Expressions onExpress={props.onExpress} />}
+          <div class="own-cards">
+            <Hand
+              row={row}
+              cards={hand}
+              picked={picked}
+              received={mine.received}
+              refusal={refusal}
+              label={handLabel}
+              onToggle={(index) => {
+                setRemark("");
+                setPicked(toggle(hand, picked, index, moves));
+              }}
+              onPlay={() => {
+                if (!move || sending) return false;
+                answer(actionOf(move, table.faces));
+                return true;
+              }}
+              onPutBack={putBack}
+              onRefused={setRemark}
             />
-            {props.onExpress && <Expressions onExpress={props.onExpress} />}
           </div>
-          <div class="own-play">
-            <div class="own-cards">
-              <Hand
-                cards={hand}
-                picked={picked}
-                received={mine.received}
-                refusal={refusal}
-                label={handLabel}
-                onToggle={(index) => {
-                  setRemark("");
-                  setPicked(toggle(hand, picked, index, moves));
-                }}
-                onPlay={() => {
-                  if (!move || sending) return false;
-                  answer(actionOf(move, table.faces));
-                  return true;
-                }}
-                onPutBack={putBack}
-                onRefused={setRemark}
-              />
-            </div>
-            {props.onAnswer && table.phase !== "gameOver" && table.phase !== "aborted" && (
-              <ActionBar
-                table={table}
-                own={own}
-                decision={decision}
-                moves={moves}
-                picked={picked}
-                move={move}
-                sending={sending}
-                remark={remark || props.trouble || ""}
-                wholeMs={wholeMs}
-                onAnswer={answer}
-                onPutBack={putBack}
-              />
-            )}
-          </div>
+          {props.onAnswer && table.phase !== "gameOver" && table.phase !== "aborted" && (
+            <ActionBar
+              table={table}
+              own={own}
+              decision={decision}
+              moves={moves}
+              picked={picked}
+              move={move}
+              sending={sending}
+              remark={remark || props.trouble || ""}
+              taught={props.refusal !== undefined}
+              wholeMs={wholeMs}
+              onAnswer={answer}
+              onPutBack={putBack}
+            />
+          )}
         </section>
       ) : (
         <Seats table={table} own={own} next={next} kind={kind} lower />

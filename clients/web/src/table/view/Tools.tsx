@@ -1,5 +1,6 @@
 // What stands beside the table's heading: sound, the look-up table, and the expressions that can be shown with one click.
 
+import type { ComponentChildren } from "preact";
 import { useState } from "preact/hooks";
 import { t } from "../../i18n";
 import { Dialog } from "../../parts/Dialog";
@@ -22,9 +23,11 @@ interface ToolsProps {
   turn: ShownTurn | undefined;
   /** Whether there are turns of the reader's own at all. */
   lookup: boolean;
+  /** More of them, from the page that the table is on. */
+  children?: ComponentChildren;
 }
 
-export function Tools({ turn, lookup }: ToolsProps) {
+export function Tools({ turn, lookup, children }: ToolsProps) {
   const words = t().table.tools;
   const [open, setOpen] = useState<ShownTurn | "none" | undefined>(undefined);
   const on = soundOn.value;
@@ -71,6 +74,7 @@ export function Tools({ turn, lookup }: ToolsProps) {
           <path d={on ? "M15.500 9a4 4 0 0 1 0 6M18 6.500a8 8 0 0 1 0 11" : "M16 9.500l5 5M21 9.500l-5 5"} />
         </svg>
       </button>
+      {children}
       {open && (
         <Dialog title={words.lookup} onClose={() => setOpen(undefined)}>
           {open === "none" ? (

@@ -1,15 +1,21 @@
-// A room before its game: who has which seat, which are still free and for whom. The game begins by itself. Who is connected is no event of a
-// room that waits, so it is asked for.
+// A room before its game: who has which seat, what each of the others waits for, and how those come in who are still to come. A join code is
+// not said here: who made the room has its invitation below. The game begins by itself. Who is connected is no event of a room that waits, so
+// it is asked for.
 
 import type { ComponentChildren } from "preact";
 import { CALL_LIMIT_MS, roomApi } from "../../api/client";
 import { usePolled } from "../../api/poll";
+import { hidden } from "../../experiment/hiding";
 import { t } from "../../i18n";
+import { rulesInShort } from "../../lobby/RoomCard";
+import { hostedRoom } from "../../lobby/seat";
+import { ButtonLink } from "../../parts/Button";
+import { KindBadge } from "../../parts/KindBadge";
+import { SeatNumber } from "../../parts/SeatNumber";
 import { isTaken, type SeatState, type TableState } from "../model/state";
+import { nameOf } from "../words";
 import { Board } from "./Board";
-import { SeatPanel } from "./SeatPanel";
-import "./table.css";
-import "./seats.css";
+import "./waiting-room.css";
 
 /** How often it is asked who is connected, milliseconds. */
 const EVERY_MS = 2000;
@@ -36,23 +42,94 @@ export function WaitingRoom({ table, own, banner }: WaitingRoomProps) {
     return { ...seat, connected };
   });
   const free = seats.filter((seat) => !isTaken(seat)).length;
+  const away = seats.filter((seat) => isTaken(seat) && !isThere(seat)).length;
   const toppings = Array.from({ length: TOPPINGS_OF_A_SEAT * (seats.length - free) }, (_, index) => {
     return TOPPINGS[index % TOPPINGS.length] ?? 1;
   });
   return (
     <section class="waiting-room">
-      <h1>{table.roomName || t().table.title}</h1>
+      <header class="waiting-head">
+        <h1>{table.roomName || t().table.title}</h1>
+        {room && <p class="soft">{rulesInShort(room)}</p>}
+      </header>
       {banner}
-      <ol class="seats" style={{ "--seats": Math.min(4, seats.length) }} aria-label={words.seats}>
-        {seats.map((seat) => (
-          <li key={seat.seat}>
-            <SeatPanel table={table} seat={seat} own={seat.seat === own} deciding={false} cards={false} />
-          </li>
-        ))}
-      </ol>
-      <Board table={{ ...table, toppings }}>
-        <strong>{free > 0 ? words.waiting(free) : t().table.heading.waiting}</strong> {words.begins}
-      </Board>
+      <div class="waiting-parts">
+        <div class="waiting-words sheet">
+          <h2>{t().table.heading.waiting}</h2>
+          <ol class="waiting-seats" aria-label={words.seats}>
+            {seats.map((seat) => (
+              <WaitingSeat key={seat.seat} table={table} seat={seat} own={seat.seat === own} />
+            ))}
+          </ol>
+          <p>{words.begins}</p>
+          {free > 0 && <Ways roomId={roomId} tournament={room?.tournamentId !== ""} seated={own !== undefined} />}
+        </div>
+        <Board table={{ ...table, toppings }}>
+          {free > 0 ? words.waiting(free) : away > 0 ? words.away(away) : t().table.heading.waiting}
+        </Board>
+      </div>
+    </section>
+  );
+}
+
+/** Whether the game could begin as far as this seat is concerned. */
+function isThere({ connected, builtIn }: SeatState): boolean {
+  return connected || builtIn !== "";
+}
+
+/** One seat: who has it and whether it is ready, or what it waits for. */
+function WaitingSeat({ table, seat, own }: { table: TableState; seat: SeatState; own: boolean }) {
+  const words = t().table.room;
+  const taken = isTaken(seat);
+  const ready = taken && isThere(seat);
+  return (
+    <li class={`waiting-seat ${ready ? "waiting-ready" : ""}`} data-seat={seat.seat}>
+      <SeatNumber seat={seat.seat} />
+      <div class="waiting-who">
+        {taken ? (
+          <>
+            <h3>
+              {nameOf(table, seat.seat)}
+              {own && <span class="soft"> ({t().table.you})</span>}
+            </h3>
+            <p class="waiting-state small">
+              <KindBadge kind={seat.kind} builtIn={seat.builtIn} />
+              <span class={ready ? "waiting-there" : ""}>
+                <span aria-hidden="true">{ready ? "✓" : "…"}</span>{" "}
+                {ready ? (seat.builtIn ? words.ready : words.here) : words.notHere}
+              </span>
+            </p>
+          </>
+        ) : (
+          <>
+            <h3>{t().table.freeSeat}</h3>
+            <p class="soft small">{words.waitsFor[seat.reservedFor]}</p>
+          </>
+        )}
+      </div>
+    </li>
+  );
+}
+
+interface WaysProps {
+  roomId: string;
+  /** Whether the room is one of a tournament's, or may be. */
+  tournament: boolean;
+  /** Whether the reader has a seat. */
+  seated: boolean;
+}
+
+/** How those come in who are still to come, as far as the reader may know. */
+function Ways({ roomId, tournament, seated }: WaysProps) {
+  const words = t().table.room;
+  const way = tournament ? words.assigned : hostedRoom(roomId) ? words.invite : seated ? words.invited : words.byCode;
+  return (
+    <section class="waiting-ways">
+      <h3>{words.ways}</h3>
+      <p>{way}</p>
+      {!tournament && !seated && !hidden.value.includes("pages") && (
+        <ButtonLink href="/join">{words.toJoin}</ButtonLink>
+      )}
     </section>
   );
 }

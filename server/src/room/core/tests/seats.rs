@@ -3,7 +3,7 @@
 use chefshat_engine::RewardScheme;
 
 use super::*;
-use crate::room::core::{ExpressError, JOIN_HOLD, JoinError};
+use crate::room::core::{ExpressError, JOIN_HOLD, JoinError, LeaveError};
 use crate::store::journal::AbortReason;
 
 #[test]
@@ -226,4 +226,36 @@ fn delayed_spectators_see_what_is_so_many_decisions_old() {
         }
     }
     assert_eq!(table.core.visible_to_spectators(), table.core.log().len());
+}
+
+#[test]
+fn a_seat_that_was_given_back_knows_nothing_of_who_had_it() {
+    let mut table = Table::empty(Policy::default(), vec![OPEN; 4]);
+    let seats: Vec<Seat> = table.core.all_seats().collect();
+    for _ in &seats {
+        table.join(ParticipantKind::Agent).expect("a seat is free");
+    }
+    // One is connected when it leaves, one was lost before, one came and went, all but the last.
+    let connection = table.attach(seats[1]);
+    table.lost(seats[1], connection);
+    table.attach(seats[2]);
+    for seat in &seats[..3] {
+        assert_eq!(table.core.leave(table.now, *seat), Ok(()));
+        table.keep();
+    }
+    assert!(table.core.standing(seats[1]).participant.is_none());
+    assert!(!table.core.standing(seats[2]).connected);
+    table.attach(seats[3]);
+    assert!(table.core.open().is_none(), "three seats are free");
+    for seat in &seats[..3] {
+        assert_eq!(table.join(ParticipantKind::Human), Ok(*seat));
+        table.attach(*seat);
+    }
+    let returned = table.happened(|it| matches!(it, Happening::Returned(_)));
+    assert_eq!(returned, 0, "they are others than those who went");
+    assert_eq!(
+        table.core.leave(table.now, seats[0]),
+        Err(LeaveError::GameStarted)
+    );
+    table.assert_replays();
 }

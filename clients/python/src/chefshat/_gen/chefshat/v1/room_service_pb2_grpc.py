@@ -55,6 +55,11 @@ class RoomServiceStub:
                 request_serializer=chefshat_dot_v1_dot_room__service__pb2.JoinRoomRequest.SerializeToString,
                 response_deserializer=chefshat_dot_v1_dot_room__service__pb2.JoinRoomResponse.FromString,
                 _registered_method=True)
+        self.LeaveRoom = channel.unary_unary(
+                '/chefshat.v1.RoomService/LeaveRoom',
+                request_serializer=chefshat_dot_v1_dot_room__service__pb2.LeaveRoomRequest.SerializeToString,
+                response_deserializer=chefshat_dot_v1_dot_room__service__pb2.LeaveRoomResponse.FromString,
+                _registered_method=True)
         self.CloseRoom = channel.unary_unary(
                 '/chefshat.v1.RoomService/CloseRoom',
                 request_serializer=chefshat_dot_v1_dot_room__service__pb2.CloseRoomRequest.SerializeToString,
@@ -77,7 +82,7 @@ class RoomServiceServicer:
         raise NotImplementedError('Method not implemented!')
 
     def GetRoom(self, request, context):
-        """One room. NOT_FOUND (ROOM_UNKNOWN).
+        """One room, by its id or its join code. NOT_FOUND (ROOM_UNKNOWN); PERMISSION_DENIED (JOIN_CODE_WRONG).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -96,6 +101,14 @@ class RoomServiceServicer:
         """Takes a seat and gives the ticket for it. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED (ROOM_FULL);
         FAILED_PRECONDITION (SEAT_TAKEN, KIND_NOT_ADMITTED, GAME_STARTED, GAME_OVER); INVALID_ARGUMENT (NO_SUCH_SEAT, NAME_REFUSED, KIND_REFUSED);
         NOT_FOUND (ROOM_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
+    def LeaveRoom(self, request, context):
+        """Gives back a seat before the game begins: it is free again, its ticket opens nothing any more, and a stream that was attached to it is told
+        so (Detached, REQUESTED). UNAUTHENTICATED (TICKET_UNKNOWN); FAILED_PRECONDITION (GAME_STARTED, GAME_OVER).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -130,6 +143,11 @@ def add_RoomServiceServicer_to_server(servicer, server):
                     servicer.JoinRoom,
                     request_deserializer=chefshat_dot_v1_dot_room__service__pb2.JoinRoomRequest.FromString,
                     response_serializer=chefshat_dot_v1_dot_room__service__pb2.JoinRoomResponse.SerializeToString,
+            ),
+            'LeaveRoom': grpc.unary_unary_rpc_method_handler(
+                    servicer.LeaveRoom,
+                    request_deserializer=chefshat_dot_v1_dot_room__service__pb2.LeaveRoomRequest.FromString,
+                    response_serializer=chefshat_dot_v1_dot_room__service__pb2.LeaveRoomResponse.SerializeToString,
             ),
             'CloseRoom': grpc.unary_unary_rpc_method_handler(
                     servicer.CloseRoom,
@@ -246,6 +264,33 @@ class RoomService:
             '/chefshat.v1.RoomService/JoinRoom',
             chefshat_dot_v1_dot_room__service__pb2.JoinRoomRequest.SerializeToString,
             chefshat_dot_v1_dot_room__service__pb2.JoinRoomResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def LeaveRoom(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/chefshat.v1.RoomService/LeaveRoom',
+            chefshat_dot_v1_dot_room__service__pb2.LeaveRoomRequest.SerializeToString,
+            chefshat_dot_v1_dot_room__service__pb2.LeaveRoomResponse.FromString,
             options,
             channel_credentials,
             insecure,

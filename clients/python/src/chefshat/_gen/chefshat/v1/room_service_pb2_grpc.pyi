@@ -40,7 +40,7 @@ class RoomServiceStub:
     (SHUTTING_DOWN, STORE_FAILED).
     """
     GetRoom: _grpc.UnaryUnaryMultiCallable[_room_service_pb2.GetRoomRequest, _room_service_pb2.GetRoomResponse]
-    """One room. NOT_FOUND (ROOM_UNKNOWN)."""
+    """One room, by its id or its join code. NOT_FOUND (ROOM_UNKNOWN); PERMISSION_DENIED (JOIN_CODE_WRONG)."""
     ListRooms: _grpc.UnaryUnaryMultiCallable[_room_service_pb2.ListRoomsRequest, _room_service_pb2.ListRoomsResponse]
     """Rooms of the server, newest first: a page goes on with those made before the last one of the page before, so that rooms made meanwhile
     do not come up; page tokens hold until the server is started anew. A page may hold fewer rooms than asked for and still have a next one. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED,
@@ -50,6 +50,10 @@ class RoomServiceStub:
     """Takes a seat and gives the ticket for it. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED (ROOM_FULL);
     FAILED_PRECONDITION (SEAT_TAKEN, KIND_NOT_ADMITTED, GAME_STARTED, GAME_OVER); INVALID_ARGUMENT (NO_SUCH_SEAT, NAME_REFUSED, KIND_REFUSED);
     NOT_FOUND (ROOM_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+    """
+    LeaveRoom: _grpc.UnaryUnaryMultiCallable[_room_service_pb2.LeaveRoomRequest, _room_service_pb2.LeaveRoomResponse]
+    """Gives back a seat before the game begins: it is free again, its ticket opens nothing any more, and a stream that was attached to it is told
+    so (Detached, REQUESTED). UNAUTHENTICATED (TICKET_UNKNOWN); FAILED_PRECONDITION (GAME_STARTED, GAME_OVER).
     """
     CloseRoom: _grpc.UnaryUnaryMultiCallable[_room_service_pb2.CloseRoomRequest, _room_service_pb2.CloseRoomResponse]
     """Closes a room; a running game is aborted. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND (ROOM_UNKNOWN)."""
@@ -66,7 +70,7 @@ class RoomServiceAsyncStub(RoomServiceStub):
     (SHUTTING_DOWN, STORE_FAILED).
     """
     GetRoom: _aio.UnaryUnaryMultiCallable[_room_service_pb2.GetRoomRequest, _room_service_pb2.GetRoomResponse]  # type: ignore[assignment]
-    """One room. NOT_FOUND (ROOM_UNKNOWN)."""
+    """One room, by its id or its join code. NOT_FOUND (ROOM_UNKNOWN); PERMISSION_DENIED (JOIN_CODE_WRONG)."""
     ListRooms: _aio.UnaryUnaryMultiCallable[_room_service_pb2.ListRoomsRequest, _room_service_pb2.ListRoomsResponse]  # type: ignore[assignment]
     """Rooms of the server, newest first: a page goes on with those made before the last one of the page before, so that rooms made meanwhile
     do not come up; page tokens hold until the server is started anew. A page may hold fewer rooms than asked for and still have a next one. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED,
@@ -76,6 +80,10 @@ class RoomServiceAsyncStub(RoomServiceStub):
     """Takes a seat and gives the ticket for it. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED (ROOM_FULL);
     FAILED_PRECONDITION (SEAT_TAKEN, KIND_NOT_ADMITTED, GAME_STARTED, GAME_OVER); INVALID_ARGUMENT (NO_SUCH_SEAT, NAME_REFUSED, KIND_REFUSED);
     NOT_FOUND (ROOM_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+    """
+    LeaveRoom: _aio.UnaryUnaryMultiCallable[_room_service_pb2.LeaveRoomRequest, _room_service_pb2.LeaveRoomResponse]  # type: ignore[assignment]
+    """Gives back a seat before the game begins: it is free again, its ticket opens nothing any more, and a stream that was attached to it is told
+    so (Detached, REQUESTED). UNAUTHENTICATED (TICKET_UNKNOWN); FAILED_PRECONDITION (GAME_STARTED, GAME_OVER).
     """
     CloseRoom: _aio.UnaryUnaryMultiCallable[_room_service_pb2.CloseRoomRequest, _room_service_pb2.CloseRoomResponse]  # type: ignore[assignment]
     """Closes a room; a running game is aborted. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND (ROOM_UNKNOWN)."""
@@ -101,7 +109,7 @@ class RoomServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _room_service_pb2.GetRoomRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_room_service_pb2.GetRoomResponse, _abc.Awaitable[_room_service_pb2.GetRoomResponse]]:
-        """One room. NOT_FOUND (ROOM_UNKNOWN)."""
+        """One room, by its id or its join code. NOT_FOUND (ROOM_UNKNOWN); PERMISSION_DENIED (JOIN_CODE_WRONG)."""
 
     @_abc_1.abstractmethod
     def ListRooms(
@@ -123,6 +131,16 @@ class RoomServiceServicer(metaclass=_abc_1.ABCMeta):
         """Takes a seat and gives the ticket for it. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED (ROOM_FULL);
         FAILED_PRECONDITION (SEAT_TAKEN, KIND_NOT_ADMITTED, GAME_STARTED, GAME_OVER); INVALID_ARGUMENT (NO_SUCH_SEAT, NAME_REFUSED, KIND_REFUSED);
         NOT_FOUND (ROOM_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+        """
+
+    @_abc_1.abstractmethod
+    def LeaveRoom(
+        self,
+        request: _room_service_pb2.LeaveRoomRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_room_service_pb2.LeaveRoomResponse, _abc.Awaitable[_room_service_pb2.LeaveRoomResponse]]:
+        """Gives back a seat before the game begins: it is free again, its ticket opens nothing any more, and a stream that was attached to it is told
+        so (Detached, REQUESTED). UNAUTHENTICATED (TICKET_UNKNOWN); FAILED_PRECONDITION (GAME_STARTED, GAME_OVER).
         """
 
     @_abc_1.abstractmethod

@@ -101,7 +101,7 @@ class TournamentServiceServicer:
         raise NotImplementedError('Method not implemented!')
 
     def GetTournament(self, request, context):
-        """One tournament. NOT_FOUND (TOURNAMENT_UNKNOWN).
+        """One tournament, by its id or its join code. NOT_FOUND (TOURNAMENT_UNKNOWN); PERMISSION_DENIED (JOIN_CODE_WRONG).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

@@ -39,7 +39,7 @@ class TournamentServiceStub:
     RESOURCE_EXHAUSTED (TOO_MANY_TOURNAMENTS, DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
     """
     GetTournament: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.GetTournamentRequest, _tournament_service_pb2.GetTournamentResponse]
-    """One tournament. NOT_FOUND (TOURNAMENT_UNKNOWN)."""
+    """One tournament, by its id or its join code. NOT_FOUND (TOURNAMENT_UNKNOWN); PERMISSION_DENIED (JOIN_CODE_WRONG)."""
     ListTournaments: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.ListTournamentsRequest, _tournament_service_pb2.ListTournamentsResponse]
     """Tournaments of the server, newest first: a page goes on with those made before the last one of the page before, so that tournaments made
     meanwhile do not come up; page tokens hold until the server is started anew. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
@@ -84,7 +84,7 @@ class TournamentServiceAsyncStub(TournamentServiceStub):
     RESOURCE_EXHAUSTED (TOO_MANY_TOURNAMENTS, DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
     """
     GetTournament: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.GetTournamentRequest, _tournament_service_pb2.GetTournamentResponse]  # type: ignore[assignment]
-    """One tournament. NOT_FOUND (TOURNAMENT_UNKNOWN)."""
+    """One tournament, by its id or its join code. NOT_FOUND (TOURNAMENT_UNKNOWN); PERMISSION_DENIED (JOIN_CODE_WRONG)."""
     ListTournaments: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.ListTournamentsRequest, _tournament_service_pb2.ListTournamentsResponse]  # type: ignore[assignment]
     """Tournaments of the server, newest first: a page goes on with those made before the last one of the page before, so that tournaments made
     meanwhile do not come up; page tokens hold until the server is started anew. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
@@ -138,7 +138,7 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _tournament_service_pb2.GetTournamentRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_tournament_service_pb2.GetTournamentResponse, _abc.Awaitable[_tournament_service_pb2.GetTournamentResponse]]:
-        """One tournament. NOT_FOUND (TOURNAMENT_UNKNOWN)."""
+        """One tournament, by its id or its join code. NOT_FOUND (TOURNAMENT_UNKNOWN); PERMISSION_DENIED (JOIN_CODE_WRONG)."""
 
     @_abc_1.abstractmethod
     def ListTournaments(

@@ -1,16 +1,43 @@
-// The parts of the form for a new room that are mostly left alone: clock, rules, those who are late or wrong, those who watch.
+// The fields of every game, for a room as for a tournament: clock, rules, those who are late or wrong, those who watch. What they hold is in
+// game-form.ts.
 
+import type { ComponentChildren } from "preact";
 import type { RuleSet } from "../gen/chefshat/v1/rules_pb";
 import { t } from "../i18n";
 import { CheckField, SelectField, TextField } from "../parts/Field";
-import type { FormProps } from "./NewRoom";
-import { type FieldName, type RoomForm, withPreset } from "./room-form";
+import type { FieldFaults } from "./filling";
+import { type GameField, type GameForm, withPreset } from "./game-form";
+import { LARGEST, type NumberProblem } from "./problems";
 
 /** Names of fields that hold what was typed. */
-type TextName = { [Name in FieldName]: string extends RoomForm[Name] ? Name : never }[FieldName];
+type TextName = { [Name in GameField]: string extends GameForm[Name] ? Name : never }[GameField];
+
+/** What the fields get: the form, the faults of its fields, and how to change it. */
+export interface GameProps {
+  form: GameForm;
+  faults: FieldFaults<GameField>;
+  change: (changed: Partial<GameForm>) => void;
+}
+
+/** What is wrong with a number, in words. */
+export function wordsOfProblem(problem: NumberProblem): string {
+  const words = t().lobby.make.problems;
+  if (typeof problem === "string") return words[problem];
+  if ("places" in problem) return words.places(problem.places);
+  const [from, to] = problem.bounds;
+  return to === LARGEST ? words.from(from) : words.between(from, to);
+}
+
+/** The same for all fields that have a problem. */
+export function wordsOfProblems<Name extends string>(
+  problems: Partial<Record<Name, NumberProblem>>,
+): FieldFaults<Name> {
+  const entries = Object.entries(problems) as [Name, NumberProblem][];
+  return Object.fromEntries(entries.map(([field, problem]) => [field, wordsOfProblem(problem)])) as FieldFaults<Name>;
+}
 
 /** How fast the game is played. */
-export function ClockFields(props: FormProps) {
+export function ClockFields(props: GameProps) {
   const { form, change } = props;
   const words = t().lobby.make.clocks;
   const choices = ["noHurry", "relaxed", "brisk", "own"] as const;
@@ -34,9 +61,9 @@ export function ClockFields(props: FormProps) {
   );
 }
 
-/** The rules: a preset, and every field of it. */
-export function RuleFields(props: FormProps & { presets: RuleSet[] }) {
-  const { form, change, presets } = props;
+/** The rules of games of so many players: a preset, and every field of it. */
+export function RuleFields(props: GameProps & { players: number; presets: RuleSet[] }) {
+  const { form, change, players, presets } = props;
   const words = t().lobby.make.rule;
   const names: Record<string, string> = words.presets;
   return (
@@ -49,7 +76,7 @@ export function RuleFields(props: FormProps & { presets: RuleSet[] }) {
           options={presets.map(({ preset }) => ({ value: preset, label: names[preset] ?? preset }))}
           onPick={(picked) => {
             const preset = presets.find((one) => one.preset === picked);
-            if (preset) change(withPreset(form, preset));
+            if (preset) change(withPreset(form, preset, players));
           }}
         />
         <SelectField
@@ -104,10 +131,9 @@ export function RuleFields(props: FormProps & { presets: RuleSet[] }) {
 }
 
 /** What happens to those who are late or answer what is not legal. */
-export function FaultFields(props: FormProps & { agents: string[] }) {
-  const { form, change, agents } = props;
+export function FaultFields(props: GameProps & { agents: string[]; children?: ComponentChildren }) {
+  const { form, change, agents, children } = props;
   const words = t().lobby.make.fault;
-  const aborts = ["allLost", "anyLost", "never"] as const;
   return (
     <div class="fields">
       <Typed {...props} name="maxInvalidAttempts" label={words.invalid} hint={words.invalidHint} />
@@ -118,18 +144,13 @@ export function FaultFields(props: FormProps & { agents: string[] }) {
         options={agents.map((value) => ({ value, label: value }))}
         onPick={(substitute) => change({ substitute })}
       />
-      <SelectField
-        label={words.abort}
-        value={form.abort}
-        options={aborts.map((value) => ({ value, label: words.aborts[value] }))}
-        onPick={(abort) => change({ abort })}
-      />
+      {children}
     </div>
   );
 }
 
 /** Who may watch, and what they see when. */
-export function WatchFields(props: FormProps) {
+export function WatchFields(props: GameProps) {
   const { form, change } = props;
   const words = t().lobby.make.watch;
   return (
@@ -156,7 +177,7 @@ export function WatchFields(props: FormProps) {
 }
 
 /** A field of the form that is typed. */
-function Typed(props: FormProps & { name: TextName; label: string; hint?: string }) {
+function Typed(props: GameProps & { name: TextName; label: string; hint?: string }) {
   const { form, faults, change, name, label, hint } = props;
   return (
     <TextField

@@ -1,0 +1,55 @@
+// The links of a study's participants, to be copied one by one or all at once, or taken along as a table (CSV).
+
+import { t } from "../i18n";
+import { CopyLine, useCopying } from "../lobby/Invite";
+import { Button } from "../parts/Button";
+
+/** The link of one participant. */
+export interface StudyLink {
+  /** Empty: for whoever opens it. */
+  readonly name: string;
+  readonly address: string;
+  /** Empty in a tournament. */
+  readonly roomId: string;
+}
+
+/** The links. */
+export function LinkList({ links }: { links: readonly StudyLink[] }) {
+  const words = t().experiment.links;
+  const all = links.map(({ name, address }) => `${name}\t${address}`).join("\n");
+  const { copied, copy } = useCopying(all);
+  return (
+    <>
+      {links.length > 1 && (
+        <p class="study-ways">
+          {copy && <Button onClick={copy}>{copied ? `✓ ${t().common.copied}` : words.copyAll}</Button>}
+          <Button onClick={() => download(tableOf(links), "links.csv")}>{words.download}</Button>
+        </p>
+      )}
+      <div class="study-list">
+        {links.map(({ name, address }) => (
+          <CopyLine key={name} label={name || words.everybody} text={address} />
+        ))}
+      </div>
+    </>
+  );
+}
+
+/** The links as a table of names, addresses and rooms: CSV as RFC 4180 has it. */
+export function tableOf(links: readonly StudyLink[]): string {
+  const rows = [["name", "link", "room_id"], ...links.map(({ name, address, roomId }) => [name, address, roomId])];
+  return rows.map((row) => `${row.map(quoted).join(",")}\r\n`).join("");
+}
+
+function quoted(cell: string): string {
+  return /[",\r\n]/.test(cell) ? `"${cell.replaceAll('"', '""')}"` : cell;
+}
+
+function download(text: string, name: string): void {
+  const address = URL.createObjectURL(new Blob([text], { type: "text/csv;charset=utf-8" }));
+  const link = document.createElement("a");
+  link.href = address;
+  link.download = name;
+  link.click();
+  URL.revokeObjectURL(address);
+}

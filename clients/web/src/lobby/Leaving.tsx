@@ -1,0 +1,125 @@
+// Leaving a room in which this device has a seat, said before it is done: what becomes of the seat, and how to come back. Before the game begins
+// the seat is given back; afterwards it stays this device's. Whoever made the room can close it here as well.
+
+import { useState } from "preact/hooks";
+import { inWords } from "../api/faults";
+import { AbortPolicy, type RoomPolicy } from "../gen/chefshat/v1/room_pb";
+import { t } from "../i18n";
+import { Button } from "../parts/Button";
+import { Dialog } from "../parts/Dialog";
+import { Notice } from "../parts/Notice";
+import { navigate } from "../router";
+import { closeRoom, giveBackSeat, hostedRoom } from "./seat";
+import "./leaving.css";
+
+interface LeavingProps {
+  roomId: string;
+  /** Whether the game has begun. */
+  playing: boolean;
+  /** Whether others than built-in agents sit there besides. */
+  others: boolean;
+  policy: RoomPolicy | undefined;
+  /** As a sign beside the tools of the table, or as a button with words. */
+  look: "tool" | "button";
+}
+
+/** The way out. */
+export function Leaving(props: LeavingProps) {
+  const words = t().lobby.leaving;
+  const [asked, setAsked] = useState(false);
+  return (
+    <>
+      {props.look === "tool" ? (
+        <button
+          type="button"
+          class="tool tool-leave"
+          aria-label={words.leave}
+          title={words.leave}
+          onClick={() => setAsked(true)}
+        >
+          <DoorSign />
+        </button>
+      ) : (
+        <p class="leaving">
+          <Button look="quiet" onClick={() => setAsked(true)}>
+            {hostedRoom(props.roomId) ? words.leaveOrClose : words.leave}
+          </Button>
+        </p>
+      )}
+      {asked && <Question {...props} onClose={() => setAsked(false)} />}
+    </>
+  );
+}
+
+function Question(props: LeavingProps & { onClose: () => void }) {
+  const { roomId, playing, others, policy, onClose } = props;
+  const words = t().lobby.leaving;
+  const [busy, setBusy] = useState(false);
+  const [fault, setFault] = useState("");
+  const doing = async (what: () => Promise<void>) => {
+    setBusy(true);
+    try {
+      await what();
+    } catch (thrown) {
+      setFault(inWords(thrown));
+      setBusy(false);
+    }
+  };
+  const close = async () => {
+    await closeRoom(roomId);
+    onClose();
+  };
+  const leave = async () => {
+    if (!playing) await giveBackSeat(roomId);
+    navigate({ page: "lobby" });
+  };
+  const givenUp =
+    policy?.abort === AbortPolicy.ANY_LOST || (!others && policy?.abort !== AbortPolicy.NEVER) || policy === undefined;
+  const timeouts = policy?.maxTimeouts ?? 1;
+  return (
+    <Dialog title={words.title} onClose={onClose}>
+      <div class="leaving-question">
+        {playing ? (
+          <>
+            <p>{givenUp ? words.givenUp(timeouts) : words.substituted(timeouts, policy?.substitute ?? "")}</p>
+            <p>{givenUp ? words.backUntilThen : words.back}</p>
+          </>
+        ) : (
+          <p>{words.waiting}</p>
+        )}
+        {hostedRoom(roomId) && <p>{playing ? words.closePlaying : words.closeWaiting}</p>}
+        {fault && <Notice kind="fault">{fault}</Notice>}
+        <p class="leaving-ways">
+          <Button look="main" onClick={onClose}>
+            {words.stay}
+          </Button>
+          <Button busy={busy} onClick={() => void doing(leave)}>
+            {words.doIt}
+          </Button>
+          {hostedRoom(roomId) && (
+            <Button busy={busy} onClick={() => void doing(close)}>
+              {playing ? words.end : words.close}
+            </Button>
+          )}
+        </p>
+      </div>
+    </Dialog>
+  );
+}
+
+/** A door, and an arrow out of it. */
+function DoorSign() {
+  return (
+    <svg
+      viewBox="0 0 24 24"
+      aria-hidden="true"
+      fill="none"
+      stroke="currentColor"
+      stroke-width="2"
+      stroke-linecap="round"
+      stroke-linejoin="round"
+    >
+      <path d="M13 4H5v16h8M10 12h10M16.500 8.500l3.500 3.500l-3.500 3.500" />
+    </svg>
+  );
+}

@@ -1,0 +1,35 @@
+// What a join code leads to, asked for before somebody types a name. Sitting down is in seat.ts.
+
+import { CALL_LIMIT_MS, roomApi, tournamentApi } from "../api/client";
+import { faultOf } from "../api/faults";
+import type { Room } from "../gen/chefshat/v1/room_pb";
+import { canonical } from "./seat";
+
+/** What has a code. */
+export type Found =
+  | { readonly kind: "room"; readonly room: Room }
+  | { readonly kind: "tournament" }
+  | { readonly kind: "nothing" }
+  | { readonly kind: "unknown" };
+
+/** Looks for what has a code. */
+export async function lookUp(code: string, signal: AbortSignal): Promise<Found> {
+  const call = { signal, timeoutMs: CALL_LIMIT_MS };
+  const asked = { joinCode: canonical(code) };
+  try {
+    const { room } = await roomApi.getRoom(asked, call);
+    return room ? { kind: "room", room } : { kind: "unknown" };
+  } catch (thrown) {
+    if (!isWrong(thrown)) return { kind: "unknown" };
+  }
+  try {
+    await tournamentApi.getTournament(asked, call);
+    return { kind: "tournament" };
+  } catch (thrown) {
+    return { kind: isWrong(thrown) ? "nothing" : "unknown" };
+  }
+}
+
+function isWrong(thrown: unknown): boolean {
+  return faultOf(thrown).reason === "JOIN_CODE_WRONG";
+}

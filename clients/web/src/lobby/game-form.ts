@@ -1,0 +1,205 @@
+// The part of a form that says how games are played: rules, clock, what happens to those who are late or wrong, who watches. The forms for a
+// new room (room-form.ts) and for a new tournament (tournaments/tournament-form.ts) have it in common. Values without a page: how they are
+// asked for is in GameFields.tsx. Whether rules and times can be accepted is the server's to say; here it is looked for what is plainly wrong.
+
+import type { MessageInitShape } from "@bufbuild/protobuf";
+import type { RoomPolicySchema } from "../gen/chefshat/v1/room_pb";
+import { Opening, PassScope, type RuleSet, type RuleSetSchema } from "../gen/chefshat/v1/rules_pb";
+import { type Bounds, LARGEST, type NumberProblem, pointsProblem, secondsProblem, wholeProblem } from "./problems";
+
+/** How fast a game is played. */
+export type ClockChoice = "noHurry" | "relaxed" | "brisk" | "own";
+
+/** Milliseconds of each clock: for a decision, and for all decisions of a seat beyond that. */
+export const CLOCKS: Record<Exclude<ClockChoice, "own">, { decisionTimeMs: number; bankMs: number }> = {
+  noHurry: { decisionTimeMs: 3_600_000, bankMs: 0 },
+  relaxed: { decisionTimeMs: 60_000, bankMs: 300_000 },
+  brisk: { decisionTimeMs: 20_000, bankMs: 60_000 },
+};
+
+/** How long built-in agents wait before they decide, so that a person can follow, milliseconds. */
+export const PACE_MS = 1200;
+
+/** The fields; numbers as they were typed. */
+export interface GameForm {
+  preset: string;
+  faces: string;
+  jokers: string;
+  stop: "points" | "shifts";
+  target: string;
+  /** Points by place, separated by commas; empty: the standard ones. */
+  points: string;
+  exchange: boolean;
+  specialActions: boolean;
+  opening: "golden" | "anyTopFace";
+  openingPass: boolean;
+  passScope: "pizza" | "turn";
+  maxIdlePizzas: string;
+  maxTurns: string;
+  clock: ClockChoice;
+  decisionSeconds: string;
+  bankSeconds: string;
+  paceSeconds: string;
+  maxInvalidAttempts: string;
+  maxTimeouts: string;
+  substitute: string;
+  spectators: boolean;
+  spectatorDelay: string;
+  spectatorsSeeHands: boolean;
+}
+
+/** Names of the fields. */
+export type GameField = keyof GameForm;
+
+/** The standard rules, with the relaxed clock. */
+export function newGame(): GameForm {
+  return {
+    preset: "paper",
+    faces: "11",
+    jokers: "2",
+    stop: "points",
+    target: "15",
+    points: "",
+    exchange: true,
+    specialActions: true,
+    opening: "golden",
+    openingPass: false,
+    passScope: "pizza",
+    maxIdlePizzas: "3",
+    maxTurns: "10000",
+    clock: "relaxed",
+    decisionSeconds: "60",
+    bankSeconds: "300",
+    paceSeconds: String(PACE_MS / 1000),
+    maxInvalidAttempts: "10",
+    maxTimeouts: "3",
+    substitute: "random",
+    spectators: true,
+    spectatorDelay: "0",
+    spectatorsSeeHands: false,
+  };
+}
+
+/** A form with the rules of a preset, which has every field set, for games of so many players. */
+export function withPreset<Form extends GameForm>(form: Form, preset: RuleSet, players: number): Form {
+  return {
+    ...form,
+    preset: preset.preset,
+    faces: String(preset.faces ?? form.faces),
+    jokers: String(preset.jokers ?? form.jokers),
+    stop: preset.stop.case === "targetShifts" ? "shifts" : "points",
+    target: String(preset.stop.value ?? form.target),
+    points: players === preset.points.length ? preset.points.join(", ") : "",
+    exchange: preset.exchange ?? form.exchange,
+    specialActions: preset.specialActions ?? form.specialActions,
+    opening: preset.opening === Opening.ANY_TOP_FACE ? "anyTopFace" : "golden",
+    openingPass: preset.openingPass ?? form.openingPass,
+    passScope: preset.passScope === PassScope.TURN ? "turn" : "pizza",
+    maxIdlePizzas: String(preset.maxIdlePizzas ?? form.maxIdlePizzas),
+    maxTurns: String(preset.maxTurns ?? form.maxTurns),
+  };
+}
+
+/** What each whole number may be. */
+const WHOLE: Partial<Record<GameField, Bounds>> = {
+  faces: [4, 15],
+  jokers: [0, 2],
+  target: [1, LARGEST],
+  maxIdlePizzas: [1, LARGEST],
+  maxTurns: [1, LARGEST],
+  maxInvalidAttempts: [0, 1000],
+  maxTimeouts: [1, 1000],
+  spectatorDelay: [0, 10_000],
+};
+const PACE_SECONDS: Bounds = [0, 60];
+const DECISION_SECONDS: Bounds = [0.01, 86_400];
+const BANK_SECONDS: Bounds = [0, 86_400];
+
+/** What can be seen to be wrong with the fields, for games of so many players. */
+export function gameProblems(form: GameForm, players: number): Partial<Record<GameField, NumberProblem>> {
+  const found: Partial<Record<GameField, NumberProblem | undefined>> = {
+    points: pointsProblem(form.points, players),
+    paceSeconds: secondsProblem(form.paceSeconds, PACE_SECONDS),
+  };
+  for (const [field, bounds] of Object.entries(WHOLE)) {
+    found[field as GameField] = wholeProblem(String(form[field as GameField]), bounds);
+  }
+  // What is not asked for is not sent as it was typed.
+  if (!form.spectators) delete found.spectatorDelay;
+  if (form.clock === "own") {
+    found.decisionSeconds = secondsProblem(form.decisionSeconds, DECISION_SECONDS);
+    found.bankSeconds = secondsProblem(form.bankSeconds, BANK_SECONDS);
+  }
+  return problemsAlone(found);
+}
+
+/** The fields with which something is wrong. */
+export function problemsAlone<Field extends string, Problem>(
+  found: Partial<Record<Field, Problem | undefined>>,
+): Partial<Record<Field, Problem>> {
+  const wrong = Object.entries(found).filter(([, problem]) => problem !== undefined);
+  return Object.fromEntries(wrong) as Partial<Record<Field, Problem>>;
+}
+
+/** The rules that a form asks for; its numbers must be readable. */
+export function rulesOf(form: GameForm, players: number): MessageInitShape<typeof RuleSetSchema> {
+  const target = Number(form.target);
+  return {
+    preset: form.preset,
+    players,
+    faces: Number(form.faces),
+    jokers: Number(form.jokers),
+    stop: form.stop === "points" ? { case: "targetPoints", value: target } : { case: "targetShifts", value: target },
+    points: form.points.split(/[\s,;]+/).flatMap((points) => (points === "" ? [] : [Number(points)])),
+    exchange: form.exchange,
+    specialActions: form.specialActions,
+    opening: form.opening === "golden" ? Opening.GOLDEN : Opening.ANY_TOP_FACE,
+    openingPass: form.openingPass,
+    passScope: form.passScope === "pizza" ? PassScope.PIZZA : PassScope.TURN,
+    maxIdlePizzas: Number(form.maxIdlePizzas),
+    maxTurns: Number(form.maxTurns),
+  };
+}
+
+/** The policy that a form asks for; its numbers must be readable. */
+export function policyOf(form: GameForm) {
+  const clock =
+    form.clock === "own"
+      ? { decisionTimeMs: milliseconds(form.decisionSeconds), bankMs: milliseconds(form.bankSeconds) }
+      : CLOCKS[form.clock];
+  return {
+    ...clock,
+    paceMs: milliseconds(form.paceSeconds),
+    maxInvalidAttempts: Number(form.maxInvalidAttempts),
+    maxTimeouts: Number(form.maxTimeouts),
+    substitute: form.substitute,
+    spectators: form.spectators,
+    spectatorDelayDecisions: form.spectators ? Number(form.spectatorDelay) : 0,
+    spectatorsSeeHands: form.spectators && form.spectatorsSeeHands,
+  } satisfies MessageInitShape<typeof RoomPolicySchema>;
+}
+
+/** The fields by the names that the protocol has for what is typed in them. */
+export const GAME_FIELDS: Record<string, GameField> = {
+  preset: "preset",
+  faces: "faces",
+  jokers: "jokers",
+  stop: "target",
+  target_points: "target",
+  target_shifts: "target",
+  points: "points",
+  max_idle_pizzas: "maxIdlePizzas",
+  max_turns: "maxTurns",
+  decision_time_ms: "decisionSeconds",
+  bank_ms: "bankSeconds",
+  pace_ms: "paceSeconds",
+  max_invalid_attempts: "maxInvalidAttempts",
+  max_timeouts: "maxTimeouts",
+  spectator_delay_decisions: "spectatorDelay",
+  spectators_see_hands: "spectatorsSeeHands",
+};
+
+/** Typed seconds as milliseconds. */
+export function milliseconds(seconds: string): number {
+  return Math.round(Number(seconds.trim().replace(",", ".")) * 1000);
+}

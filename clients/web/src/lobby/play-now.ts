@@ -1,0 +1,17 @@
+// A game at once: a room with three built-in agents and the relaxed clock, the person on its first seat.
+
+import { serverInfo } from "../api/server";
+import { t } from "../i18n";
+import { navigate } from "../router";
+import { quickGame } from "./room-form";
+import { makeRoom, takeSeat } from "./seat";
+
+/** Makes the game and goes there. Without a name the person is a guest. */
+export async function playNow(name: string): Promise<void> {
+  const words = t().lobby.quick;
+  const { builtInAgents } = await serverInfo();
+  const player = name.trim() || words.guest;
+  const { joinCode } = await makeRoom(quickGame(words.roomOf(player), builtInAgents));
+  const { roomId } = await takeSeat(joinCode, player);
+  navigate({ page: "room", roomId });
+}

@@ -1,0 +1,49 @@
+// A room like one that stands: the same rules, times and agents, all other seats free again. For a study, in which each participant plays in a room
+// of their own, and for who wants to play once more.
+
+import { create, type MessageInitShape } from "@bufbuild/protobuf";
+import { CALL_LIMIT_MS, roomApi } from "../api/client";
+import { GameOrigin, type Participant, type Room, RoomPolicySchema } from "../gen/chefshat/v1/room_pb";
+import type { CreateRoomRequestSchema } from "../gen/chefshat/v1/room_service_pb";
+import { navigate } from "../router";
+import { MAX_NAME } from "./room-form";
+import { makeRoom, takeSeat } from "./seat";
+
+/** Why there can be no other room quite like this one; null if there can. */
+export function notToBeRepeated(room: Room): "seed" | "hands" | null {
+  if (room.origin === GameOrigin.SCRIPTED) return "hands";
+  return room.seedFixed ? "seed" : null;
+}
+
+/** The request for a room with the rules, the policy and the agents of another. */
+export function requestLike(
+  room: Room,
+  name: string,
+  waitingTimeMs = room.policy?.waitingTimeMs,
+): MessageInitShape<typeof CreateRoomRequestSchema> {
+  return {
+    name: Array.from(name).slice(0, MAX_NAME).join(""),
+    seats: room.seats.map(seatLike),
+    policy: { ...(room.policy ?? create(RoomPolicySchema)), ...(waitingTimeMs === undefined ? {} : { waitingTimeMs }) },
+    // The rules of a game that branches from another are that one's.
+    ...(room.branchedFrom
+      ? { start: { case: "branch" as const, value: room.branchedFrom } }
+      : room.rules && { rules: room.rules }),
+  };
+}
+
+function seatLike(seat: Participant) {
+  const { replay, builtInAgent, name, reservedFor } = seat;
+  if (replay) return { filledBy: { case: "replay" as const, value: replay }, name };
+  if (builtInAgent) return { filledBy: { case: "builtInAgent" as const, value: builtInAgent }, name };
+  return { filledBy: { case: "reservedFor" as const, value: reservedFor } };
+}
+
+/** Makes a room like one that this device has made, takes the same seat in it and goes there. */
+export async function playAgain(roomId: string, name: string, seat: number): Promise<void> {
+  const { room } = await roomApi.getRoom({ roomId }, { timeoutMs: CALL_LIMIT_MS });
+  if (!room) throw new Error("the server did not say which room it is");
+  const { joinCode } = await makeRoom(requestLike(room, room.name));
+  const again = await takeSeat(joinCode, name, seat);
+  navigate({ page: "room", roomId: again.roomId });
+}

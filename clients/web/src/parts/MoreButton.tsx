@@ -1,0 +1,18 @@
+// The button below a list that shows more of it; nothing where there is no more.
+
+import type { Shown } from "../api/pages";
+import { t } from "../i18n";
+import { Button } from "./Button";
+
+/** The button, and for those who hear it which list it is for. */
+export function MoreButton({ shown, what }: { shown: Shown<unknown>; what: string }) {
+  if (!shown.list?.more) return null;
+  return (
+    <div>
+      <Button onClick={shown.showMore}>
+        {t().common.showMore}
+        <span class="only-heard">: {what}</span>
+      </Button>
+    </div>
+  );
+}

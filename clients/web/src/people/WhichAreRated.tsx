@@ -1,0 +1,20 @@
+// Which games count for ratings, as docs/ratings.md says, folded away.
+
+import { t } from "../i18n";
+
+/** The words. */
+export function WhichAreRated({ open = false }: { open?: boolean }) {
+  const words = t().people.which;
+  return (
+    <details class="people-which small" open={open}>
+      <summary>{words.title}</summary>
+      <p>{words.text}</p>
+      <ul>
+        {words.conditions.map((condition) => (
+          <li key={condition}>{condition}</li>
+        ))}
+      </ul>
+      <p>{words.toSee}</p>
+    </details>
+  );
+}

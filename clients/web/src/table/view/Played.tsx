@@ -1,0 +1,42 @@
+// How many cards of each face have been played in this Shift, of how many in the deck: each face fills up, and turns dark once all are out.
+
+import { t } from "../../i18n";
+import type { TableState } from "../model/state";
+import "./played.css";
+
+export function Played({ table }: { table: TableState }) {
+  const words = t().table.played;
+  const cells = table.played
+    .map((count, index) => ({
+      name: index < table.faces ? String(index + 1) : "J",
+      count,
+      all: index < table.faces ? index + 1 : table.jokers,
+    }))
+    .filter(({ all }) => all > 0);
+  if (cells.length === 0) return null;
+  return (
+    <section class="played" aria-label={words.title}>
+      <h3 class="played-title">
+        {words.title}
+        <span class="played-key" aria-hidden="true">
+          <i class="played-out" /> {words.allOut}
+        </span>
+      </h3>
+      <ul>
+        {cells.map(({ name, count, all }) => (
+          <li
+            key={name}
+            class={`number ${count === 0 ? "played-none" : ""} ${count === all ? "played-out" : ""}`}
+            style={{ "--share": (count / all).toFixed(3) }}
+          >
+            <b>{name}</b>{" "}
+            <span>
+              {count}/{all}
+            </span>
+            {count === all && <span class="only-heard">, {words.allOut}</span>}
+          </li>
+        ))}
+      </ul>
+    </section>
+  );
+}

@@ -1,0 +1,45 @@
+// One of a few, each with a line that says what it is: for choices whose names alone say too little.
+
+import { useId } from "preact/hooks";
+import "./choices.css";
+
+interface ChoicesProps<Value extends string> {
+  label: string;
+  value: Value;
+  options: readonly { value: Value; name: string; hint: string }[];
+  fault?: string | undefined;
+  onPick: (value: Value) => void;
+}
+
+/** The choice. */
+export function Choices<Value extends string>({ label, value, options, fault, onPick }: ChoicesProps<Value>) {
+  const id = useId();
+  return (
+    <fieldset class="choices" aria-describedby={fault && `${id}-fault`}>
+      <legend>{label}</legend>
+      <div class="choices-options">
+        {options.map((option) => (
+          <label key={option.value} class="choice">
+            <input
+              type="radio"
+              name={id}
+              checked={option.value === value}
+              aria-labelledby={`${id}-${option.value}-name`}
+              aria-describedby={`${id}-${option.value}`}
+              onChange={() => onPick(option.value)}
+            />
+            <b id={`${id}-${option.value}-name`}>{option.name}</b>
+            <span id={`${id}-${option.value}`} class="soft small">
+              {option.hint}
+            </span>
+          </label>
+        ))}
+      </div>
+      {fault && (
+        <p id={`${id}-fault`} class="field-fault" role="alert">
+          {fault}
+        </p>
+      )}
+    </fieldset>
+  );
+}

@@ -1,0 +1,40 @@
+// Who takes part in a tournament that has not begun: names and kinds, in the order of joining. Places and scores come with the first game
+// (Standings.tsx).
+
+import type { Tournament } from "../gen/chefshat/v1/tournament_pb";
+import { t } from "../i18n";
+import { KindBadge } from "../parts/KindBadge";
+import { nameOf } from "./course";
+import { PersonName } from "./PersonName";
+import "./entrants.css";
+
+interface EntrantsProps {
+  tournament: Tournament;
+  /** The participant that this device plays for. */
+  mine?: number | undefined;
+  /** For a wall: nothing to follow, and no more than it has room for. */
+  large?: boolean;
+}
+
+/** Most names on a wall. */
+const ON_WALL = 40;
+
+/** The list. */
+export function Entrants({ tournament, mine, large = false }: EntrantsProps) {
+  const words = t().tournaments.standings;
+  const { participants } = tournament;
+  if (participants.length === 0) return <p class="soft">{words.none}</p>;
+  // On a wall those are of interest who have just come.
+  const shown = large ? participants.slice(-ON_WALL) : participants;
+  return (
+    <ul class={`entrants ${large ? "entrants-large" : ""}`}>
+      {shown.map(({ participant, kind, builtInAgent, connected }) => (
+        <li key={participant} class={participant === mine ? "entrants-mine" : ""}>
+          <PersonName name={nameOf(tournament, participant)} builtIn={builtInAgent} linked={!large} />
+          <KindBadge kind={kind} builtIn={builtInAgent} />
+          {!connected && <span class="soft small">{words.away}</span>}
+        </li>
+      ))}
+    </ul>
+  );
+}

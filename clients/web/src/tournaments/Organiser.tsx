@@ -1,0 +1,89 @@
+// A tournament's page for whoever made it on this device: how to invite others, how to begin it, how to close it.
+
+import { useState } from "preact/hooks";
+import { inWords } from "../api/faults";
+import { StudyLinks } from "../experiment/StudyLinks";
+import { type Tournament, TournamentFormat, TournamentState } from "../gen/chefshat/v1/tournament_pb";
+import { t } from "../i18n";
+import { Invite } from "../lobby/Invite";
+import { Sure } from "../lobby/Sure";
+import { Button } from "../parts/Button";
+import { Notice } from "../parts/Notice";
+import { isEnded } from "./course";
+import { closeTournament, hostedTournament, invitationTo, startTournament } from "./hosting";
+import { isForAgents, isForPeople } from "./words";
+
+/** The organiser's part of the page; nothing for all others, and once it is over. */
+export function Organiser({ tournament }: { tournament: Tournament }) {
+  const { tournamentId, state } = tournament;
+  const hosted = hostedTournament(tournamentId);
+  if (!hosted || isEnded(tournament)) return null;
+  const words = t().organise.own;
+  const open = state === TournamentState.OPEN;
+  const address = invitationTo(tournamentId, hosted.joinCode);
+  const command = `chefshat tournament join --agent greedy --name Gustav --server ${location.origin} --code ${hosted.joinCode}`;
+  return (
+    <section class="sheet organiser">
+      <header>
+        <h2>{words.title}</h2>
+        <p class="soft small">{words.text}</p>
+      </header>
+      {open && <Begin tournament={tournament} />}
+      {open && (
+        <>
+          <Invite
+            title={words.invite}
+            code={hosted.joinCode}
+            address={address}
+            agent={isForAgents(tournament) ? { label: words.agent, command } : undefined}
+          />
+          {isForPeople(tournament) && <StudyLinks address={address} />}
+        </>
+      )}
+      <Sure label={words.close} confirm={words.closeDo} act={() => closeTournament(tournamentId)}>
+        {open ? words.closeOpen : words.closePlaying}
+      </Sure>
+    </section>
+  );
+}
+
+/** Beginning it, with what comes of it. */
+function Begin({ tournament }: { tournament: Tournament }) {
+  const { tournamentId, participants, settings } = tournament;
+  const words = t().organise.own;
+  const [busy, setBusy] = useState(false);
+  const [fault, setFault] = useState("");
+  const begin = async () => {
+    setBusy(true);
+    setFault("");
+    try {
+      await startTournament(tournamentId);
+    } catch (thrown) {
+      setFault(inWords(thrown));
+      setBusy(false);
+    }
+  };
+  const joined = participants.length;
+  const field = fieldFor(tournament);
+  return (
+    <div class="organiser-begin">
+      <p>
+        <b>{words.joined(joined)}</b> {settings?.startWhenJoined ? words.startsAt(settings.startWhenJoined) : null}{" "}
+        {field > joined && joined > 1 && words.filledUp(field, settings?.filler ?? "", field - joined)}
+      </p>
+      <p class="soft small">{words.startText}</p>
+      {fault && <Notice kind="fault">{fault}</Notice>}
+      <Button look="main" busy={busy} onClick={() => void begin()}>
+        {words.start}
+      </Button>
+    </div>
+  );
+}
+
+/** How many take part once it has been filled up: a knockout to a power of two, all others to one table. */
+export function fieldFor({ participants, settings }: Tournament): number {
+  const joined = participants.length;
+  const table = settings?.rules?.players ?? 4;
+  if (settings?.format !== TournamentFormat.KNOCKOUT) return Math.max(joined, table);
+  return Math.max(table, 2 ** Math.ceil(Math.log2(Math.max(1, joined))));
+}

@@ -1,0 +1,151 @@
+// The parts of the form for a new tournament that most people look at: who plays whom, who takes part, when it begins.
+
+import { t } from "../i18n";
+import type { FieldFaults } from "../lobby/filling";
+import { CheckField, SelectField, TextField } from "../parts/Field";
+import { Choices } from "./Choices";
+import { builtIns, type TournamentField, type TournamentForm, withFormat, withTable } from "./tournament-form";
+
+/** What a part of the form gets: the form, the faults of its fields, and how to change it. */
+export interface FormProps {
+  form: TournamentForm;
+  faults: FieldFaults<TournamentField>;
+  change: (changed: Partial<TournamentForm>) => void;
+}
+
+/** Names of fields that hold what was typed. */
+type TextName = { [Name in TournamentField]: string extends TournamentForm[Name] ? Name : never }[TournamentField];
+
+const FORMATS: readonly TournamentForm["format"][] = ["knockout", "roundRobin", "swiss"];
+const PLAYERS: readonly TournamentForm["players"][] = ["2", "3", "4", "5", "6"];
+
+/** Who plays whom, and how often. */
+export function FormatFields(props: FormProps) {
+  const { form, faults, change } = props;
+  const words = t().organise;
+  const knockout = form.format === "knockout";
+  return (
+    <>
+      <Choices
+        label={words.format}
+        value={form.format}
+        options={FORMATS.map((value) => ({
+          value,
+          name: t().tournaments.formats[value],
+          hint: words.formats[value],
+        }))}
+        fault={faults.format}
+        onPick={(format) => change(withFormat(form, format))}
+      />
+      <div class="fields">
+        <SelectField
+          label={words.players}
+          hint={knockout ? words.playersKnockout : undefined}
+          fault={faults.players}
+          value={form.players}
+          options={PLAYERS.filter((count) => !knockout || count === "4").map((value) => ({ value, label: value }))}
+          onPick={(players) => change(withTable(form, players))}
+        />
+        {!knockout && <Typed {...props} name="rounds" label={words.rounds} hint={words.roundsHint} />}
+        <Typed
+          {...props}
+          name="gamesPerPairing"
+          label={words.gamesPerPairing}
+          hint={form.deals === "rotated" ? words.gamesPerPairingRotated : words.gamesPerPairingHint}
+        />
+      </div>
+    </>
+  );
+}
+
+/** Built-in agents by number, and who may join besides. */
+export function WhoFields(props: FormProps & { agents: string[] }) {
+  const { form, faults, change, agents } = props;
+  const words = t().organise;
+  return (
+    <>
+      <fieldset class="new-tournament-group">
+        <legend>{words.builtIn}</legend>
+        <p class="soft small">{words.builtInHint}</p>
+        <div class="new-tournament-counts">
+          {agents.map((agent) => (
+            <TextField
+              key={agent}
+              label={agent}
+              value={form.builtIn[agent] ?? ""}
+              onText={(count) => change({ builtIn: { ...form.builtIn, [agent]: count } })}
+              autoComplete="off"
+            />
+          ))}
+        </div>
+        {builtIns(form) > 0 && <p class="small">{words.builtInSum(builtIns(form))}</p>}
+        {faults.builtIn && (
+          <p class="field-fault" role="alert">
+            {faults.builtIn}
+          </p>
+        )}
+      </fieldset>
+      <fieldset class="new-tournament-group">
+        <legend>{words.kinds}</legend>
+        <div class="new-tournament-kinds">
+          {(["people", "agents", "robots"] as const).map((kind) => (
+            <CheckField
+              key={kind}
+              label={words.kind[kind]}
+              checked={form[kind]}
+              // The fault that nobody may join is the first one's, whichever is picked to mend it.
+              onCheck={(may) => change({ people: form.people, [kind]: may })}
+            />
+          ))}
+        </div>
+        {faults.people && (
+          <p class="field-fault" role="alert">
+            {faults.people}
+          </p>
+        )}
+      </fieldset>
+      <div class="fields">
+        <Typed {...props} name="maxParticipants" label={words.maxParticipants} hint={words.maxParticipantsHint} />
+      </div>
+    </>
+  );
+}
+
+/** When it begins, and how long those are waited for who are absent then. */
+export function StartFields(props: FormProps) {
+  const { form, change } = props;
+  const words = t().organise;
+  return (
+    <div class="fields">
+      <SelectField
+        label={words.start.label}
+        hint={form.start === "byHand" ? words.start.byHandHint : words.start.joinedHint}
+        value={form.start}
+        options={[
+          { value: "byHand", label: words.start.byHand },
+          { value: "joined", label: words.start.joined },
+        ]}
+        onPick={(start) => change({ start })}
+      />
+      {form.start === "joined" && (
+        <Typed {...props} name="startWhen" label={words.startWhen} hint={words.startWhenHint} />
+      )}
+      <Typed {...props} name="noShowSeconds" label={words.noShow} hint={words.noShowHint} />
+    </div>
+  );
+}
+
+/** A field of the form that is typed. */
+export function Typed(props: FormProps & { name: TextName; label: string; hint?: string }) {
+  const { form, faults, change, name, label, hint } = props;
+  return (
+    <TextField
+      label={label}
+      hint={hint}
+      value={form[name]}
+      fault={faults[name]}
+      onText={(text) => change({ [name]: text })}
+      autoComplete="off"
+    />
+  );
+}

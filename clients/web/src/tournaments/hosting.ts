@@ -1,0 +1,51 @@
+// Holding a tournament: making it, beginning it, closing it, and the secrets of it that this device keeps for that. Taking part is in place.ts.
+
+import type { MessageInitShape } from "@bufbuild/protobuf";
+import { CALL_LIMIT_MS, tournamentApi } from "../api/client";
+import type { TournamentSettingsSchema } from "../gen/chefshat/v1/tournament_pb";
+import { pathOf } from "../router";
+import { recallObject, remember } from "../store";
+
+/** The secrets of a tournament that this device has made. */
+export interface HostedTournament {
+  joinCode: string;
+  ownerToken: string;
+}
+
+/** The secrets of a tournament if this device made it. */
+export function hostedTournament(tournamentId: string): HostedTournament | null {
+  return recallObject(`organised.${tournamentId}`, ({ joinCode, ownerToken }) =>
+    typeof joinCode === "string" && typeof ownerToken === "string" ? { joinCode, ownerToken } : null,
+  );
+}
+
+/** Makes a tournament and remembers its secrets; gives its id. */
+export async function makeTournament(settings: MessageInitShape<typeof TournamentSettingsSchema>): Promise<string> {
+  const { tournament, joinCode, ownerToken } = await tournamentApi.createTournament(
+    { settings },
+    { timeoutMs: CALL_LIMIT_MS },
+  );
+  if (!tournament) throw new Error("the server did not say which tournament it is");
+  const hosted: HostedTournament = { joinCode, ownerToken };
+  remember(`organised.${tournament.tournamentId}`, JSON.stringify(hosted));
+  return tournament.tournamentId;
+}
+
+/** Begins a tournament that this device has made. */
+export async function startTournament(tournamentId: string): Promise<void> {
+  await tournamentApi.startTournament(ownership(tournamentId), { timeoutMs: CALL_LIMIT_MS });
+}
+
+/** Closes a tournament that this device has made; games that are being played are aborted. */
+export async function closeTournament(tournamentId: string): Promise<void> {
+  await tournamentApi.closeTournament(ownership(tournamentId), { timeoutMs: CALL_LIMIT_MS });
+}
+
+/** The address that invites to a tournament. */
+export function invitationTo(tournamentId: string, code: string): string {
+  return `${location.origin}${pathOf({ page: "tournament", tournamentId })}?code=${encodeURIComponent(code)}`;
+}
+
+function ownership(tournamentId: string) {
+  return { tournamentId, ownerToken: hostedTournament(tournamentId)?.ownerToken ?? "" };
+}

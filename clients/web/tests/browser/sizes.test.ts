@@ -1,0 +1,133 @@
+// Screens from a small phone to a large desk: what a player needs to decide is seen at once, without scrolling and under nothing else.
+
+import type { Browser, Page } from "playwright-core";
+import { afterAll, beforeAll, expect, test } from "vitest";
+import { byClicks, playOn, sitDown } from "./play";
+import { gameOf, newRoom } from "./rooms";
+import { person, Server, startBrowser } from "./stage";
+
+/** Width and height. */
+const SIZES = [
+  [360, 740],
+  [390, 844],
+  [412, 915],
+  [844, 390],
+  [768, 1024],
+  [1024, 768],
+  [1280, 720],
+  [1280, 800],
+  [1366, 650],
+  [1366, 768],
+  [1920, 1080],
+  [2560, 1440],
+] as const;
+
+/** The longest name, and one that cannot be broken. */
+const LONG = "W".repeat(64);
+
+const EVERYBODY = [".table-head h1", ".seats .seat", ".seats .seat-points", ".own .seat", ".own .seat-points"];
+const CHOICE = [".board", ".now-heading", ".hand-stack", "[data-action=play]", "[data-action=pass]"];
+
+let server: Server;
+let browser: Browser;
+/** The game that was played to its end. */
+let gameId: string;
+
+beforeAll(async () => {
+  server = await Server.start();
+  browser = await startBrowser();
+});
+
+afterAll(async () => {
+  await browser?.close();
+  await server?.stop();
+});
+
+test("a turn, and the end of the game, at every size", async () => {
+  const { roomId, code } = await newRoom(server, { name: LONG, seats: ["person", "greedy", "random", "greedy"] });
+  const { page, faults } = await person(browser);
+  // As if the room had been made here, so that the game can be played again.
+  await page.addInitScript(([name, secrets]) => localStorage.setItem(name, secrets), [
+    `chefshat.hosted.${roomId}`,
+    JSON.stringify({ joinCode: code, ownerToken: "-" }),
+  ] as const);
+  await sitDown(page, server, code, LONG);
+  const address = page.url();
+  let looked = 0;
+  await playOn(page, byClicks, async (taken) => {
+    if (taken > 0) return;
+    for (const language of ["en", "it"]) {
+      await page.goto(`${address}?lang=${language}`);
+      await page.locator("[data-decision]").waitFor();
+      await expectSeen(page, [...EVERYBODY, ...CHOICE, ".clock", ".expressions", ".own .chip"]);
+      looked += 1;
+    }
+  });
+  expect(looked).toBe(2);
+  await expectSeen(page, [...EVERYBODY, ".own .chip", ".result", ".result-ways .button"]);
+  await page.getByRole("button", { name: "Gioca ancora" }).waitFor();
+  gameId = await gameOf(server, roomId);
+  expect(faults).toEqual([]);
+});
+
+test("a replay: its controls cover no seat of a desk's screen, and nothing is wider than the screen", async () => {
+  const { page } = await person(browser);
+  await page.goto(`${server.url}/replay/${gameId}?lang=it`);
+  const slider = page.locator(".replay-slider input");
+  const last = Number(await slider.getAttribute("max"));
+  expect(last).toBeGreaterThan(20);
+  for (const [width, height] of SIZES) {
+    await page.setViewportSize({ width, height });
+    for (let at = 0; at <= last; at += Math.ceil(last / 12)) {
+      await slider.fill(String(at));
+      const wider = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
+      expect(wider, `${width} × ${height} at ${at}`).toBeLessThanOrEqual(0);
+    }
+    // A smaller screen is scrolled.
+    if (width < 1000) continue;
+    await slider.fill("3");
+    await expectSeenNow(page, [".seats .seat", ".seats .seat-points", ".seat-open", ".board", ".replay-bar"]);
+  }
+});
+
+test.each(["en", "it"])("the tutorial in %s, its words included, at every size", async (language) => {
+  const { page } = await person(browser);
+  await page.goto(`${server.url}/tutorial?lang=${language}`);
+  await page.locator(".lesson .button").waitFor();
+  await expectSeen(page, [".lesson", ".lesson .button", ...EVERYBODY, ...CHOICE]);
+});
+
+/** At every size nothing of what is named is outside of the window, or under something else. */
+async function expectSeen(page: Page, parts: readonly string[]): Promise<void> {
+  for (const [width, height] of SIZES) {
+    await page.setViewportSize({ width, height });
+    await expectSeenNow(page, parts);
+  }
+}
+
+async function expectSeenNow(page: Page, parts: readonly string[]): Promise<void> {
+  const message = JSON.stringify(page.viewportSize());
+  await expect.poll(() => unseen(page, parts), { message }).toEqual([]);
+}
+
+/** Parts that are not there, not wholly in the window of a page that has not been scrolled, or covered in the middle. */
+async function unseen(page: Page, parts: readonly string[]): Promise<string[]> {
+  return page.evaluate((parts) => {
+    scrollTo(0, 0);
+    // A pixel for what rounding does.
+    const [right, bottom] = [innerWidth + 1, innerHeight + 1];
+    return parts.flatMap((part) => {
+      const found = [...document.querySelectorAll(part)];
+      if (found.length === 0) return [`${part} is not there`];
+      return found.flatMap((element, index) => {
+        const box = element.getBoundingClientRect();
+        const inside = box.left >= -1 && box.top >= -1 && box.right <= right && box.bottom <= bottom;
+        const at = document.elementFromPoint(box.left + box.width / 2, box.top + box.height / 2);
+        const free = at !== null && (element.contains(at) || at.contains(element));
+        // What the board shows may have the result over it, and the cards of a hand lie on each other.
+        const seen = inside && (free || element.matches(".board, .hand-stack"));
+        return seen ? [] : [`${part} ${index}: ${Math.round(box.top)} to ${Math.round(box.bottom)}`];
+      });
+    });
+  }, parts);
+}

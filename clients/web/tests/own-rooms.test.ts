@@ -1,0 +1,106 @@
+// Rooms for the participants of a study, each like one that stands: who they are, what is asked for, and the table of their links.
+
+import { create } from "@bufbuild/protobuf";
+import { afterEach, expect, test, vi } from "vitest";
+import { roomApi } from "../src/api/client";
+import { tableOf } from "../src/experiment/LinkList";
+import { makeOwnRooms, type OwnRoom, ownRooms } from "../src/experiment/own-rooms";
+import { MAX_PARTICIPANTS, participantsIn } from "../src/experiment/participants";
+import { GameOrigin, ParticipantKind, RoomSchema } from "../src/gen/chefshat/v1/room_pb";
+import { CreateRoomRequestSchema, CreateRoomResponseSchema } from "../src/gen/chefshat/v1/room_service_pb";
+import { notToBeRepeated, requestLike } from "../src/lobby/room-like";
+import { hostedRoom } from "../src/lobby/seat";
+import { forgetAll } from "../src/store";
+
+const room = create(RoomSchema, {
+  roomId: "like",
+  name: "Lab",
+  origin: GameOrigin.DEALT,
+  rules: { preset: "paper", players: 4, faces: 7, stop: { case: "targetShifts", value: 2 } },
+  policy: { decisionTimeMs: 20_000, waitingTimeMs: 3_600_000, clocks: [{ kind: ParticipantKind.HUMAN, bankMs: 5 }] },
+  seats: [
+    { seat: 0, name: "Mia", kind: ParticipantKind.HUMAN, reservedFor: ParticipantKind.HUMAN },
+    { seat: 1, name: "Bea", kind: ParticipantKind.AGENT, builtInAgent: "greedy" },
+    { seat: 2, builtInAgent: "replay", name: "P01", replay: { gameId: "g", seat: 3 } },
+    { seat: 3, reservedFor: ParticipantKind.AGENT },
+  ],
+});
+
+afterEach(() => {
+  vi.restoreAllMocks();
+  forgetAll();
+});
+
+test.each([
+  ["", []],
+  ["P01\n P02 \n\nP01", ["P01", "P02"]],
+  ["P08-P11", ["P08", "P09", "P10", "P11"]],
+  ["P08 – 11", ["P08", "P09", "P10", "P11"]],
+  ["9-11", ["9", "10", "11"]],
+  ["Anne-Marie\nP3-Q9\nP9-P3", ["Anne-Marie", "P3-Q9", "P9-P3"]],
+])("%j names %j", (typed, names) => {
+  expect(participantsIn(typed)).toEqual(names);
+});
+
+test("of too many participants one more than there may be is named", () => {
+  expect(participantsIn("P1-P5000").length).toBe(MAX_PARTICIPANTS + 1);
+  expect(participantsIn("A1-A90\nB1-B90").length).toBe(MAX_PARTICIPANTS + 1);
+});
+
+test("a room like another has its rules, times and agents, and free seats for all others", () => {
+  const asked = create(CreateRoomRequestSchema, requestLike(room, "Lab · P07", 86_400_000));
+  expect(asked.name).toBe("Lab · P07");
+  expect(asked.rules).toEqual(room.rules);
+  expect(asked.policy).toEqual({ ...room.policy, waitingTimeMs: 86_400_000 });
+  expect(asked.seats.map(({ filledBy, name }) => [filledBy.case, name])).toEqual([
+    ["reservedFor", ""],
+    ["builtInAgent", "Bea"],
+    ["replay", "P01"],
+    ["reservedFor", ""],
+  ]);
+  expect(asked.seats.map(({ filledBy }) => filledBy.value)).toEqual([
+    ParticipantKind.HUMAN,
+    "greedy",
+    room.seats[2]?.replay,
+    ParticipantKind.AGENT,
+  ]);
+});
+
+test("a branch goes on from the same point, and says so where a game cannot be dealt again", () => {
+  const branched = create(RoomSchema, { branchedFrom: { gameId: "g", decisions: 9n } });
+  const asked = create(CreateRoomRequestSchema, requestLike(branched, ""));
+  expect([asked.rules, asked.start.case]).toEqual([undefined, "branch"]);
+  expect(notToBeRepeated(room)).toBeNull();
+  expect(notToBeRepeated(create(RoomSchema, { seedFixed: true }))).toBe("seed");
+  expect(notToBeRepeated(create(RoomSchema, { origin: GameOrigin.SCRIPTED }))).toBe("hands");
+});
+
+test("what was made before one is refused is kept, and the rest is made when it is tried again", async () => {
+  let left = 2;
+  vi.spyOn(roomApi, "createRoom").mockImplementation(async ({ name }) => {
+    left -= 1;
+    if (left < 0) throw new Error("no more");
+    return create(CreateRoomResponseSchema, {
+      room: { roomId: `of ${name}` },
+      joinCode: `code of ${name}`,
+      ownerToken: "o",
+    });
+  });
+  const told: (readonly OwnRoom[])[] = [];
+  const make = () => makeOwnRooms(room, ["P1", "P2", "P3"], 1000, (made) => told.push(made));
+  await expect(make()).rejects.toThrow("no more");
+  expect(ownRooms("like").map(({ name }) => name)).toEqual(["P1", "P2"]);
+  left = 5;
+  await make();
+  expect(told.map((made) => made.length)).toEqual([1, 2, 3]);
+  expect(ownRooms("like")[2]).toEqual({ name: "P3", roomId: "of Lab · P3", joinCode: "code of Lab · P3" });
+  expect(hostedRoom("of Lab · P3")?.ownerToken).toBe("o");
+  expect(ownRooms("another")).toEqual([]);
+});
+
+test("links are a table that any program reads", () => {
+  const link = (name: string) => ({ name, address: "https://a.example/join/X?name=1", roomId: "r" });
+  expect(tableOf([link("P07"), link('Ann, "A"')])).toBe(
+    'name,link,room_id\r\nP07,https://a.example/join/X?name=1,r\r\n"Ann, ""A""",https://a.example/join/X?name=1,r\r\n',
+  );
+});

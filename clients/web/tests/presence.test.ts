@@ -1,0 +1,114 @@
+// Connections that come and go: one line in the log, and read out once for each change that lasted.
+
+import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { isPresence, worthSaying } from "../src/table/model/log";
+import type { Happening, LogLine } from "../src/table/model/state";
+import { SETTLED_MS, tellPresence } from "../src/table/presence";
+
+beforeEach(() => void vi.useFakeTimers());
+afterEach(() => void vi.useRealTimers());
+
+const lost = (seat: number): Happening => ({ kind: "lost", seat });
+const back = (seat: number): Happening => ({ kind: "back", seat });
+const replaced = (seat: number): Happening => ({ kind: "substituted", seat, agent: "greedy" });
+const passed = (seat: number): Happening => ({ kind: "passed", seat, cause: "agent" });
+const joy = (seat: number): Happening => ({ kind: "expressed", seat, label: "joy" });
+
+test.each<[string, Happening[], number[]]>([
+  ["gone and back", [lost(1), back(1)], [1]],
+  ["gone, replaced and back", [lost(1), replaced(1), back(1)], [2]],
+  ["again and again while others play", [lost(1), passed(2), back(1), passed(3), lost(1), back(1)], [1, 3, 5]],
+  ["two at once", [lost(1), lost(0), back(1), back(0)], [2, 3]],
+  ["away while it was decided for the seat", [lost(1), passed(1), back(1)], [0, 1, 2]],
+  ["gone for good", [passed(1), lost(1), passed(2)], [0, 1, 2]],
+  ["an expression between", [lost(1), joy(1), back(1)], [1, 2]],
+])("in the log, %s", (_, happenings, kept) => {
+  const log = happenings.map((happening, sequence): LogLine => ({ sequence, happening }));
+  expect(worthSaying(log, true).map(({ sequence }) => sequence)).toEqual(kept);
+  const quiet = kept.filter((sequence) => happenings[sequence]?.kind !== "expressed");
+  expect(worthSaying(log, false).map(({ sequence }) => sequence)).toEqual(quiet);
+});
+
+/** Lets things happen, each so long after the one before; gives what was said until everything had settled. */
+function heard(steps: readonly (readonly [afterMs: number, happening: Happening])[]): Happening[] {
+  const said: Happening[] = [];
+  const teller = tellPresence(({ happening }) => said.push(happening));
+  steps.forEach(([afterMs, happening], sequence) => {
+    vi.advanceTimersByTime(afterMs);
+    const line: LogLine = { sequence, happening };
+    if (!isPresence(line)) throw new Error("not about a connection");
+    teller.hear(line);
+  });
+  vi.advanceTimersByTime(SETTLED_MS);
+  return said;
+}
+
+const SOON = SETTLED_MS / 4;
+const LATE = SETTLED_MS * 2;
+
+test.each<[string, [number, Happening][], Happening[]]>([
+  ["a change that lasts is said", [[0, lost(1)]], [lost(1)]],
+  [
+    "one that does not is not",
+    [
+      [0, lost(1)],
+      [SOON, back(1)],
+    ],
+    [],
+  ],
+  [
+    "a connection that flaps says how it ended",
+    Array.from({ length: 21 }, (_, step) => [SOON, step % 2 === 0 ? lost(1) : back(1)]),
+    [lost(1)],
+  ],
+  [
+    "each lasting change is said",
+    [
+      [0, lost(1)],
+      [LATE, back(1)],
+      [LATE, lost(1)],
+    ],
+    [lost(1), back(1), lost(1)],
+  ],
+  [
+    "back for a moment only is not said",
+    [
+      [0, lost(1)],
+      [LATE, back(1)],
+      [SOON, lost(1)],
+    ],
+    [lost(1)],
+  ],
+  ["who was lost before this page came is back", [[0, back(1)]], [back(1)]],
+  [
+    "a substitute is said once",
+    [
+      [0, lost(1)],
+      [SOON, replaced(1)],
+      [LATE, back(1)],
+    ],
+    [replaced(1), back(1)],
+  ],
+  [
+    "seats have nothing to do with each other",
+    [
+      [0, lost(1)],
+      [SOON, lost(2)],
+      [SOON, back(2)],
+    ],
+    [lost(1)],
+  ],
+])("%s", (_, steps, said) => {
+  expect(heard(steps)).toEqual(said);
+});
+
+test("who leaves the table is told nothing any more", () => {
+  const said = vi.fn();
+  const teller = tellPresence(said);
+  const line: LogLine = { sequence: 1, happening: lost(1) };
+  if (isPresence(line)) teller.hear(line);
+  teller.stop();
+  vi.advanceTimersByTime(LATE);
+  expect(isPresence(line)).toBe(true);
+  expect(said).not.toHaveBeenCalled();
+});

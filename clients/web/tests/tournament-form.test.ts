@@ -1,0 +1,133 @@
+// What the form for a new tournament asks the server for, what it does not send, and where a refusal belongs.
+
+import { create } from "@bufbuild/protobuf";
+import { Code } from "@connectrpc/connect";
+import { expect, test } from "vitest";
+import { ParticipantKind } from "../src/gen/chefshat/v1/room_pb";
+import {
+  TournamentDeals,
+  TournamentFormat,
+  TournamentSchema,
+  TournamentSettingsSchema,
+} from "../src/gen/chefshat/v1/tournament_pb";
+import { refusedField } from "../src/lobby/filling";
+import { tournamentIn } from "../src/lobby/JoinForm";
+import { fieldFor } from "../src/tournaments/Organiser";
+import {
+  newTournament,
+  problemsOf,
+  settingsOf,
+  TOURNAMENT_FIELDS,
+  type TournamentForm,
+  withFormat,
+  withTable,
+} from "../src/tournaments/tournament-form";
+
+const form = (changed: Partial<TournamentForm> = {}): TournamentForm => ({
+  ...newTournament(["random", "greedy"]),
+  name: "Spring cup",
+  ...changed,
+});
+const asked = (changed: Partial<TournamentForm> = {}) => create(TournamentSettingsSchema, settingsOf(form(changed)));
+
+test("a form as it begins asks for a knockout that its organiser begins, open to everybody", () => {
+  const settings = asked({ name: " Spring cup " });
+  expect([settings.name, settings.format, settings.rounds]).toEqual(["Spring cup", TournamentFormat.KNOCKOUT, 0]);
+  expect([settings.kinds, settings.builtInAgents, settings.startWhenJoined]).toEqual([[], [], 0]);
+  expect([settings.rules?.players, settings.noShowTimeMs, settings.policy?.spectators]).toEqual([4, 60_000, true]);
+  // These are the tournament's to say.
+  expect([settings.policy?.abort, settings.policy?.waitingTimeMs]).toEqual([0, undefined]);
+});
+
+test("built-in agents are named as often as they take part", () => {
+  const settings = asked({ builtIn: { random: "2", greedy: " 1 ", trained: "" }, start: "joined", startWhen: "5" });
+  expect(settings.builtInAgents).toEqual(["random", "random", "greedy"]);
+  expect(settings.startWhenJoined).toBe(5);
+});
+
+test("who may join, their clocks and the seeds are as they were picked and typed", () => {
+  const settings = asked({
+    robots: false,
+    otherClocks: true,
+    agentSeconds: "0,5",
+    robotSeconds: "20",
+    drawSeed: `0a${"ff".repeat(31)}`,
+  });
+  expect(settings.kinds).toEqual([ParticipantKind.HUMAN, ParticipantKind.AGENT]);
+  expect(settings.policy?.clocks.map(({ kind, decisionTimeMs, bankMs }) => [kind, decisionTimeMs, bankMs])).toEqual([
+    [ParticipantKind.AGENT, 500, 0],
+    [ParticipantKind.ROBOT, 20_000, 0],
+  ]);
+  expect([settings.drawSeed.length, settings.drawSeed[0], settings.drawSeed[1], settings.dealSeed.length]).toEqual([
+    32, 10, 255, 0,
+  ]);
+});
+
+test("where tables are dealt alike, nobody is said to watch", () => {
+  const settings = asked({ deals: "same", spectatorsSeeHands: true });
+  expect(settings.deals).toBe(TournamentDeals.SAME_AT_ALL_TABLES);
+  expect([settings.policy?.spectators, settings.policy?.spectatorsSeeHands]).toEqual([undefined, false]);
+});
+
+test("a knockout is for tables of four, whose rounds nobody chooses", () => {
+  const before = withTable(form({ format: "swiss", rounds: "9", points: "5, 3, 1, 0" }), "6");
+  expect(before.points).toBe("");
+  expect(asked(before).rounds).toBe(9);
+  const knockout = withFormat(before, "knockout");
+  expect([knockout.players, asked(knockout).rounds]).toEqual(["4", 0]);
+});
+
+test.each<[Partial<TournamentForm>, object]>([
+  [{}, {}],
+  [{ name: " " }, { name: "nameMissing" }],
+  [
+    { rounds: "many", faces: "-1" },
+    { rounds: "notANumber", faces: { bounds: [4, 15] } },
+  ],
+  [{ start: "byHand", startWhen: "" }, {}],
+  [{ start: "joined", startWhen: "" }, { startWhen: "notANumber" }],
+  [{ otherClocks: true, agentSeconds: "" }, { agentSeconds: "notANumber" }],
+  [{ builtIn: { greedy: "some" } }, { builtIn: "notANumber" }],
+  [
+    { rounds: "2000", maxCalls: "2.5" },
+    { rounds: { bounds: [1, 1000] }, maxCalls: "notWhole" },
+  ],
+  [{ builtIn: { greedy: "1000", random: "100" } }, { builtIn: "tooMany" }],
+  [{ people: false, agents: false, robots: false }, { people: "nobody" }],
+  [{ drawSeed: "abc" }, { drawSeed: "notASeed" }],
+])("of %j is wrong: %j", (changed, problems) => {
+  expect(problemsOf(form(changed))).toEqual(problems);
+});
+
+test.each([
+  ["rounds", "rounds: 2000 is not within 1..=1000", { field: "rounds", words: "2000 is not within 1..=1000" }],
+  ["rules", "rules: faces: 99 is too many", { field: "faces", words: "99 is too many" }],
+  ["policy", "policy: pace_ms: at most 60000", { field: "paceSeconds", words: "at most 60000" }],
+  ["rules", "rules: 4 players, points for 3", { field: "points", words: "4 players, points for 3" }],
+  ["policy", "policy: durability: not here", null],
+  ["", "the disk is full", null],
+])("what the server says of %j in %j belongs to a field of the form", (field, message, expected) => {
+  const fault = { reason: "SETTINGS_REFUSED", code: Code.InvalidArgument, message, metadata: field ? { field } : {} };
+  expect(refusedField(fault, TOURNAMENT_FIELDS)).toEqual(expected);
+});
+
+test.each([
+  [TournamentFormat.KNOCKOUT, 0, 4],
+  [TournamentFormat.KNOCKOUT, 5, 8],
+  [TournamentFormat.KNOCKOUT, 16, 16],
+  [TournamentFormat.SWISS, 2, 4],
+  [TournamentFormat.ROUND_ROBIN, 7, 7],
+])("a field of format %i with %i is filled up to %i", (format, joined, field) => {
+  const participants = Array.from({ length: joined }, (_, participant) => ({ participant }));
+  const tournament = create(TournamentSchema, { participants, settings: { format, rules: { players: 4 } } });
+  expect(fieldFor(tournament)).toBe(field);
+});
+
+test.each([
+  ["http://127.0.0.1:50051/tournaments/89ab?code=BCDF2345&name=P07", { id: "89ab", search: "?code=BCDF2345&name=P07" }],
+  [" /tournaments/89ab ", { id: "89ab", search: "" }],
+  ["http://127.0.0.1:50051/tournaments/new", null],
+  ["BCDF2345", null],
+])("in %j there is the tournament %j", (typed, expected) => {
+  expect(tournamentIn(typed)).toEqual(expected);
+});
