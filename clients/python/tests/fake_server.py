@@ -102,6 +102,16 @@ class FakeServer(
                     return pb.JoinRoomResponse(room=game.room, seat=seat.number, ticket=seat.ticket)
         refuse(context, grpc.StatusCode.RESOURCE_EXHAUSTED, "ROOM_FULL", "every seat is taken")
 
+    def LeaveRoom(self, request: pb.LeaveRoomRequest, context: Context) -> pb.LeaveRoomResponse:
+        """Frees the seat of a ticket."""
+        for game in self.games:
+            for seat in game.seats.values():
+                if seat.ticket == request.ticket and game.room.seats[seat.number].name:
+                    with game.lock:
+                        game.room.seats[seat.number].name = ""
+                    return pb.LeaveRoomResponse(room=game.room)
+        refuse(context, grpc.StatusCode.UNAUTHENTICATED, "TICKET_UNKNOWN", "no seat has this ticket", field="ticket")
+
     def CloseRoom(self, request: pb.CloseRoomRequest, context: Context) -> pb.CloseRoomResponse:
         """Aborts the game."""
         if request.owner_token != "owner":

@@ -286,3 +286,13 @@ def test_a_recorded_game_is_branched_and_played_again(real_address: str) -> None
 
         with pytest.raises(chefshat.ChefsHatError, match="BRANCH_REFUSED"):
             client.create_room(branch=pb.BranchPoint(game_id=first.game_id, decisions=len(course)))
+
+
+def test_a_seat_that_was_given_back_is_free(real_address: str) -> None:
+    with chefshat.Client(real_address) as client:
+        room = client.create_room(seats=[None, "random", "random", "random"])
+        left = client.join_room(room.join_code, "Ada").ticket
+        assert client.leave_room(left).seats[0].name == ""
+        with pytest.raises(chefshat.ChefsHatError, match="TICKET_UNKNOWN"):
+            client.leave_room(left)
+        assert client.join_room(room.join_code, "Ben").seat == 0

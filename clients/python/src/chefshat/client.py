@@ -131,6 +131,10 @@ class Client(TournamentCalls):
     def _rooms_page(self, request: pb.ListRoomsRequest) -> pb.ListRoomsResponse:
         return called(lambda: self._rooms.ListRooms(request))
 
+    def leave_room(self, ticket: str) -> pb.Room:
+        """Gives back a seat before the game begins: others can take it, and its ticket opens nothing any more."""
+        return called(lambda: self._rooms.LeaveRoom(pb.LeaveRoomRequest(ticket=ticket))).room
+
     def close_room(self, room_id: str, owner_token: str) -> pb.Room:
         """Closes a room with the token its creator got; a running game is aborted."""
         request = pb.CloseRoomRequest(room_id=room_id, owner_token=owner_token)
