@@ -92,13 +92,18 @@ impl RoomService for RoomCalls {
         let request = request.into_inner();
         let page_size = pages::page_size(request.page_size);
         let before = pages::last_shown(&request.page_token)?;
-        if v1::RoomState::try_from(request.state).is_err() {
-            let problem = FieldProblem::new("state", "not a value of this enum");
-            return Err(field("STATE_REFUSED", &problem));
-        }
+        let over = match v1::RoomState::try_from(request.state) {
+            Ok(v1::RoomState::Unspecified) => None,
+            Ok(v1::RoomState::Waiting | v1::RoomState::Playing) => Some(false),
+            Ok(v1::RoomState::Finished | v1::RoomState::Aborted) => Some(true),
+            Err(_) => {
+                let problem = FieldProblem::new("state", "not a value of this enum");
+                return Err(field("STATE_REFUSED", &problem));
+            }
+        };
         let mut response = v1::ListRoomsResponse::default();
         // Rooms in other states are passed over, but only so many for one page.
-        let looked_at = self.rooms.newest(before, ROOMS_LOOKED_AT);
+        let looked_at = self.rooms.newest(before, over, ROOMS_LOOKED_AT);
         let mut rest = looked_at.len() == ROOMS_LOOKED_AT;
         let mut last = before;
         for (number, handle) in looked_at {

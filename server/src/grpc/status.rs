@@ -168,6 +168,7 @@ impl From<JoinError> for Refusal {
     fn from(error: JoinError) -> Self {
         let (code, reason) = match error {
             JoinError::RoomFull => (Code::ResourceExhausted, "ROOM_FULL"),
+            JoinError::TooManySeatings => (Code::ResourceExhausted, "TOO_MANY_SEATINGS"),
             JoinError::SeatTaken => (Code::FailedPrecondition, "SEAT_TAKEN"),
             JoinError::NoSuchSeat => (Code::InvalidArgument, "NO_SUCH_SEAT"),
             JoinError::KindNotAdmitted => (Code::FailedPrecondition, "KIND_NOT_ADMITTED"),

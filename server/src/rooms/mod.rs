@@ -167,12 +167,19 @@ impl Rooms {
         self.by_code(code).is_some_and(|handle| handle.id() == id)
     }
 
-    /// The newest `count` rooms, or of those made before the one numbered `before`, with their numbers, newest first.
-    pub fn newest(&self, before: Option<u64>, count: usize) -> Vec<(u64, Handle)> {
+    /// The newest `count` rooms, or of those made before the one numbered `before`, with their numbers, newest first: those whose games are
+    /// over, those whose are not, or all.
+    pub fn newest(
+        &self,
+        before: Option<u64>,
+        over: Option<bool>,
+        count: usize,
+    ) -> Vec<(u64, Handle)> {
         self.lock()
             .by_number
             .range(..before.unwrap_or(u64::MAX))
             .rev()
+            .filter(|(_, entry)| over.is_none_or(|over| entry.over == over))
             .take(count)
             .map(|(number, entry)| (*number, entry.handle.clone()))
             .collect()

@@ -96,16 +96,19 @@ test.each([
         .locator(ready ?? "")
         .waitFor();
       if (id === over) await page.getByText("finished").first().waitFor();
-      const places = await page.locator(".wall-fitted").evaluateAll((boxes) =>
-        boxes.map((box) => ({
-          size: Number.parseFloat(getComputedStyle(box).fontSize),
-          fits: box.scrollHeight <= box.clientHeight && box.scrollWidth <= box.clientWidth,
-          written: box.textContent !== "",
-        })),
-      );
+      const measured = () =>
+        page.locator(".wall-fitted").evaluateAll((boxes) =>
+          boxes.map((box) => ({
+            size: Number.parseFloat(getComputedStyle(box).fontSize),
+            fits: box.scrollHeight <= box.clientHeight && box.scrollWidth <= box.clientWidth,
+            written: box.textContent !== "",
+          })),
+        );
+      // The size is found anew when the style or the type comes after what is written.
+      await expect.poll(async () => (await measured())[0]?.size, { timeout: 15_000 }).toBeGreaterThan(least * height);
+      const places = await measured();
       expect(places.length).toBe(id === over ? 2 : 1);
       for (const place of places) expect(place).toMatchObject({ fits: true, written: true });
-      expect(places[0]?.size).toBeGreaterThan(least * height);
       expect(await page.evaluate(() => document.documentElement.scrollHeight <= window.innerHeight)).toBe(true);
     }
   }

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use chefshat_engine::Seat;
 
-use super::MAX_EXPRESSIONS_PER_SEAT;
+use super::{MAX_EXPRESSIONS_PER_SEAT, MAX_SEATINGS};
 use crate::store::journal::{Fill, SeatedParticipant};
 
 /// How a seat stands, as everybody may know it.
@@ -26,6 +26,9 @@ pub enum JoinError {
     /// All seats are taken.
     #[error("every seat of this room is taken")]
     RoomFull,
+    /// Seats were taken and given back again and again.
+    #[error("seats of this room were taken {MAX_SEATINGS} times; make a new room")]
+    TooManySeatings,
     /// The seat asked for is taken.
     #[error("this seat is taken; leave `seat` unset to take any free one")]
     SeatTaken,

@@ -9,8 +9,9 @@ use chefshat_engine::{ActionError, Seat};
 use super::answers::{AnswerInput, Answered, ExpressError, JoinError, LeaveError, Verdict};
 use super::{
     ConnectionId, Core, MAX_ANNOTATION_BYTES, MAX_ANNOTATION_BYTES_PER_GAME, MAX_CONNECTION_EVENTS,
-    MAX_EXPRESSIONS_PER_SEAT, State,
+    MAX_EXPRESSIONS_PER_SEAT, MAX_SEATINGS, State,
 };
+use crate::room::log::Happening;
 use crate::store::journal::{Change, Fill, ParticipantKind, SeatedParticipant, Source};
 
 impl Core {
@@ -28,6 +29,11 @@ impl Core {
             State::Waiting => {}
             State::Playing => return Err(JoinError::GameStarted),
             State::Finished | State::Aborted(_) => return Err(JoinError::GameOver),
+        }
+        let log = self.log.since(0).iter();
+        let seatings = log.filter(|it| matches!(it.happening, Happening::Seated(..)));
+        if seatings.count() >= MAX_SEATINGS {
+            return Err(JoinError::TooManySeatings);
         }
         let seat = match wanted {
             Some(number) => {

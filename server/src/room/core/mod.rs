@@ -47,6 +47,9 @@ pub const MAX_ANNOTATION_BYTES: usize = 4 * 1024;
 pub const MAX_EXPRESSIONS_PER_SEAT: u32 = 10_000;
 /// Most events of lost and new connections of one seat in one game; later ones are not told.
 pub const MAX_CONNECTION_EVENTS: u32 = 1_000;
+
+/// Seats taken in a room, those counted that were given back: each stays in its log.
+pub const MAX_SEATINGS: usize = 1_000;
 /// Invalid attempts at one decision after which the default is taken even where they are unlimited: a record must hold them.
 pub const MAX_ATTEMPTS: u32 = 10_000;
 /// Most changes of one game; beyond it the game is aborted.

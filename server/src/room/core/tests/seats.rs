@@ -3,7 +3,7 @@
 use chefshat_engine::RewardScheme;
 
 use super::*;
-use crate::room::core::{ExpressError, JOIN_HOLD, JoinError, LeaveError};
+use crate::room::core::{ExpressError, JOIN_HOLD, JoinError, LeaveError, MAX_SEATINGS};
 use crate::store::journal::AbortReason;
 
 #[test]
@@ -258,4 +258,15 @@ fn a_seat_that_was_given_back_knows_nothing_of_who_had_it() {
         Err(LeaveError::GameStarted)
     );
     table.assert_replays();
+}
+
+#[test]
+fn seats_cannot_be_taken_and_given_back_for_ever() {
+    let mut table = Table::empty(Policy::default(), vec![OPEN; 4]);
+    for _ in 0..MAX_SEATINGS {
+        let seat = table.join(ParticipantKind::Agent).expect("a seat is free");
+        assert_eq!(table.core.leave(table.now, seat), Ok(()));
+    }
+    let error = table.join(ParticipantKind::Agent).expect_err("too often");
+    assert_eq!(error, JoinError::TooManySeatings);
 }

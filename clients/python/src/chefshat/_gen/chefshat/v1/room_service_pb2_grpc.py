@@ -98,7 +98,7 @@ class RoomServiceServicer:
         raise NotImplementedError('Method not implemented!')
 
     def JoinRoom(self, request, context):
-        """Takes a seat and gives the ticket for it. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED (ROOM_FULL);
+        """Takes a seat and gives the ticket for it. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED (ROOM_FULL, TOO_MANY_SEATINGS);
         FAILED_PRECONDITION (SEAT_TAKEN, KIND_NOT_ADMITTED, GAME_STARTED, GAME_OVER); INVALID_ARGUMENT (NO_SUCH_SEAT, NAME_REFUSED, KIND_REFUSED);
         NOT_FOUND (ROOM_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
         """

@@ -47,7 +47,7 @@ class RoomServiceStub:
     STATE_REFUSED).
     """
     JoinRoom: _grpc.UnaryUnaryMultiCallable[_room_service_pb2.JoinRoomRequest, _room_service_pb2.JoinRoomResponse]
-    """Takes a seat and gives the ticket for it. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED (ROOM_FULL);
+    """Takes a seat and gives the ticket for it. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED (ROOM_FULL, TOO_MANY_SEATINGS);
     FAILED_PRECONDITION (SEAT_TAKEN, KIND_NOT_ADMITTED, GAME_STARTED, GAME_OVER); INVALID_ARGUMENT (NO_SUCH_SEAT, NAME_REFUSED, KIND_REFUSED);
     NOT_FOUND (ROOM_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
     """
@@ -77,7 +77,7 @@ class RoomServiceAsyncStub(RoomServiceStub):
     STATE_REFUSED).
     """
     JoinRoom: _aio.UnaryUnaryMultiCallable[_room_service_pb2.JoinRoomRequest, _room_service_pb2.JoinRoomResponse]  # type: ignore[assignment]
-    """Takes a seat and gives the ticket for it. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED (ROOM_FULL);
+    """Takes a seat and gives the ticket for it. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED (ROOM_FULL, TOO_MANY_SEATINGS);
     FAILED_PRECONDITION (SEAT_TAKEN, KIND_NOT_ADMITTED, GAME_STARTED, GAME_OVER); INVALID_ARGUMENT (NO_SUCH_SEAT, NAME_REFUSED, KIND_REFUSED);
     NOT_FOUND (ROOM_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
     """
@@ -128,7 +128,7 @@ class RoomServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _room_service_pb2.JoinRoomRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_room_service_pb2.JoinRoomResponse, _abc.Awaitable[_room_service_pb2.JoinRoomResponse]]:
-        """Takes a seat and gives the ticket for it. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED (ROOM_FULL);
+        """Takes a seat and gives the ticket for it. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED (ROOM_FULL, TOO_MANY_SEATINGS);
         FAILED_PRECONDITION (SEAT_TAKEN, KIND_NOT_ADMITTED, GAME_STARTED, GAME_OVER); INVALID_ARGUMENT (NO_SUCH_SEAT, NAME_REFUSED, KIND_REFUSED);
         NOT_FOUND (ROOM_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
         """
