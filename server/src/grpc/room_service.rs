@@ -196,7 +196,7 @@ fn join_code_wrong() -> Status {
     status::status(
         Code::PermissionDenied,
         "JOIN_CODE_WRONG",
-        "no room here has this join code; ask the room's creator for it",
+        "no room here has this join code; ask the room's creator for it, and join a tournament as one if it is a tournament's",
         [("field", "join_code")],
     )
 }

@@ -216,18 +216,22 @@ fn refused(error: chefshat_client::Error) -> CommandError {
 fn next_step(room: &v1::Room, server: &str, code: &str) -> Option<String> {
     let free = free_seats(room);
     let first = room.seats.iter().find(|seat| seat.name.is_empty())?;
-    let kind = match first.reserved_for() {
-        v1::ParticipantKind::Unspecified | v1::ParticipantKind::Agent => "",
-        v1::ParticipantKind::Human => " --kind-of human",
-        v1::ParticipantKind::Robot => " --kind-of robot",
-    };
     let free = match free {
         1 => "1 seat is free; fill it with:".to_owned(),
         _ => format!("{free} seats are free; fill each with:"),
     };
-    Some(format!(
-        "{free} chefshat agent greedy --server {server} --code {code}{kind}"
-    ))
+    let there = format!("--server {server} --code {code}");
+    Some(match first.reserved_for() {
+        v1::ParticipantKind::Unspecified | v1::ParticipantKind::Agent => {
+            format!("{free} chefshat agent greedy {there}")
+        }
+        v1::ParticipantKind::Human => {
+            format!("{free} chefshat play {there}, or in a browser at {server}/join/{code}")
+        }
+        v1::ParticipantKind::Robot => {
+            format!("{free} chefshat agent greedy {there} --kind-of robot")
+        }
+    })
 }
 
 #[cfg(test)]
@@ -340,7 +344,7 @@ mod tests {
             words(vec![seat("Ada", any), seat("", human)]).as_deref(),
             Some(
                 "1 seat is free; fill it with: \
-                 chefshat agent greedy --server http://[::1]:7 --code BCDF2345 --kind-of human"
+                 chefshat play --server http://[::1]:7 --code BCDF2345, or in a browser at http://[::1]:7/join/BCDF2345"
             )
         );
         let two = words(vec![seat("", any), seat("", any)]).expect("two are free");
