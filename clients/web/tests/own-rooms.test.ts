@@ -4,10 +4,11 @@ import { create } from "@bufbuild/protobuf";
 import { afterEach, expect, test, vi } from "vitest";
 import { roomApi } from "../src/api/client";
 import { tableOf } from "../src/experiment/LinkList";
-import { makeOwnRooms, type OwnRoom, ownRooms } from "../src/experiment/own-rooms";
-import { MAX_PARTICIPANTS, participantsIn } from "../src/experiment/participants";
+import { jobs, makeOwnRooms, ownRooms } from "../src/experiment/own-rooms";
+import { isTooLong, MAX_PARTICIPANTS, participantsIn } from "../src/experiment/participants";
 import { GameOrigin, ParticipantKind, RoomSchema } from "../src/gen/chefshat/v1/room_pb";
 import { CreateRoomRequestSchema, CreateRoomResponseSchema } from "../src/gen/chefshat/v1/room_service_pb";
+import { MAX_NAME } from "../src/lobby/room-form";
 import { notToBeRepeated, requestLike } from "../src/lobby/room-like";
 import { hostedRoom } from "../src/lobby/seat";
 import { forgetAll } from "../src/store";
@@ -86,16 +87,53 @@ test("what was made before one is refused is kept, and the rest is made when it 
       ownerToken: "o",
     });
   });
-  const told: (readonly OwnRoom[])[] = [];
-  const make = () => makeOwnRooms(room, ["P1", "P2", "P3"], 1000, (made) => told.push(made));
-  await expect(make()).rejects.toThrow("no more");
+  const make = (asked: string) => makeOwnRooms(room, ["P1", "P2", "P3"], 1000, (name) => `?name=${name}${asked}`);
+  await make("&hide=log");
+  expect(jobs.value.get("like")).toMatchObject({ busy: false, fault: new Error("no more") });
   expect(ownRooms("like").map(({ name }) => name)).toEqual(["P1", "P2"]);
   left = 5;
-  await make();
-  expect(told.map((made) => made.length)).toEqual([1, 2, 3]);
-  expect(ownRooms("like")[2]).toEqual({ name: "P3", roomId: "of Lab · P3", joinCode: "code of Lab · P3" });
+  await make("");
+  expect(jobs.value.get("like")).toMatchObject({ busy: false, fault: undefined });
+  expect(left).toBe(4);
+  // What the link of each says stays what it was when it was made.
+  expect(ownRooms("like").map(({ search }) => search)).toEqual(["?name=P1&hide=log", "?name=P2&hide=log", "?name=P3"]);
+  expect(ownRooms("like")[2]).toMatchObject({ name: "P3", roomId: "of Lab · P3", joinCode: "code of Lab · P3" });
   expect(hostedRoom("of Lab · P3")?.ownerToken).toBe("o");
   expect(ownRooms("another")).toEqual([]);
+});
+
+test("a form that is left and opened again while rooms are being made makes none twice", async () => {
+  const made: string[] = [];
+  let goOn = () => {};
+  const first = new Promise<void>((resolve) => {
+    goOn = resolve;
+  });
+  vi.spyOn(roomApi, "createRoom").mockImplementation(async ({ name = "" }) => {
+    made.push(name);
+    await first;
+    return create(CreateRoomResponseSchema, { room: { roomId: `of ${name}` }, joinCode: "c", ownerToken: "o" });
+  });
+  const make = () => makeOwnRooms(room, ["P1", "P2"], 1000, () => "");
+  const both = [make(), make()];
+  expect(jobs.value.get("like")?.busy).toBe(true);
+  goOn();
+  await Promise.all(both);
+  expect(made).toEqual(["Lab · P1", "Lab · P2"]);
+  expect(ownRooms("like").map(({ name }) => name)).toEqual(["P1", "P2"]);
+});
+
+test("the room of a participant has a name that is not too long, with theirs in it", async () => {
+  const names: string[] = [];
+  vi.spyOn(roomApi, "createRoom").mockImplementation(async ({ name = "" }) => {
+    names.push(name);
+    return create(CreateRoomResponseSchema, { room: { roomId: name }, joinCode: "c", ownerToken: "o" });
+  });
+  const long = create(RoomSchema, { ...room, name: "🍕".repeat(MAX_NAME) });
+  const participants = ["P07", "x".repeat(MAX_NAME)];
+  await makeOwnRooms(long, participants, 1000, () => "");
+  expect(names).toEqual([`${"🍕".repeat(MAX_NAME - 6)} · P07`, participants[1]]);
+  expect(participants.map(isTooLong)).toEqual([false, false]);
+  expect(isTooLong("x".repeat(MAX_NAME + 1))).toBe(true);
 });
 
 test("links are a table that any program reads", () => {

@@ -31,12 +31,17 @@ test.each(["", "null", "3", "[]", "{", '{"ticket":1}'])("%j is no seat and no ro
 });
 
 test.each([
-  ["bcdf2345", "BCDF2345"],
-  [" bcdf 2345 ", "BCDF2345"],
-  ["http://127.0.0.1:50051/join/bcdf2345?lang=it", "BCDF2345"],
-  ["", ""],
-])("%j is the code %s", (typed, code) => {
-  expect(codeIn(typed)).toBe(code);
+  ["bcdf2345", "BCDF2345", ""],
+  [" bcdf 2345 ", "BCDF2345", ""],
+  ["http://127.0.0.1:50051/join/bcdf2345", "BCDF2345", ""],
+  [
+    "http://127.0.0.1:50051/join/bcdf2345?name=P07&hide=log,pages&lang=it ",
+    "BCDF2345",
+    "?name=P07&hide=log,pages&lang=it",
+  ],
+  ["", "", ""],
+])("%j is the code %s, and besides %j", (typed, code, search) => {
+  expect(codeIn(typed)).toEqual({ code, search });
 });
 
 test("everything that is remembered can be forgotten, and nothing else is touched", () => {

@@ -119,6 +119,8 @@ test("the seat knows how it is attached, and by whom it is played", () => {
   expect(other.attachment).toEqual({ kind: "superseded" });
   const over = told(start(), { case: "detached", value: { reason: DetachReason.GAME_OVER } });
   expect(over.attachment).toEqual({ kind: "over" });
+  const left = told(start(), { case: "detached", value: { reason: DetachReason.REQUESTED } });
+  expect(left.attachment).toEqual({ kind: "left" });
   const refused = told(start(), { case: "refused", value: { reason: "TICKET_UNKNOWN", message: "no" } });
   expect(refused.attachment).toEqual({ kind: "refused", reason: "TICKET_UNKNOWN", message: "no" });
   const replaced = told(start(), events({ sequence: 1n, kind: { case: "substituted", value: { seat: OWN } } }));

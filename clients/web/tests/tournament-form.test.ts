@@ -67,6 +67,11 @@ test("where tables are dealt alike, nobody is said to watch", () => {
   const settings = asked({ deals: "same", spectatorsSeeHands: true });
   expect(settings.deals).toBe(TournamentDeals.SAME_AT_ALL_TABLES);
   expect([settings.policy?.spectators, settings.policy?.spectatorsSeeHands]).toEqual([undefined, false]);
+  // What was typed before is not asked for any more, and so cannot be wrong.
+  const typed: Partial<TournamentForm> = { deals: "rotated", spectatorDelay: "soon" };
+  expect(problemsOf(form(typed))).toEqual({});
+  expect(asked(typed).policy?.spectatorDelayDecisions).toBe(0);
+  expect(problemsOf(form({ spectatorDelay: "soon" }))).toEqual({ spectatorDelay: "notANumber" });
 });
 
 test("a knockout is for tables of four, whose rounds nobody chooses", () => {

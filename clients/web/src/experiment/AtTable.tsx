@@ -5,7 +5,7 @@ import { studyIn } from "./study";
 
 interface AtTableProps {
   roomId: string;
-  /** Whether the game is over, with a result or without. */
+  /** Whether a game is over, with a result or without; not where a room was closed before one began. */
   over: boolean;
 }
 

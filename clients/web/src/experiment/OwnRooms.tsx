@@ -1,6 +1,6 @@
 // A room of their own for each participant of a study, like the one at hand: made one after the other, with their links.
 
-import { useEffect, useRef, useState } from "preact/hooks";
+import { useState } from "preact/hooks";
 import { inWords } from "../api/faults";
 import type { Room } from "../gen/chefshat/v1/room_pb";
 import { t } from "../i18n";
@@ -10,44 +10,28 @@ import { Button } from "../parts/Button";
 import { SelectField } from "../parts/Field";
 import { Notice } from "../parts/Notice";
 import { LinkList } from "./LinkList";
-import { LONGEST_WAIT_MS, makeOwnRooms, type OwnRoom, ownRooms } from "./own-rooms";
+import { jobs, LONGEST_WAIT_MS, makeOwnRooms, type OwnRoom, ownRooms } from "./own-rooms";
 
 interface OwnRoomsProps {
   /** The room that those to be made are like. */
   room: Room;
   names: readonly string[];
-  /** A participant's link, from the address that invites to their room. */
-  linkTo: (name: string, address: string) => string;
+  /** What a participant's link says, from its "?" on. */
+  searchFor: (name: string) => string;
 }
 
 /** The rooms and their links. */
-export function OwnRooms({ room, names, linkTo }: OwnRoomsProps) {
+export function OwnRooms({ room, names, searchFor }: OwnRoomsProps) {
   const words = t().experiment.links.own;
-  const [made, setMade] = useState<readonly OwnRoom[]>(() => ownRooms(room.roomId));
-  const [busy, setBusy] = useState(false);
-  const [fault, setFault] = useState("");
   const own = room.policy?.waitingTimeMs ?? LONGEST_WAIT_MS;
   const [wait, setWait] = useState(LONGEST_WAIT_MS);
-  // Who has gone to another page finds what was made when they come back.
-  const here = useRef(true);
-  useEffect(() => {
-    here.current = true;
-    return () => {
-      here.current = false;
-    };
-  }, []);
-  const missing = names.filter((name) => !made.some((one) => one.name === name));
+  const job = jobs.value.get(room.roomId);
+  const made = ownRooms(room.roomId);
+  const hasRoom = (name: string) => made.some((one) => one.name === name);
+  const missing = names.filter((name) => !hasRoom(name));
+  const wanted = job?.participants ?? [];
+  const done = wanted.filter(hasRoom).length;
   const barred = notToBeRepeated(room);
-  const make = async () => {
-    setBusy(true);
-    setFault("");
-    try {
-      await makeOwnRooms(room, missing, wait, (rooms) => here.current && setMade(rooms));
-    } catch (thrown) {
-      if (here.current) setFault(inWords(thrown));
-    }
-    if (here.current) setBusy(false);
-  };
   const waits = [...new Set([LONGEST_WAIT_MS, own])];
   return (
     <>
@@ -63,36 +47,45 @@ export function OwnRooms({ room, names, linkTo }: OwnRoomsProps) {
             onPick={(picked) => setWait(Number(picked))}
           />
           {names.length === 0 && <p class="soft">{words.namesMissing}</p>}
-          {busy && (
+          {job?.busy && (
             <p role="status">
-              {words.making(names.length - missing.length, names.length)}{" "}
-              <progress value={names.length - missing.length} max={names.length} />
+              {words.making(done, wanted.length)} <progress value={done} max={wanted.length} />
             </p>
           )}
-          {fault && (
+          {job?.fault !== undefined && (
             <Notice kind="fault">
-              {fault} {made.length > 0 && words.keptMade(made.length, missing.length)}
+              {inWords(job.fault)} {made.length > 0 && words.keptMade(made.length, wanted.length - done)}
             </Notice>
           )}
-          {missing.length > 0 && (
-            <Button look="main" busy={busy} onClick={() => void make()}>
-              {words.make(missing.length)}
+          {(missing.length > 0 || job?.busy) && (
+            <Button
+              look="main"
+              busy={job?.busy ?? false}
+              onClick={() => void makeOwnRooms(room, missing, wait, searchFor)}
+            >
+              {words.make(job?.busy ? wanted.length - done : missing.length)}
             </Button>
           )}
         </>
       )}
-      {made.length > 0 && (
-        <>
-          <h3>{t().experiment.links.result}</h3>
-          <LinkList
-            links={made.map(({ name, roomId, joinCode }) => ({
-              name,
-              roomId,
-              address: linkTo(name, invitation(joinCode)),
-            }))}
-          />
-        </>
-      )}
+      <OwnLinks made={made} />
+    </>
+  );
+}
+
+/** The links of the rooms that were made, each as it was then. */
+export function OwnLinks({ made }: { made: readonly OwnRoom[] }) {
+  if (made.length === 0) return null;
+  return (
+    <>
+      <h3>{t().experiment.links.result}</h3>
+      <LinkList
+        links={made.map(({ name, roomId, joinCode, search }) => ({
+          name,
+          roomId,
+          address: invitation(joinCode) + search,
+        }))}
+      />
     </>
   );
 }

@@ -18,8 +18,8 @@ interface StudyJoinProps {
   study: Study;
   /** What it is that one comes into. */
   what: "room" | "tournament";
-  /** Takes the seat, or the place in a tournament, under a name; gives the id of the room or tournament. */
-  take: (name: string) => Promise<string>;
+  /** Takes the seat, or the place in a tournament, under a name; gives the id of the room or tournament, null if the page asks something first. */
+  take: (name: string) => Promise<string | null>;
   /** Whether somebody there has a name that a participant chooses; the server says so of tournaments. */
   isTaken?: (name: string) => boolean;
   /** Goes there. */
@@ -93,6 +93,7 @@ function Come({ study, what, take, isTaken, arrive }: StudyJoinProps) {
     const before = lastName();
     try {
       const id = await take(name);
+      if (id === null) return setBusy(false);
       // The next one at this device is somebody else.
       remember("name", before === "" ? null : before);
       rememberStudy(id, { ...study, name: name.trim() });

@@ -6,11 +6,14 @@ import { CALL_LIMIT_MS, roomApi } from "../api/client";
 import { usePolled } from "../api/poll";
 import type { Room } from "../gen/chefshat/v1/room_pb";
 import { type Language, languages, t } from "../i18n";
+import { MAX_NAME } from "../lobby/room-form";
+import { hostedRoom, invitation } from "../lobby/seat";
 import { CheckField, Field, SelectField, TextField } from "../parts/Field";
 import { Notice } from "../parts/Notice";
 import { LinkList } from "./LinkList";
-import { OwnRooms } from "./OwnRooms";
-import { MAX_PARTICIPANTS, participantsIn } from "./participants";
+import { OwnLinks, OwnRooms } from "./OwnRooms";
+import { ownRooms } from "./own-rooms";
+import { isTooLong, MAX_PARTICIPANTS, participantsIn } from "./participants";
 import { freeForPeople, type Place, placed } from "./places";
 import { HIDEABLE, type Hideable, questionnaire, searchOf } from "./study";
 import "./experiment.css";
@@ -37,15 +40,27 @@ export function StudyLinks({ address, roomId }: StudyLinksProps & { roomId?: str
 function RoomStudyForm({ roomId, address }: StudyLinksProps & { roomId: string }) {
   const ask = async (signal: AbortSignal) =>
     (await roomApi.getRoom({ roomId }, { signal, timeoutMs: CALL_LIMIT_MS })).room ?? null;
-  const room = usePolled(ask, EVERY_MS, roomId).value;
-  return room ? <StudyForm address={address} room={room} /> : <p class="soft">{t().common.loading}</p>;
+  const { value: room, fault } = usePolled(ask, EVERY_MS, roomId);
+  if (room) return <StudyForm address={address} room={room} />;
+  return fault ? <OwnLinks made={ownRooms(roomId)} /> : <p class="soft">{t().common.loading}</p>;
+}
+
+/** The form again where its room is not invited to any more, for whoever made rooms like it: their links outlast it. */
+export function KeptLinks({ roomId }: { roomId: string }) {
+  const hosted = hostedRoom(roomId);
+  if (!hosted || ownRooms(roomId).length === 0) return null;
+  return (
+    <section class="sheet kept-links">
+      <StudyLinks roomId={roomId} address={invitation(hosted.joinCode)} />
+    </section>
+  );
 }
 
 /** Where there are no seats to choose among, as in a tournament, none are given. */
 function StudyForm({ address, room }: StudyLinksProps & { room?: Room }) {
   const words = t().experiment.links;
   const seats = room?.seats;
-  const [where, setWhere] = useState<"here" | "own">("here");
+  const [where, setWhere] = useState<"here" | "own">(() => (room && ownRooms(room.roomId).length > 0 ? "own" : "here"));
   const [names, setNames] = useState("");
   const [seat, setSeat] = useState("any");
   const [lang, setLang] = useState<Language | "">("");
@@ -55,14 +70,16 @@ function StudyForm({ address, room }: StudyLinksProps & { room?: Room }) {
   const [before, setBefore] = useState("");
   const [after, setAfter] = useState("");
   const group = useId();
-  const given = participantsIn(names);
-  const tooMany = given.length > MAX_PARTICIPANTS;
-  const wanted = given.length === 0 ? [""] : given.slice(0, MAX_PARTICIPANTS);
+  const typed = participantsIn(names);
+  const tooMany = typed.length > MAX_PARTICIPANTS;
+  const tooLong = typed.some(isTooLong);
+  const given = typed.slice(0, MAX_PARTICIPANTS).filter((name) => !isTooLong(name));
+  const wanted = typed.length === 0 ? [""] : given;
   const free = seats && freeForPeople(seats);
   const places: Partial<Place>[] = seats
     ? placed(seats, wanted, seat === "any" ? 0 : Number(seat))
     : wanted.map((name) => ({ name }));
-  const linkTo = (name: string, to: string, own: number | undefined) => {
+  const searchFor = (name: string, own: number | undefined) => {
     const study = {
       name,
       seat: seat === "any" ? undefined : own,
@@ -72,11 +89,13 @@ function StudyForm({ address, room }: StudyLinksProps & { room?: Room }) {
       before: questionnaire(before),
       after: questionnaire(after),
     };
-    const asked = searchOf(study, lang).slice(1);
-    return asked === "" ? to : `${to}${to.includes("?") ? "&" : "?"}${asked}`;
+    const search = searchOf(study, lang);
+    return search === "?" ? "" : search;
   };
   const links = places.map(({ name = "", seat: own }) => {
-    return { name, address: linkTo(name, address, own), roomId: room?.roomId ?? "" };
+    const search = searchFor(name, own);
+    const asked = address.includes("?") ? search.replace("?", "&") : search;
+    return { name, address: address + asked, roomId: room?.roomId ?? "" };
   });
   const addressFault = (address: string) =>
     address !== "" && questionnaire(address) === "" ? words.notAnAddress : undefined;
@@ -97,7 +116,7 @@ function StudyForm({ address, room }: StudyLinksProps & { room?: Room }) {
       <Field
         label={words.names}
         hint={where === "own" ? words.own.namesHint : words.namesHint}
-        fault={tooMany ? words.tooManyNames(MAX_PARTICIPANTS) : undefined}
+        fault={tooLong ? words.tooLong(MAX_NAME) : tooMany ? words.tooManyNames(MAX_PARTICIPANTS) : undefined}
       >
         {(joined) => (
           <textarea {...joined} rows={3} value={names} onInput={(event) => setNames(event.currentTarget.value)} />
@@ -157,11 +176,7 @@ function StudyForm({ address, room }: StudyLinksProps & { room?: Room }) {
         fault={addressFault(after)}
       />
       {room && where === "own" ? (
-        <OwnRooms
-          room={room}
-          names={given.slice(0, MAX_PARTICIPANTS)}
-          linkTo={(name, to) => linkTo(name, to, Number(seat))}
-        />
+        <OwnRooms room={room} names={given} searchFor={(name) => searchFor(name, Number(seat))} />
       ) : (
         <>
           <h3>{words.result}</h3>

@@ -1,5 +1,7 @@
 // The names of a study's participants as they are typed: one a line, or a range such as "P01-P20". Their links are in StudyLinks.tsx.
 
+import { MAX_NAME } from "../lobby/room-form";
+
 /** Most participants at a time: each may get a room of their own, and a server holds only so many. */
 export const MAX_PARTICIPANTS = 100;
 
@@ -24,4 +26,9 @@ function namesOf(line: string): string[] {
   return Array.from({ length: Math.min(count, MAX_PARTICIPANTS + 1) }, (_, index) => {
     return stem + String(Number(first) + index).padStart(first.length, "0");
   });
+}
+
+/** Whether a name has more characters than the server takes: nobody could sit down by its link. */
+export function isTooLong(name: string): boolean {
+  return Array.from(name).length > MAX_NAME;
 }

@@ -4,7 +4,9 @@
 import { CALL_LIMIT_MS, roomApi } from "../api/client";
 import { wordsOf } from "../api/faults";
 import { usePolled } from "../api/poll";
+import { hidden } from "../experiment/hiding";
 import { freeForPeople } from "../experiment/places";
+import { KeptLinks } from "../experiment/StudyLinks";
 import { type Room, RoomState } from "../gen/chefshat/v1/room_pb";
 import { t } from "../i18n";
 import { ButtonLink } from "../parts/Button";
@@ -32,14 +34,20 @@ export function Doorway({ roomId }: { roomId: string }) {
   if (!room) {
     if (!fault) return <p class="soft">{t().common.loading}</p>;
     return (
-      <section class="sheet doorway">
-        <Notice kind="fault">{wordsOf(fault)}</Notice>
-        <p>
-          <ButtonLink href="/">{words.toLobby}</ButtonLink>
-        </p>
-      </section>
+      <div class="doorway">
+        <section class="sheet">
+          <Notice kind="fault">{wordsOf(fault)}</Notice>
+          {!hidden.value.includes("pages") && (
+            <p>
+              <ButtonLink href="/">{words.toLobby}</ButtonLink>
+            </p>
+          )}
+        </section>
+        <KeptLinks roomId={roomId} />
+      </div>
     );
   }
+  const waiting = room.state === RoomState.WAITING && room.tournamentId === "";
   return (
     <div class="doorway">
       <section class="sheet doorway-room">
@@ -52,7 +60,8 @@ export function Doorway({ roomId }: { roomId: string }) {
         <DoorwayLinks room={room} />
         {fault && <Notice kind="fault">{wordsOf(fault)}</Notice>}
       </section>
-      {room.state === RoomState.WAITING && room.tournamentId === "" && <WayIn room={room} />}
+      {waiting && <WayIn room={room} />}
+      {!(waiting && isOpen(room)) && <KeptLinks roomId={roomId} />}
       {[RoomState.WAITING, RoomState.PLAYING].includes(room.state) && hostedRoom(roomId) && (
         <Sure label={words.close} act={() => closeRoom(roomId)}>
           {room.state === RoomState.WAITING ? words.closeSure : words.closePlaying}

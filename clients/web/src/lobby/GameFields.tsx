@@ -9,9 +9,6 @@ import type { FieldFaults } from "./filling";
 import { type GameField, type GameForm, withPreset } from "./game-form";
 import { LARGEST, type NumberProblem } from "./problems";
 
-/** Names of fields that hold what was typed. */
-type TextName = { [Name in GameField]: string extends GameForm[Name] ? Name : never }[GameField];
-
 /** What the fields get: the form, the faults of its fields, and how to change it. */
 export interface GameProps {
   form: GameForm;
@@ -161,7 +158,8 @@ export function WatchFields(props: GameProps) {
           <Typed {...props} name="spectatorDelay" label={words.delay} hint={words.delayHint} />
           <CheckField
             label={words.hands}
-            hint={props.faults.spectatorsSeeHands ?? words.handsHint}
+            hint={words.handsHint}
+            fault={props.faults.spectatorsSeeHands}
             checked={form.spectatorsSeeHands}
             onCheck={(spectatorsSeeHands) =>
               change({
@@ -176,8 +174,17 @@ export function WatchFields(props: GameProps) {
   );
 }
 
-/** A field of the form that is typed. */
-function Typed(props: GameProps & { name: TextName; label: string; hint?: string }) {
+interface TypedProps<Name extends string> {
+  form: NoInfer<Readonly<Record<Name, string>>>;
+  faults: NoInfer<FieldFaults<Name>>;
+  change: NoInfer<(changed: { [Key in Name]?: string }) => void>;
+  name: Name;
+  label: string;
+  hint?: string;
+}
+
+/** A field of a form that is typed. */
+export function Typed<Name extends string>(props: TypedProps<Name>) {
   const { form, faults, change, name, label, hint } = props;
   return (
     <TextField
@@ -185,7 +192,7 @@ function Typed(props: GameProps & { name: TextName; label: string; hint?: string
       hint={hint}
       value={form[name]}
       fault={faults[name]}
-      onText={(text) => change({ [name]: text })}
+      onText={(text) => change({ [name]: text } as { [Key in Name]?: string })}
       autoComplete="off"
     />
   );

@@ -8,20 +8,20 @@ import { AfterStudy } from "../experiment/AfterStudy";
 import { useHiding } from "../experiment/hiding";
 import { StudyJoin } from "../experiment/StudyJoin";
 import { finishedBy, holderOf, languageOf, type Study, studyOf } from "../experiment/study";
-import type { Room } from "../gen/chefshat/v1/room_pb";
+import { ParticipantKind, type Room, RoomState } from "../gen/chefshat/v1/room_pb";
 import { t } from "../i18n";
 import { Button } from "../parts/Button";
 import { TextField } from "../parts/Field";
 import { Notice } from "../parts/Notice";
 import { navigate, type Route } from "../router";
-import { takePlace } from "../tournaments/place";
+import { heldPlace, takePlace } from "../tournaments/place";
 import { lookUp } from "./code";
 import { JoinForm } from "./JoinForm";
 import { rulesInShort } from "./RoomCard";
 import { MAX_NAME } from "./room-form";
 import { nameOf } from "./rooms";
 import { Seats } from "./Seats";
-import { canonical, heldSeat, lastName, roomOfCode, takeSeat } from "./seat";
+import { canonical, giveBackSeat, heldSeat, lastName, roomOfCode, takeSeat } from "./seat";
 import "./join.css";
 
 /** How often it is asked what has the code, and who sits there, milliseconds. */
@@ -34,30 +34,16 @@ export function Join({ route }: PageProps<"join">) {
   const study = studyOf(location.search);
   useHiding(study);
   const held = code === "" ? null : roomOfCode(code);
-  const [another, setAnother] = useState(false);
   const before = held === null ? "" : (heldSeat(held)?.name ?? "");
-  const holder = another ? "another" : holderOf(study, before);
-  const seated = holder === "reader" ? held : null;
+  const seated = holderOf(study, before) === "reader" ? held : null;
   const goOn = (roomId: string) =>
     navigate({ page: "room", roomId }, { replace: true, search: languageOf(location.search) });
   useEffect(() => {
     if (seated) goOn(seated);
   }, [seated]);
   if (seated) return null;
-  if (held && holder === "unclear") {
-    return (
-      <section class="sheet join-page">
-        <h1>{t().experiment.join.title}</h1>
-        <p>{t().experiment.join.taken(before)}</p>
-        <Button look="main" onClick={() => goOn(held)}>
-          {t().experiment.join.goOn(before)}
-        </Button>
-        <Button onClick={() => setAnother(true)}>{t().experiment.join.another}</Button>
-      </section>
-    );
-  }
   const finished = study ? finishedBy(code, study.name) : [];
-  if (finished.length > 0) {
+  if ((held === null || study?.name !== "") && finished.length > 0) {
     return (
       <section class="sheet join-page">
         <h1>{t().experiment.join.over}</h1>
@@ -80,19 +66,87 @@ export function Join({ route }: PageProps<"join">) {
 function StudyWay(props: { study: Study; code: string; arrive: (roomId: string) => void }) {
   const { study, code, arrive } = props;
   const { value: found } = usePolled((signal) => lookUp(code, signal), EVERY_MS, code);
+  // Whose seat this device is to give back, if that was agreed to.
+  const [givenUp, setGivenUp] = useState<string | null>(null);
+  const [, setAsked] = useState(0);
   if (found === null) return <p class="soft">{t().common.loading}</p>;
-  if (found.kind === "nothing") {
+  if (found.kind === "tournament") return <ToTournament tournamentId={found.tournamentId} code={code} />;
+  const room = found.kind === "room" ? found.room : undefined;
+  const seats = room?.seats ?? [];
+  // Asked anew each time: another page of this device may have sat down in the meantime.
+  const held = roomOfCode(code);
+  const holder = held === null ? null : heldSeat(held);
+  const gone = found.kind === "nothing";
+  const waiting = found.kind === "unknown" || room?.state === RoomState.WAITING;
+  if (gone && !(held && study.name === "")) {
+    return <StudyNotice kind="fault">{t().experiment.join.gone}</StudyNotice>;
+  }
+  if (held && holder && (!waiting || holder.ticket !== givenUp)) {
     return (
-      <section class="sheet join-page">
-        <h1>{t().experiment.join.title}</h1>
-        <Notice kind="fault">{t().experiment.join.gone}</Notice>
-      </section>
+      <Holder
+        name={holder.name}
+        study={study}
+        onSame={() => arrive(held)}
+        onOther={waiting ? () => setGivenUp(holder.ticket) : undefined}
+      />
     );
   }
-  const seats = found.kind === "room" ? found.room.seats : [];
-  const take = async (name: string) => (await takeSeat(code, name, study.seat)).roomId;
+  if (seats.some((seat) => study.name !== "" && seat.kind === ParticipantKind.HUMAN && seat.name === study.name)) {
+    return <StudyNotice kind="hint">{t().experiment.join.seated(study.name)}</StudyNotice>;
+  }
+  const take = async (name: string) => {
+    const roomId = roomOfCode(code);
+    const holder = roomId === null ? null : heldSeat(roomId);
+    if (roomId !== null && holder) {
+      if (holder.ticket !== givenUp) {
+        setAsked((times) => times + 1);
+        return null;
+      }
+      await giveBackSeat(roomId);
+    }
+    return (await takeSeat(code, name, study.seat)).roomId;
+  };
   const isTaken = (name: string) => seats.some((seat) => sameName(nameOf(seat), name));
   return <StudyJoin study={study} what="room" take={take} isTaken={isTaken} arrive={arrive} />;
+}
+
+interface HolderProps {
+  /** Who has this device's seat. */
+  name: string;
+  /** What the link says that was opened. */
+  study: Study;
+  onSame: () => void;
+  /** Undefined once the game has begun: the seat cannot be given back then. */
+  onOther: (() => void) | undefined;
+}
+
+/** Asks who is at this device, which has a seat in the room already and would lose it to another. */
+function Holder({ name, study, onSame, onOther }: HolderProps) {
+  const words = t().experiment.join;
+  // Another page of this device has sat down by the same link in the meantime.
+  const same = study.name === name;
+  return (
+    <section class="sheet join-page">
+      <h1>{words.title}</h1>
+      <p>{study.name === "" || same ? words.taken(name) : words.held(name)}</p>
+      {!same && <p class="soft">{onOther ? words.oneSeat(name) : words.begun(name)}</p>}
+      <Button look="main" onClick={onSame}>
+        {words.goOn(name)}
+      </Button>
+      {onOther && !same && (
+        <Button onClick={onOther}>{study.name === "" ? words.another : words.giveBack(name, study.name)}</Button>
+      )}
+    </section>
+  );
+}
+
+function StudyNotice({ kind, children }: { kind: "fault" | "hint"; children: string }) {
+  return (
+    <section class="sheet join-page">
+      <h1>{t().experiment.join.title}</h1>
+      <Notice kind={kind}>{children}</Notice>
+    </section>
+  );
 }
 
 /** What is known of who has the code, and the way in, or why there is none. */
@@ -111,6 +165,7 @@ function WayIn({ code }: { code: string }) {
       </>
     );
   }
+  if (found.kind === "tournament") return <ToTournament tournamentId={found.tournamentId} code={code} />;
   const room = found.kind === "room" ? found.room : undefined;
   return (
     <>
@@ -124,6 +179,16 @@ function WayIn({ code }: { code: string }) {
       <NameForm code={code} room={room} />
     </>
   );
+}
+
+/** Leads on to the page of the tournament that has the code: there a place that this device has already is found again. */
+function ToTournament({ tournamentId, code }: { tournamentId: string; code: string }) {
+  useEffect(() => {
+    const search = new URLSearchParams(location.search);
+    search.set("code", code);
+    navigate({ page: "tournament", tournamentId }, { replace: true, search: `?${search}` });
+  }, [tournamentId]);
+  return <p class="soft">{t().common.loading}</p>;
 }
 
 interface NameFormProps {
@@ -187,6 +252,11 @@ async function comeIn(code: string, name: string): Promise<Route> {
     return { page: "room", roomId };
   } catch (thrown) {
     if (faultOf(thrown).reason !== "JOIN_CODE_WRONG") throw thrown;
-    return { page: "tournament", tournamentId: await takePlace("", code, name) };
+    const found = await lookUp(code);
+    if (found.kind !== "tournament") throw thrown;
+    const { tournamentId } = found;
+    // A second place would take the first one's ticket from this device.
+    if (!heldPlace(tournamentId)) await takePlace(tournamentId, code, name);
+    return { page: "tournament", tournamentId };
   }
 }

@@ -18,8 +18,8 @@ export function JoinForm() {
     const tournament = tournamentIn(code);
     if (tournament) return navigate({ page: "tournament", tournamentId: tournament.id }, { search: tournament.search });
     const typed = codeIn(code);
-    setMissing(typed === "");
-    if (typed !== "") navigate({ page: "join", code: typed });
+    setMissing(typed.code === "");
+    if (typed.code !== "") navigate({ page: "join", code: typed.code }, { search: typed.search });
   };
   return (
     <form class="join-form" onSubmit={go}>
@@ -37,10 +37,10 @@ export function JoinForm() {
   );
 }
 
-/** The code in what was typed: a code, or an address that ends in one. */
-export function codeIn(typed: string): string {
-  const address = /\/join\/([^/?#\s]+)/.exec(typed);
-  return canonical(address?.[1] ?? typed);
+/** The code in what was typed, a code or an address that ends in one, with what the address says besides. */
+export function codeIn(typed: string): { code: string; search: string } {
+  const address = /\/join\/([^/?#\s]+)(\?[^#\s]*)?/.exec(typed);
+  return { code: canonical(address?.[1] ?? typed), search: address?.[2] ?? "" };
 }
 
 /** The tournament whose invitation was pasted, with what the address says besides; null if it is none. */

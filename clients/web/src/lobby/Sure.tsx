@@ -1,7 +1,8 @@
-// A button for what cannot be undone: it asks once more before it does it, and says what went wrong if it could not.
+// A button for what cannot be undone: it asks once more before it does it, and says what went wrong if it could not. The focus goes to the
+// question, so that it is read out, and back to the button.
 
 import type { ComponentChildren } from "preact";
-import { useState } from "preact/hooks";
+import { useEffect, useRef, useState } from "preact/hooks";
 import { inWords } from "../api/faults";
 import { t } from "../i18n";
 import { Button } from "../parts/Button";
@@ -21,17 +22,41 @@ interface SureProps {
 /** The button. */
 export function Sure({ label, confirm = label, act, children }: SureProps) {
   const [asked, setAsked] = useState(false);
+  const [busy, setBusy] = useState(false);
   const [fault, setFault] = useState<string | null>(null);
-  const doIt = () => {
-    act().catch((thrown: unknown) => setFault(inWords(thrown)));
+  const whole = useRef<HTMLDivElement>(null);
+  const before = useRef(asked);
+  useEffect(() => {
+    if (before.current === asked) return;
+    before.current = asked;
+    whole.current?.querySelector<HTMLElement>(asked ? ".sure-question" : "button")?.focus();
+  }, [asked]);
+  const doIt = async () => {
+    setBusy(true);
+    setFault(null);
+    try {
+      // When it is done the page has no more use for the button: until it knows, it is not to be pressed again.
+      await act();
+    } catch (thrown) {
+      setFault(inWords(thrown));
+      setBusy(false);
+    }
+  };
+  const cancel = () => {
+    setAsked(false);
+    setFault(null);
   };
   return (
-    <div class="sure">
+    <div class="sure" ref={whole}>
       {asked ? (
         <>
-          <span>{children}</span>
-          <Button onClick={doIt}>{confirm}</Button>
-          <Button look="quiet" onClick={() => setAsked(false)}>
+          <span class="sure-question" tabIndex={-1}>
+            {children}
+          </span>
+          <Button busy={busy} onClick={() => void doIt()}>
+            {confirm}
+          </Button>
+          <Button look="quiet" disabled={busy} onClick={cancel}>
             {t().common.cancel}
           </Button>
         </>

@@ -8,13 +8,13 @@ import { canonical } from "./seat";
 /** What has a code. */
 export type Found =
   | { readonly kind: "room"; readonly room: Room }
-  | { readonly kind: "tournament" }
+  | { readonly kind: "tournament"; readonly tournamentId: string }
   | { readonly kind: "nothing" }
   | { readonly kind: "unknown" };
 
 /** Looks for what has a code. */
-export async function lookUp(code: string, signal: AbortSignal): Promise<Found> {
-  const call = { signal, timeoutMs: CALL_LIMIT_MS };
+export async function lookUp(code: string, signal?: AbortSignal): Promise<Found> {
+  const call = { ...(signal && { signal }), timeoutMs: CALL_LIMIT_MS };
   const asked = { joinCode: canonical(code) };
   try {
     const { room } = await roomApi.getRoom(asked, call);
@@ -23,8 +23,8 @@ export async function lookUp(code: string, signal: AbortSignal): Promise<Found> 
     if (!isWrong(thrown)) return { kind: "unknown" };
   }
   try {
-    await tournamentApi.getTournament(asked, call);
-    return { kind: "tournament" };
+    const { tournament } = await tournamentApi.getTournament(asked, call);
+    return tournament ? { kind: "tournament", tournamentId: tournament.tournamentId } : { kind: "unknown" };
   } catch (thrown) {
     return { kind: isWrong(thrown) ? "nothing" : "unknown" };
   }

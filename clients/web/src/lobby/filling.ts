@@ -1,7 +1,7 @@
 // Filling in a form that makes something on the server: what was typed, which fields cannot be accepted and why, and sending it. Which
 // fields there are is for the form itself.
 
-import { useState } from "preact/hooks";
+import { useEffect, useRef, useState } from "preact/hooks";
 import { type Fault, faultOf, wordsOf } from "../api/faults";
 import { t } from "../i18n";
 
@@ -43,6 +43,12 @@ export function useFilling<Form extends object, Name extends string>(
   const [refusal, setRefusal] = useState<string | null>(null);
   const [busy, setBusy] = useState(false);
   const [unfolded, unfold] = useState(false);
+  const sent = useRef<HTMLElement | null>(null);
+  const [refusals, setRefusals] = useState(0);
+  useEffect(() => {
+    // The first field at fault, once all of them are marked and unfolded.
+    if (refusals > 0) sent.current?.querySelector<HTMLElement>('[aria-invalid="true"]')?.focus();
+  }, [refusals]);
   const change = (changed: Partial<Form>) => {
     setForm((before) => ({ ...before, ...changed }));
     setFaults((before) => {
@@ -55,6 +61,7 @@ export function useFilling<Form extends object, Name extends string>(
     setFaults(refused);
     setRefusal(words);
     unfold(true);
+    setRefusals((before) => before + 1);
   };
   const send = async () => {
     const bad = use.check(form);
@@ -73,6 +80,7 @@ export function useFilling<Form extends object, Name extends string>(
   };
   const submit = (event: Event) => {
     event.preventDefault();
+    sent.current = event.currentTarget instanceof HTMLElement ? event.currentTarget : null;
     void send();
   };
   return { form, faults, change, refusal, busy, unfolded, unfold, submit };

@@ -1,5 +1,6 @@
-// A page that cannot be shown: its name, what went wrong, and the way to the lobby.
+// A page that cannot be shown: its name, what went wrong, and the way to the lobby, unless a study leaves out the ways to other pages.
 
+import { hidden } from "../experiment/hiding";
 import { t } from "../i18n";
 import { ButtonLink } from "./Button";
 import { Notice } from "./Notice";
@@ -11,9 +12,11 @@ export function Faulty({ title, words }: { title: string; words: string }) {
     <section class="faulty">
       <h1>{title}</h1>
       <Notice kind="fault">{words}</Notice>
-      <p>
-        <ButtonLink href="/">{t().common.notFound.link}</ButtonLink>
-      </p>
+      {!hidden.value.includes("pages") && (
+        <p>
+          <ButtonLink href="/">{t().common.notFound.link}</ButtonLink>
+        </p>
+      )}
     </section>
   );
 }

@@ -8,6 +8,8 @@ interface FieldFrame {
   label: string;
   hint?: string | undefined;
   fault?: string | undefined;
+  /** The element that says the fault, where it is that of a whole group which this field has a part in. */
+  faultId?: string | undefined;
 }
 
 /** Attributes that join a field to its hint and fault. */
@@ -20,12 +22,12 @@ interface Joined {
 /** A frame around any field; `children` gets the attributes to put on it. */
 export function Field(props: FieldFrame & { children: (joined: Joined) => ComponentChildren }) {
   const id = useId();
-  const { label, hint, fault } = props;
-  const described = [hint && `${id}-hint`, fault && `${id}-fault`].filter(Boolean).join(" ");
+  const { label, hint, fault, faultId } = props;
+  const described = [hint && `${id}-hint`, fault && `${id}-fault`, faultId].filter(Boolean).join(" ");
   return (
     <div class="field">
       <label for={id}>{label}</label>
-      {props.children({ id, "aria-describedby": described || undefined, "aria-invalid": Boolean(fault) })}
+      {props.children({ id, "aria-describedby": described || undefined, "aria-invalid": Boolean(fault || faultId) })}
       {hint && (
         <p id={`${id}-hint`} class="field-hint">
           {hint}
@@ -55,9 +57,9 @@ interface TextProps extends FieldFrame {
 }
 
 /** A line of text, or a number as text. */
-export function TextField({ label, hint, fault, onText, type = "text", ...rest }: TextProps) {
+export function TextField({ label, hint, fault, faultId, onText, type = "text", ...rest }: TextProps) {
   return (
-    <Field label={label} hint={hint} fault={fault}>
+    <Field label={label} hint={hint} fault={fault} faultId={faultId}>
       {(joined) => (
         <input {...rest} {...joined} type={type as "text"} onInput={(event) => onText(event.currentTarget.value)} />
       )}
@@ -95,17 +97,16 @@ export function SelectField<Value extends string>({ label, hint, fault, value, o
   );
 }
 
-interface CheckProps {
-  label: string;
-  hint?: string | undefined;
+interface CheckProps extends FieldFrame {
   checked: boolean;
   disabled?: boolean;
   onCheck: (checked: boolean) => void;
 }
 
 /** Yes or no. */
-export function CheckField({ label, hint, checked, disabled = false, onCheck }: CheckProps) {
+export function CheckField({ label, hint, fault, faultId, checked, disabled = false, onCheck }: CheckProps) {
   const id = useId();
+  const described = [hint && `${id}-hint`, fault && `${id}-fault`, faultId].filter(Boolean).join(" ");
   return (
     <div class="field field-check">
       <input
@@ -113,13 +114,19 @@ export function CheckField({ label, hint, checked, disabled = false, onCheck }: 
         type="checkbox"
         checked={checked}
         disabled={disabled}
-        aria-describedby={hint && `${id}-hint`}
+        aria-describedby={described || undefined}
+        aria-invalid={Boolean(fault || faultId)}
         onChange={(event) => onCheck(event.currentTarget.checked)}
       />
       <label for={id}>{label}</label>
       {hint && (
         <p id={`${id}-hint`} class="field-hint">
           {hint}
+        </p>
+      )}
+      {fault && (
+        <p id={`${id}-fault`} class="field-fault" role="alert">
+          {fault}
         </p>
       )}
     </div>

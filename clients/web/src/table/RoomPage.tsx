@@ -1,12 +1,13 @@
 // A room as one of its players sees it: the seats while it waits, then the table, for as long as this device holds a seat there.
 
-import { useEffect, useState } from "preact/hooks";
+import { useEffect, useMemo, useState } from "preact/hooks";
 import { CALL_LIMIT_MS, roomApi } from "../api/client";
 import { faultOf, wordsOf } from "../api/faults";
 import type { PageProps } from "../app";
 import { AfterRoom } from "../experiment/AfterStudy";
 import { AtTable } from "../experiment/AtTable";
 import { useHiding } from "../experiment/hiding";
+import { KeptLinks } from "../experiment/StudyLinks";
 import { studyIn } from "../experiment/study";
 import { ParticipantKind } from "../gen/chefshat/v1/room_pb";
 import { t } from "../i18n";
@@ -27,9 +28,11 @@ export function RoomPage({ route }: PageProps<"room">) {
   const { roomId } = route;
   const [table, setTable] = useState<TableState | undefined>(undefined);
   const [session, setSession] = useState<Session | undefined>(undefined);
+  const [ticket, setTicket] = useState("");
   const [fault, setFault] = useState("");
-  // For the whole page, from its loading on: not for a part of it, of which the table has others than the waiting room.
-  useHiding(studyIn(roomId));
+  // For the whole page, from its loading on: not for a part of it, of which the table has others than the waiting room. And for as long as it is
+  // shown, also when the seat is forgotten: where something fails, a study leaves out what it has left out before.
+  useHiding(useMemo(() => studyIn(roomId), [roomId]));
 
   useEffect(() => {
     let left = false;
@@ -43,6 +46,7 @@ export function RoomPage({ route }: PageProps<"room">) {
         started = held ? startSession(held, table) : undefined;
         setTable(table);
         setSession(started);
+        setTicket(held?.ticket ?? "");
       } catch (thrown) {
         const fault = faultOf(thrown);
         if (fault.reason === "ROOM_UNKNOWN") leaveSeat(roomId);
@@ -55,16 +59,19 @@ export function RoomPage({ route }: PageProps<"room">) {
       left = true;
       started?.stop();
       // A reload goes on with the last page of a study; who leaves it is done, and finds its questionnaire by the link again.
-      if (started && isOver(started.live.peek().table)) leaveSeat(roomId);
+      const last = started?.live.peek().table;
+      if (last && isOver(last)) depart(last);
     };
   }, [roomId]);
 
   const attachment = session?.live.value.attachment;
-  const vacated = attachment?.kind === "refused" && attachment.reason === "TICKET_UNKNOWN";
+  const vacated =
+    attachment?.kind === "left" || (attachment?.kind === "refused" && attachment.reason === "TICKET_UNKNOWN");
   useEffect(() => {
     if (!vacated) return;
-    // The seat was given to others while this page was away: from here on the room is one to come into.
-    giveUpSeat(roomId);
+    // The seat was given back, here or in another page, or to others while this page was away: the room is one to come into.
+    // Unless another page of this device has sat down here since, for somebody else.
+    if (session && heldSeat(roomId)?.ticket === ticket) depart(session.live.peek().table);
     session?.stop();
     setSession(undefined);
   }, [vacated]);
@@ -75,6 +82,7 @@ export function RoomPage({ route }: PageProps<"room">) {
       <>
         {after}
         <Faulty title={t().table.title} words={fault} />
+        <KeptLinks roomId={roomId} />
       </>
     );
   }
@@ -88,6 +96,12 @@ export function RoomPage({ route }: PageProps<"room">) {
   );
 }
 
+/** Forgets a seat; a study's last questionnaire stays to be found if there was a game. */
+function depart(table: TableState): void {
+  if (hasBegun(table)) leaveSeat(table.roomId);
+  else giveUpSeat(table.roomId);
+}
+
 /** The table from the seat that this device holds. */
 function Held({ session }: { session: Session }) {
   const { table, own } = session.live.value;
@@ -95,7 +109,7 @@ function Held({ session }: { session: Session }) {
   const banner = (
     <>
       <Banner session={session} />
-      <AtTable roomId={roomId} over={isOver(table)} />
+      <AtTable roomId={roomId} over={isOver(table) && hasBegun(table)} />
     </>
   );
   const waiting = table.phase === "waiting";
@@ -110,24 +124,32 @@ function Held({ session }: { session: Session }) {
     />
   );
   return (
-    <Seated
-      acting={session}
-      banner={banner}
-      tools={!isOver(table) && leaving}
-      onward={!others && hostedRoom(roomId) && !studyIn(roomId) && <Again roomId={roomId} />}
-      below={
-        <>
-          <HostInvite roomId={roomId} forAgents={table.seats.some(isForAgent)} />
-          {leaving}
-        </>
-      }
-    />
+    <>
+      <Seated
+        acting={session}
+        banner={banner}
+        tools={!isOver(table) && leaving}
+        onward={!others && hostedRoom(roomId) && !studyIn(roomId) && <Again roomId={roomId} />}
+        below={
+          <>
+            <HostInvite roomId={roomId} forAgents={table.seats.some(isForAgent)} />
+            {leaving}
+          </>
+        }
+      />
+      {!waiting && <KeptLinks roomId={roomId} />}
+    </>
   );
 }
 
 /** Whether an agent may still take the seat. */
 function isForAgent(seat: SeatState): boolean {
   return !isTaken(seat) && [ParticipantKind.UNSPECIFIED, ParticipantKind.AGENT].includes(seat.reservedFor);
+}
+
+/** Whether there was a game: a room may be closed before. */
+function hasBegun({ shift, standings }: TableState): boolean {
+  return shift > 0 || standings.length > 0;
 }
 
 function isOver({ phase }: TableState): boolean {

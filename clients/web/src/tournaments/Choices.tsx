@@ -24,6 +24,8 @@ export function Choices<Value extends string>({ label, value, options, fault, on
               type="radio"
               name={id}
               checked={option.value === value}
+              // The one that is picked is the one at fault, and the one that the focus goes to.
+              aria-invalid={Boolean(fault) && option.value === value}
               aria-labelledby={`${id}-${option.value}-name`}
               aria-describedby={`${id}-${option.value}`}
               onChange={() => onPick(option.value)}

@@ -4,7 +4,7 @@
 import { type Offered, useOffered } from "../api/server";
 import { t } from "../i18n";
 import { useFilling } from "../lobby/filling";
-import { ClockFields, FaultFields, RuleFields, WatchFields, wordsOfProblem } from "../lobby/GameFields";
+import { ClockFields, FaultFields, RuleFields, Typed, WatchFields, wordsOfProblem } from "../lobby/GameFields";
 import type { NumberProblem } from "../lobby/problems";
 import { MAX_NAME } from "../lobby/room-form";
 import { Button } from "../parts/Button";
@@ -13,7 +13,7 @@ import { Notice } from "../parts/Notice";
 import { navigate } from "../router";
 import { Choices } from "./Choices";
 import { makeTournament } from "./hosting";
-import { FormatFields, type FormProps, StartFields, Typed, WhoFields } from "./TournamentFields";
+import { FormatFields, type FormProps, StartFields, WhoFields } from "./TournamentFields";
 import {
   newTournament,
   type Problem,

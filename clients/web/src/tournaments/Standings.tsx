@@ -7,10 +7,10 @@ import {
   type TournamentStanding,
   TournamentState,
 } from "../gen/chefshat/v1/tournament_pb";
-import { t } from "../i18n";
+import { decimal, t } from "../i18n";
 import { KindBadge } from "../parts/KindBadge";
 import { ratingWords } from "../people/rating";
-import { gradeOf, isEnded, nameOf, participantOf } from "./course";
+import { gradeOf, isEnded, meanScore, nameOf, participantOf } from "./course";
 import { PersonName } from "./PersonName";
 import "./standings.css";
 
@@ -75,7 +75,7 @@ export function Standings({ tournament, standings, mine, large = false }: Standi
             {knockout && <td class="number">{standing.lastRound || "–"}</td>}
             <td class="number standings-minor">{standing.games}</td>
             <td class="number">
-              <b>{String(standing.score)}</b>
+              <b>{standing.games > 0 ? decimal(meanScore(standing), 2) : "–"}</b>
             </td>
             {!large && (
               <>

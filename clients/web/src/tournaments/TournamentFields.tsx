@@ -1,10 +1,19 @@
 // The parts of the form for a new tournament that most people look at: who plays whom, who takes part, when it begins.
 
+import { useId } from "preact/hooks";
 import { t } from "../i18n";
 import type { FieldFaults } from "../lobby/filling";
+import { Typed } from "../lobby/GameFields";
 import { CheckField, SelectField, TextField } from "../parts/Field";
 import { Choices } from "./Choices";
-import { builtIns, type TournamentField, type TournamentForm, withFormat, withTable } from "./tournament-form";
+import {
+  builtIns,
+  isNoCount,
+  type TournamentField,
+  type TournamentForm,
+  withFormat,
+  withTable,
+} from "./tournament-form";
 
 /** What a part of the form gets: the form, the faults of its fields, and how to change it. */
 export interface FormProps {
@@ -12,9 +21,6 @@ export interface FormProps {
   faults: FieldFaults<TournamentField>;
   change: (changed: Partial<TournamentForm>) => void;
 }
-
-/** Names of fields that hold what was typed. */
-type TextName = { [Name in TournamentField]: string extends TournamentForm[Name] ? Name : never }[TournamentField];
 
 const FORMATS: readonly TournamentForm["format"][] = ["knockout", "roundRobin", "swiss"];
 const PLAYERS: readonly TournamentForm["players"][] = ["2", "3", "4", "5", "6"];
@@ -62,6 +68,10 @@ export function FormatFields(props: FormProps) {
 export function WhoFields(props: FormProps & { agents: string[] }) {
   const { form, faults, change, agents } = props;
   const words = t().organise;
+  const id = useId();
+  // The sum is the fault of all of them.
+  const counts = Object.values(form.builtIn);
+  const atFault = (count: string) => Boolean(faults.builtIn) && (isNoCount(count) || !counts.some(isNoCount));
   return (
     <>
       <fieldset class="new-tournament-group">
@@ -73,6 +83,7 @@ export function WhoFields(props: FormProps & { agents: string[] }) {
               key={agent}
               label={agent}
               value={form.builtIn[agent] ?? ""}
+              faultId={atFault(form.builtIn[agent] ?? "") ? `${id}-built-in` : undefined}
               onText={(count) => change({ builtIn: { ...form.builtIn, [agent]: count } })}
               autoComplete="off"
             />
@@ -80,7 +91,7 @@ export function WhoFields(props: FormProps & { agents: string[] }) {
         </div>
         {builtIns(form) > 0 && <p class="small">{words.builtInSum(builtIns(form))}</p>}
         {faults.builtIn && (
-          <p class="field-fault" role="alert">
+          <p id={`${id}-built-in`} class="field-fault" role="alert">
             {faults.builtIn}
           </p>
         )}
@@ -93,13 +104,14 @@ export function WhoFields(props: FormProps & { agents: string[] }) {
               key={kind}
               label={words.kind[kind]}
               checked={form[kind]}
+              faultId={faults.people && `${id}-kinds`}
               // The fault that nobody may join is the first one's, whichever is picked to mend it.
               onCheck={(may) => change({ people: form.people, [kind]: may })}
             />
           ))}
         </div>
         {faults.people && (
-          <p class="field-fault" role="alert">
+          <p id={`${id}-kinds`} class="field-fault" role="alert">
             {faults.people}
           </p>
         )}
@@ -132,20 +144,5 @@ export function StartFields(props: FormProps) {
       )}
       <Typed {...props} name="noShowSeconds" label={words.noShow} hint={words.noShowHint} />
     </div>
-  );
-}
-
-/** A field of the form that is typed. */
-export function Typed(props: FormProps & { name: TextName; label: string; hint?: string }) {
-  const { form, faults, change, name, label, hint } = props;
-  return (
-    <TextField
-      label={label}
-      hint={hint}
-      value={form[name]}
-      fault={faults[name]}
-      onText={(text) => change({ [name]: text })}
-      autoComplete="off"
-    />
   );
 }

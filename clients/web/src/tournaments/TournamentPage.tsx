@@ -81,7 +81,10 @@ function Visited({ heard }: { heard: Heard }) {
       </Participation>
     );
   }
-  if (held && holder === "unclear") return <Whose name={held.name} onSame={arrive} onOther={() => setAnother(true)} />;
+  if (held && !another && (holder === "unclear" || !isEnded(tournament))) {
+    const onOther = open || holder === "unclear" ? () => setAnother(true) : undefined;
+    return <Whose name={held.name} as={invited?.study?.name ?? ""} onSame={arrive} onOther={onOther} />;
+  }
   if (open && invited?.study) {
     const take = (name: string) => takePlace(tournamentId, invited.code, name);
     return <StudyJoin study={invited.study} what="tournament" take={take} arrive={arrive} />;
@@ -103,17 +106,28 @@ function inviteIn(search: string): { code: string; study: Study | null } | null 
   return code ? { code, study: studyOf(search) } : null;
 }
 
-/** Asks who is at this device, where a link names nobody and somebody has followed it already. */
-function Whose({ name, onSame, onOther }: { name: string; onSame: () => void; onOther: () => void }) {
+interface WhoseProps {
+  /** Who has this device's place. */
+  name: string;
+  /** Whom the link names; empty: nobody. */
+  as: string;
+  onSame: () => void;
+  /** Undefined once nobody can join any more. */
+  onOther: (() => void) | undefined;
+}
+
+/** Asks who is at this device, where somebody has a place already and would lose it to another. */
+function Whose({ name, as, onSame, onOther }: WhoseProps) {
   const words = t().experiment.join;
   return (
     <section class="sheet join-page">
       <h1>{words.title}</h1>
-      <p>{words.takenPlace(name)}</p>
+      <p>{as === "" ? words.takenPlace(name) : words.heldPlace(name)}</p>
+      {onOther && <p class="soft">{words.onePlace(name)}</p>}
       <Button look="main" onClick={onSame}>
         {words.goOn(name)}
       </Button>
-      <Button onClick={onOther}>{words.anotherPlace}</Button>
+      {onOther && <Button onClick={onOther}>{as === "" ? words.anotherPlace : words.joinAs(as)}</Button>}
     </section>
   );
 }

@@ -22,7 +22,7 @@ export function heldPlace(tournamentId: string): HeldPlace | null {
   );
 }
 
-/** Joins as a person; without an id the tournament that the code finds. Gives the tournament's id. */
+/** Joins as a person. Gives the tournament's id. */
 export async function takePlace(tournamentId: string, code: string, name: string): Promise<string> {
   const joined = await tournamentApi.joinTournament(
     { tournamentId, joinCode: canonical(code), name: name.trim(), kind: ParticipantKind.HUMAN },

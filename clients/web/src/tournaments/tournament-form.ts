@@ -96,9 +96,17 @@ export function withTable(form: TournamentForm, players: TournamentForm["players
   return { ...form, players, points: players === form.players ? form.points : "" };
 }
 
+/** The form without spectators where games are dealt alike: nobody may watch there, and what was typed for it before is not asked for. */
+function asWatched(form: TournamentForm): TournamentForm {
+  return { ...form, spectators: form.spectators && form.deals === "independent" };
+}
+
 /** What can be seen to be wrong before it is sent. */
 export function problemsOf(form: TournamentForm): Partial<Record<TournamentField, Problem>> {
-  const problems: Partial<Record<TournamentField, Problem | undefined>> = gameProblems(form, Number(form.players));
+  const problems: Partial<Record<TournamentField, Problem | undefined>> = gameProblems(
+    asWatched(form),
+    Number(form.players),
+  );
   const whole: [TournamentField, Bounds][] = [
     ["gamesPerPairing", [1, 1000]],
     ["maxParticipants", [2, MAX_PARTICIPANTS]],
@@ -111,9 +119,8 @@ export function problemsOf(form: TournamentForm): Partial<Record<TournamentField
   if (form.otherClocks) seconds.push(["agentSeconds", [0.01, 86_400]], ["robotSeconds", [0.01, 86_400]]);
   for (const [field, bounds] of whole) problems[field] = wholeProblem(String(form[field]), bounds);
   for (const [field, bounds] of seconds) problems[field] = secondsProblem(String(form[field]), bounds);
-  const counts = Object.values(form.builtIn);
-  const wrong = counts.filter((count) => count.trim() !== "" && !isCount(count));
-  if (wrong[0] !== undefined) problems.builtIn = wholeProblem(wrong[0], [0, MAX_PARTICIPANTS]);
+  const wrong = Object.values(form.builtIn).find(isNoCount);
+  if (wrong !== undefined) problems.builtIn = wholeProblem(wrong, [0, MAX_PARTICIPANTS]);
   else if (builtIns(form) > MAX_PARTICIPANTS) problems.builtIn = "tooMany";
   for (const seed of ["drawSeed", "dealSeed"] as const)
     if (form[seed].trim() !== "" && !/^[0-9a-f]{64}$/i.test(form[seed].trim())) problems[seed] = "notASeed";
@@ -126,6 +133,11 @@ function isCount(typed: string): boolean {
   return wholeProblem(typed, [0, MAX_PARTICIPANTS]) === undefined;
 }
 
+/** Whether what was typed for a built-in agent is no number of participants; nothing typed is none. */
+export function isNoCount(typed: string): boolean {
+  return typed.trim() !== "" && !isCount(typed);
+}
+
 /** How many built-in agents take part, as far as numbers were typed. */
 export function builtIns(form: TournamentForm): number {
   return Object.values(form.builtIn).reduce((sum, count) => sum + (isCount(count) ? Number(count) : 0), 0);
@@ -133,9 +145,9 @@ export function builtIns(form: TournamentForm): number {
 
 /** The settings that a form asks for; it must have no problems. */
 export function settingsOf(form: TournamentForm): MessageInitShape<typeof TournamentSettingsSchema> {
-  const { spectators, ...policy } = policyOf(form);
-  // Where games are dealt alike, nobody may watch, and the server does not take it as said.
-  const watched = form.deals === "independent" ? { spectators } : { spectatorsSeeHands: false };
+  const { spectators, ...policy } = policyOf(asWatched(form));
+  // Where games are dealt alike, the server does not take it as said that nobody may watch.
+  const watched = form.deals === "independent" ? { spectators } : {};
   const clocks = form.otherClocks
     ? [
         { kind: ParticipantKind.AGENT, decisionTimeMs: milliseconds(form.agentSeconds), bankMs: 0 },

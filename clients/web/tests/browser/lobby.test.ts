@@ -3,7 +3,7 @@
 import type { Browser } from "playwright-core";
 import { afterAll, beforeAll, expect, test } from "vitest";
 import { sitDown } from "./play";
-import { newRoom } from "./rooms";
+import { clientsOf, newRoom } from "./rooms";
 import { person, Server, startBrowser } from "./stage";
 
 /** More rooms than the lobby shows at first, fewer than twice as many. */
@@ -79,6 +79,7 @@ test("what cannot be accepted is marked at its field, all of it at once", async 
   await page.getByText("Type a number here.").waitFor();
   await page.getByText("Type whole numbers from 0 on with commas between them").waitFor();
   expect(await invalid()).toBe(3);
+  await page.waitForFunction(() => document.activeElement === document.querySelector('[aria-invalid="true"]'));
   // What only the server can tell is marked as well: so few cards cannot be dealt to so many.
   await page.getByLabel("Players").selectOption("6");
   await page.getByLabel("Faces").fill("4");
@@ -142,7 +143,7 @@ test("who leaves before the game gives the seat back, during it is told what bec
   const guest = await person(browser);
   await sitDown(guest.page, server, code, "Rosa");
   await guest.page.getByRole("button", { name: "Leave…" }).click();
-  await guest.page.getByText("after 3 that are lost so in a row, the agent “random” plays for you").waitFor();
+  await guest.page.getByText("after 3 in a row that ran out, the agent “random” plays for you").waitFor();
   expect(await guest.page.getByRole("button", { name: "End the game" }).count()).toBe(0);
   await guest.page.getByRole("button", { name: "Stay" }).click();
 
@@ -151,6 +152,22 @@ test("who leaves before the game gives the seat back, during it is told what bec
   for (const { page } of [host, guest]) await page.getByText("The room was closed by its owner.").waitFor();
   expect(await host.page.getByRole("button", { name: "Leave…" }).count()).toBe(0);
   expect([...host.faults, ...guest.faults]).toEqual([]);
+});
+
+test("a seat that is given back elsewhere leaves its page with the way in", async () => {
+  const { code } = await newRoom(server, { name: "Given back", seats: ["person", "person", "random", "random"] });
+  const { page, faults } = await person(browser);
+  await sitDown(page, server, code, "Ada");
+  await page.getByRole("button", { name: "Leave…" }).waitFor();
+  const kept = `seat.${new URL(page.url()).pathname.split("/").at(-1)}`;
+  const ticket = await page.evaluate((kept) => {
+    const name = Object.keys(localStorage).find((name) => name.endsWith(kept));
+    return String(JSON.parse((name && localStorage.getItem(name)) || "{}").ticket);
+  }, kept);
+  await clientsOf(server).rooms.leaveRoom({ ticket });
+  await page.getByRole("heading", { name: "Sit down" }).waitFor();
+  expect(await page.getByRole("button", { name: "Leave…" }).count()).toBe(0);
+  expect(faults).toEqual([]);
 });
 
 test("language and look are chosen and kept", async () => {

@@ -111,10 +111,10 @@ test("it begins by itself, its code alone leads to it, and its organiser closes 
   await guest.page.goto(`${server.url}/`);
   await guest.page.getByLabel("Join code").fill(code ?? "");
   await guest.page.getByRole("button", { name: "Go on" }).click();
-  // The lobby asks for a name too.
-  await guest.page.getByRole("heading", { name: "Join with a code", level: 1 }).waitFor();
+  // The code is not asked for again.
+  await guest.page.getByRole("heading", { name: "Open league", level: 1 }).waitFor();
   await guest.page.getByLabel("Your name").fill("Ada");
-  await guest.page.getByRole("button", { name: "Sit down" }).click();
+  await guest.page.getByRole("button", { name: "Join the tournament" }).click();
   await guest.page.waitForURL(/\/tournaments\/[0-9a-f]{32}$/);
 
   await host.page.getByText("being played").first().waitFor();

@@ -36,8 +36,11 @@ interface Wanted {
 }
 
 /** A room of some Shifts without hurry. */
-export async function newRoom(server: Server, wanted: Wanted): Promise<{ roomId: string; code: string }> {
-  const { room, joinCode } = await clientsOf(server).rooms.createRoom({
+export async function newRoom(
+  server: Server,
+  wanted: Wanted,
+): Promise<{ roomId: string; code: string; ownerToken: string }> {
+  const { room, joinCode, ownerToken } = await clientsOf(server).rooms.createRoom({
     name: wanted.name ?? "Friday evening",
     rules: { preset: "paper", faces: wanted.faces ?? 11, stop: { case: "targetShifts", value: wanted.shifts ?? 1 } },
     seats: wanted.seats.map((who) => ({ filledBy: filledBy(who) })),
@@ -46,7 +49,7 @@ export async function newRoom(server: Server, wanted: Wanted): Promise<{ roomId:
     ...(wanted.rated ? {} : { gameSeed: new Uint8Array(32).fill(7) }),
   });
   if (!room) throw new Error("the server did not say which room it made");
-  return { roomId: room.roomId, code: joinCode };
+  return { roomId: room.roomId, code: joinCode, ownerToken };
 }
 
 function secondShift(dealt: readonly (readonly number[])[], top: number) {

@@ -4,12 +4,16 @@
 import { readFileSync } from "node:fs";
 import type { Browser } from "playwright-core";
 import { afterAll, beforeAll, expect, test } from "vitest";
+import { ParticipantKind } from "../../src/gen/chefshat/v1/room_pb";
 import { byClicks, playOn } from "./play";
 import { agent, clientsOf, gameOf, newRoom, recordOf } from "./rooms";
 import { person, Server, startBrowser } from "./stage";
 
 /** As docs/playing.md names it. */
 const PERSON_TIME_KEY = "person_decision_time_ms";
+
+/** What a study can leave out, as it is drawn at the table. */
+const PARTS = [".header-nav", ".log", ".tool-lookup", ".tool-leave", ".expressions", ".played", ".result-links"];
 
 let server: Server;
 let browser: Browser;
@@ -66,7 +70,8 @@ test("a participant's link leads from the consent to the table, and to the quest
     away.href = "/leaderboard?lang=it";
     away.click();
   });
-  await page.getByRole("heading", { name: "Classifica" }).waitFor();
+  await page.getByRole("heading", { name: "Classifica", level: 1 }).waitFor();
+  await page.locator(".table").waitFor({ state: "detached" });
   expect(await page.evaluate(() => Object.keys(localStorage).filter((key) => key.includes("seat.")))).toEqual([]);
   await page.goto(link.href);
   await page.getByRole("heading", { name: "Hai partecipato a questo studio" }).waitFor();
@@ -77,7 +82,7 @@ test("a participant's link leads from the consent to the table, and to the quest
   await page.getByRole("button", { name: "Dimentica", exact: true }).click();
   await page.waitForURL(`${server.url}/`);
   await page.goto(link.href);
-  await page.getByRole("button", { name: "Ho letto e acconsento" }).waitFor();
+  await page.getByText("P07 si è già seduto al tavolo.").waitFor();
 
   const lines = (await recordOf(server, await gameOf(server, roomId))).map(({ line }) => line);
   const header = lines.flatMap((line) => (line.case === "header" ? line.value : []))[0];
@@ -101,6 +106,22 @@ test("who does not agree does not sit down", async () => {
   await page.getByRole("button", { name: "Sit down at the table" }).waitFor();
 });
 
+test("each part that a study can leave out is seen where none is left out", async () => {
+  const { code } = await newRoom(server, { seats: ["person", "random", "random", "random"] });
+  const { page, faults } = await person(browser);
+  const seen = new Set<string>();
+  const look = async () => {
+    for (const part of PARTS) if (await page.locator(part).first().isVisible()) seen.add(part);
+  };
+  await page.goto(`${server.url}/join/${code}?name=P09`);
+  await page.getByRole("button", { name: "Sit down at the table" }).click();
+  await playOn(page, byClicks, look);
+  await page.locator(".result").waitFor();
+  await look();
+  expect([...seen].toSorted()).toEqual(PARTS.toSorted());
+  expect(faults).toEqual([]);
+});
+
 test("what a study leaves out is left out from its first page to the end of the game, also after a reload", async () => {
   const { code } = await newRoom(server, { seats: ["person", "agent", "random", "random"] });
   const { page, faults } = await person(browser);
@@ -116,10 +137,9 @@ test("what a study leaves out is left out from its first page to the end of the 
     const seen = { subtree: true, attributes: true, attributeFilter: ["data-hide"] };
     new MutationObserver(look).observe(document, seen);
   });
-  const parts = [".header-nav", ".log", ".tool-lookup", ".tool-leave", ".expressions", ".played", ".result-links"];
   const isLeftOut = async () => {
     expect(await page.locator("html").getAttribute("data-hide")).toBe(hide);
-    for (const part of parts)
+    for (const part of PARTS)
       for (const found of await page.locator(part).all()) expect(await found.isVisible()).toBe(false);
     expect(await page.evaluate(() => "slipped" in window)).toBe(false);
   };
@@ -149,19 +169,63 @@ test("what a study leaves out is left out from its first page to the end of the 
   expect(faults).toEqual([]);
 });
 
-test("at one device one participant after the other takes a seat of their own", async () => {
+test("who opens their link where another has the seat is asked, and by their link nobody sits down twice", async () => {
   const { roomId, code } = await newRoom(server, { seats: ["greedy", "person", "person", "person"] });
-  const { page } = await person(browser);
-  for (const name of ["P01", "P02"]) {
-    await page.goto(`${server.url}/join/${code}?name=${name}`);
-    await page.getByText(`You take part as ${name}.`).waitFor();
-    await page.getByRole("button", { name: "Sit down at the table" }).click();
-    await page.waitForURL(new RegExp(`/rooms/${roomId}`));
-  }
-  await page.getByRole("listitem").filter({ hasText: "P02" }).getByText("(you)").waitFor();
+  const named = async () => {
+    const { room } = await clientsOf(server).rooms.getRoom({ roomId });
+    return room?.seats.flatMap(({ kind, name }) => (kind === ParticipantKind.HUMAN ? name : []));
+  };
+  const { page, faults } = await person(browser);
+  const link = (name: string) => `${server.url}/join/${code}?name=${name}`;
+  const table = new RegExp(`/rooms/${roomId}`);
+  await page.goto(link("P01"));
+  await page.getByText("You take part as P01.").waitFor();
+  await page.getByRole("button", { name: "Sit down at the table" }).click();
+  await page.waitForURL(table);
+  await page.goto(link("P02"));
+  await page.getByRole("button", { name: "Go on as P01" }).click();
+  await page.waitForURL(table);
+  expect(await named()).toEqual(["P01"]);
+  // While their seat is open in another page, too.
+  const second = await page.context().newPage();
+  await second.goto(link("P02"));
+  await second.getByRole("button", { name: "Give the seat of P01 back and take part as P02" }).click();
+  await second.getByText("You take part as P02.").waitFor();
+  await second.getByRole("button", { name: "Sit down at the table" }).click();
+  await second.waitForURL(table);
+  await second.getByRole("listitem").filter({ hasText: "P02" }).getByText("(you)").waitFor();
+  expect(await named()).toEqual(["P02"]);
+  await page.getByRole("heading", { name: "Sit down" }).waitFor();
+  await page.close();
   // Their own link leads back to their seat.
-  await page.goto(`${server.url}/join/${code}?name=P02`);
-  await page.waitForURL(new RegExp(`/rooms/${roomId}`));
+  await second.goto(link("P02"));
+  await second.getByRole("listitem").filter({ hasText: "P02" }).getByText("(you)").waitFor();
+  const other = await person(browser);
+  await other.page.goto(link("P02"));
+  await other.page.getByText("P02 has sat down already.").waitFor();
+  expect(await other.page.getByRole("button", { name: "Sit down at the table" }).count()).toBe(0);
+  expect(await named()).toEqual(["P02"]);
+  expect([...faults, ...other.faults]).toEqual([]);
+});
+
+test("where its room is closed before a game, a study has no last questionnaire, and where it is gone, no ways to other pages", async () => {
+  const { roomId, code, ownerToken } = await newRoom(server, { seats: ["greedy", "person", "person", "random"] });
+  const { page } = await person(browser);
+  const asked = new URLSearchParams({ name: "P01", hide: "pages", after: "https://forms.example/" });
+  await page.goto(`${server.url}/join/${code}?${asked}`);
+  await page.getByRole("button", { name: "Sit down at the table" }).click();
+  await page.getByText("(you)").waitFor();
+  await clientsOf(server).rooms.closeRoom({ roomId, ownerToken });
+  await page.getByText("The room was closed by its owner.").first().waitFor();
+  expect(await page.getByRole("link", { name: "Open the questionnaire" }).count()).toBe(0);
+  expect(await page.locator("html").getAttribute("data-hide")).toBe("pages");
+
+  const gone = "0".repeat(32);
+  await page.evaluate((id) => localStorage.setItem(`chefshat.study.${id}`, "?hide=pages"), gone);
+  await page.goto(`${server.url}/rooms/${gone}`);
+  await page.getByText("There is no such room any more.").waitFor();
+  expect(await page.locator("html").getAttribute("data-hide")).toBe("pages");
+  expect(await page.locator(".faulty").getByRole("link").count()).toBe(0);
 });
 
 test("the host of a room makes links for its participants", async () => {
@@ -216,9 +280,17 @@ test("each participant gets a room of their own like the one at hand, with all l
   await page.reload();
   await page.getByText("Links for a study").click();
   await page.getByLabel("They play").selectOption("own");
-  await page.getByText("name=P02", { exact: false }).waitFor();
-  await page.getByLabel("Participants, one a line").fill("P01-P04");
+  await page.getByText("name=P02&hide=log").waitFor();
+  await page.getByLabel("Participants, one a line").fill(`P01-P04\n${"x".repeat(65)}`);
+  await page.getByText("A name has at most 64 characters").waitFor();
   await page.getByRole("button", { name: "Make 1 room" }).waitFor();
+  // Also once the room at hand is closed.
+  await page.getByRole("button", { name: "Close the room" }).click();
+  await page.getByRole("button", { name: "Close the room" }).click();
+  await page.getByRole("heading", { name: "Sit down" }).waitFor({ state: "detached" });
+  await page.reload();
+  await page.getByText("Links for a study").click();
+  await page.getByText("name=P02&hide=log").waitFor();
 
   const participant = await person(browser);
   await participant.page.goto(rows[1]?.[1] ?? "");

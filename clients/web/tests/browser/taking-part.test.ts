@@ -21,8 +21,8 @@ afterAll(async () => {
   await server?.stop();
 });
 
-/** A tournament of one Shift a game that begins when one person has joined; its id and join code. */
-async function newTournament(rounds: number): Promise<{ id: string; code: string }> {
+/** A tournament of one Shift a game that begins when so many have joined, with one person if not said; its id and join code. */
+async function newTournament(rounds: number, startWhenJoined = 4): Promise<{ id: string; code: string }> {
   const { tournament, joinCode } = await clientsOf(server).tournaments.createTournament({
     settings: {
       name: "Friday league",
@@ -31,7 +31,7 @@ async function newTournament(rounds: number): Promise<{ id: string; code: string
       rules: { preset: "paper", stop: { case: "targetShifts", value: 1 } },
       policy: { decisionTimeMs: 600_000, paceMs: 0, spectators: true },
       builtInAgents: ["greedy", "random", "random"],
-      startWhenJoined: 4,
+      startWhenJoined,
     },
   });
   if (!tournament) throw new Error("the server did not say which tournament it made");
@@ -94,4 +94,26 @@ test("a code that is wrong and a name that is taken are answered in words", asyn
   await page.getByLabel("Codice d’ingresso del torneo").fill(code);
   await join.click();
   await page.getByText("Qualcun altro ha già questo nome.").waitFor();
+});
+
+test("a code that is typed a second time leads back to the place that it has taken", async () => {
+  const { id, code } = await newTournament(1, 8);
+  const { page, faults } = await person(browser);
+  const typed = async () => {
+    await page.goto(`${server.url}/join`);
+    await page.getByLabel("Join code").fill(code);
+    await page.getByRole("button", { name: "Go on" }).click();
+    await page.waitForURL(new RegExp(`/tournaments/${id}`));
+  };
+  await typed();
+  await page.getByLabel("Your name").fill("Rosa");
+  await page.getByRole("button", { name: "Join the tournament" }).click();
+  await page.getByText("You take part as Rosa.").waitFor();
+  await typed();
+  await page.getByText("You take part as Rosa.").waitFor();
+  expect(await page.getByRole("button", { name: "Join the tournament" }).count()).toBe(0);
+  const { tournament } = await clientsOf(server).tournaments.getTournament({ tournamentId: id });
+  expect(tournament?.participants.map(({ name }) => name).filter((name) => name === "Rosa")).toEqual(["Rosa"]);
+  expect(tournament?.participants).toHaveLength(4);
+  expect(faults).toEqual([]);
 });

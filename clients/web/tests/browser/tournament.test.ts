@@ -54,7 +54,7 @@ test("a tournament's page follows it from the first participant to the final sta
     tournamentId: tournament.tournamentId,
   });
   const shown = await rows.evaluateAll((lines) => lines.map((line) => line.querySelector("td b")?.textContent));
-  expect(shown).toEqual(standings.map(({ score }) => String(score)));
+  expect(shown).toEqual(standings.map(({ score, games }) => (Number(score) / games).toFixed(2)));
   expect(await rows.filter({ hasText: "Gustav" }).locator(".number").allInnerTexts()).toContain("3");
   expect(loads).toBe(1);
   expect(faults).toEqual([]);

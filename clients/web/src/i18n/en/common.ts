@@ -48,7 +48,6 @@ export const common = {
   close: "Close",
   cancel: "Cancel",
   back: "Back",
-  retry: "Try again",
   copy: "Copy",
   copied: "Copied",
   loading: "Loading…",

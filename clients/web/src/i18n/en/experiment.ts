@@ -24,7 +24,18 @@ export const experiment = {
     taken: (name: string) => `Somebody has sat down with this link on this device already, as ${name}.`,
     goOn: (name: string) => `Go on as ${name}`,
     another: "Take another seat",
+    held: (name: string) => `On this device ${name} has a seat in this room already.`,
+    oneSeat: (name: string) =>
+      `A device has one seat in a room: when somebody else sits down here, the seat of ${name} is given back.`,
+    begun: (name: string) => `The game has begun: here only ${name} can go on. Open this link on another device.`,
+    giveBack: (name: string, as: string) => `Give the seat of ${name} back and take part as ${as}`,
+    seated: (name: string) =>
+      `${name} has sat down already. Go on at the device where that was; if it was not you, ask whoever sent you this link.`,
     takenPlace: (name: string) => `Somebody has joined with this link on this device already, as ${name}.`,
+    heldPlace: (name: string) => `On this device ${name} takes part in this tournament already.`,
+    onePlace: (name: string) =>
+      `A device plays for one participant: when somebody else joins here, ${name} can play no more games.`,
+    joinAs: (name: string) => `Take part as ${name}`,
     anotherPlace: "Join as somebody else",
     come: { room: "Sit down at the table", tournament: "Join the tournament" },
     recorded: {
@@ -50,6 +61,7 @@ export const experiment = {
     names: "Participants, one a line",
     namesHint: "Pseudonyms such as P07, or P01-P20 for twenty. Empty: each chooses a name.",
     tooManyNames: (most: number) => `No more than ${most} at a time: the rest is left out.`,
+    tooLong: (most: number) => `A name has at most ${most} characters: there are no links for longer ones.`,
     seat: "Seat of the first; the others follow",
     anySeat: "any free seat",
     language: "Language",
@@ -82,7 +94,7 @@ export const experiment = {
       label: "each in a room of their own like this one",
       namesHint: "Pseudonyms such as P07, or P01-P20 for twenty: a room is made for each.",
       seat: "Their seat",
-      text: "Each room gets the rules, the times and the agents of this one. This device keeps what it needs to close them; their links stay listed here.",
+      text: "Each room gets the rules, the times and the agents of this one. This device keeps what it needs to close them; their links stay listed here, each with what this form said when its room was made.",
       barred: {
         seed: "This room’s deals are fixed, by a seed that nobody is told: the other rooms are dealt by chance.",
         hands: "This room begins with given hands, which are not known here: no other room can be made like it.",

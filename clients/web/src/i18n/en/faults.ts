@@ -29,6 +29,7 @@ export const faults = {
     OWNER_TOKEN_WRONG: "Only the device that made this can do that.",
     NOT_STATELESS: "This tournament is not for people: its deals come up again.",
     TOURNAMENT_FULL: "The tournament is full.",
+    NAME_REFUSED: "This name is longer than 64 characters, or has some that cannot be seen. Choose another.",
     NAME_TAKEN: "Somebody else has this name already. Choose another.",
   },
 };

@@ -86,13 +86,13 @@ export const lobby = {
     waiting: "Your seat becomes free for somebody else. To come back you need the invitation again.",
     substituted: (timeouts: number, substitute: string) =>
       `The game goes on. Each of your decisions waits until its time is over; ${plural(timeouts, {
-        one: "after one that is lost so",
-        other: "after # that are lost so in a row",
+        one: "after one that ran out",
+        other: "after # in a row that ran out",
       })}, the agent “${substitute}” plays for you.`,
     givenUp: (timeouts: number) =>
       `The game goes on. Each of your decisions waits until its time is over; ${plural(timeouts, {
-        one: "after one that is lost so",
-        other: "after # that are lost so in a row",
+        one: "after one that ran out",
+        other: "after # in a row that ran out",
       })}, the game ends without a result.`,
     back: "You can come back and play on at any time: the lobby leads to your seat, from this device.",
     backUntilThen: "Until then you can come back: the lobby leads to your seat, from this device.",

@@ -82,7 +82,7 @@ export const table = {
     youMayDeclare: "You hold both jokers",
     face: "face",
     cards: (count: number) => plural(count, { one: "card", other: "cards" }),
-    openingGolden: "and the Golden one",
+    openingGolden: "with the Golden one",
     openingFace: "and no other face",
     anything: "The board is empty: any play.",
     beat: "A rarer face, no fewer cards.",
@@ -115,7 +115,7 @@ export const table = {
     ready: "Ready to play.",
     sending: "On its way…",
     notYourTurn: "It is not your turn.",
-    noPass: "Whoever opens the Shift may not pass.",
+    noPass: "Pick cards: whoever opens the Shift may not pass.",
     mustPlay: "After pizzas without a play you must play now.",
   },
   reasons: {

@@ -49,7 +49,6 @@ export const common: Texts["common"] = {
   close: "Chiudi",
   cancel: "Annulla",
   back: "Indietro",
-  retry: "Riprova",
   copy: "Copia",
   copied: "Copiato",
   loading: "Caricamento…",

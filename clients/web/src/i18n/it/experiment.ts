@@ -25,7 +25,19 @@ export const experiment: Texts["experiment"] = {
     taken: (name) => `Con questo link qualcuno si è già seduto su questo dispositivo, come ${name}.`,
     goOn: (name) => `Continua come ${name}`,
     another: "Prendi un altro posto",
+    held: (name) => `Su questo dispositivo ${name} ha già un posto in questa stanza.`,
+    oneSeat: (name) =>
+      `Un dispositivo ha un solo posto per stanza: quando qui si siede un’altra persona, il posto di ${name} si libera.`,
+    begun: (name) =>
+      `La partita è iniziata: qui può continuare solo ${name}. Apri questo link su un altro dispositivo.`,
+    giveBack: (name, as) => `Libera il posto di ${name} e partecipa come ${as}`,
+    seated: (name) =>
+      `${name} si è già seduto al tavolo. Continua sul dispositivo usato allora; se non sei stato tu, chiedi a chi ti ha mandato il link.`,
     takenPlace: (name) => `Con questo link qualcuno si è già iscritto su questo dispositivo, come ${name}.`,
+    heldPlace: (name) => `Su questo dispositivo ${name} partecipa già a questo torneo.`,
+    onePlace: (name) =>
+      `Un dispositivo gioca per un solo partecipante: se qui si iscrive un’altra persona, ${name} non può più giocare.`,
+    joinAs: (name) => `Partecipa come ${name}`,
     anotherPlace: "Iscrivi un’altra persona",
     come: { room: "Siediti al tavolo", tournament: "Iscriviti al torneo" },
     recorded: {
@@ -51,6 +63,7 @@ export const experiment: Texts["experiment"] = {
     names: "Partecipanti, uno per riga",
     namesHint: "Pseudonimi come P07, o P01-P20 per venti. Vuoto: ognuno sceglie un nome.",
     tooManyNames: (most) => `Non più di ${most} alla volta: gli altri restano fuori.`,
+    tooLong: (most) => `Un nome ha al massimo ${most} caratteri: per quelli più lunghi non ci sono link.`,
     seat: "Posto del primo; gli altri seguono",
     anySeat: "un posto libero qualsiasi",
     language: "Lingua",
@@ -83,7 +96,7 @@ export const experiment: Texts["experiment"] = {
       label: "ognuno in una stanza propria, come questa",
       namesHint: "Pseudonimi come P07, o P01-P20 per venti: per ognuno si crea una stanza.",
       seat: "Il loro posto",
-      text: "Ogni stanza ha le regole, i tempi e gli agenti di questa. Questo dispositivo conserva ciò che serve per chiuderle; i link restano elencati qui.",
+      text: "Ogni stanza ha le regole, i tempi e gli agenti di questa. Questo dispositivo conserva ciò che serve per chiuderle; i link restano elencati qui, ciascuno con ciò che diceva questo modulo quando la stanza è stata creata.",
       barred: {
         seed: "Le carte di questa stanza sono fissate da un seme che non si rivela: nelle altre stanze si danno a caso.",
         hands:

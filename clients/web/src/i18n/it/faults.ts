@@ -31,6 +31,7 @@ export const faults: Texts["faults"] = {
     OWNER_TOKEN_WRONG: "Può farlo solo il dispositivo che l’ha creato.",
     NOT_STATELESS: "Questo torneo non è per persone: le stesse carte ritornano.",
     TOURNAMENT_FULL: "Il torneo è al completo.",
+    NAME_REFUSED: "Questo nome ha più di 64 caratteri, o ne ha che non si vedono. Scegline un altro.",
     NAME_TAKEN: "Qualcun altro ha già questo nome. Scegline un altro.",
   },
 };

@@ -87,13 +87,13 @@ export const lobby: Texts["lobby"] = {
     waiting: "Il tuo posto torna libero per qualcun altro. Per tornare ti serve di nuovo l’invito.",
     substituted: (timeouts, substitute) =>
       `La partita continua. Ogni tua decisione aspetta finché scade il tempo; ${plural(timeouts, {
-        one: "dopo una persa così",
-        other: "dopo # perse così di seguito",
+        one: "dopo una decisione scaduta",
+        other: "dopo # decisioni scadute di seguito",
       })} gioca per te l’agente «${substitute}».`,
     givenUp: (timeouts) =>
       `La partita continua. Ogni tua decisione aspetta finché scade il tempo; ${plural(timeouts, {
-        one: "dopo una persa così",
-        other: "dopo # perse così di seguito",
+        one: "dopo una decisione scaduta",
+        other: "dopo # decisioni scadute di seguito",
       })} la partita finisce senza risultato.`,
     back: "Puoi tornare a giocare in ogni momento: dalla sala, su questo dispositivo, si arriva al tuo posto.",
     backUntilThen: "Fino ad allora puoi tornare: dalla sala, su questo dispositivo, si arriva al tuo posto.",

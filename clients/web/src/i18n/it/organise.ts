@@ -39,9 +39,9 @@ export const organise: Texts["organise"] = {
   start: {
     label: "Comincia",
     byHand: "quando lo dico io",
-    joined: "da solo, a un numero di partecipanti",
+    joined: "da solo, raggiunto un numero di partecipanti",
     byHandHint: "Con un pulsante sulla sua pagina, che ha solo questo dispositivo.",
-    joinedHint: "Appena ci sono tanti iscritti.",
+    joinedHint: "Appena si raggiunge questo numero di iscritti.",
   },
   startWhen: "Partecipanti",
   startWhenHint: "Compresi gli agenti del server",

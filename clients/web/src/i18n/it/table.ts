@@ -115,7 +115,7 @@ export const table: Texts["table"] = {
     ready: "Si può giocare.",
     sending: "In viaggio…",
     notYourTurn: "Non tocca a te.",
-    noPass: "Chi apre lo Shift non può passare.",
+    noPass: "Scegli le carte: chi apre lo Shift non può passare.",
     mustPlay: "Dopo pizze senza giocate ora devi giocare.",
   },
   reasons: {

@@ -37,10 +37,9 @@ export const tournaments: Texts["tournaments"] = {
       `${plural(games, { one: "# partita per turno", other: "# partite per turno" })} a tavoli da quattro; i primi due vanno avanti`,
     rounds: (rounds, games) =>
       rounds === 0
-        ? `Tanti turni quanti ne servono ai partecipanti, di ${plural(games, { one: "# partita", other: "# partite" })} ciascuno`
+        ? `Tanti turni quanti ne richiede il numero dei partecipanti, di ${plural(games, { one: "# partita", other: "# partite" })} ciascuno`
         : `${plural(rounds, { one: "# turno", other: "# turni" })} di ${plural(games, { one: "# partita", other: "# partite" })}`,
-    toPoints: (points) =>
-      plural(points, { one: "Una partita arriva a # punto", other: "Una partita arriva a # punti" }),
+    toPoints: (points) => plural(points, { one: "Si gioca a # punto", other: "Si gioca a # punti" }),
     shifts: (shifts) => plural(shifts, { one: "Una partita è di # Shift", other: "Una partita è di # Shift" }),
     clock: (decisionMs, bankMs) =>
       `Le persone hanno ${time(decisionMs)} per ogni decisione${bankMs > 0 ? ` e ${time(bankMs)} in più in tutta la partita` : ""}`,
@@ -51,8 +50,8 @@ export const tournaments: Texts["tournaments"] = {
     place: "Posizione",
     name: "Nome",
     games: "Partite",
-    score: "Punteggio",
-    scoreHint: "Punti delle regole per la posizione in ogni partita, sommati",
+    score: "Punteggio medio",
+    scoreHint: "Punti delle regole per la posizione in una partita, in media: decidono l’ordine",
     points: "Punti",
     places: "Piazzamenti",
     placesWords: (places) => places.map((count, index) => `${count} × ${index + 1}º posto`).join(", "),
@@ -78,7 +77,6 @@ export const tournaments: Texts["tournaments"] = {
     of: (table, number) => `${table}, partita ${number}`,
     free: "da decidere",
     from: (first) => `i primi due del tavolo ${first}`,
-    bye: "riposa",
     forfeited: "non si è presentato",
     advances: "passa il turno",
     champion: "vince il torneo",

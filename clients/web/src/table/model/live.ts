@@ -36,6 +36,8 @@ export type Attachment =
   | { readonly kind: "attached" }
   | { readonly kind: "superseded" }
   | { readonly kind: "over" }
+  /** The seat was given back, by whoever has its ticket: this page never asks to be detached otherwise. */
+  | { readonly kind: "left" }
   | { readonly kind: "refused"; readonly reason: string; readonly message: string };
 
 export interface LiveState {
@@ -75,9 +77,8 @@ export function applyUpdate(live: LiveState, update: SeatUpdate, nowMs: number):
       return { ...live, decision: undefined };
     }
     case "detached": {
-      const { reason } = told.value;
-      const superseded = reason === DetachReason.SUPERSEDED;
-      return { ...live, decision: undefined, attachment: { kind: superseded ? "superseded" : "over" } };
+      const kind = DETACHED[told.value.reason] ?? "over";
+      return { ...live, decision: undefined, attachment: { kind } };
     }
     case "refused": {
       const { reason, message } = told.value;
@@ -87,6 +88,11 @@ export function applyUpdate(live: LiveState, update: SeatUpdate, nowMs: number):
       return live;
   }
 }
+
+const DETACHED: Partial<Record<DetachReason, "superseded" | "left">> = {
+  [DetachReason.SUPERSEDED]: "superseded",
+  [DetachReason.REQUESTED]: "left",
+};
 
 function withSnapshot(live: LiveState, table: TableState): LiveState {
   const mine = live.own === undefined ? undefined : table.seats[live.own];

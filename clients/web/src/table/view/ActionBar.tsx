@@ -93,8 +93,8 @@ function hint({ table, own, decision, moves, picked, move, sending, taught }: Ac
   if (sending) return words.sending;
   if (!decision) return table.phase === "pizza" || table.phase === "dealt" ? words.notYourTurn : "";
   if (decision.kind === DecisionKind.SPECIAL_ACTION) return "";
-  if (move) return words.ready;
   if (decision.kind === DecisionKind.EXCHANGE) return giftWords(table, own);
+  if (move) return words.ready;
   const mayPass = moves.some((legal) => legal.kind === "pass");
   if (picked.size > 0) {
     const more = missing(decision.hand, picked, moves);

@@ -5,6 +5,7 @@ import type { ComponentChildren } from "preact";
 import { useEffect, useRef, useState } from "preact/hooks";
 import { DecisionKind } from "../../gen/chefshat/v1/decision_pb";
 import { t } from "../../i18n";
+import { clockOfPeople } from "../../lobby/rooms";
 import type { Label } from "../expressions";
 import { actionOf } from "../model/actions";
 import type { Card } from "../model/cards";
@@ -113,7 +114,7 @@ export function TableView(props: TableViewProps) {
     }
     props.onAnswer?.(action);
   };
-  const wholeMs = props.untimed ? 0 : (table.policy?.decisionTimeMs ?? 0);
+  const wholeMs = props.untimed || !table.policy ? 0 : clockOfPeople(table.policy).decisionTimeMs;
 
   const handLabel = props.replayed && mine ? t().table.hand.of(nameOf(table, mine.seat)) : t().table.hand.label;
 

@@ -62,7 +62,9 @@ export function WaitingRoom({ table, own, banner }: WaitingRoomProps) {
             ))}
           </ol>
           <p>{words.begins}</p>
-          {free > 0 && <Ways roomId={roomId} tournament={room?.tournamentId !== ""} seated={own !== undefined} />}
+          {room && free > 0 && (
+            <Ways roomId={roomId} tournament={room.tournamentId !== ""} seated={own !== undefined} />
+          )}
         </div>
         <Board table={{ ...table, toppings }}>
           {free > 0 ? words.waiting(free) : away > 0 ? words.away(away) : t().table.heading.waiting}
@@ -113,7 +115,7 @@ function WaitingSeat({ table, seat, own }: { table: TableState; seat: SeatState;
 
 interface WaysProps {
   roomId: string;
-  /** Whether the room is one of a tournament's, or may be. */
+  /** Whether the room is one of a tournament's. */
   tournament: boolean;
   /** Whether the reader has a seat. */
   seated: boolean;

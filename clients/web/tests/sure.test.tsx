@@ -1,0 +1,60 @@
+// The button that asks once more: where the focus goes, that it acts once, and what it says when it could not.
+
+import { render } from "preact";
+import { act } from "preact/test-utils";
+import { afterEach, beforeEach, expect, test } from "vitest";
+import { startLanguage } from "../src/i18n";
+import { Sure } from "../src/lobby/Sure";
+
+let root: HTMLElement;
+let calls: { done: () => void; failed: (why: Error) => void }[];
+
+beforeEach(async () => {
+  await startLanguage();
+  root = document.createElement("div");
+  document.body.append(root);
+  calls = [];
+  const perform = () => new Promise<void>((done, failed) => calls.push({ done, failed }));
+  await act(() =>
+    render(
+      <Sure label="Close…" confirm="Do it" act={perform}>
+        It ends for everybody.
+      </Sure>,
+      root,
+    ),
+  );
+});
+
+afterEach(async () => {
+  await act(() => render(null, root));
+  root.remove();
+});
+
+const button = (words: string) => [...root.querySelectorAll("button")].find(({ textContent }) => textContent === words);
+const press = (words: string) => act(() => button(words)?.click());
+
+test("the question has the focus, and the button has it back", async () => {
+  await press("Close…");
+  expect(document.activeElement?.textContent).toBe("It ends for everybody.");
+  await press("Cancel");
+  expect(document.activeElement).toBe(button("Close…"));
+  expect(calls).toHaveLength(0);
+});
+
+test("pressed twice it acts once", async () => {
+  await press("Close…");
+  await press("Do it");
+  await press("Do it");
+  expect(calls).toHaveLength(1);
+  expect(button("Do it")?.disabled).toBe(true);
+});
+
+test("what went wrong is said until it is tried again or left alone", async () => {
+  await press("Close…");
+  await press("Do it");
+  await act(async () => calls[0]?.failed(new Error("no")));
+  expect(root.querySelector("[role=alert]")).not.toBeNull();
+  expect(button("Do it")?.disabled).toBe(false);
+  await press("Cancel");
+  expect(root.querySelector("[role=alert]")).toBeNull();
+});
