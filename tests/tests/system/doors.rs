@@ -87,8 +87,8 @@ async fn attaching_needs_a_ticket_of_this_room() {
     let (_, tickets) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;
     let mut altered = tickets[0].clone().into_bytes();
     let last = altered.len() - 3;
-    altered[last] = if altered[last] == b'A' { b'B' } else { b'A' };
-    let altered = String::from_utf8(altered).expect("still letters");
+    altered[last] = if altered[last] == b'0' { b'1' } else { b'0' };
+    let altered = String::from_utf8(altered).expect("still digits");
     let mut seat = StreamSeat::open(server.channel().await).await;
     for (request_id, ticket) in [(7, "nonsense"), (8, ""), (9, altered.as_str())] {
         seat.attach(v1::Attach {
