@@ -1,6 +1,6 @@
 // A room as one of its players sees it: the seats while it waits, then the table, for as long as this device holds a seat there.
 
-import { useEffect, useMemo, useState } from "preact/hooks";
+import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { CALL_LIMIT_MS, roomApi } from "../api/client";
 import { faultOf, wordsOf } from "../api/faults";
 import type { PageProps } from "../app";
@@ -30,6 +30,7 @@ export function RoomPage({ route }: PageProps<"room">) {
   const [session, setSession] = useState<Session | undefined>(undefined);
   const [ticket, setTicket] = useState("");
   const [fault, setFault] = useState("");
+  const ended = useRef<TableState | undefined>(undefined);
   // For the whole page, from its loading on: not for a part of it, of which the table has others than the waiting room. And for as long as it is
   // shown, also when the seat is forgotten: where something fails, a study leaves out what it has left out before.
   useHiding(useMemo(() => studyIn(roomId), [roomId]));
@@ -59,10 +60,13 @@ export function RoomPage({ route }: PageProps<"room">) {
       left = true;
       started?.stop();
       // A reload goes on with the last page of a study; who leaves it is done, and finds its questionnaire by the link again.
-      const last = started?.live.peek().table;
-      if (last && isOver(last)) depart(last);
+      if (ended.current?.roomId === roomId) depart(ended.current);
     };
   }, [roomId]);
+
+  // What is over stays over, also while the page hears of it once more from the beginning.
+  const live = session?.live.value.table;
+  if (live && isOver(live)) ended.current = live;
 
   const attachment = session?.live.value.attachment;
   const vacated =
