@@ -1,26 +1,14 @@
 // The lobby in a real browser: from one page to the other, a room made and joined by its invitation, what is refused said in words.
 
-import type { Browser } from "playwright-core";
-import { afterAll, beforeAll, expect, test } from "vitest";
+import { expect, test } from "vitest";
 import { sitDown } from "./play";
 import { clientsOf, newRoom } from "./rooms";
-import { person, Server, startBrowser } from "./stage";
+import { browser, person, server, useStage } from "./stage";
 
 /** More rooms than the lobby shows at first, fewer than twice as many. */
 const MANY = 14;
 
-let server: Server;
-let browser: Browser;
-
-beforeAll(async () => {
-  server = await Server.start();
-  browser = await startBrowser();
-});
-
-afterAll(async () => {
-  await browser?.close();
-  await server?.stop();
-});
+useStage();
 
 test("a room is made, and who opens its invitation takes the seat kept for a person", async () => {
   const host = await person(browser);

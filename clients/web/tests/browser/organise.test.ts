@@ -1,23 +1,11 @@
 // A tournament from its making to its end without a command line: its organiser makes it on the page, invites, begins it; a person joins from
 // another browser and plays; and what is refused is marked at its field.
 
-import type { Browser } from "playwright-core";
-import { afterAll, beforeAll, expect, test } from "vitest";
+import { expect, test } from "vitest";
 import { byClicks, playOn } from "./play";
-import { person, Server, startBrowser } from "./stage";
+import { browser, person, server, useStage } from "./stage";
 
-let server: Server;
-let browser: Browser;
-
-beforeAll(async () => {
-  server = await Server.start();
-  browser = await startBrowser();
-});
-
-afterAll(async () => {
-  await browser?.close();
-  await server?.stop();
-});
+useStage();
 
 test("a tournament is made on the page, joined from another, filled up, begun, played to its end", async () => {
   const host = await person(browser);

@@ -4,20 +4,18 @@
 import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import type { AxeResults, RunOptions } from "axe-core";
-import type { Browser, Page } from "playwright-core";
-import { afterAll, beforeAll, expect, test } from "vitest";
+import type { Page } from "playwright-core";
+import { beforeAll, expect, test } from "vitest";
 import { TournamentFormat } from "../../src/gen/chefshat/v1/tournament_pb";
 import { byClicks, nextDecision, sitDown } from "./play";
 import { agent, clientsOf, gameOf, newRoom } from "./rooms";
-import { person, Server, startBrowser } from "./stage";
+import { browser, person, server, useStage } from "./stage";
 
 const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 const PHONE = { width: 360, height: 740 };
 const COMPUTER = { width: 1280, height: 800 };
 const MOST_FIRST_PAGE_BYTES = 200_000;
 
-let server: Server;
-let browser: Browser;
 /** A page whose device holds a seat at a table; there it must decide. */
 let seated: Page;
 let gameId: string;
@@ -28,9 +26,9 @@ let rooms: { table: string; waiting: string };
 /** The join code of a room in which the device has no seat. */
 let code: string;
 
+useStage();
+
 beforeAll(async () => {
-  server = await Server.start();
-  browser = await startBrowser();
   const over = await newRoom(server, { seats: ["agent", "greedy", "random", "trained"], rated: true });
   expect(await agent(server, "greedy", over.code, "Gustav")).toBe(0);
   gameId = await gameOf(server, over.roomId);
@@ -63,11 +61,6 @@ beforeAll(async () => {
     await byClicks(seated);
     id = await nextDecision(seated, id);
   }
-});
-
-afterAll(async () => {
-  await browser?.close();
-  await server?.stop();
 });
 
 /** Every page: its address, and what is there once it has drawn itself. */

@@ -1,29 +1,22 @@
 // A replay in a browser: at any decision it shows what the record says.
 
-import type { Browser, Page } from "playwright-core";
-import { afterAll, beforeAll, expect, test } from "vitest";
+import type { Page } from "playwright-core";
+import { beforeAll, expect, test } from "vitest";
 import type { DecisionRecord, RecordLine } from "../../src/gen/chefshat/v1/record_pb";
 import { legalActions } from "../../src/table/model/actions";
 import { agent, gameOf, newRoom, recordOf } from "./rooms";
-import { person, Server, startBrowser } from "./stage";
+import { browser, person, server, useStage } from "./stage";
 
-let server: Server;
-let browser: Browser;
 let gameId: string;
 let lines: RecordLine[];
 
+useStage();
+
 beforeAll(async () => {
-  server = await Server.start();
-  browser = await startBrowser();
   const { roomId, code } = await newRoom(server, { seats: ["agent", "greedy", "random", "greedy"], shifts: 2 });
   expect(await agent(server, "greedy", code, "Gustav")).toBe(0);
   gameId = await gameOf(server, roomId);
   lines = await recordOf(server, gameId);
-});
-
-afterAll(async () => {
-  await browser?.close();
-  await server?.stop();
 });
 
 test("scrubbing shows the hands and the choice that the record has at that decision", async () => {

@@ -1,26 +1,15 @@
 // People at a table: whole Shifts with the mouse and with the keyboard alone, through a reload and through the end of the server, and
 // two people with two agents in one room.
 
-import type { Browser, Page } from "playwright-core";
-import { afterAll, beforeAll, expect, test } from "vitest";
+import type { Page } from "playwright-core";
+import { expect, test } from "vitest";
 import { byClicks, byKeys, focus, HAND, nextDecision, playOn, sitDown, tabTo } from "./play";
 import { agent, gameOf, newRoom, recordOf } from "./rooms";
-import { person, Server, startBrowser } from "./stage";
+import { browser, person, server, startBrowser, useStage } from "./stage";
 
 const OPPONENTS = ["greedy", "random", "greedy"];
 
-let server: Server;
-let browser: Browser;
-
-beforeAll(async () => {
-  server = await Server.start();
-  browser = await startBrowser();
-});
-
-afterAll(async () => {
-  await browser?.close();
-  await server?.stop();
-});
+useStage();
 
 test("a person plays a whole Shift by clicking, reloads in the middle and goes on", async () => {
   const { roomId, code } = await newRoom(server, { seats: ["person", ...OPPONENTS], faces: 9 });

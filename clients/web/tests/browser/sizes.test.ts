@@ -1,10 +1,10 @@
 // Screens from a small phone to a large desk: what a player needs to decide is seen at once, without scrolling and under nothing else.
 
-import type { Browser, Page } from "playwright-core";
-import { afterAll, beforeAll, expect, test } from "vitest";
+import type { Page } from "playwright-core";
+import { expect, test } from "vitest";
 import { byClicks, playOn, sitDown } from "./play";
 import { gameOf, newRoom } from "./rooms";
-import { person, Server, startBrowser } from "./stage";
+import { browser, person, server, useStage } from "./stage";
 
 /** Width and height. */
 const SIZES = [
@@ -28,20 +28,10 @@ const LONG = "W".repeat(64);
 const EVERYBODY = [".table-head h1", ".seats .seat", ".seats .seat-points", ".own .seat", ".own .seat-points"];
 const CHOICE = [".board", ".now-heading", ".hand-stack", "[data-action=play]", "[data-action=pass]"];
 
-let server: Server;
-let browser: Browser;
 /** The game that was played to its end. */
 let gameId: string;
 
-beforeAll(async () => {
-  server = await Server.start();
-  browser = await startBrowser();
-});
-
-afterAll(async () => {
-  await browser?.close();
-  await server?.stop();
-});
+useStage();
 
 test("a turn, and the end of the game, at every size", async () => {
   const { roomId, code } = await newRoom(server, { name: LONG, seats: ["person", "greedy", "random", "greedy"] });

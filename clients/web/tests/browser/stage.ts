@@ -6,7 +6,7 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { createInterface } from "node:readline";
 import { type Browser, type BrowserContextOptions, chromium, type Page } from "playwright-core";
-import { vi } from "vitest";
+import { afterAll, beforeAll, vi } from "vitest";
 
 const CHROMIUM = process.env.CHEFSHAT_CHROMIUM ?? "/usr/bin/chromium";
 const FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"];
@@ -43,6 +43,23 @@ export class Server {
     await ended(this.process, "SIGKILL");
     rmSync(this.dataDir, { recursive: true, force: true });
   }
+}
+
+/** The server of a file of tests, between its `useStage` and its end. */
+export let server: Server;
+/** The browser of a file of tests. */
+export let browser: Browser;
+
+/** Gives a file of tests a server and a browser of its own: to be called at its top. */
+export function useStage(): void {
+  beforeAll(async () => {
+    server = await Server.start();
+    browser = await startBrowser();
+  });
+  afterAll(async () => {
+    await browser?.close();
+    await server?.stop();
+  });
 }
 
 /** A browser; each person in it has a context of its own. */

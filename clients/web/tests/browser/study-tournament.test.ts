@@ -1,29 +1,17 @@
 // A study in a tournament by its links: a participant agrees, joins under the name that the link says, and in every game sees what it says; the
 // times measured at the page go with the decisions, and the questionnaire comes when the whole tournament is over, as often as the link is opened.
 
-import type { Browser } from "playwright-core";
-import { afterAll, beforeAll, expect, test } from "vitest";
+import { expect, test } from "vitest";
 import { TournamentFormat } from "../../src/gen/chefshat/v1/tournament_pb";
 import { byClicks, playOn } from "./play";
 import { clientsOf, recordOf } from "./rooms";
-import { person, Server, startBrowser } from "./stage";
+import { browser, person, server, useStage } from "./stage";
 
 /** As docs/playing.md names it. */
 const PERSON_TIME_KEY = "person_decision_time_ms";
 const ROUNDS = 2;
 
-let server: Server;
-let browser: Browser;
-
-beforeAll(async () => {
-  server = await Server.start();
-  browser = await startBrowser();
-});
-
-afterAll(async () => {
-  await browser?.close();
-  await server?.stop();
-});
+useStage();
 
 test("a participant's link holds for every game of the tournament", async () => {
   const { tournaments } = clientsOf(server);

@@ -2,12 +2,11 @@
 // link says, sees what the link says, and the times measured at the page go with the decisions. And what a link cannot do.
 
 import { readFileSync } from "node:fs";
-import type { Browser } from "playwright-core";
-import { afterAll, beforeAll, expect, test } from "vitest";
+import { expect, test } from "vitest";
 import { ParticipantKind } from "../../src/gen/chefshat/v1/room_pb";
 import { byClicks, playOn } from "./play";
 import { agent, clientsOf, gameOf, newRoom, recordOf } from "./rooms";
-import { person, Server, startBrowser } from "./stage";
+import { browser, person, server, useStage } from "./stage";
 
 /** As docs/playing.md names it. */
 const PERSON_TIME_KEY = "person_decision_time_ms";
@@ -15,18 +14,7 @@ const PERSON_TIME_KEY = "person_decision_time_ms";
 /** What a study can leave out, as it is drawn at the table. */
 const PARTS = [".header-nav", ".log", ".tool-lookup", ".tool-leave", ".expressions", ".played", ".result-links"];
 
-let server: Server;
-let browser: Browser;
-
-beforeAll(async () => {
-  server = await Server.start();
-  browser = await startBrowser();
-});
-
-afterAll(async () => {
-  await browser?.close();
-  await server?.stop();
-});
+useStage();
 
 test("a participant's link leads from the consent to the table, and to the questionnaire after it", async () => {
   const { roomId, code } = await newRoom(server, { seats: ["greedy", "random", "person", "random"] });

@@ -1,25 +1,13 @@
 // A person in a tournament: joins on its page, is seated in each of its games there, through a reload and the end of the server, and is back
 // at the standings. And the same tournament as a wall shows it.
 
-import type { Browser } from "playwright-core";
-import { afterAll, beforeAll, expect, test } from "vitest";
+import { expect, test } from "vitest";
 import { TournamentFormat } from "../../src/gen/chefshat/v1/tournament_pb";
 import { byClicks, playOn } from "./play";
 import { clientsOf } from "./rooms";
-import { person, Server, startBrowser } from "./stage";
+import { browser, person, server, useStage } from "./stage";
 
-let server: Server;
-let browser: Browser;
-
-beforeAll(async () => {
-  server = await Server.start();
-  browser = await startBrowser();
-});
-
-afterAll(async () => {
-  await browser?.close();
-  await server?.stop();
-});
+useStage();
 
 /** A tournament of one Shift a game that begins when so many have joined, with one person if not said; its id and join code. */
 async function newTournament(rounds: number, startWhenJoined = 4): Promise<{ id: string; code: string }> {

@@ -1,23 +1,11 @@
 // The page of a tournament, left open from before its beginning to its end: it follows without being loaded again.
 
-import type { Browser } from "playwright-core";
-import { afterAll, beforeAll, expect, test } from "vitest";
+import { expect, test } from "vitest";
 import { TournamentFormat } from "../../src/gen/chefshat/v1/tournament_pb";
 import { clientsOf, program } from "./rooms";
-import { person, Server, startBrowser } from "./stage";
+import { browser, person, server, useStage } from "./stage";
 
-let server: Server;
-let browser: Browser;
-
-beforeAll(async () => {
-  server = await Server.start();
-  browser = await startBrowser();
-});
-
-afterAll(async () => {
-  await browser?.close();
-  await server?.stop();
-});
+useStage();
 
 test("a tournament's page follows it from the first participant to the final standings", async () => {
   const { tournament, joinCode } = await clientsOf(server).tournaments.createTournament({

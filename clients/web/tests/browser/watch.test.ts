@@ -1,29 +1,18 @@
 // A spectator's page, and what reaches it: the bytes of every answer are looked through for cards that nobody may see before the end.
 
-import type { Browser } from "playwright-core";
-import { afterAll, beforeAll, expect, test } from "vitest";
+import { expect, test } from "vitest";
 import type { GameEvent } from "../../src/gen/chefshat/v1/event_pb";
 import { SpectatorServiceWatchResponseSchema } from "../../src/gen/chefshat/v1/spectator_service_pb";
 import { agent, newRoom } from "./rooms";
-import { person, Server, startBrowser } from "./stage";
+import { browser, person, server, useStage } from "./stage";
 import { Tap } from "./tap";
 
 const GET_ROOM = "/chefshat.v1.RoomService/GetRoom";
 const WATCH = "/chefshat.v1.SpectatorService/Watch";
 
-let server: Server;
-let browser: Browser;
 let tap: Tap;
 
-beforeAll(async () => {
-  server = await Server.start();
-  browser = await startBrowser();
-});
-
-afterAll(async () => {
-  await browser?.close();
-  await server?.stop();
-});
+useStage();
 
 /** A game of two Shifts, watched from before its first card to its end: what the page was sent, and whether it ever showed an open hand. */
 async function watched(policy: { spectatorsSeeHands?: boolean; spectatorDelayDecisions?: number }) {
