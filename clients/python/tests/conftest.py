@@ -11,8 +11,8 @@ from fake_vector import FakeVector
 from real_server import RealServer
 from stage import Stage, attached
 
+from chefshat.join_options import TICKET
 from chefshat.local_server import BINARY
-from chefshat.way_in import TICKET
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -1,7 +1,7 @@
 """A session on a stage: scripted responses in, requests out, and an agent that writes down what it is told. No tests of its own."""
 
 from chefshat import Agent, ChefsHatError, Decision, PlayOptions, SeatInfo, SeatResult, pb
-from chefshat.place import Ask
+from chefshat.seat_session import Ask
 from chefshat.session import PlaySession
 
 MASK = bytes([0b0000_0110])

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 from waiting import LIMIT_S, wait_until
 
+from chefshat.join_options import TICKET
 from chefshat.players_club.process import AgentError, AgentLost, AgentProcess, AgentRaised, AgentSpec
-from chefshat.way_in import TICKET
 
 TESTS = str(Path(__file__).parent)
 VECTOR = [0.0] * 28 + [1.0] + [0.0] * 196 + [1.0, 0.0, 1.0]

@@ -5,7 +5,7 @@ from stage import Scribe, decision, detached, ended, events
 
 from chefshat import Agent, ChefsHatError, PlayOptions, SeatInfo, pb
 from chefshat.participant import REQUEST_ID
-from chefshat.place import Ask
+from chefshat.seat_session import Ask
 from chefshat.session import PlaySession
 
 # First handle of the seats that a server attaches by itself.

@@ -16,10 +16,10 @@ from waiting import LIMIT_S, wait_until
 
 import chefshat
 from chefshat import RandomAgent, pb
+from chefshat.join_options import TICKET
 from chefshat.players_club import AgentProcess, AgentSpec, PlayersClubAgent
 from chefshat.players_club.__main__ import main
 from chefshat.players_club.table import ACTIONS
-from chefshat.way_in import TICKET
 
 pytestmark = pytest.mark.server
 

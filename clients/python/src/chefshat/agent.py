@@ -1,6 +1,6 @@
 """The command `python -m chefshat.agent`: plays one game in a room, or all of its games in a tournament, and prints the standings.
 
-What an agent is stands in `agents`, how the command comes by its place in `way_in`, what it prints in `outcome`.
+What an agent is stands in `agents`, how the command comes by its place in `join_options`, what it prints in `outcome`.
 """
 
 import argparse
@@ -11,7 +11,7 @@ import sys
 from collections.abc import Sequence
 
 import chefshat
-from chefshat import outcome, way_in
+from chefshat import join_options, outcome
 from chefshat.agents import Agent, RandomAgent
 from chefshat.decision import SeatInfo
 from chefshat.errors import exit_code
@@ -39,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--address", required=True, help="the server, HOST:PORT")
-    way_in.add_options(parser)
+    join_options.add_options(parser)
     parser.add_argument("--name", help="name to show, 1 to 64 characters; not needed with a ticket")
     parser.add_argument(
         "--agent",
@@ -49,7 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, help="seed of the agent's chance; a tournament's games count on from it")
     parser.add_argument("--json", action="store_true", help="print one line of JSON instead of a table")
     options = parser.parse_args(arguments)
-    (way,) = way_in.ways(parser, options)
+    (way,) = join_options.ways(parser, options)
     try:
         agents = [make_agent(options.agent, options.seed)]
     except (ImportError, AttributeError, TypeError, ValueError) as error:
@@ -64,7 +64,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     def play() -> int:
         with chefshat.Client(options.address) as client:
-            return outcome.report(way_in.take_part(client, way, make), as_json=options.json)
+            return outcome.report(join_options.take_part(client, way, make), as_json=options.json)
 
     return exit_code(play, as_json=options.json)
 

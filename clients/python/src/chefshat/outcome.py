@@ -1,6 +1,6 @@
 """What came of a place, as commands print it: for people as a table, for programs as plain values.
 
-How the place was come by is in `way_in`; what is left of a single seat's game is in `result`.
+How the place was come by is in `join_options`; what is left of a single seat's game is in `result`.
 """
 
 import json

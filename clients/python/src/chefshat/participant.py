@@ -1,6 +1,6 @@
 """What a session remembers of a participant of a tournament, who is given a seat in each of its games.
 
-What it remembers of a seat is in `place`; what changes either, and why, in `session`.
+What it remembers of a seat is in `seat_session`; what changes either, and why, in `session`.
 """
 
 from collections.abc import Callable

@@ -1,14 +1,32 @@
-"""What both clients share around a call: where the server is, how the channel behaves, what becomes of arguments and of errors."""
+"""What both clients share around a call: addresses, channel options, building requests, paging and errors."""
 
-from collections.abc import Awaitable, Callable, Sequence
-from typing import NamedTuple, TypeAlias, TypeVar
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Iterator, Sequence
+from typing import NamedTuple, Protocol, TypeAlias, TypeVar
 
 import grpc
+import grpc.aio
 
 from chefshat import pb
 from chefshat.errors import from_rpc_error
 
+
+class PageRequest(Protocol):
+    """A request of a listing."""
+
+    page_token: str
+
+
+class Page(Protocol):
+    """A response of a listing; an empty `next_page_token` marks the last."""
+
+    next_page_token: str
+
+
+Asked = TypeVar("Asked")
 Answered = TypeVar("Answered")
+AskedPage = TypeVar("AskedPage", bound=PageRequest)
+AnsweredPage = TypeVar("AnsweredPage", bound=Page)
+Item = TypeVar("Item")
 
 # Times in milliseconds. Waits between attempts to connect are `Backoff`'s business, so the channel's own are kept short. (But not
 # "grpc.min_reconnect_backoff_ms", which despite its name bounds how long one attempt may take.) Pings notice a peer that is gone
@@ -45,12 +63,20 @@ def target(address: str) -> Target:
 
 
 def channel(address: str, options: Sequence[tuple[str, int]] = ()) -> grpc.Channel:
-    """A blocking channel to the server at the address; options are added to `CHANNEL_OPTIONS`."""
+    """Opens a blocking channel. `options` are added to `CHANNEL_OPTIONS`."""
     where = target(address)
     together = [*CHANNEL_OPTIONS, *options]
     if where.tls:
         return grpc.secure_channel(where.authority, grpc.ssl_channel_credentials(), together)
     return grpc.insecure_channel(where.authority, together)
+
+
+def async_channel(address: str) -> grpc.aio.Channel:
+    """Opens a channel of asyncio. Call it where the event loop runs."""
+    where = target(address)
+    if where.tls:
+        return grpc.aio.secure_channel(where.authority, grpc.ssl_channel_credentials(), CHANNEL_OPTIONS)
+    return grpc.aio.insecure_channel(where.authority, CHANNEL_OPTIONS)
 
 
 def create_room(
@@ -77,6 +103,22 @@ def create_room(
     configs = [seat_config(seat) for seat in seats]
     return pb.CreateRoomRequest(
         name=name, rules=rules, seats=configs, policy=policy, game_seed=game_seed, branch=branch, scripted=hands
+    )
+
+
+def join_tournament(
+    join_code: str,
+    name: str,
+    tournament_id: str,
+    kind: pb.ParticipantKind.ValueType,
+    max_games: int,
+    stateless: bool,
+) -> pb.JoinTournamentRequest:
+    """Builds the request to join a tournament."""
+    if max_games < 1:
+        raise ValueError(f"max_games is {max_games}: a participant plays at least one game at a time")
+    return pb.JoinTournamentRequest(
+        tournament_id=tournament_id, join_code=join_code, name=name, kind=kind, max_games=max_games, stateless=stateless
     )
 
 
@@ -109,17 +151,42 @@ def attach(
     return command
 
 
-def called(call: Callable[[], Answered]) -> Answered:
-    """Runs one unary call, turning gRPC's error into ours."""
+def called(method: Callable[[Asked], Answered], request: Asked) -> Answered:
+    """Makes a unary call. Raises a gRPC error as `ChefsHatError`."""
     try:
-        return call()
+        return method(request)
     except grpc.RpcError as error:
         raise from_rpc_error(error) from error
 
 
-async def awaited(call: Awaitable[Answered]) -> Answered:
-    """Awaits one unary call, turning gRPC's error into ours."""
+async def awaited(method: Callable[[Asked], Awaitable[Answered]], request: Asked) -> Answered:
+    """Makes a unary call of asyncio. Raises a gRPC error as `ChefsHatError`."""
     try:
-        return await call
+        return await method(request)
     except grpc.RpcError as error:
         raise from_rpc_error(error) from error
+
+
+def pages(
+    method: Callable[[AskedPage], AnsweredPage], request: AskedPage, items: Callable[[AnsweredPage], Iterable[Item]]
+) -> Iterator[Item]:
+    """Yields the items of a listing. Fetches pages on demand."""
+    while True:
+        page = called(method, request)
+        yield from items(page)
+        request.page_token = page.next_page_token
+        if not request.page_token:
+            return
+
+
+async def async_pages(
+    method: Callable[[AskedPage], Awaitable[AnsweredPage]], request: AskedPage, items: Callable[[AnsweredPage], Iterable[Item]]
+) -> AsyncIterator[Item]:
+    """Yields the items of a listing under asyncio. Fetches pages on demand."""
+    while True:
+        page = await awaited(method, request)
+        for item in items(page):
+            yield item
+        request.page_token = page.next_page_token
+        if not request.page_token:
+            return

@@ -20,9 +20,9 @@ from chefshat.decision import Decision, SeatInfo
 from chefshat.errors import ChefsHatError, from_refused
 from chefshat.limits import MAX_ENTROPY_BYTES, pack, why_not_recorded
 from chefshat.participant import REQUEST_ID, MakeAgent, OnEntered, Participant
-from chefshat.place import Ask, SeatPlace
 from chefshat.requests import attach
 from chefshat.result import SeatResult, abort_reason_of, standings_of
+from chefshat.seat_session import Ask, SeatSession
 
 LOG = logging.getLogger("chefshat")
 
@@ -65,12 +65,12 @@ class PlaySession:
         """
         self._options = options or PlayOptions()
         # Seats whose games go on, by their request ids, which count from 1, so that 0 (not set) is no seat's.
-        self._places: dict[int, SeatPlace] = {}
+        self._places: dict[int, SeatSession] = {}
         # Of a seat that is done nothing is kept but its result, lest a long tournament keep all its agents.
         self._results: dict[int, tuple[str, SeatResult]] = {}
         self._added = 0
         self._participant: Participant | None = None
-        self._by_handle: dict[int, SeatPlace] = {}
+        self._by_handle: dict[int, SeatSession] = {}
         self._outbox: list[pb.SeatCommand] = []
         #: Grows whenever the game has moved on for a seat. A connection that brought none was of no use.
         self.progress = 0
@@ -89,9 +89,9 @@ class PlaySession:
         session._participant = Participant(ticket, make_agent, session._options.draw_entropy(), on_entered)
         return session
 
-    def _add(self, ticket: str, agent: Agent, entropy: bytes) -> SeatPlace:
+    def _add(self, ticket: str, agent: Agent, entropy: bytes) -> SeatSession:
         self._added += 1
-        place = SeatPlace(ticket, self._added, agent, entropy)
+        place = SeatSession(ticket, self._added, agent, entropy)
         self._places[place.request_id] = place
         return place
 
@@ -173,7 +173,7 @@ class PlaySession:
         """
         asks: list[Ask] = []
         # Seats that may have to say that they are here. What follows in the same response may say that this is known already.
-        away: list[SeatPlace] = []
+        away: list[SeatSession] = []
         by_handle = self._by_handle
         for update in response.updates:
             what = update.WhichOneof("update")
@@ -223,7 +223,7 @@ class PlaySession:
             return None
         return annotations
 
-    def _note_dropped(self, place: SeatPlace, decision_id: int, why: str) -> None:
+    def _note_dropped(self, place: SeatSession, decision_id: int, why: str) -> None:
         """Counts annotations that are not recorded. An agent that does it once does it often, so only the first is logged."""
         place.annotations_dropped += 1
         if place.annotations_dropped == 1:
@@ -234,13 +234,13 @@ class PlaySession:
                 why,
             )
 
-    def _resume(self, place: SeatPlace) -> None:
+    def _resume(self, place: SeatSession) -> None:
         """Says that the seat's agent plays itself again, if a substitute plays for it."""
         if place.substituted and place.handle is not None and not place.game_is_over:
             self._outbox.append(pb.SeatCommand(handle=place.handle, resume=pb.ResumeSeat()))
         place.substituted = False
 
-    def _send_answer(self, place: SeatPlace) -> None:
+    def _send_answer(self, place: SeatSession) -> None:
         if place.handle is not None and place.unacknowledged is not None:
             self._outbox.append(pb.SeatCommand(handle=place.handle, answer=place.unacknowledged))
 
@@ -256,7 +256,7 @@ class PlaySession:
         else:
             participant.told(update)
 
-    def _seated(self, participant: Participant, attached: pb.Attached) -> SeatPlace:
+    def _seated(self, participant: Participant, attached: pb.Attached) -> SeatSession:
         """The seat that the server has given a participant: one it has already, or a new one."""
         for place in self._places.values():
             if place.info is not None and place.info.game_id == attached.game_id:
@@ -266,7 +266,7 @@ class PlaySession:
                 return place
         return self._add_seat(participant, attached, attached.ticket)
 
-    def _add_seat(self, participant: Participant, attached: pb.Attached, ticket: str) -> SeatPlace:
+    def _add_seat(self, participant: Participant, attached: pb.Attached, ticket: str) -> SeatSession:
         agent = participant.make_agent(SeatInfo(attached.room_id, attached.game_id, attached.seat))
         return self._add(ticket, agent, participant.entropy)
 
@@ -305,7 +305,7 @@ class PlaySession:
         if place is not None:
             place.agent.on_refused(refused)
 
-    def _events(self, place: SeatPlace, batch: pb.EventBatch) -> None:
+    def _events(self, place: SeatSession, batch: pb.EventBatch) -> None:
         for event in batch.events:
             if event.sequence <= place.last_sequence:
                 continue  # Seen before a reconnection.
@@ -328,14 +328,14 @@ class PlaySession:
             if place.hears_events:
                 place.agent.on_event(event)
 
-    def _snapshot(self, place: SeatPlace, snapshot: pb.Snapshot) -> None:
+    def _snapshot(self, place: SeatSession, snapshot: pb.Snapshot) -> None:
         place.last_sequence = max(place.last_sequence, snapshot.next_sequence - 1)
         self.progress += 1
         if place.info is not None and snapshot.HasField("game_started"):
             place.info.game_started = snapshot.game_started
         place.agent.on_snapshot(snapshot)
 
-    def _decision(self, place: SeatPlace, request: pb.DecisionRequest, asks: list[Ask]) -> None:
+    def _decision(self, place: SeatSession, request: pb.DecisionRequest, asks: list[Ask]) -> None:
         decision_id = request.decision_id
         if place.unacknowledged is not None:
             if place.unacknowledged.decision_id == decision_id:
@@ -345,13 +345,13 @@ class PlaySession:
             return  # Told again while the agent is still thinking about it.
         self._ask(place, request, None, asks)
 
-    def _ask(self, place: SeatPlace, request: pb.DecisionRequest, attempts_left: int | None, asks: list[Ask]) -> None:
+    def _ask(self, place: SeatSession, request: pb.DecisionRequest, attempts_left: int | None, asks: list[Ask]) -> None:
         if place.info is None:
             return  # A seat without a handle is told nothing.
         place.asked = Decision(request, place.info, attempts_left)
         asks.append(Ask(place, place.asked))
 
-    def _result(self, place: SeatPlace, result: pb.AnswerResult, asks: list[Ask]) -> None:
+    def _result(self, place: SeatSession, result: pb.AnswerResult, asks: list[Ask]) -> None:
         answered = place.answered
         awaited = place.unacknowledged is not None and place.unacknowledged.decision_id == result.decision_id
         if awaited:
@@ -378,7 +378,7 @@ class PlaySession:
                 attempts_left = result.invalid_attempts_left if limited else None
                 self._ask(place, answered.request, attempts_left, asks)
 
-    def _detached(self, place: SeatPlace, handle: int, detached: pb.Detached) -> None:
+    def _detached(self, place: SeatSession, handle: int, detached: pb.Detached) -> None:
         del self._by_handle[handle]
         place.handle = None
         place.substituted = False
@@ -390,7 +390,7 @@ class PlaySession:
         else:
             self._finish(place, ChefsHatError("DETACHED", "the seat has left the stream"))
 
-    def _finish(self, place: SeatPlace, error: ChefsHatError | None = None) -> None:
+    def _finish(self, place: SeatSession, error: ChefsHatError | None = None) -> None:
         result = place.finish(error)
         del self._places[place.request_id]
         self._results[place.request_id] = (place.ticket, result)

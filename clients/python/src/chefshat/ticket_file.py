@@ -1,6 +1,6 @@
 """The file that keeps the ticket of a command's place: held by one command at a time, for as long as it has the place.
 
-What a place is and how it is come by is in `way_in`.
+What a place is and how it is come by is in `join_options`.
 """
 
 import contextlib

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from chefshat import way_in
+from chefshat import join_options
 
 EXAMPLES = """examples:
   python -m chefshat.learn ppo --out strong.safetensors --minutes 30 --seed 1
@@ -171,7 +171,7 @@ def _deep_q_games(command: argparse.ArgumentParser) -> None:
 def _play(command: argparse.ArgumentParser) -> None:
     command.add_argument("file", type=Path, help="the network")
     command.add_argument("--address", required=True, metavar="HOST:PORT", help="the server")
-    way_in.add_options(command)
+    join_options.add_options(command)
     command.add_argument("--name", help="name to show, 1 to 64 characters; not needed with a ticket")
     # Which of these go together is checked when all have been read.
     command.set_defaults(parser=command)

@@ -9,7 +9,7 @@ import argparse
 import numpy as np
 import numpy.typing as npt
 
-from chefshat import Agent, Client, Decision, SeatInfo, outcome, pb, way_in
+from chefshat import Agent, Client, Decision, SeatInfo, join_options, outcome, pb
 from chefshat.errors import exit_code
 from chefshat.learn import network
 from chefshat.learn.network import Network, NetworkFileError
@@ -73,12 +73,12 @@ class Row:
 
 def run(options: argparse.Namespace) -> int:
     """The command: plays one game in a room, or a tournament to its end, and prints the standings. Returns the exit code."""
-    (way,) = way_in.ways(options.parser, options)
+    (way,) = join_options.ways(options.parser, options)
 
     def play() -> int:
         net = network.load(options.file)
         with Client(options.address) as client:
-            played = way_in.take_part(client, way, lambda seat: NetworkAgent(net), check_rules=NetworkAgent(net).check_rules)
+            played = join_options.take_part(client, way, lambda seat: NetworkAgent(net), check_rules=NetworkAgent(net).check_rules)
             return outcome.report(played, as_json=options.json)
 
     return exit_code(play, NetworkFileError, RulesDoNotFit, as_json=options.json)

@@ -1,7 +1,6 @@
 """The command `python -m chefshat.players_club`: plays in rooms or a tournament with a player of the reference implementation.
 
-How the player is run and understood is in `process` and `agent`, how a place is come by in `way_in`; here are the arguments and
-what is printed.
+Here are the arguments and the output. Running and understanding the player is in `process` and `agent`, joining in `join_options`.
 """
 
 import argparse
@@ -12,12 +11,12 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from chefshat import Client, outcome, way_in
+from chefshat import Client, join_options, outcome
 from chefshat.errors import exit_code
+from chefshat.join_options import JoinOptions
 from chefshat.players_club.agent import ATTEMPTS, RulesDoNotFit, check_rules
 from chefshat.players_club.players import Players
 from chefshat.players_club.process import AgentError, AgentSpec
-from chefshat.way_in import WayIn
 
 EXAMPLE = """examples:
   python -m chefshat.players_club --server 127.0.0.1:50051 --code BCDF2345 \\
@@ -66,11 +65,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return exit_code(play_all, AgentError, RulesDoNotFit, as_json=options.json)
 
 
-def play(client: Client, players: Players, way: WayIn, *, as_json: bool) -> int:
+def play(client: Client, players: Players, way: JoinOptions, *, as_json: bool) -> int:
     """Plays the game of one room, or a tournament, and prints what came of it. Returns 0 if it was finished, else 1."""
     way = replace(way, name=way.name or players.name[:MAX_NAME])
     before = own_counts(players)
-    played = way_in.take_part(client, way, players.seat, check_rules=check_rules, prepare=players.prepare)
+    played = join_options.take_part(client, way, players.seat, check_rules=check_rules, prepare=players.prepare)
     own = {what: count - before[what] for what, count in own_counts(players).items()}
     words = "{failures} failures of the player, {replaced} decisions taken for it, {restarts} restarts".format(**own)
     if own["crowded"]:
@@ -93,7 +92,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--server", "--address", dest="address", required=True, help="the server, HOST:PORT")
-    way_in.add_options(parser, several_codes=True)
+    join_options.add_options(parser, several_codes=True)
     parser.add_argument("--agent", required=True, type=class_name, help="the player, module.path:Class")
     parser.add_argument("--python", default=sys.executable, help="the Python that has what the player needs (default: this one)")
     parser.add_argument(
@@ -117,7 +116,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--log", type=Path, metavar="FILE", help="a file to append what the player prints to (default: not kept)")
     parser.add_argument("--json", action="store_true", help="print one line of JSON a game or tournament instead of a table")
     options = parser.parse_args(arguments)
-    options.ways = way_in.ways(parser, options, needs_name=False)
+    options.ways = join_options.ways(parser, options, needs_name=False)
     return options
 
 

@@ -12,7 +12,7 @@ from chefshat.result import SeatResult, Standing
 class Ask(NamedTuple):
     """A decision to be put to an agent."""
 
-    place: "SeatPlace"
+    place: "SeatSession"
     decision: Decision
 
     @property
@@ -21,7 +21,7 @@ class Ask(NamedTuple):
         return self.place.agent
 
 
-class SeatPlace:
+class SeatSession:
     """One seat's part of a session; it outlives connections."""
 
     def __init__(self, ticket: str, request_id: int, agent: Agent, entropy: bytes) -> None:

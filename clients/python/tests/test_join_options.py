@@ -20,7 +20,7 @@ from waiting import LIMIT_S
 import chefshat
 from chefshat import ChefsHatError, RandomAgent, pb
 from chefshat import agent as command
-from chefshat.way_in import TICKET
+from chefshat.join_options import TICKET
 
 TESTS = Path(__file__).parent
 # Far longer than a test: who is killed comes back in time, however slow the machine is.

@@ -27,7 +27,7 @@ TICKET = "CHEFSHAT_TICKET"
 
 
 @dataclass(frozen=True)
-class WayIn:
+class JoinOptions:
     """How one place is come by: with `code`, `tournament` or `ticket`, or with what is in `ticket_file` and nothing else.
 
     Attributes:
@@ -79,7 +79,7 @@ def add_options(parser: argparse.ArgumentParser, *, several_codes: bool = False)
     )
 
 
-def ways(parser: argparse.ArgumentParser, options: argparse.Namespace, *, needs_name: bool = True) -> list[WayIn]:
+def ways(parser: argparse.ArgumentParser, options: argparse.Namespace, *, needs_name: bool = True) -> list[JoinOptions]:
     """The places that the options name. Ends the process with 2, as the parser does, where they do not go together."""
     codes = options.code if isinstance(options.code, list) else [options.code] if options.code is not None else []
     ticket = options.ticket or os.environ.get(TICKET)
@@ -108,7 +108,7 @@ def ways(parser: argparse.ArgumentParser, options: argparse.Namespace, *, needs_
         parser.error(f"--seat: seats are counted from 0, and no table has more than {MAX_SEATS}")
     if options.games is not None and not 1 <= options.games <= MAX_GAMES:
         parser.error(f"--games: a participant plays 1 to {MAX_GAMES} games at a time")
-    way = WayIn(
+    way = JoinOptions(
         tournament=options.tournament,
         ticket=ticket,
         ticket_file=options.ticket_file,
@@ -122,7 +122,7 @@ def ways(parser: argparse.ArgumentParser, options: argparse.Namespace, *, needs_
 
 def take_part(
     client: Client,
-    way: WayIn,
+    way: JoinOptions,
     make_agent: MakeAgent,
     *,
     check_rules: Callable[[pb.RuleSet], None] = lambda rules: None,
@@ -155,7 +155,7 @@ def take_part(
         return played
 
 
-def _play(client: Client, way: WayIn, ticket: str, make_agent: MakeAgent, prepare: Callable[[int], None] | None) -> Played:
+def _play(client: Client, way: JoinOptions, ticket: str, make_agent: MakeAgent, prepare: Callable[[int], None] | None) -> Played:
     """Plays in the place that the ticket is of, until its game or tournament is over."""
     entered: list[pb.Entered] = []
     prepared = prepare is None
@@ -198,7 +198,7 @@ def _play(client: Client, way: WayIn, ticket: str, make_agent: MakeAgent, prepar
     return Played(games, client.tournament_results(last.tournament_id), last.participant)
 
 
-def _kept(way: WayIn, file: TicketFile | None) -> str | None:
+def _kept(way: JoinOptions, file: TicketFile | None) -> str | None:
     """The ticket that is kept in the file; None if a place is to be taken first."""
     if file is None:
         return None
@@ -210,7 +210,7 @@ def _kept(way: WayIn, file: TicketFile | None) -> str | None:
     return None
 
 
-def _join(client: Client, way: WayIn, file: TicketFile | None, check_rules: Callable[[pb.RuleSet], None]) -> str:
+def _join(client: Client, way: JoinOptions, file: TicketFile | None, check_rules: Callable[[pb.RuleSet], None]) -> str:
     """Takes the place, and sees to it that the ticket is not lost with this process."""
     if way.tournament is not None:
         entrant = client.join_tournament(way.tournament, way.name, max_games=way.games, stateless=way.stateless)

@@ -1,0 +1,353 @@
+"""The calls of a client: rooms, records, spectating, tournaments, and the entry points for playing.
+
+The asyncio form in `_async` is the source; `tools/generate.py` generates the blocking form in `_sync` from it. How a stream of
+decisions is played differs between the two and is in `chefshat.aio` and `chefshat.client`.
+"""
+
+import asyncio
+import random
+from abc import ABC, abstractmethod
+from collections.abc import AsyncIterator, Mapping, Sequence
+from typing import Self
+
+import grpc
+
+from chefshat import pb, requests
+from chefshat._gen.chefshat.v1.play_service_pb2_grpc import PlayServiceStub
+from chefshat._gen.chefshat.v1.record_service_pb2_grpc import RecordServiceStub
+from chefshat._gen.chefshat.v1.room_service_pb2_grpc import RoomServiceStub
+from chefshat._gen.chefshat.v1.server_service_pb2_grpc import ServerServiceStub
+from chefshat._gen.chefshat.v1.spectator_service_pb2_grpc import SpectatorServiceStub
+from chefshat._gen.chefshat.v1.tournament_service_pb2_grpc import TournamentServiceStub
+from chefshat.agents import Agent
+from chefshat.backoff import Backoff
+from chefshat.errors import ChefsHatError, connection_lost, from_rpc_error
+from chefshat.participant import MakeAgent, OnEntered
+from chefshat.requests import async_channel, async_pages, awaited
+from chefshat.result import SeatResult
+from chefshat.session import PlayOptions, PlaySession
+
+# The final states of a tournament.
+OVER = (pb.TOURNAMENT_STATE_FINISHED, pb.TOURNAMENT_STATE_CLOSED)
+
+
+class AsyncCalls(ABC):
+    """A connection to a server, opened on first use. Close it, or use it as a context manager.
+
+    Every method raises `ChefsHatError`: with the server's reason if the server refuses, with "UNAVAILABLE" if it cannot be reached.
+    """
+
+    def __init__(self, address: str, *, backoff: Backoff | None = None) -> None:
+        """Sets the server.
+
+        Args:
+            address: "host:port", "http://host:port" or, for TLS, "https://host:port".
+            backoff: delays between connection attempts while playing or watching.
+        """
+        self._channel = async_channel(address)
+        self._backoff = backoff or Backoff()
+        self._rng = random.Random()
+        self._rooms = RoomServiceStub(self._channel)
+        self._play = PlayServiceStub(self._channel)
+        self._server = ServerServiceStub(self._channel)
+        self._records = RecordServiceStub(self._channel)
+        self._spectators = SpectatorServiceStub(self._channel)
+        self._tournaments = TournamentServiceStub(self._channel)
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        await self.close()
+
+    async def close(self) -> None:
+        """Closes the connection. Calls still in progress fail."""
+        await self._channel.close()
+
+    async def create_room(
+        self,
+        name: str = "",
+        *,
+        rules: pb.RuleSet | str | None = None,
+        seats: Sequence[requests.SeatSpec] = (),
+        policy: pb.RoomPolicy | None = None,
+        game_seed: bytes = b"",
+        branch: pb.BranchPoint | None = None,
+        hands: pb.ScriptedShift | None = None,
+        durability: pb.Durability.ValueType | None = None,
+    ) -> pb.CreateRoomResponse:
+        """Creates a room.
+
+        Args:
+            name: display name.
+            rules: the rule set or the name of a preset; None: the default rules.
+            seats: how each seat is filled, index = seat; empty: all seats are open. See `SeatSpec`.
+            policy: times and limits; unset fields take their defaults.
+            game_seed: 32 bytes that fix all deals, for experiments; empty: the server draws them.
+            branch: the point of a recorded game to continue from, under the rules of that game (leave out `rules`).
+            hands: the hands of the first Shift, instead of a deal.
+            durability: what the game survives, overriding the policy; default: a restart of the server.
+
+        Returns:
+            The room, its join code, and the token that closes it.
+        """
+        request = requests.create_room(name, rules, seats, policy, game_seed, branch, hands, durability)
+        return await awaited(self._rooms.CreateRoom, request)
+
+    async def join_room(
+        self,
+        join_code: str,
+        name: str,
+        *,
+        room_id: str = "",
+        kind: pb.ParticipantKind.ValueType = pb.PARTICIPANT_KIND_AGENT,
+        seat: int | None = None,
+    ) -> pb.JoinRoomResponse:
+        """Takes `seat`, or the first free seat that admits `kind`. Returns the room, the seat and its ticket."""
+        request = pb.JoinRoomRequest(room_id=room_id, join_code=join_code, name=name, kind=kind, seat=seat)
+        return await awaited(self._rooms.JoinRoom, request)
+
+    async def get_room(self, room_id: str) -> pb.Room:
+        """Returns the public view of a room."""
+        return (await awaited(self._rooms.GetRoom, pb.GetRoomRequest(room_id=room_id))).room
+
+    def list_rooms(self, state: pb.RoomState.ValueType = pb.ROOM_STATE_UNSPECIFIED) -> AsyncIterator[pb.Room]:
+        """Iterates over the server's rooms, newest first, optionally only those in one state. Fetches pages on demand."""
+        return async_pages(self._rooms.ListRooms, pb.ListRoomsRequest(state=state), lambda page: page.rooms)
+
+    async def leave_room(self, ticket: str) -> pb.Room:
+        """Gives up a seat before the game begins. The seat becomes free and the ticket invalid."""
+        return (await awaited(self._rooms.LeaveRoom, pb.LeaveRoomRequest(ticket=ticket))).room
+
+    async def close_room(self, room_id: str, owner_token: str) -> pb.Room:
+        """Closes a room with its creator's token. A running game is aborted."""
+        request = pb.CloseRoomRequest(room_id=room_id, owner_token=owner_token)
+        return (await awaited(self._rooms.CloseRoom, request)).room
+
+    async def server_info(self) -> pb.GetServerInfoResponse:
+        """Returns the server's version, limits, presets and built-in agents."""
+        return await awaited(self._server.GetServerInfo, pb.GetServerInfoRequest())
+
+    async def action_table(self, faces: int = 0) -> pb.GetActionTableResponse:
+        """Returns the text of every action for decks of `faces` faces (0: the default, 11)."""
+        return await awaited(self._server.GetActionTable, pb.GetActionTableRequest(faces=faces))
+
+    def records(self, wanted: pb.RecordFilter | None = None, *, newest_first: bool = False) -> AsyncIterator[pb.RecordSummary]:
+        """Iterates over the server's records that match a filter, oldest first by default. Fetches pages on demand."""
+        request = pb.ListRecordsRequest(filter=wanted, newest_first=newest_first)
+        return async_pages(self._records.ListRecords, request, lambda page: page.records)
+
+    async def record(self, game_id: str) -> AsyncIterator[pb.RecordLine]:
+        """Iterates over the lines of a finished game's record."""
+        call = self._records.GetRecord(pb.GetRecordRequest(game_id=game_id))
+        try:
+            async for response in call:
+                for line in response.lines:
+                    yield line
+        except grpc.RpcError as error:
+            raise from_rpc_error(error) from error
+        finally:
+            call.cancel()
+
+    async def watch(self, room_id: str, *, from_sequence: int = 0) -> AsyncIterator[pb.GameEvent]:
+        """Iterates over a room's public events until its game is over. Reconnects; each event arrives once and in order.
+
+        Args:
+            room_id: the room.
+            from_sequence: number of the first event wanted; 0: all.
+        """
+        last = max(from_sequence - 1, 0)
+        failures = 0
+        while True:
+            call = self._spectators.Watch(requests.watch_request(room_id, last))
+            try:
+                async for response in call:
+                    for event in response.events:
+                        last = event.sequence
+                        failures = 0
+                        yield event
+                return
+            except grpc.RpcError as error:
+                failures += 1
+                await self._wait(failures, from_rpc_error(error))
+            finally:
+                call.cancel()
+
+    async def create_tournament(self, settings: pb.TournamentSettings) -> pb.CreateTournamentResponse:
+        """Creates a tournament.
+
+        Args:
+            settings: a name and a format are required; other unset fields take their defaults.
+
+        Returns:
+            The tournament, its join code, and the token that starts and closes it.
+        """
+        return await awaited(self._tournaments.CreateTournament, pb.CreateTournamentRequest(settings=settings))
+
+    async def join_tournament(
+        self,
+        join_code: str,
+        name: str,
+        *,
+        tournament_id: str = "",
+        kind: pb.ParticipantKind.ValueType = pb.PARTICIPANT_KIND_AGENT,
+        max_games: int = 1,
+        stateless: bool = False,
+    ) -> pb.JoinTournamentResponse:
+        """Joins a tournament. The join code identifies it.
+
+        Args:
+            join_code: the tournament's join code.
+            name: display name, 1..=64 characters, unique among the participants.
+            tournament_id: if given, the join code must belong to this tournament.
+            kind: kind of the participant.
+            max_games: games it can play at a time, 1..=64.
+            stateless: declares that it remembers nothing from one game to the next.
+
+        Returns:
+            The tournament, the participant's number in it, and the ticket to play with.
+        """
+        request = requests.join_tournament(join_code, name, tournament_id, kind, max_games, stateless)
+        return await awaited(self._tournaments.JoinTournament, request)
+
+    async def start_tournament(self, tournament_id: str, owner_token: str) -> pb.Tournament:
+        """Starts a tournament with its creator's token."""
+        request = pb.StartTournamentRequest(tournament_id=tournament_id, owner_token=owner_token)
+        return (await awaited(self._tournaments.StartTournament, request)).tournament
+
+    async def close_tournament(self, tournament_id: str, owner_token: str) -> pb.Tournament:
+        """Closes a tournament with its creator's token. Running games are aborted; counted results remain."""
+        request = pb.CloseTournamentRequest(tournament_id=tournament_id, owner_token=owner_token)
+        return (await awaited(self._tournaments.CloseTournament, request)).tournament
+
+    async def get_tournament(self, tournament_id: str) -> pb.Tournament:
+        """Returns the public view of a tournament."""
+        request = pb.GetTournamentRequest(tournament_id=tournament_id)
+        return (await awaited(self._tournaments.GetTournament, request)).tournament
+
+    def list_tournaments(
+        self, state: pb.TournamentState.ValueType = pb.TOURNAMENT_STATE_UNSPECIFIED
+    ) -> AsyncIterator[pb.Tournament]:
+        """Iterates over the server's tournaments, newest first, without participants, optionally only those in one state.
+
+        Fetches pages on demand.
+        """
+        request = pb.ListTournamentsRequest(state=state)
+        return async_pages(self._tournaments.ListTournaments, request, lambda page: page.tournaments)
+
+    async def follow_tournament(self, tournament_id: str) -> AsyncIterator[pb.FollowTournamentResponse]:
+        """Iterates over the state of a tournament: now, and after every change, until it is over. Reconnects."""
+        failures = 0
+        while True:
+            call = self._tournaments.FollowTournament(pb.FollowTournamentRequest(tournament_id=tournament_id))
+            error = connection_lost("the server ended the stream before the tournament was over")
+            try:
+                async for report in call:
+                    failures = 0
+                    if not report.HasField("tournament"):
+                        continue  # A heartbeat.
+                    yield report
+                    if report.tournament.state in OVER:
+                        return
+            except grpc.RpcError as failure:
+                error = from_rpc_error(failure)
+            finally:
+                call.cancel()
+            failures += 1
+            await self._wait(failures, error)
+
+    async def tournament_results(self, tournament_id: str) -> pb.GetTournamentResultsResponse:
+        """Returns standings, ratings and the certainty of the order; final once the tournament is over."""
+        request = pb.GetTournamentResultsRequest(tournament_id=tournament_id)
+        return await awaited(self._tournaments.GetTournamentResults, request)
+
+    def tournament_games(self, tournament_id: str) -> AsyncIterator[pb.TournamentGame]:
+        """Iterates over the games of a tournament, in order. Fetches pages on demand."""
+        request = pb.ListTournamentGamesRequest(tournament_id=tournament_id)
+        return async_pages(self._tournaments.ListTournamentGames, request, lambda page: page.games)
+
+    async def leaderboard(
+        self,
+        kind: pb.ParticipantKind.ValueType = pb.PARTICIPANT_KIND_UNSPECIFIED,
+        *,
+        min_games: int = 0,
+        limit: int = 0,
+    ) -> pb.GetLeaderboardResponse:
+        """Returns the ratings of all players of rated games on the server, best first.
+
+        Args:
+            kind: only participants of this kind.
+            min_games: only participants with at least this many rated games.
+            limit: maximum number of entries, 1..=1000; 0: the server's default.
+        """
+        request = pb.GetLeaderboardRequest(kind=kind, min_games=min_games, limit=limit)
+        return await awaited(self._tournaments.GetLeaderboard, request)
+
+    async def express(self, ticket: str, expression: pb.Expression) -> None:
+        """Sends an expression of affect for the seat of the ticket. Allowed at any time."""
+        await awaited(self._play.Act, pb.ActRequest(ticket=ticket, express=expression))
+
+    async def resume_seat(self, ticket: str) -> None:
+        """Takes the seat back from its substitute."""
+        await awaited(self._play.Act, pb.ActRequest(ticket=ticket, resume=pb.ResumeSeat()))
+
+    async def play(self, agent: Agent, ticket: str, *, options: PlayOptions | None = None) -> SeatResult:
+        """Plays one seat until its game is over. Raises the seat's error if the seat is lost before that."""
+        result = (await self.play_many({ticket: agent}, options=options))[ticket]
+        result.raise_for_error()
+        return result
+
+    async def play_many(self, agents: Mapping[str, Agent], *, options: PlayOptions | None = None) -> dict[str, SeatResult]:
+        """Plays several seats, of any rooms, over one stream until all their games are over.
+
+        Reconnects after a lost connection, and the seats resume. In the blocking client the agents decide one after another, in a
+        thread of the stream; under asyncio, agents whose `decide` is a coroutine decide concurrently and continue during a
+        reconnection. Exceptions of agents propagate to the caller. A seat that is lost has its `error` set in its result; the
+        others continue.
+
+        Args:
+            agents: the agent for each ticket.
+            options: how the seats attach.
+
+        Returns:
+            The result of each ticket.
+        """
+        session = PlaySession(agents, options)
+        await self._play_session(session)
+        return session.results()
+
+    async def play_tournament(
+        self, ticket: str, make_agent: MakeAgent, *, options: PlayOptions | None = None, on_entered: OnEntered | None = None
+    ) -> list[SeatResult]:
+        """Takes part in a tournament until it is over, in up to as many games at a time as declared when joining.
+
+        The server seats the participant in its games; all are played over one stream. Reconnects after a lost connection, and the
+        agents resume their games. Agents decide as in `play_many`.
+
+        Args:
+            ticket: the participant's, from `join_tournament`. With the ticket of a seat, only that seat's game is played.
+            make_agent: called with the seat of every game the participant is seated in; returns the game's agent.
+            options: how the seats attach.
+            on_entered: called on each connection with the tournament and the participant's number; not for the ticket of a seat.
+
+        Returns:
+            The result of each game, in the order in which the participant was seated. Includes games that were aborted or that
+            could not be played to their end here (`error`); the server counts such a game as it ended, or calls it again.
+
+        Raises:
+            ChefsHatError: the ticket was refused, a newer connection replaced this one ("SUPERSEDED"), or the server stayed
+                unreachable. Agents of games that had ended by then have been notified (`on_game_over`).
+        """
+        session = PlaySession.of_participant(ticket, make_agent, options, on_entered)
+        await self._play_session(session)
+        return session.played()
+
+    @abstractmethod
+    async def _play_session(self, session: PlaySession) -> None:
+        """Plays until the session is done, reconnecting as needed."""
+
+    async def _wait(self, failures: int, error: ChefsHatError) -> None:
+        """Waits before the next connection attempt. Raises the error if there is to be none."""
+        if not error.retryable or failures > self._backoff.attempts:
+            raise error
+        await asyncio.sleep(self._backoff.delay_s(failures, self._rng))
