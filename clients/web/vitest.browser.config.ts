@@ -1,15 +1,16 @@
-// How the tests in tests/browser are run: each file starts a server (CHEFSHAT_BIN) with the built page and a browser, one file after the
-// other, so that they do not take the processor from each other.
+// Runs the tests in tests/browser. Each file starts a server (CHEFSHAT_BIN) that serves the built page, and a browser. The files run one
+// after the other, so that they do not compete for the processor.
 
 import { defineConfig } from "vitest/config";
+import { PATIENCE_MS } from "./tests/browser/patience";
 
 export default defineConfig({
   test: {
     environment: "node",
     include: ["tests/browser/**/*.test.ts"],
     fileParallelism: false,
-    testTimeout: 120_000,
-    hookTimeout: 60_000,
-    expect: { poll: { timeout: 30_000 } },
+    testTimeout: 5 * PATIENCE_MS,
+    hookTimeout: 5 * PATIENCE_MS,
+    expect: { poll: { timeout: PATIENCE_MS } },
   },
 });

@@ -1,14 +1,14 @@
-// The page that the address names, inside the frame that all pages have. Pages are loaded when they are first gone to, so that the
+// Draws the page that the address names inside the common frame. Each page's code is loaded on the first visit, so that the
 // lobby does not wait for the table.
 
 import type { ComponentType } from "preact";
-import { useEffect, useState } from "preact/hooks";
+import { useEffect, useLayoutEffect, useState } from "preact/hooks";
 import { t } from "./i18n";
 import { Layout } from "./parts/Layout";
 import { Notice } from "./parts/Notice";
-import { type Route, route, startRouter } from "./router";
+import { type Route, restoreScroll, route, startRouter } from "./router";
 
-/** What every page gets: its own route. */
+/** The props of every page. */
 export interface PageProps<Name extends Route["page"]> {
   route: Extract<Route, { page: Name }>;
 }
@@ -31,14 +31,14 @@ const pages: Pages = {
   unknown: async () => (await import("./parts/NotFound")).NotFound,
 };
 
-/** A page that has been loaded, with the route that it is for. Going to a page again begins it anew: so each has a number. */
+/** A loaded page and its route. Each visit has a number of its own, so that visiting a page again starts it afresh. */
 interface Shown {
   visit: number;
   route: Route;
   Page: ComponentType<{ route: Route }>;
 }
 
-/** Everything. */
+/** The root component. */
 export function App() {
   useEffect(startRouter, []);
   const here = route.value;
@@ -47,7 +47,7 @@ export function App() {
   useEffect(() => {
     let current = true;
     setFailed(false);
-    // The table of pages says that page and route belong together; TypeScript cannot follow that through an index.
+    // `pages` pairs each page with its route; TypeScript cannot follow that through an index.
     const load = pages[here.page] as () => Promise<Shown["Page"]>;
     load().then(
       (Page) => current && setShown((before) => ({ visit: (before?.visit ?? 0) + 1, route: here, Page })),
@@ -57,6 +57,7 @@ export function App() {
       current = false;
     };
   }, [here]);
+  useLayoutEffect(restoreScroll, [shown?.visit]);
   return (
     <Layout here={here}>
       {failed ? (

@@ -1,9 +1,9 @@
-// Which page an address names, and going to another one without loading the document again. Addresses have no "#": the server gives
-// the same document for all of them. The pages themselves are in app.tsx.
+// Maps addresses to pages and navigates between them without reloading the document. Addresses contain no "#": the server
+// returns the same document for every path. The pages themselves are in app.tsx.
 
 import { signal } from "@preact/signals";
 
-/** A page with what its address says. */
+/** A page and the parameters in its address. */
 export type Route =
   | { page: "lobby" }
   | { page: "new" }
@@ -19,7 +19,7 @@ export type Route =
   | { page: "tutorial" }
   | { page: "unknown" };
 
-/** The route of a path such as "/rooms/0123". */
+/** Parses a path such as "/rooms/0123". */
 export function routeOf(path: string): Route {
   const parts = path.split("/").filter((part) => part !== "");
   const [first, second] = parts.map(decoded);
@@ -60,7 +60,7 @@ export function routeOf(path: string): Route {
   }
 }
 
-/** The path of a route, the inverse of `routeOf`. */
+/** Formats the path of a route; the inverse of `routeOf`. */
 export function pathOf(route: Route): string {
   switch (route.page) {
     case "lobby":
@@ -86,45 +86,115 @@ export function pathOf(route: Route): string {
   }
 }
 
-/** Where the reader is. Read it in a component to be drawn again when it changes. */
+/** The current page. */
 export const route = signal<Route>(routeOf(location.pathname));
 
-/** Goes to a page; `replace` leaves no trace in the browser's history. */
+/** Goes to a page; `replace` adds no entry to the browser's history. */
 export function navigate(to: Route, options: { replace?: boolean; search?: string } = {}): void {
   const address = pathOf(to) + (options.search ?? "");
-  if (options.replace) history.replaceState(null, "", address);
-  else history.pushState(null, "", address);
-  arrive();
+  if (options.replace) history.replaceState(history.state, "", address);
+  else push(address);
+  arrive(0);
 }
 
-/** Follows the browser's buttons and links of this page. Gives a function that stops it. */
+/** Follows the browser's Back and Forward buttons and the links of this page. Returns a function that stops it. */
 export function startRouter(): () => void {
-  window.addEventListener("popstate", arrive);
-  document.addEventListener("click", follow);
+  // The browser would restore a scroll position before the page that it belongs to is drawn.
+  history.scrollRestoration = "manual";
+  history.replaceState({ ...history.state, entry }, "");
+  window.addEventListener("popstate", goBack);
+  window.addEventListener("pagehide", storeScrolls);
+  document.addEventListener("click", followLink);
   return () => {
-    window.removeEventListener("popstate", arrive);
-    document.removeEventListener("click", follow);
+    window.removeEventListener("popstate", goBack);
+    window.removeEventListener("pagehide", storeScrolls);
+    document.removeEventListener("click", followLink);
   };
 }
 
-function arrive(): void {
-  route.value = routeOf(location.pathname);
-  window.scrollTo(0, 0);
+/** Name of the scroll positions in the session's storage, where they outlast a reload. */
+const SCROLLS = "chefshat.scrolls";
+/** How far each page was scrolled when it was left, by the key of its entry in the browser's history. */
+const scrolls = new Map<string, number>(storedScrolls());
+/** Key of the current entry. */
+let entry: string = history.state?.entry ?? newEntry();
+/** Where the page that is being loaded is to be scrolled. */
+let wanted = scrolls.get(entry) ?? 0;
+
+function newEntry(): string {
+  return Math.random().toString(36).slice(2);
 }
 
-/** A plain click on a link of our own changes the page; with a modifier key, a target or another origin the browser does its work. */
-function follow(event: MouseEvent): void {
+function storedScrolls(): [string, number][] {
+  try {
+    return JSON.parse(sessionStorage.getItem(SCROLLS) ?? "[]");
+  } catch {
+    return [];
+  }
+}
+
+function push(address: string): void {
+  scrolls.set(entry, window.scrollY);
+  entry = newEntry();
+  history.pushState({ entry }, "", address);
+}
+
+function goBack({ state }: PopStateEvent): void {
+  scrolls.set(entry, window.scrollY);
+  entry = state?.entry ?? newEntry();
+  arrive(scrolls.get(entry) ?? 0);
+}
+
+/** Before a reload, or before another site is shown. */
+function storeScrolls(): void {
+  scrolls.set(entry, window.scrollY);
+  try {
+    sessionStorage.setItem(SCROLLS, JSON.stringify([...scrolls]));
+  } catch {
+    // Storage is blocked or full: a reload begins at the top.
+  }
+}
+
+function arrive(scroll: number): void {
+  stopRestoring();
+  wanted = scroll;
+  route.value = routeOf(location.pathname);
+}
+
+let stopRestoring = () => {};
+
+/** Scrolls a page that has just been drawn to where it was left: as soon as it is long enough, unless the reader acts before. */
+export function restoreScroll(): void {
+  stopRestoring();
+  window.scrollTo(0, wanted);
+  if (wanted === 0) return;
+  const acts = ["wheel", "touchmove", "keydown", "pointerdown"] as const;
+  const observer = new ResizeObserver(() => {
+    window.scrollTo(0, wanted);
+    if (Math.abs(window.scrollY - wanted) < 1) stopRestoring();
+  });
+  observer.observe(document.body);
+  stopRestoring = () => {
+    observer.disconnect();
+    for (const kind of acts) window.removeEventListener(kind, stopRestoring);
+    stopRestoring = () => {};
+  };
+  for (const kind of acts) window.addEventListener(kind, stopRestoring);
+}
+
+/** A plain click on a link to this origin changes the page; everything else is left to the browser. */
+function followLink(event: MouseEvent): void {
   if (event.defaultPrevented || event.button !== 0) return;
   if (event.metaKey || event.ctrlKey || event.shiftKey || event.altKey) return;
   const link = event.target instanceof Element ? event.target.closest("a") : null;
   if (!link || link.target || link.hasAttribute("download") || link.origin !== location.origin) return;
   if (link.pathname === location.pathname && link.hash) return;
   event.preventDefault();
-  history.pushState(null, "", link.href);
-  arrive();
+  push(link.href);
+  arrive(0);
 }
 
-/** A part of an address that is not well encoded stands for itself: it will name nothing. */
+/** Decodes a part of an address; a badly encoded part is returned as it is. */
 function decoded(part: string): string {
   try {
     return decodeURIComponent(part);

@@ -1,14 +1,19 @@
 // The model of the table against recorded games: after every event it must agree with what the server's engine wrote down, at every
 // decision with the mask of legal actions.
 
+import { create, type MessageInitShape } from "@bufbuild/protobuf";
 import { describe, expect, test } from "vitest";
 import { DecisionKind } from "../src/gen/chefshat/v1/decision_pb";
+import { GameEventSchema } from "../src/gen/chefshat/v1/event_pb";
+import { SnapshotSchema } from "../src/gen/chefshat/v1/play_service_pb";
 import type { DecisionRecord } from "../src/gen/chefshat/v1/record_pb";
-import { actionOf, legalActions, maskOf, moveOf, turnActions } from "../src/table/model/actions";
+import { Opening, type RuleSetSchema } from "../src/gen/chefshat/v1/rules_pb";
+import { actionOf, legalActions, type Move, maskOf, moveOf, turnActions } from "../src/table/model/actions";
 import { allows, demandOf, holds } from "../src/table/model/demand";
 import { lookupOf } from "../src/table/model/lookup";
 import { canPick, legalMoves, pickedMove, picksOf, reasonAgainst, toggle } from "../src/table/model/picking";
 import { applyEvent } from "../src/table/model/reduce";
+import { applySnapshot } from "../src/table/model/snapshot";
 import { emptyTable, type TableState } from "../src/table/model/state";
 import { RECORDS, recorded, seenBy } from "./record";
 
@@ -115,6 +120,65 @@ describe.each(RECORDS)("the recorded game %s", (name) => {
     expect(refused).toBeGreaterThan(50);
     expect(ways).toBeGreaterThan(50);
   });
+});
+
+/** A table on which the first turn of a Shift is open, with the first seat's hand known. */
+function opening(rules: MessageInitShape<typeof RuleSetSchema>, cards: number[]): TableState {
+  const events: NonNullable<MessageInitShape<typeof GameEventSchema>["kind"]>[] = [
+    { case: "gameStarted", value: { rules, seats: [{ seat: 0 }, { seat: 1 }] } },
+    { case: "shiftStarted", value: { shift: 1, hands: [{ seat: 0, cards, golden: true }] } },
+  ];
+  return events.reduce(
+    (table, kind) => applyEvent(table, create(GameEventSchema, { sequence: BigInt(table.nextSequence), kind })),
+    emptyTable(),
+  );
+}
+
+/** The table after the first or second seat plays elevens. */
+function playElevens(table: TableState, seat: number, quantity: number): TableState {
+  const kind = { case: "play", value: { seat, face: 11, quantity, cardsLeft: 1 } } as const;
+  return applyEvent(table, create(GameEventSchema, { sequence: BigInt(table.nextSequence), kind }));
+}
+
+const GOLDEN = { kind: "golden", face: 11 };
+const ELEVEN = { kind: "face", face: 11 };
+
+describe("the Golden card", () => {
+  test("opens the Shift under the standard opening, also where passing is allowed", () => {
+    const table = opening({ opening: Opening.GOLDEN, openingPass: true }, [11, 11, 11]);
+    expect(playElevens(table, 1, 2).board).toEqual([GOLDEN, ELEVEN]);
+    const played = playElevens(table, 0, 2);
+    expect([played.board, played.seats[0]?.hand]).toEqual([[GOLDEN, ELEVEN], [ELEVEN]]);
+  });
+
+  test("goes last of its face where any top face opens", () => {
+    const table = opening({ opening: Opening.ANY_TOP_FACE, openingPass: true }, [11, 11, 11]);
+    const played = playElevens(table, 0, 2);
+    expect([played.board, played.seats[0]?.hand]).toEqual([[ELEVEN, ELEVEN], [GOLDEN]]);
+    expect(playElevens(played, 0, 1).board).toEqual([GOLDEN]);
+    expect(playElevens(table, 1, 2).board).toEqual([ELEVEN, ELEVEN]);
+  });
+
+  test("is picked first where a play must include it, and last otherwise", () => {
+    const hand = opening({}, [11, 11]).seats[0]?.hand ?? [];
+    const moves: Move[] = [{ kind: "play", face: 11, quantity: 1, jokers: 0 }];
+    const picks = (index: number, goldenFirst: boolean) => [...toggle(hand, new Set(), index, moves, goldenFirst)];
+    expect(hand).toEqual([GOLDEN, ELEVEN]);
+    expect([picks(0, true), picks(1, true), picks(0, false), picks(1, false)]).toEqual([[0], [0], [1], [1]]);
+    expect([...toggle(hand, new Set(), 0, [{ kind: "give", face: 11 }])]).toEqual([1]);
+  });
+});
+
+test("a viewer who comes in the middle of a Shift does not take the next turn for its first", () => {
+  const observation = { shift: 1, pizza: 3, played: [0, 0, 2], passed: [0, 0], cardsLeft: [3, 3] };
+  const bytes = Object.fromEntries(
+    Object.entries(observation).map(([name, value]) => [name, Array.isArray(value) ? Uint8Array.from(value) : value]),
+  );
+  const gameStarted = { rules: {}, seats: [{ seat: 0 }, { seat: 1 }] };
+  const snapshot = create(SnapshotSchema, { nextSequence: 40n, gameStarted, observation: bytes });
+  const table = applySnapshot(emptyTable(), snapshot, undefined);
+  expect(demandOf(table)).toEqual({ kind: "anything" });
+  expect(playElevens(table, 1, 2).board).toEqual([ELEVEN, ELEVEN]);
 });
 
 test("an event that was seen before changes nothing", () => {

@@ -12,47 +12,41 @@ import { navigate } from "../router";
 import { closeRoom, giveBackSeat, hostedRoom } from "./seat";
 import "./leaving.css";
 
-interface LeavingProps {
+interface LeaveButtonProps {
   roomId: string;
-  /** Whether the game has begun. */
-  playing: boolean;
-  /** Whether others than built-in agents sit there besides. */
-  others: boolean;
-  policy: RoomPolicy | undefined;
-  /** As a sign beside the tools of the table, or as a button with words. */
+  /** An icon among the tools of the table, or a button with text. */
   look: "tool" | "button";
+  onClick: () => void;
 }
 
-/** The way out. */
-export function Leaving(props: LeavingProps) {
+/** Opens the dialog. */
+export function LeaveButton({ roomId, look, onClick }: LeaveButtonProps) {
   const words = t().lobby.leaving;
-  const [asked, setAsked] = useState(false);
-  return (
-    <>
-      {props.look === "tool" ? (
-        <button
-          type="button"
-          class="tool tool-leave"
-          aria-label={words.leave}
-          title={words.leave}
-          onClick={() => setAsked(true)}
-        >
-          <DoorSign />
-        </button>
-      ) : (
-        <p class="leaving">
-          <Button look="quiet" onClick={() => setAsked(true)}>
-            {hostedRoom(props.roomId) ? words.leaveOrClose : words.leave}
-          </Button>
-        </p>
-      )}
-      {asked && <Question {...props} onClose={() => setAsked(false)} />}
-    </>
+  return look === "tool" ? (
+    <button type="button" class="tool tool-leave" aria-label={words.leave} title={words.leave} onClick={onClick}>
+      <DoorSign />
+    </button>
+  ) : (
+    <p class="leaving">
+      <Button look="quiet" onClick={onClick}>
+        {hostedRoom(roomId) ? words.leaveOrClose : words.leave}
+      </Button>
+    </p>
   );
 }
 
-function Question(props: LeavingProps & { onClose: () => void }) {
-  const { roomId, playing, others, policy, onClose } = props;
+interface LeaveDialogProps {
+  roomId: string;
+  /** Whether the game has started. It may start while the dialog is open. */
+  playing: boolean;
+  /** Whether anyone but built-in agents sits there besides. */
+  others: boolean;
+  policy: RoomPolicy | undefined;
+  onClose: () => void;
+}
+
+/** The dialog. */
+export function LeaveDialog({ roomId, playing, others, policy, onClose }: LeaveDialogProps) {
   const words = t().lobby.leaving;
   const [busy, setBusy] = useState(false);
   const [fault, setFault] = useState("");

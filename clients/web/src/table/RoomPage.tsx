@@ -14,7 +14,7 @@ import { t } from "../i18n";
 import { Again } from "../lobby/Again";
 import { Doorway } from "../lobby/Doorway";
 import { HostInvite } from "../lobby/Invite";
-import { Leaving } from "../lobby/Leaving";
+import { LeaveButton, LeaveDialog } from "../lobby/Leaving";
 import { giveUpSeat, heldSeat, hostedRoom, leaveSeat } from "../lobby/seat";
 import { Button } from "../parts/Button";
 import { Faulty } from "../parts/Faulty";
@@ -110,6 +110,7 @@ function depart(table: TableState): void {
 function Held({ session }: { session: Session }) {
   const { table, own } = session.live.value;
   const { roomId } = table;
+  const [leaving, setLeaving] = useState(false);
   const banner = (
     <>
       <Banner session={session} />
@@ -118,30 +119,32 @@ function Held({ session }: { session: Session }) {
   );
   const waiting = table.phase === "waiting";
   const others = table.seats.some((seat) => isTaken(seat) && seat.seat !== own && seat.builtIn === "");
-  const leaving = (
-    <Leaving
-      roomId={roomId}
-      playing={!waiting}
-      others={others}
-      policy={table.policy}
-      look={waiting ? "button" : "tool"}
-    />
-  );
+  const leave = <LeaveButton roomId={roomId} look={waiting ? "button" : "tool"} onClick={() => setLeaving(true)} />;
   return (
     <>
       <Seated
         acting={session}
         banner={banner}
-        tools={!isOver(table) && leaving}
+        tools={!isOver(table) && leave}
         onward={!others && hostedRoom(roomId) && !studyIn(roomId) && <Again roomId={roomId} />}
         below={
           <>
             <HostInvite roomId={roomId} forAgents={table.seats.some(isForAgent)} />
-            {leaving}
+            {leave}
           </>
         }
       />
       {!waiting && <KeptLinks roomId={roomId} />}
+      {/* Outside of waiting room and table, so that it stays open when the one becomes the other. */}
+      {leaving && !isOver(table) && (
+        <LeaveDialog
+          roomId={roomId}
+          playing={!waiting}
+          others={others}
+          policy={table.policy}
+          onClose={() => setLeaving(false)}
+        />
+      )}
     </>
   );
 }

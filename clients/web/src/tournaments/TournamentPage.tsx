@@ -68,7 +68,7 @@ function Visited({ heard }: { heard: Heard }) {
   const open = tournament.state === TournamentState.OPEN;
   const arrive = () => {
     // The link has been followed: a reload goes on with the place that was taken.
-    history.replaceState(null, "", location.pathname + languageOf(location.search));
+    history.replaceState(history.state, "", location.pathname + languageOf(location.search));
     setHeld(heldPlace(tournamentId));
     setAnother(false);
   };

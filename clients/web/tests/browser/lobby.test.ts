@@ -74,8 +74,7 @@ test("what cannot be accepted is marked at its field, all of it at once", async 
   await page.getByLabel("Jokers").fill("0");
   await page.getByLabel("Points by place").fill("");
   await page.getByRole("button", { name: "Make the room" }).click();
-  await page.getByText("Something cannot be accepted").waitFor();
-  expect(await page.getByLabel("Faces").getAttribute("aria-invalid")).toBe("true");
+  await expect.poll(() => page.getByLabel("Faces").getAttribute("aria-invalid")).toBe("true");
 });
 
 test("a wrong code and an address that names nothing are answered in words", async () => {
@@ -140,6 +139,46 @@ test("who leaves before the game gives the seat back, during it is told what bec
   for (const { page } of [host, guest]) await page.getByText("The room was closed by its owner.").waitFor();
   expect(await host.page.getByRole("button", { name: "Leave…" }).count()).toBe(0);
   expect([...host.faults, ...guest.faults]).toEqual([]);
+});
+
+test("the dialog of leaving stays open when the game begins meanwhile", async () => {
+  const { code } = await newRoom(server, { seats: ["person", "person", "random", "random"] });
+  const [ada, ben] = [await person(browser), await person(browser)];
+  await sitDown(ada.page, server, code, "Ada");
+  await ada.page.getByRole("button", { name: "Leave…" }).click();
+  const dialog = ada.page.getByRole("dialog");
+  await dialog.getByText("Your seat becomes free for somebody else.").waitFor();
+  await sitDown(ben.page, server, code, "Ben");
+  await ada.page.locator("[data-decision], .table").first().waitFor();
+  await dialog.getByText("after 3 in a row that ran out, the agent “random” plays for you").waitFor();
+  await dialog.getByRole("button", { name: "Stay" }).click();
+  await dialog.waitFor({ state: "detached" });
+  expect([...ada.faults, ...ben.faults]).toEqual([]);
+});
+
+test("Back and Forward show a page scrolled as it was left", async () => {
+  for (let number = 1; number <= MANY; number += 1)
+    await newRoom(server, { seats: ["person", "person", "random", "random"] });
+  const { page, faults } = await person(browser, { viewport: { width: 390, height: 844 } });
+  await page.goto(`${server.url}/`);
+  const last = page.getByRole("button", { name: "Show more" }).first();
+  await last.scrollIntoViewIfNeeded();
+  const left = await page.evaluate(() => scrollY);
+  expect(left).toBeGreaterThan(844);
+  await page.evaluate(() => document.querySelector<HTMLElement>('nav a[href="/leaderboard"]')?.click());
+  const other = page.getByRole("heading", { level: 1, name: "Leaderboard" });
+  await other.waitFor();
+  expect(await page.evaluate(() => scrollY)).toBe(0);
+  await page.goBack();
+  await expect.poll(() => page.evaluate(() => scrollY)).toBe(left);
+  await page.goForward();
+  await other.waitFor();
+  await expect.poll(() => page.evaluate(() => scrollY)).toBe(0);
+  await page.goBack();
+  await expect.poll(() => page.evaluate(() => scrollY)).toBe(left);
+  await page.reload();
+  await expect.poll(() => page.evaluate(() => scrollY)).toBe(left);
+  expect(faults).toEqual([]);
 });
 
 test("a seat that is given back elsewhere leaves its page with the way in", async () => {

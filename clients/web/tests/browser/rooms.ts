@@ -44,7 +44,7 @@ export async function newRoom(
     name: wanted.name ?? "Friday evening",
     rules: { preset: "paper", faces: wanted.faces ?? 11, stop: { case: "targetShifts", value: wanted.shifts ?? 1 } },
     seats: wanted.seats.map((who) => ({ filledBy: filledBy(who) })),
-    policy: { decisionTimeMs: 600_000, paceMs: 0, spectators: true, ...wanted.policy },
+    policy: { decisionTimeMs: 3_600_000, paceMs: 0, spectators: true, ...wanted.policy },
     ...(wanted.hands && { start: { case: "scripted" as const, value: secondShift(wanted.hands, wanted.faces ?? 11) } }),
     ...(wanted.rated ? {} : { gameSeed: new Uint8Array(32).fill(7) }),
   });

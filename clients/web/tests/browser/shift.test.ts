@@ -42,7 +42,7 @@ test("a person plays a whole Shift with the keyboard alone, and hears every turn
   await page.keyboard.press("Enter");
   const taken = await playOn(page, byKeys, async (already) => {
     // From its second decision on a player is in the hand or at the buttons, never thrown back to the top of the page.
-    if (already > 0) expect((await focus(page)).label).not.toBe("");
+    if (already > 0) await expect.poll(async () => (await focus(page)).label).not.toBe("");
   });
   await expectEnd(page, roomId, taken);
   await expect.poll(() => heard.join(" ").match(/Your turn\./g)?.length).toBe(taken);
@@ -98,8 +98,10 @@ test("Food Fight and both gifts of the Chef are decided by keys, and no card goe
 
   const turn = await nextDecision(page, second);
   expect(turn).toBeDefined();
-  expect((await focus(page)).label).toBe(HAND);
-  const taken = await playOn(page, byKeys, async () => expect((await focus(page)).label).not.toBe(""));
+  await expect.poll(async () => (await focus(page)).label).toBe(HAND);
+  const taken = await playOn(page, byKeys, async () => {
+    await expect.poll(async () => (await focus(page)).label).not.toBe("");
+  });
   await expectEnd(page, roomId, 3 + taken);
   const record = await recordOf(server, await gameOf(server, roomId));
   const gave = record.flatMap(({ line }) =>

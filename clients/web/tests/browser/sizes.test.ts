@@ -70,8 +70,8 @@ test("a replay: its controls cover no seat of a desk's screen, and nothing is wi
     await page.setViewportSize({ width, height });
     for (let at = 0; at <= last; at += Math.ceil(last / 12)) {
       await slider.fill(String(at));
-      const wider = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
-      expect(wider, `${width} × ${height} at ${at}`).toBeLessThanOrEqual(0);
+      const wider = () => page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
+      await expect.poll(wider, { message: `${width} × ${height} at ${at}` }).toBeLessThanOrEqual(0);
     }
     // A smaller screen is scrolled.
     if (width < 1000) continue;

@@ -7,6 +7,7 @@ import { join } from "node:path";
 import { createInterface } from "node:readline";
 import { type Browser, type BrowserContextOptions, chromium, type Page } from "playwright-core";
 import { afterAll, beforeAll, vi } from "vitest";
+import { PATIENCE_MS } from "./patience";
 
 const CHROMIUM = process.env.CHEFSHAT_CHROMIUM ?? "/usr/bin/chromium";
 const FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"];
@@ -73,6 +74,7 @@ export async function person(
   options: BrowserContextOptions = {},
 ): Promise<{ page: Page; faults: string[] }> {
   const context = await browser.newContext({ locale: "en-GB", viewport: { width: 1280, height: 800 }, ...options });
+  context.setDefaultTimeout(PATIENCE_MS);
   const page = await context.newPage();
   const faults: string[] = [];
   page.on("pageerror", (error) => faults.push(error.message));
@@ -82,9 +84,9 @@ export async function person(
   return { page, faults };
 }
 
-/** Waits until something holds, for as long as a page's own waiting lasts. */
+/** Waits until a condition holds. */
 export async function until(holds: () => boolean | Promise<boolean>): Promise<void> {
-  await vi.waitUntil(holds, { timeout: 30_000 });
+  await vi.waitUntil(holds, { timeout: PATIENCE_MS });
 }
 
 async function serve(dataDir: string, listen: string): Promise<{ child: ChildProcess; address: string }> {

@@ -61,7 +61,7 @@ test("a participant's link leads from the consent to the table, and to the quest
   await page.getByRole("heading", { name: "Classifica", level: 1 }).waitFor();
   await page.locator(".table").waitFor({ state: "detached" });
   const seats = () => page.evaluate(() => Object.keys(localStorage).filter((key) => key.includes("seat.")));
-  await expect.poll(seats, { timeout: 10_000 }).toEqual([]);
+  await expect.poll(seats).toEqual([]);
   await page.goto(link.href);
   await page.getByRole("heading", { name: "Hai partecipato a questo studio" }).waitFor();
   expect(await after.getAttribute("href")).toBe(`https://forms.example/after?id=P07&room=${roomId}`);

@@ -17,7 +17,7 @@ async function newTournament(rounds: number, startWhenJoined = 4): Promise<{ id:
       format: TournamentFormat.SWISS,
       rounds,
       rules: { preset: "paper", stop: { case: "targetShifts", value: 1 } },
-      policy: { decisionTimeMs: 600_000, paceMs: 0, spectators: true },
+      policy: { decisionTimeMs: 3_600_000, paceMs: 0, spectators: true },
       builtInAgents: ["greedy", "random", "random"],
       startWhenJoined,
     },

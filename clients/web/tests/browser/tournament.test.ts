@@ -41,8 +41,8 @@ test("a tournament's page follows it from the first participant to the final sta
   const { standings } = await clientsOf(server).tournaments.getTournamentResults({
     tournamentId: tournament.tournamentId,
   });
-  const shown = await rows.evaluateAll((lines) => lines.map((line) => line.querySelector("td b")?.textContent));
-  expect(shown).toEqual(standings.map(({ score, games }) => (Number(score) / games).toFixed(2)));
+  const shown = () => rows.evaluateAll((lines) => lines.map((line) => line.querySelector("td b")?.textContent));
+  await expect.poll(shown).toEqual(standings.map(({ score, games }) => (Number(score) / games).toFixed(2)));
   expect(await rows.filter({ hasText: "Gustav" }).locator(".number").allInnerTexts()).toContain("3");
   expect(loads).toBe(1);
   expect(faults).toEqual([]);
@@ -93,10 +93,9 @@ test.each([
           })),
         );
       // The size is found anew when the style or the type comes after what is written.
-      await expect.poll(async () => (await measured())[0]?.size, { timeout: 15_000 }).toBeGreaterThan(least * height);
-      const places = await measured();
-      expect(places.length).toBe(id === over ? 2 : 1);
-      for (const place of places) expect(place).toMatchObject({ fits: true, written: true });
+      await expect.poll(async () => (await measured())[0]?.size).toBeGreaterThan(least * height);
+      const full = Array<object>(id === over ? 2 : 1).fill({ fits: true, written: true });
+      await expect.poll(measured).toMatchObject(full);
       expect(await page.evaluate(() => document.documentElement.scrollHeight <= window.innerHeight)).toBe(true);
     }
   }

@@ -91,17 +91,23 @@ export function missing(hand: readonly Card[], picked: Picked, moves: readonly M
 
 /**
  * What is picked after a click on a card. A picked card is put back. Another joins those picked where a legal move has them all; else it takes
- * their place, together with what the smallest legal move with it needs.
+ * their place, together with what the smallest legal move with it needs. `goldenFirst` where the play must include the Golden card.
  */
-export function toggle(hand: readonly Card[], picked: Picked, index: number, moves: readonly Move[]): Picked {
+export function toggle(
+  hand: readonly Card[],
+  picked: Picked,
+  index: number,
+  moves: readonly Move[],
+  goldenFirst = false,
+): Picked {
   const card = hand[index];
   if (picked.has(index)) return new Set([...picked].filter((other) => other !== index));
   if (!card || !canPick(hand, index, moves)) return picked;
   const joined = [...cardsAt(hand, picked), card];
   if (picked.size > 0 && moves.some((move) => includes(move, joined))) {
-    return withGolden(hand, new Set([...picked, index]), moves);
+    return inOrder(hand, new Set([...picked, index]), goldenFirst);
   }
-  return withGolden(hand, smallest(hand, index, moves), moves);
+  return inOrder(hand, smallest(hand, index, moves), goldenFirst);
 }
 
 /** The picks of the smallest legal move with a card, with the fewest jokers. A joker waits for the card it goes with. */
@@ -137,20 +143,15 @@ function pickFor(hand: readonly Card[], needs: Needs, first: readonly number[]):
   return picked;
 }
 
-/** Cards of the top face are one action with the Golden card or without: shown is what will go, the Golden card first at a turn. */
-function withGolden(hand: readonly Card[], picked: Picked, moves: readonly Move[]): Picked {
-  const golden = hand.findIndex((card) => card.kind === "golden");
-  const plain = hand.findIndex(
-    (card, index) => card.kind === "face" && card.face === faceOfGolden(hand) && picked.has(index),
-  );
-  const turn = moves.some((move) => move.kind === "play");
-  if (golden < 0 || plain < 0 || picked.has(golden) || !turn) return picked;
-  return new Set([...picked].map((index) => (index === plain ? golden : index)));
-}
-
-function faceOfGolden(hand: readonly Card[]): number | undefined {
-  const golden = hand.find((card) => card.kind === "golden");
-  return golden && faceOf(golden);
+/** Picks the Golden card before the plain cards of its face, or after them: a move names the face alone, and that is the order they go in. */
+function inOrder(hand: readonly Card[], picked: Picked, goldenFirst: boolean): Picked {
+  const golden = hand.findIndex(({ kind }) => kind === "golden");
+  const top = hand[golden] && faceOf(hand[golden]);
+  const isPlain = (card: Card) => card.kind === "face" && card.face === top;
+  const plain = hand.findIndex((card, index) => isPlain(card) && picked.has(index) === goldenFirst);
+  if (golden < 0 || plain < 0 || picked.has(golden) === goldenFirst) return picked;
+  const [from, to] = goldenFirst ? [plain, golden] : [golden, plain];
+  return new Set([...picked].map((index) => (index === from ? to : index)));
 }
 
 /** Why a card cannot be picked at a turn. */

@@ -3,8 +3,8 @@
 
 import type { GameEvent, Play } from "../../gen/chefshat/v1/event_pb";
 import { DecisionSource } from "../../gen/chefshat/v1/event_pb";
-import { PassScope, Role } from "../../gen/chefshat/v1/rules_pb";
-import { type Card, cardsFromNumbers, faceOf, playedCards, together, without } from "./cards";
+import { Opening, PassScope, Role } from "../../gen/chefshat/v1/rules_pb";
+import { type Card, cardsFromNumbers, countOf, faceOf, playedCards, together, without } from "./cards";
 import {
   type Cause,
   fromRules,
@@ -196,11 +196,8 @@ function exchanged(
 
 function play(table: TableState, { seat, face, quantity, jokers, cardsLeft, source }: Play): Change {
   const alone = face > table.faces;
-  // The opening with the Golden card is the only play of the top face that a Shift's first turn can be under that rule.
   const hand = table.seats[seat]?.hand;
-  const opens = table.turn === 1 && face === table.faces && !(table.rules?.openingPass ?? false);
-  const golden = opens && (hand ? hand.some((card) => card.kind === "golden") : table.rules?.opening !== 2);
-  const cards = playedCards(face, quantity, jokers, golden);
+  const cards = playedCards(face, quantity, jokers, face === table.faces && playsGolden(table, hand, quantity));
   const changed = withSeat(turnTaken(table), seat, {
     cardsLeft,
     hand: hand && without(hand, cards),
@@ -218,6 +215,13 @@ function play(table: TableState, { seat, face, quantity, jokers, cardsLeft, sour
     { ...after, next: nextAfter(after, seat) },
     { kind: "played", seat, cards, cause: CAUSES[source] },
   ];
+}
+
+/** Whether cards of the top face include the Golden card: it opens the Shift under the standard opening, and else goes last. */
+function playsGolden(table: TableState, hand: readonly Card[] | undefined, quantity: number): boolean {
+  if (table.turn === 1 && table.rules?.opening !== Opening.ANY_TOP_FACE) return true;
+  const held = hand?.some(({ kind }) => kind === "golden") ?? false;
+  return held && countOf(hand ?? [], table.faces) === quantity;
 }
 
 function turnTaken(table: TableState): TableState {

@@ -40,9 +40,15 @@ export function applyObservation(table: TableState, seen: Observation, own: numb
     ...table,
     seats,
     board,
+    turn: isFirstTurn(seen) ? 1 : Math.max(2, table.turn),
     phase: seen.pizza > 0 ? "pizza" : "dealt",
     shift: seen.shift,
     pizza: seen.pizza,
     played: Array.from(seen.played),
   };
+}
+
+/** Whether an observation is one of the Shift's first turn, or from before it. */
+function isFirstTurn({ pizza, played, passed }: Observation): boolean {
+  return pizza <= 1 && played.every((count) => count === 0) && passed.every((out) => out === 0);
 }

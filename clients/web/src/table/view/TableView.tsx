@@ -9,6 +9,7 @@ import { clockOfPeople } from "../../lobby/rooms";
 import type { Label } from "../expressions";
 import { actionOf } from "../model/actions";
 import type { Card } from "../model/cards";
+import { demandOf } from "../model/demand";
 import type { OpenDecision } from "../model/live";
 import { canPick, legalMoves, type Picked, pickedMove, reasonAgainst, toggle } from "../model/picking";
 import type { TableState } from "../model/state";
@@ -92,6 +93,8 @@ export function TableView(props: TableViewProps) {
   const next = props.next ?? (decision ? own : table.next);
   const kind = decision?.kind ?? props.nextKind;
 
+  const demand = demandOf(table);
+  const goldenFirst = demand.kind === "opening" && demand.golden;
   const special = decision?.kind === DecisionKind.SPECIAL_ACTION;
 
   const refusal = (index: number): string | undefined => {
@@ -173,7 +176,7 @@ export function TableView(props: TableViewProps) {
               label={handLabel}
               onToggle={(index) => {
                 setRemark("");
-                setPicked(toggle(hand, picked, index, moves));
+                setPicked(toggle(hand, picked, index, moves, goldenFirst));
               }}
               onPlay={() => {
                 if (!move || sending) return false;
