@@ -67,7 +67,7 @@ def test_the_standard_parameters_are_those_of_the_paper() -> None:
     assert (config.batch_size, config.memory_size, config.discount, config.learning_rate) == (32, 2000, 0.95, 0.001)
     assert (config.epsilon_start, config.epsilon_decay, config.epsilon_end) == (1.0, 0.995, 0.1)
     agents = deep_q.start(config, [1])
-    assert [weight.shape for weight, _ in agents.online] == [(1, 228, 128), (1, 128, 256), (1, 256, 200)]
+    assert [layer["kernel"].shape for layer in agents.online.values()] == [(1, 228, 128), (1, 128, 256), (1, 256, 200)]
 
 
 @pytest.mark.parametrize(
@@ -215,11 +215,11 @@ def test_the_target_is_the_online_network_of_the_last_multiple() -> None:
     online = []
     for number in range(8 + 24):
         agents = deep_q.learn(TINY, agents, ids(0), transitions(TINY, 1, number))
-        online.append(np.asarray(agents.online[0][0]))
+        online.append(np.asarray(agents.online["Dense_0"]["kernel"]))
     updates = int(agents.updates[0])
     assert updates == 25
     # The 20th update was the 27th transition.
-    assert np.array_equal(np.asarray(agents.target[0][0]), online[26])
+    assert np.array_equal(np.asarray(agents.target["Dense_0"]["kernel"]), online[26])
     assert not np.array_equal(online[26], online[-1])
 
 
@@ -290,12 +290,12 @@ def test_agents_begin_with_networks_that_were_learned_before() -> None:
     for number in range(12):
         agents = deep_q.learn(TINY, agents, ids(0, 1), transitions(TINY, 2, number))
     fresh = deep_q.start_from(TINY, agents.online, [3, 4])
-    assert np.array_equal(np.asarray(fresh.online[0][0]), np.asarray(agents.online[0][0]))
+    assert np.array_equal(np.asarray(fresh.online["Dense_0"]["kernel"]), np.asarray(agents.online["Dense_0"]["kernel"]))
     assert np.asarray(fresh.epsilon).tolist() == [1.0, 1.0]
     assert np.asarray(fresh.remembered).tolist() == [0, 0]
     # What learns on does not consume what it began with.
     deep_q.learn(TINY, fresh, ids(0, 1), transitions(TINY, 2, 0))
-    assert np.isfinite(np.asarray(agents.online[0][0])).all()
+    assert np.isfinite(np.asarray(agents.online["Dense_0"]["kernel"])).all()
     with pytest.raises(ValueError, match="2 networks and 1 seeds"):
         deep_q.start_from(TINY, agents.online, [3])
 

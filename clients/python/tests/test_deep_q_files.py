@@ -16,6 +16,7 @@ from chefshat.learn.deep_q import DeepQConfig
 from chefshat.learn.training_file import TrainingFileError
 
 RULES = pb.RuleSet(preset="paper", players=4, faces=11, jokers=2, target_shifts=250)
+DATA = Path(__file__).parent / "data"
 SMALL = DeepQConfig(hidden=(16, 8), batch_size=4, memory_size=16, target_every=3)
 
 
@@ -60,16 +61,25 @@ def test_a_network_decides_as_the_agent_does(training: Training, tmp_path: Path)
 
 
 def test_networks_from_files_are_begun_with(training: Training) -> None:
-    layers = checkpoint.stacked(SMALL, training.networks("both"))
-    for (weight, bias), (weight_before, bias_before) in zip(layers, training.agents.online, strict=True):
-        assert np.array_equal(np.asarray(weight), np.asarray(weight_before))
-        assert np.array_equal(np.asarray(bias), np.asarray(bias_before))
+    params = checkpoint.stacked(SMALL, training.networks("both"))
+    jax.tree.map(np.testing.assert_array_equal, params, training.agents.online)
     with pytest.raises(ValueError, match="have the sizes"):
         checkpoint.stacked(DeepQConfig(), training.networks("both"))
     other = dataclasses.replace(training.networks("both")[0].info, input="table")
     layer = network.Layer(np.zeros((200, other.input_width), np.float32), np.zeros(200, np.float32))
     with pytest.raises(ValueError, match="not a network of a Deep Q agent"):
         checkpoint.stacked(SMALL, [network.Network([layer], other)])
+
+
+def test_a_training_of_an_older_version_continues(tmp_path: Path) -> None:
+    """The files were written before the networks were modules of flax: a training, and a network of it one update later."""
+    old = checkpoint.load(DATA / "deep-q-1.training")
+    assert (old.config.hidden, old.opponents, old.seed, old.shifts) == ((4, 3), "greedy", 3, 17)
+    agents = deep_q.learn(old.config, old.agents, ids(0, 1), transitions(old.config, 2, 5))
+    learned = dataclasses.replace(old, agents=agents).networks("now")[1]
+    for now, then in zip(learned.layers, network.load(DATA / "deep-q-1.safetensors").layers, strict=True):
+        np.testing.assert_allclose(now.weight, then.weight, rtol=1e-5, atol=1e-6)
+        np.testing.assert_allclose(now.bias, then.bias, rtol=1e-5, atol=1e-6)
 
 
 def test_what_an_agent_does_not_see_has_no_weight() -> None:

@@ -5,6 +5,7 @@ import importlib.metadata
 from pathlib import Path
 from typing import Any
 
+import jax
 import numpy as np
 import pytest
 
@@ -89,9 +90,8 @@ def test_experiment_3_begins_with_the_networks_of_2(real_address: str, tmp_path:
     # A seed alone learns what it learns beside another.
     (tmp_path / "alone").mkdir()
     alone = rules.networks(Config(real_address, (2,), True, tmp_path / "alone"), quiet)
-    for (first, _), (second, _), (third, _) in zip(both, again, alone, strict=True):
-        assert np.array_equal(np.asarray(first), np.asarray(second))
-        assert np.array_equal(np.asarray(first[1]), np.asarray(third[0]))
+    jax.tree.map(np.testing.assert_array_equal, both, again)
+    jax.tree.map(lambda first, third: np.testing.assert_array_equal(first[1], third[0]), both, alone)
 
 
 @pytest.mark.server
@@ -103,7 +103,7 @@ def test_networks_made_otherwise_are_learned_again(real_address: str, tmp_path: 
     rules._keep(quick, Learned(agents, Played({}, {}, ruleset, 0)))
     monkeypatch.setattr(learning, "learn", never)
     kept = rules.networks(quick, Progress(show=False))
-    assert np.array_equal(np.asarray(kept[0][0]), np.asarray(agents.online[0][0]))
+    jax.tree.map(np.testing.assert_array_equal, kept, agents.online)
 
     def is_learned_again(config: Config = quick) -> bool:
         with pytest.raises(AssertionError, match="learned again"):

@@ -1,5 +1,6 @@
 """PPO: what it draws is always legal, it learns what pays, and it goes on from a file as if nothing had been."""
 
+import dataclasses
 from pathlib import Path
 
 import jax
@@ -9,12 +10,13 @@ import pytest
 from hand_made import hand_made
 
 from chefshat import pb
-from chefshat.learn import features, ppo, ppo_checkpoint
-from chefshat.learn.ppo import Hyper, Samples
+from chefshat.learn import features, network, ppo, ppo_checkpoint
+from chefshat.learn.ppo import Hyperparameters, Samples
 from chefshat.learn.ppo_checkpoint import Plan, Progress
 from chefshat.learn.training_file import TrainingFileError
 
-HYPER = Hyper(policy_widths=(16,), value_widths=(16,), minibatches=4)
+HYPER = Hyperparameters(policy_widths=(16,), value_widths=(16,), minibatches=4)
+DATA = Path(__file__).parent / "data"
 RULES = pb.RuleSet(players=4, faces=11, jokers=2)
 
 
@@ -101,6 +103,26 @@ def test_a_training_goes_on_from_a_file_as_if_nothing_had_been(tmp_path: Path) -
         np.testing.assert_array_equal(one, other)
 
 
+def test_a_training_of_an_older_version_continues(tmp_path: Path) -> None:
+    """The files were written before the networks were modules of flax: a training, and its network one epoch later."""
+    old = ppo_checkpoint.load(DATA / "ppo-1.training")
+    assert (old.plan.gae_lambda, old.plan.hyper.policy_widths, old.progress.decisions) == (0.9, (4, 4), 128)
+    case = hand_made(16, seed=4, players=2, faces=4, jokers=2)
+    size = features.dealt(2, 4, 2)
+    inputs = jnp.asarray(features.table(case, case.seats, case.kinds, case.mask_bits, players=2, faces=4, hand_size=size))
+    actions, log_probabilities, _ = ppo.act(old.learner.params, jax.random.key(1), inputs)
+    gains = jnp.linspace(-1, 1, 16)
+    samples = Samples(inputs, actions, log_probabilities, gains, gains, jnp.ones(16))
+    learner, _ = ppo.learn(old.learner, samples, jnp.float32(1e-2), jnp.float32(0.01), old.plan.hyper)
+    learned = dataclasses.replace(old, learner=ppo.Learner(*learner))
+    for now, then in zip(learned.network("now").layers, network.load(DATA / "ppo-1.safetensors").layers, strict=True):
+        np.testing.assert_allclose(now.weight, then.weight, rtol=1e-5, atol=1e-6)
+        np.testing.assert_allclose(now.bias, then.bias, rtol=1e-5, atol=1e-6)
+    ppo_checkpoint.save(tmp_path / "t", learned)
+    again = ppo_checkpoint.load(tmp_path / "t")
+    jax.tree.map(np.testing.assert_array_equal, again.learner.params, learned.learner.params)
+
+
 def test_what_is_no_training_is_refused_in_words(tmp_path: Path) -> None:
     path = tmp_path / "t"
     path.write_bytes(b"cards")
@@ -112,10 +134,10 @@ def test_what_is_no_training_is_refused_in_words(tmp_path: Path) -> None:
 
 def test_the_network_is_the_policy() -> None:
     training = ppo_checkpoint.begin(Plan(hyper=HYPER), 7, RULES, "a command")
-    network = training.network("a name")
+    policy = training.network("a name")
     case = hand_made(20, seed=5)
-    inputs = network.inputs(case, case.seats, case.kinds, case.mask_bits)
-    chosen = network.actions(case, case.seats, case.kinds, case.mask_bits)
+    inputs = policy.inputs(case, case.seats, case.kinds, case.mask_bits)
+    chosen = policy.actions(case, case.seats, case.kinds, case.mask_bits)
     logits = np.asarray(ppo._logits(training.learner.params, jnp.asarray(inputs)))
     np.testing.assert_array_equal(chosen, logits.argmax(axis=1))
-    assert network.info.trained_by == "a command"
+    assert policy.info.trained_by == "a command"

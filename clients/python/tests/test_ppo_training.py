@@ -10,7 +10,7 @@ import pytest
 from chefshat.learn import __main__ as command
 from chefshat.learn import network, ppo_checkpoint
 from chefshat.learn.evaluation import evaluate
-from chefshat.learn.ppo import Hyper
+from chefshat.learn.ppo import Hyperparameters
 from chefshat.learn.ppo_checkpoint import Plan
 from chefshat.learn.ppo_training import Trainer
 from chefshat.learn.runs import full_rules
@@ -18,7 +18,7 @@ from chefshat.learn.runs import full_rules
 pytestmark = pytest.mark.server
 
 SMALL = {"players": 2, "faces": 4}
-PLAN = Plan(games=64, steps=32, learning_rate=2e-3, hyper=Hyper(policy_widths=(32,), value_widths=(32,), minibatches=4))
+PLAN = Plan(games=64, steps=32, learning_rate=2e-3, hyper=Hyperparameters(policy_widths=(32,), value_widths=(32,), minibatches=4))
 
 
 def test_a_small_game_is_learned(real_address: str) -> None:

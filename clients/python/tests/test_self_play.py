@@ -32,7 +32,7 @@ def made_up(seed: int) -> Rollout:
     )
 
 
-def plain(rollout: Rollout, discount: float, trace: float) -> dict[tuple[int, int], float]:
+def plain(rollout: Rollout, discount: float, gae_lambda: float) -> dict[tuple[int, int], float]:
     """The advantage of every decision of which it is known, by step and game."""
     # For each game and seat what happened to it, in order: its decisions (step) and the rewards of its ends (None, reward).
     stories: dict[tuple[int, int], list[int | float]] = defaultdict(list)
@@ -56,7 +56,7 @@ def plain(rollout: Rollout, discount: float, trace: float) -> dict[tuple[int, in
             if what is not None and values:
                 deltas.append(what - values[-1])
             for number in range(len(deltas)):
-                found[chain[number], game] = sum((discount * trace) ** k * delta for k, delta in enumerate(deltas[number:]))
+                found[chain[number], game] = sum((discount * gae_lambda) ** k * delta for k, delta in enumerate(deltas[number:]))
             chain = []
     return found
 
@@ -64,7 +64,7 @@ def plain(rollout: Rollout, discount: float, trace: float) -> dict[tuple[int, in
 @pytest.mark.parametrize("seed", range(5))
 def test_advantages_are_those_of_a_plain_loop(seed: int) -> None:
     rollout = made_up(seed)
-    found, known = advantages(rollout, PLAYERS, discount=0.9, trace=0.8)
+    found, known = advantages(rollout, PLAYERS, discount=0.9, gae_lambda=0.8)
     expected = plain(rollout, 0.9, 0.8)
     assert len(expected) > 100
     assert {(int(step), int(game)) for step, game in np.argwhere(known)} == set(expected)

@@ -10,6 +10,7 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import jax
 import numpy as np
 import numpy.typing as npt
 from google.protobuf.json_format import MessageToDict
@@ -18,8 +19,9 @@ from chefshat.experiments import paper, stats
 from chefshat.experiments.progress import Progress
 from chefshat.experiments.results import Config, Estimate, Line
 from chefshat.learn import deep_q, deep_q_training
-from chefshat.learn.deep_q import Agents, DeepQConfig, Layers
+from chefshat.learn.deep_q import Agents, DeepQConfig
 from chefshat.learn.deep_q_training import Played
+from chefshat.learn.mlp import Params
 from chefshat.vector import VectorEnv
 
 QUICK_SHIFTS = 2
@@ -96,7 +98,7 @@ def learn(
     agent: DeepQConfig,
     rewards: str,
     seats: Sequence[int],
-    begin_with: Layers | None = None,
+    begin_with: Params | None = None,
     idle_pass_is_wrong: bool = False,
 ) -> Learned:
     """Lets agents learn for 250 Shifts (a few if quick), in a game for each seed of the config.
@@ -117,7 +119,7 @@ def learn(
         agents = deep_q.start(agent, seeds)
     else:
         copies = np.repeat(np.arange(len(config.seeds)), len(seats))
-        agents = deep_q.start_from(agent, tuple((weight[copies], bias[copies]) for weight, bias in begin_with), seeds)
+        agents = deep_q.start_from(agent, jax.tree.map(lambda leaf: leaf[copies], begin_with), seeds)
     env = VectorEnv(
         config.address,
         len(config.seeds),

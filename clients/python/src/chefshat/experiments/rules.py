@@ -28,7 +28,8 @@ from chefshat.experiments.progress import Progress
 from chefshat.experiments.results import Cell, Config, Estimate, Figure, Level, Panel, Result, Table
 from chefshat.learn import checkpoint, network
 from chefshat.learn.checkpoint import Training
-from chefshat.learn.deep_q import DeepQConfig, Layers
+from chefshat.learn.deep_q import DeepQConfig
+from chefshat.learn.mlp import Params
 from chefshat.learn.network import NetworkFileError
 
 # The learning agent's seat; the paper calls it Player 1.
@@ -73,7 +74,7 @@ def run(config: Config, progress: Progress) -> Result:
     )
 
 
-def networks(config: Config, progress: Progress) -> Layers:
+def networks(config: Config, progress: Progress) -> Params:
     """The networks of this experiment, one for each seed.
 
     Those in the folder, if they were learned with these seeds and settings and by this version; else they are learned now.

@@ -112,7 +112,7 @@ def _ppo(command: argparse.ArgumentParser) -> None:
     plan.add_argument("--value-width", type=_count, default=128, help="units of each of the value network's two hidden layers")
     plan.add_argument("--learning-rate", type=_above_zero, default=5e-4, help="at the beginning")
     plan.add_argument("--entropy-bonus", type=float, default=0.01, help="at the beginning")
-    plan.add_argument("--trace", type=float, default=0.95, help="lambda of the advantage estimation")
+    plan.add_argument("--gae-lambda", "--trace", type=float, default=0.95, help="lambda of the advantage estimation")
     plan.add_argument("--clip", type=_above_zero, default=0.2, help="how far probabilities may move")
 
 

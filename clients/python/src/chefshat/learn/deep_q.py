@@ -1,20 +1,20 @@
 """The Deep Q agent of the 2020 paper, as pure functions over a stack of independent agents that are trained in lock-step.
 
 Here are its hyper-parameters, the state of the agents, and the functions `start`, `act` and `learn`. Every array of the state has
-a leading axis, one entry an agent; agents share nothing, so a stack of one is simply one agent, and an agent in a stack learns what
-it would have learned alone. Playing games is not here (see `deep_q_training`), nor are files (`checkpoint`).
+a leading axis, one entry an agent. Agents share nothing: an agent in a stack learns what it would have learned alone. Playing games
+is in `deep_q_training`, files are in `checkpoint`.
 
 Where the paper is silent, this is decided:
 
-- An agent learns after every transition, wrong actions included, once its memory holds a batch: one batch of `batch_size`
+- An agent learns after every transition, illegal actions included, once its memory holds a batch: one batch of `batch_size`
   transitions, drawn uniformly with replacement, and one step of Adam.
-- Epsilon is multiplied with `epsilon_decay` after each such update, so it reaches 0.1 after 460 of them: in the first Shifts.
-  Decayed once a game it would still be 0.78 at the 50th game, from which on the paper's agent is said to win always. The agent
+- Epsilon is multiplied by `epsilon_decay` after each such update, so it reaches 0.1 after 460 of them, within the first Shifts.
+  Decayed once a game it would still be 0.78 at the 50th game, from which on the paper reports that its agent always wins. The agent
   first published with the paper's figures also decays with every update.
-- The target network is the online network as it was after the last update whose number is a multiple of `target_every`.
-- The loss is the mean squared error of the chosen actions. What an action is aimed at may lie outside of -1..=1, the range of the
-  outputs, since rewards of 1 discounted by 0.95 add up to 20; it is not cut off.
-- Actions are compared before the tanh, which changes no order but tells apart what single precision rounds to the same 1.
+- The target network is the online network as of the last update whose number is a multiple of `target_every`.
+- The loss is the mean squared error of the chosen actions. Targets may lie outside of -1..=1, the range of the outputs, since
+  rewards of 1 discounted by 0.95 add up to 20; they are not clipped.
+- Actions are compared before the tanh, which preserves order but maps values far from 0 to the same 1 in single precision.
 """
 
 import dataclasses
@@ -22,40 +22,39 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, partial
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import optax
+from jax import Array
 from jax.typing import ArrayLike
 
-Array: TypeAlias = jax.Array
-# Weights (agents, in, out) and biases (agents, out), from the input on.
-Layers: TypeAlias = tuple[tuple[Array, Array], ...]
+from chefshat.learn.mlp import Mlp, Params
 
 
 @dataclass(frozen=True)
 class DeepQConfig:
-    """The hyper-parameters; the standard values are those of the paper's table. A value out of its range raises ValueError.
+    """The hyper-parameters; the defaults are those of the paper's table. Raises ValueError for a value out of range.
 
     Attributes:
-        inputs: numbers an agent sees, 1..=4096; the classic vector of the standard deck has 228.
-        outputs: actions, 2..=1024; the turns of the standard deck are 200.
-        hidden: neurons of each hidden layer (ReLU), 1 to 8 layers of 1..=4096. The output layer is tanh.
+        inputs: width of an observation, 1..=4096; the classic vector of the default deck has 228.
+        outputs: actions, 2..=1024; a turn of the default deck has 200.
+        hidden: units of each hidden layer (ReLU), 1 to 8 layers of 1..=4096. The output layer is tanh.
         batch_size: transitions in one update, 1..=4096.
-        memory_size: transitions that are remembered, `batch_size`..=1,000,000; the oldest is forgotten first.
+        memory_size: capacity of the replay memory, `batch_size`..=1,000,000 transitions; the oldest is dropped first.
         discount: of the next decision's value, 0..=1.
         learning_rate: of Adam, above 0 and at most 1.
-        epsilon_start: chance to explore at the beginning, 0..=1.
-        epsilon_decay: factor of that chance after every update, 0..=1.
-        epsilon_end: where it stops, 0..=1.
+        epsilon_start: initial probability of exploring, 0..=1.
+        epsilon_decay: factor of that probability after every update, 0..=1.
+        epsilon_end: its lower bound, 0..=1.
         target_every: updates between two copies of the online network to the target network, 1..=1,000,000.
-        double: whether the online network says which next action the target network values (double Q-learning).
-        mask: whether illegal actions are left out: in exploring, in exploiting and in the value of the next decision.
-        wrong_limit: wrong actions at one decision after which a legal one is taken by chance, 0..=1,000,000; 0: any number of them.
-        see_mask: whether the agent sees the legal actions. If not, the last `outputs` inputs count as 0 for it, which leaves the
-            board and the hand.
+        double: whether the online network selects the next action that the target network evaluates (double Q-learning).
+        mask: whether illegal actions are excluded: in exploring, in exploiting and in the value of the next decision.
+        wrong_limit: illegal actions at one decision after which a random legal one is taken, 0..=1,000,000; 0: unlimited.
+        see_mask: whether the agent sees the legal actions. If not, the last `outputs` inputs are 0, which leaves the board and the
+            hand.
     """
 
     inputs: int = 228
@@ -78,8 +77,8 @@ class DeepQConfig:
         _within("inputs", self.inputs, 1, 4096)
         _within("outputs", self.outputs, 2, 1024)
         _within("the number of hidden layers", len(self.hidden), 1, 8)
-        for neurons in self.hidden:
-            _within("hidden", neurons, 1, 4096)
+        for units in self.hidden:
+            _within("hidden", units, 1, 4096)
         _within("batch_size", self.batch_size, 1, 4096)
         _within("memory_size", self.memory_size, self.batch_size, 1_000_000)
         for name in ("discount", "epsilon_start", "epsilon_decay", "epsilon_end"):
@@ -90,12 +89,17 @@ class DeepQConfig:
         if not self.see_mask and self.inputs <= self.outputs:
             raise ValueError(f"without see_mask, inputs must be more than outputs ({self.outputs}), not {self.inputs}")
 
+    @property
+    def network(self) -> Mlp:
+        """The network of one agent, before its tanh."""
+        return Mlp((*self.hidden, self.outputs))
 
-class Numbers(NamedTuple):
-    """Those hyper-parameters that neither shapes nor steps depend on: what is compiled for one set of them serves all others.
 
-    They are numpy numbers under the names of `DeepQConfig`. The discount is not among them: compiled in, it is rounded otherwise,
-    and the networks of the experiments in docs/experiments.md would be others.
+class Hyperparameters(NamedTuple):
+    """The hyper-parameters that are passed to compiled functions as numbers, so that one compilation serves all their values.
+
+    The names are those of `DeepQConfig`. The discount is not among them: compiled in, it is rounded differently, and the
+    experiments in docs/experiments.md would give other networks.
     """
 
     learning_rate: np.float32
@@ -106,15 +110,15 @@ class Numbers(NamedTuple):
 
 
 class Transitions(NamedTuple):
-    """What followed a decision, one row an agent. Rows whose agent has nothing to learn are ignored.
+    """What followed a decision, one row an agent. Rows of agents that have nothing to learn are ignored.
 
     Attributes:
-        states: (rows, inputs) f32, what was seen.
-        actions: (rows,) i32, what was done.
+        states: (rows, inputs) f32, the observation.
+        actions: (rows,) i32, the action taken.
         rewards: (rows,) f32.
-        next_states: (rows, inputs) f32, what was seen at the agent's next decision.
+        next_states: (rows, inputs) f32, the observation at the agent's next decision.
         next_masks: (rows, outputs) bool, the legal actions there.
-        done: (rows,) bool, the episode ended instead, and the next state means nothing.
+        done: (rows,) bool, whether the episode ended instead; the next state is then ignored.
     """
 
     states: Array
@@ -126,21 +130,21 @@ class Transitions(NamedTuple):
 
 
 class Agents(NamedTuple):
-    """The state of all agents. `learn` consumes it: use what it returns, not what it was given.
+    """The state of all agents. `learn` consumes it: use the state it returns.
 
     Attributes:
         online: the network that decides.
-        target: the network that values next decisions.
+        target: the network that evaluates next decisions.
         optimiser: Adam's state.
-        memory: transitions (agents, memory_size, ...), a ring.
-        remembered: (agents,) i32, transitions ever remembered; the next one goes to slot `remembered % memory_size`.
-        epsilon: (agents,) f32, chance to explore.
+        memory: transitions (agents, memory_size, ...), a ring buffer.
+        remembered: (agents,) i32, transitions stored so far; the next one goes to slot `remembered % memory_size`.
+        epsilon: (agents,) f32, probability of exploring.
         updates: (agents,) i32, updates so far.
-        keys: (agents,) keys of each agent's own chance.
+        keys: (agents,) the random keys.
     """
 
-    online: Layers
-    target: Layers
+    online: Params
+    target: Params
     optimiser: optax.OptState
     memory: Transitions
     remembered: Array
@@ -149,85 +153,88 @@ class Agents(NamedTuple):
     keys: Array
 
 
+# What one update changes.
+LEARNED = ("online", "target", "optimiser", "epsilon", "updates", "keys")
+
+
 def start(config: DeepQConfig, seeds: Sequence[int]) -> Agents:
-    """New agents, one a seed: weights drawn uniformly as by Glorot and Bengio, biases 0, memories empty."""
-    agents: Agents = _started(_shapes(config), _keys(seeds))
+    """Returns new agents, one a seed: Glorot-uniform weights, biases 0, empty memories."""
+    agents: Agents = _init(_shapes(config), _keys(seeds))
     return _exploring(config, agents)
 
 
-def start_from(config: DeepQConfig, online: Layers, seeds: Sequence[int]) -> Agents:
-    """New agents that begin with given networks, stacked, and with memory, optimiser and exploration as at a start."""
-    if len(seeds) != len(online[0][0]):
-        raise ValueError(f"{len(online[0][0])} networks and {len(seeds)} seeds: every agent needs one of each")
-    agents: Agents = _started_from(_shapes(config), online, _keys(seeds))
+def start_from(config: DeepQConfig, online: Params, seeds: Sequence[int]) -> Agents:
+    """Returns new agents with given networks (stacked), and with new memories, optimisers and exploration."""
+    networks = len(online["Dense_0"]["bias"])
+    if len(seeds) != networks:
+        raise ValueError(f"{networks} networks and {len(seeds)} seeds: every agent needs one of each")
+    agents: Agents = _init_from(_shapes(config), online, _keys(seeds))
     return _exploring(config, agents)
 
 
-def outputs(config: DeepQConfig, layers: Layers, states: Array) -> Array:
-    """What one network says of states (rows, inputs) before its tanh: (rows, outputs)."""
-    values = states
+def outputs(config: DeepQConfig, params: Params, states: Array) -> Array:
+    """Returns one network's outputs before the tanh, (rows, outputs), for states (rows, inputs)."""
     if not config.see_mask:
-        values = jnp.where(jnp.arange(config.inputs) < config.inputs - config.outputs, values, 0.0)
-    for weight, bias in layers[:-1]:
-        values = jax.nn.relu(values @ weight + bias)
-    weight, bias = layers[-1]
-    return values @ weight + bias
+        states = jnp.where(jnp.arange(config.inputs) < config.inputs - config.outputs, states, 0.0)
+    return config.network.of(params, states)
 
 
 def act(
     config: DeepQConfig, agents: Agents, ids: ArrayLike, states: Array, masks: Array, attempts: Array, *, explore: bool = True
 ) -> tuple[Array, Array]:
-    """One decision for each row.
+    """Takes one decision for each row.
 
     Args:
         config: the hyper-parameters.
         agents: all agents.
-        ids: (rows,) i32, the row's agent; each agent at most once. Rows of an agent that does not exist are decided somehow.
+        ids: (rows,) i32, the row's agent; each agent at most once. Rows of an agent that does not exist get some action.
         states: (rows, inputs) f32.
         masks: (rows, outputs) bool, the legal actions.
-        attempts: (rows,) i32, wrong actions at this decision so far.
+        attempts: (rows,) i32, illegal actions at this decision so far.
         explore: whether to explore at all.
 
     Returns:
-        The keys of all agents, to be put into the agents, and the actions (rows,) i32.
+        The new keys of all agents, to be stored in the agents, and the actions (rows,) i32.
     """
-    # Only what a decision needs is handed over: it is called much, and memories are many arrays.
+    # Passes only what a decision needs: this is called often, and memories are many arrays.
     decider = agents.online, agents.epsilon, agents.keys
-    keys, actions = _acted(_compiled(config), _numbers(config).wrong_limit, explore, decider, ids, states, masks, attempts)
+    keys, actions = _act_step(
+        _compiled(config), _hyperparameters(config).wrong_limit, explore, decider, ids, states, masks, attempts
+    )
     return keys, actions
 
 
 def learn(config: DeepQConfig, agents: Agents, ids: ArrayLike, transitions: Transitions) -> Agents:
-    """Remembers one transition a row and, where the memory holds a batch, updates the row's agent once.
+    """Stores one transition a row and, where the memory holds a batch, updates the row's agent once.
 
     Args:
         config: the hyper-parameters.
         agents: all agents. Consumed.
         ids: (rows,) i32, the row's agent; each agent at most once. Rows of an agent that does not exist (any number from the
-            number of agents on) are ignored: so the number of rows can stay the same, and nothing is compiled anew.
+            number of agents on) are ignored: padding with them keeps the number of rows constant and avoids recompilation.
         transitions: one a row.
     """
-    learned: Agents = _taught(_compiled(config), agents, _numbers(config), ids, transitions)
+    learned: Agents = _learn_step(_compiled(config), agents, _hyperparameters(config), ids, transitions)
     return learned
 
 
 @cache
 def _compiled(config: DeepQConfig) -> DeepQConfig:
-    """The same with the standard value of all that is not compiled into `act` and `learn`."""
-    standard = DeepQConfig()
-    names = (*Numbers._fields, "epsilon_start")
-    return dataclasses.replace(config, **{name: getattr(standard, name) for name in names})
+    """Resets to the default what is not compiled into `act` and `learn`."""
+    default = DeepQConfig()
+    names = (*Hyperparameters._fields, "epsilon_start")
+    return dataclasses.replace(config, **{name: getattr(default, name) for name in names})
 
 
 @cache
 def _shapes(config: DeepQConfig) -> DeepQConfig:
-    """Those that the shapes of agents depend on. A batch is as small as can be, so that it fits every memory."""
+    """Keeps only what the shapes of agents depend on. The batch is minimal, so that it fits every memory."""
     return DeepQConfig(config.inputs, config.outputs, config.hidden, 1, config.memory_size)
 
 
 @cache
-def _numbers(config: DeepQConfig) -> Numbers:
-    return Numbers(
+def _hyperparameters(config: DeepQConfig) -> Hyperparameters:
+    return Hyperparameters(
         learning_rate=np.float32(config.learning_rate),
         epsilon_decay=np.float32(config.epsilon_decay),
         epsilon_end=np.float32(config.epsilon_end),
@@ -237,100 +244,80 @@ def _numbers(config: DeepQConfig) -> Numbers:
 
 
 @partial(jax.jit, static_argnums=0)
-def _acted(
+def _act_step(
     config: DeepQConfig,
     wrong_limit: Array,
     explore: bool | Array,
-    decider: tuple[Layers, Array, Array],
+    decider: tuple[Params, Array, Array],
     ids: Array,
     states: Array,
     masks: Array,
     attempts: Array,
 ) -> tuple[Array, Array]:
-    """See `act`; `decider` is what of the agents a decision needs: networks, epsilon and keys."""
-    layers, epsilon, before = jax.tree.map(lambda leaf: leaf.at[ids].get(mode="clip"), decider)
+    """See `act`; `decider` holds the networks, epsilon and keys of the agents."""
+    params, epsilon, before = jax.tree.map(lambda leaf: leaf.at[ids].get(mode="clip"), decider)
     epsilon = jnp.where(explore, epsilon, 0.0)
-    actions, keys = jax.vmap(partial(_decided, config, wrong_limit))(layers, epsilon, before, states, masks, attempts)
+    actions, keys = jax.vmap(partial(_choose, config, wrong_limit))(params, epsilon, before, states, masks, attempts)
     return decider[2].at[ids].set(keys, mode="drop"), actions
 
 
 @partial(jax.jit, static_argnums=0, donate_argnums=1)
-def _taught(config: DeepQConfig, agents: Agents, numbers: Numbers, ids: Array, transitions: Transitions) -> Agents:
+def _learn_step(config: DeepQConfig, agents: Agents, hyper: Hyperparameters, ids: Array, transitions: Transitions) -> Agents:
     """See `learn`."""
     slots = agents.remembered.at[ids].get(mode="clip") % config.memory_size
-    memory = jax.tree.map(lambda kept, new: kept.at[ids, slots].set(new, mode="drop"), agents.memory, transitions)
-    remembered = agents.remembered.at[ids].add(1, mode="drop")
-    agents = agents._replace(memory=memory, remembered=remembered)
+    memory = jax.tree.map(lambda old, new: old.at[ids, slots].set(new, mode="drop"), agents.memory, transitions)
+    agents = agents._replace(memory=memory, remembered=agents.remembered.at[ids].add(1, mode="drop"))
 
-    held = jnp.minimum(remembered.at[ids].get(mode="clip"), config.memory_size)
-    learners = jax.tree.map(lambda leaf: leaf.at[ids].get(mode="clip"), _learner(agents))
-    keys, draws = _split(learners.keys)
-    drawn = jax.vmap(lambda key, top: jax.random.randint(key, (config.batch_size,), 0, top))(draws, jnp.maximum(held, 1))
-    batches = jax.tree.map(lambda kept: kept.at[ids[:, None], drawn].get(mode="clip"), memory)
-    updated = jax.vmap(partial(_updated, config, numbers))(learners, batches)
-    # An agent whose memory does not yet hold a batch stays as it is: its row is dropped.
-    ready = jnp.where(held >= config.batch_size, ids, len(agents.keys))
-    learned = jax.tree.map(lambda leaf, new: leaf.at[ready].set(new, mode="drop"), _learner(agents), updated._replace(keys=keys))
-    return agents._replace(**learned._asdict())
-
-
-class _Learner(NamedTuple):
-    """What an update changes, under the names it has in `Agents`."""
-
-    online: Layers
-    target: Layers
-    optimiser: optax.OptState
-    epsilon: Array
-    updates: Array
-    keys: Array
+    stored = jnp.minimum(agents.remembered.at[ids].get(mode="clip"), config.memory_size)
+    learned = {name: getattr(agents, name) for name in LEARNED}
+    learners = jax.tree.map(lambda leaf: leaf.at[ids].get(mode="clip"), learned)
+    learners["keys"], draws = _split(learners["keys"])
+    drawn = jax.vmap(lambda key, top: jax.random.randint(key, (config.batch_size,), 0, top))(draws, jnp.maximum(stored, 1))
+    batches = jax.tree.map(lambda column: column.at[ids[:, None], drawn].get(mode="clip"), memory)
+    updated = jax.vmap(partial(_update, config, hyper))(learners, batches)
+    # An agent whose memory does not hold a batch yet stays as it is: its row is dropped.
+    ready = jnp.where(stored >= config.batch_size, ids, len(agents.keys))
+    return agents._replace(**jax.tree.map(lambda leaf, new: leaf.at[ready].set(new, mode="drop"), learned, updated))
 
 
-def _learner(agents: Agents) -> _Learner:
-    return _Learner(agents.online, agents.target, agents.optimiser, agents.epsilon, agents.updates, agents.keys)
-
-
-def _decided(
-    config: DeepQConfig, wrong_limit: Array, layers: Layers, epsilon: Array, key: Array, state: Array, mask: Array, attempts: Array
+def _choose(
+    config: DeepQConfig, wrong_limit: Array, params: Params, epsilon: Array, key: Array, state: Array, mask: Array, attempts: Array
 ) -> tuple[Array, Array]:
-    """One agent's decision and its next key."""
+    """Returns one agent's action and its next key."""
     allowed = mask if config.mask else jnp.ones_like(mask)
-    best = jnp.argmax(jnp.where(allowed, outputs(config, layers, state[None])[0], -jnp.inf))
+    best = jnp.argmax(jnp.where(allowed, outputs(config, params, state[None])[0], -jnp.inf))
     key, coin, choice = jax.random.split(key, 3)
-    given_up = jnp.logical_and(wrong_limit > 0, attempts >= wrong_limit)
-    by_chance = jnp.argmax(jnp.where(jnp.where(given_up, mask, allowed), jax.random.uniform(choice, mask.shape), -1.0))
+    exhausted = jnp.logical_and(wrong_limit > 0, attempts >= wrong_limit)
+    by_chance = jnp.argmax(jnp.where(jnp.where(exhausted, mask, allowed), jax.random.uniform(choice, mask.shape), -1.0))
     exploring = jax.random.uniform(coin) < epsilon
-    return jnp.where(jnp.logical_or(given_up, exploring), by_chance, best).astype(jnp.int32), key
+    return jnp.where(jnp.logical_or(exhausted, exploring), by_chance, best).astype(jnp.int32), key
 
 
-def _updated(config: DeepQConfig, numbers: Numbers, learner: _Learner, batch: Transitions) -> _Learner:
-    """One agent after one update."""
-    next_values = jnp.tanh(outputs(config, learner.target, batch.next_states))
-    judged = outputs(config, learner.online, batch.next_states) if config.double else next_values
+def _update(config: DeepQConfig, hyper: Hyperparameters, learner: dict[str, Any], batch: Transitions) -> dict[str, Any]:
+    """Returns one agent's learned state after one update."""
+    online, target = learner["online"], learner["target"]
+    next_values = jnp.tanh(outputs(config, target, batch.next_states))
+    judged = outputs(config, online, batch.next_states) if config.double else next_values
     if config.mask:
         judged = jnp.where(batch.next_masks, judged, -jnp.inf)
     best = jax.nn.one_hot(jnp.argmax(judged, axis=-1), config.outputs)
-    aim = batch.rewards + config.discount * jnp.where(batch.done, 0.0, (best * next_values).sum(-1))
+    targets = batch.rewards + config.discount * jnp.where(batch.done, 0.0, (best * next_values).sum(-1))
 
-    def loss(layers: Layers) -> Array:
+    def loss(params: Params) -> Array:
         taken = jax.nn.one_hot(batch.actions, config.outputs)
-        chosen = (taken * jnp.tanh(outputs(config, layers, batch.states))).sum(-1)
-        return jnp.mean((chosen - aim) ** 2)
+        chosen = (taken * jnp.tanh(outputs(config, params, batch.states))).sum(-1)
+        return jnp.mean((chosen - targets) ** 2)
 
-    steps, optimiser = _adam(numbers.learning_rate).update(jax.grad(loss)(learner.online), learner.optimiser)
-    online: Layers = optax.apply_updates(learner.online, steps)
-    updates = learner.updates + 1
-    copied = updates % numbers.target_every == 0
-    return learner._replace(
-        online=online,
-        target=jax.tree.map(lambda new, old: jnp.where(copied, new, old), online, learner.target),
-        optimiser=optimiser,
-        epsilon=jnp.minimum(learner.epsilon, jnp.maximum(numbers.epsilon_end, learner.epsilon * numbers.epsilon_decay)),
-        updates=updates,
-    )
-
-
-def _adam(learning_rate: float | np.float32) -> optax.GradientTransformation:
-    return optax.adam(learning_rate)
+    steps, optimiser = optax.adam(hyper.learning_rate).update(jax.grad(loss)(online), learner["optimiser"])
+    online = optax.apply_updates(online, steps)
+    updates = learner["updates"] + 1
+    return learner | {
+        "online": online,
+        "target": optax.periodic_update(online, target, updates, hyper.target_every),
+        "optimiser": optimiser,
+        "epsilon": jnp.minimum(learner["epsilon"], jnp.maximum(hyper.epsilon_end, learner["epsilon"] * hyper.epsilon_decay)),
+        "updates": updates,
+    }
 
 
 def _split(keys: Array) -> tuple[Array, Array]:
@@ -339,7 +326,7 @@ def _split(keys: Array) -> tuple[Array, Array]:
 
 
 def _exploring(config: DeepQConfig, agents: Agents) -> Agents:
-    """The agents as much as they explore at the beginning."""
+    """Sets epsilon to its initial value."""
     return agents._replace(epsilon=jnp.full(len(agents.keys), config.epsilon_start, jnp.float32))
 
 
@@ -350,33 +337,23 @@ def _keys(seeds: Sequence[int]) -> Array:
 
 
 @partial(jax.jit, static_argnums=0)
-def _started(config: DeepQConfig, keys: Array) -> Agents:
+def _init(config: DeepQConfig, keys: Array) -> Agents:
     keys, draws = _split(keys)
-    return _fresh(config, jax.vmap(partial(_new_layers, config))(draws), keys)
+    return _fresh(config, jax.vmap(lambda key: config.network.start(key, config.inputs))(draws), keys)
 
 
 @partial(jax.jit, static_argnums=0)
-def _started_from(config: DeepQConfig, online: Layers, keys: Array) -> Agents:
+def _init_from(config: DeepQConfig, online: Params, keys: Array) -> Agents:
     return _fresh(config, online, _split(keys)[0])
 
 
-def _new_layers(config: DeepQConfig, key: Array) -> Layers:
-    sizes = (config.inputs, *config.hidden, config.outputs)
-    glorot = jax.nn.initializers.glorot_uniform()
-    keys = jax.random.split(key, len(sizes) - 1)
-    return tuple(
-        (glorot(keys[layer], (size, sizes[layer + 1]), jnp.float32), jnp.zeros(sizes[layer + 1], jnp.float32))
-        for layer, size in enumerate(sizes[:-1])
-    )
-
-
-def _fresh(config: DeepQConfig, online: Layers, keys: Array) -> Agents:
+def _fresh(config: DeepQConfig, online: Params, keys: Array) -> Agents:
     number = len(keys)
     ring = (number, config.memory_size)
     return Agents(
         online=online,
         target=online,
-        optimiser=jax.vmap(_adam(config.learning_rate).init)(online),
+        optimiser=jax.vmap(optax.adam(config.learning_rate).init)(online),
         memory=Transitions(
             states=jnp.zeros((*ring, config.inputs), jnp.float32),
             actions=jnp.zeros(ring, jnp.int32),

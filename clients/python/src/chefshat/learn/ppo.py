@@ -1,37 +1,37 @@
-"""Proximal policy optimisation with a mask, as pure functions in JAX: the networks, how they act, and one epoch of learning.
+"""Proximal policy optimisation with an action mask, as pure functions in JAX: the networks, acting, and one epoch of learning.
 
-The policy network gives a number for each action, of which illegal ones are taken out before anything is drawn or compared; the
-value network, apart from it, guesses what the Shift will bring the seat. Games, and what is to be learned from them, are in
-`self_play`; the training as a whole is in `ppo_training`.
+The policy network has an output for each action; illegal actions are masked out before sampling or comparing. The value network
+is separate and estimates the seat's reward at the end of the Shift. Games and samples are in `self_play`, the training loop is in
+`ppo_training`.
 """
 
-import itertools
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
+import flax.linen as nn
 import jax
 import jax.numpy as jnp
 import optax
 
-# One layer: weight (out, in), bias (out,).
-Layers: TypeAlias = list[tuple[jax.Array, jax.Array]]
+from chefshat.learn import mlp
+from chefshat.learn.mlp import Mlp
 
 
 class Params(NamedTuple):
-    """Both networks."""
+    """The parameters of both networks."""
 
-    policy: Layers
-    value: Layers
+    policy: mlp.Params
+    value: mlp.Params
 
 
 class Learner(NamedTuple):
-    """All that a training goes on from, but for its games.
+    """The state of a training, except for its games.
 
     Attributes:
         params: the networks.
         optimizer: the state of Adam.
-        key: where chance comes from.
+        key: the random key.
     """
 
     params: Params
@@ -44,10 +44,10 @@ class Samples(NamedTuple):
 
     Attributes:
         inputs: (B, width) features; the last A of them are the mask.
-        actions: (B,) what was decided.
-        log_probabilities: (B,) of that, when it was decided.
-        advantages: (B,) how much better than expected it went.
-        returns: (B,) what the value network should have said.
+        actions: (B,) the actions taken.
+        log_probabilities: (B,) of these actions, when they were taken.
+        advantages: (B,) estimated advantages.
+        returns: (B,) targets of the value network.
         weights: (B,) 1 for rows that count, 0 for the others.
     """
 
@@ -63,30 +63,30 @@ class Losses(NamedTuple):
     """Means over the rows of an epoch.
 
     Attributes:
-        policy: loss of the policy, as it was minimised.
+        policy: the clipped surrogate loss.
         value: squared error of the value network.
         entropy: of the policy over legal actions, in nats.
-        divergence: estimated Kullback-Leibler divergence of the policy that decided and the one learned.
-        clipped: share of rows whose probability had changed by more than the clip range.
+        approx_kl: estimated Kullback-Leibler divergence between the acting and the learned policy.
+        clipped: share of rows whose probability ratio left the clip range.
     """
 
     policy: jax.Array
     value: jax.Array
     entropy: jax.Array
-    divergence: jax.Array
+    approx_kl: jax.Array
     clipped: jax.Array
 
 
 @dataclass(frozen=True)
-class Hyper:
+class Hyperparameters:
     """What is fixed for a training, and compiled in.
 
     Attributes:
-        policy_widths: hidden units of the policy network, layer by layer.
-        value_widths: hidden units of the value network.
-        clip: how far the ratio of probabilities may move before it counts no more.
-        max_gradient_norm: gradients are scaled down to it.
-        minibatches: into how many parts an epoch's rows are split; a divisor of their number.
+        policy_widths: units of the policy network's hidden layers.
+        value_widths: units of the value network's hidden layers.
+        clip: clip range of the probability ratio.
+        max_gradient_norm: gradients are clipped to this global norm.
+        minibatches: number of parts an epoch's rows are split into; a divisor of their number.
     """
 
     policy_widths: tuple[int, ...] = (256, 256)
@@ -96,38 +96,31 @@ class Hyper:
     minibatches: int = 16
 
 
-def _optimizer(hyper: Hyper) -> optax.GradientTransformation:
-    # The learning rate changes as the training goes on, so it is multiplied in by `learn`.
-    return optax.chain(optax.clip_by_global_norm(hyper.max_gradient_norm), optax.scale_by_adam(eps=1e-5))
+def _optimizer(hyper: Hyperparameters, learning_rate: float | jax.Array) -> optax.GradientTransformation:
+    return optax.chain(
+        optax.clip_by_global_norm(hyper.max_gradient_norm), optax.scale_by_adam(eps=1e-5), optax.scale(-learning_rate)
+    )
 
 
-def start(seed: int, inputs: int, actions: int, hyper: Hyper) -> Learner:
-    """A learner that knows nothing: orthogonal weights, small ones last, so that at first all legal actions are about alike."""
+def start(seed: int, inputs: int, actions: int, hyper: Hyperparameters) -> Learner:
+    """Returns a new learner: orthogonal weights, with small ones in the policy's last layer for a near-uniform first policy."""
     key, policy, value = jax.random.split(jax.random.key(seed), 3)
 
-    def layers(key: jax.Array, widths: tuple[int, ...], last: float) -> Layers:
-        gains = [2**0.5] * (len(widths) - 2) + [last]
-        keys = jax.random.split(key, len(gains))
-        shapes = [(outputs, inputs) for inputs, outputs in itertools.pairwise(widths)]
-        made = zip(gains, keys, shapes, strict=True)
-        return [(jax.nn.initializers.orthogonal(gain)(key, shape), jnp.zeros(shape[0])) for gain, key, shape in made]
+    def params(key: jax.Array, widths: tuple[int, ...], gain: float) -> mlp.Params:
+        orthogonal = nn.initializers.orthogonal
+        return Mlp(widths, orthogonal(2**0.5), orthogonal(gain)).start(key, inputs)
 
-    params = Params(
-        layers(policy, (inputs, *hyper.policy_widths, actions), 0.01), layers(value, (inputs, *hyper.value_widths, 1), 1.0)
-    )
-    return Learner(params, _optimizer(hyper).init(params), key)
+    both = Params(params(policy, (*hyper.policy_widths, actions), 0.01), params(value, (*hyper.value_widths, 1), 1.0))
+    return Learner(both, _optimizer(hyper, 1.0).init(both), key)
 
 
-def _forward(layers: Layers, inputs: jax.Array) -> jax.Array:
-    values = inputs
-    for weight, bias in layers[:-1]:
-        values = jax.nn.relu(values @ weight.T + bias)
-    weight, bias = layers[-1]
-    return values @ weight.T + bias
+def _forward(params: mlp.Params, inputs: jax.Array) -> jax.Array:
+    widths = tuple(params[f"Dense_{number}"]["bias"].shape[-1] for number in range(len(params)))
+    return Mlp(widths).of(params, inputs)
 
 
 def _logits(params: Params, inputs: jax.Array) -> jax.Array:
-    """(B, A): log-probabilities; of illegal actions minus infinity."""
+    """Returns the log-probabilities, (B, A); minus infinity for illegal actions."""
     outputs = _forward(params.policy, inputs)
     legal = inputs[:, -outputs.shape[1] :] > 0
     return jax.nn.log_softmax(jnp.where(legal, outputs, -jnp.inf))
@@ -135,11 +128,11 @@ def _logits(params: Params, inputs: jax.Array) -> jax.Array:
 
 @jax.jit
 def act(params: Params, key: jax.Array, inputs: jax.Array) -> tuple[jax.Array, jax.Array, jax.Array]:
-    """Draws an action for each row.
+    """Samples an action for each row.
 
     Args:
         params: the networks.
-        key: chance of this call.
+        key: random key of this call.
         inputs: (B, width) features, at least one legal action in each row.
 
     Returns:
@@ -151,7 +144,7 @@ def act(params: Params, key: jax.Array, inputs: jax.Array) -> tuple[jax.Array, j
     return actions, chosen, _forward(params.value, inputs)[:, 0]
 
 
-def _loss(params: Params, samples: Samples, entropy_bonus: jax.Array, hyper: Hyper) -> tuple[jax.Array, Losses]:
+def _loss(params: Params, samples: Samples, entropy_bonus: jax.Array, hyper: Hyperparameters) -> tuple[jax.Array, Losses]:
     rows = jnp.maximum(samples.weights.sum(), 1)
 
     def mean(values: jax.Array) -> jax.Array:
@@ -172,26 +165,27 @@ def _loss(params: Params, samples: Samples, entropy_bonus: jax.Array, hyper: Hyp
 
 @partial(jax.jit, static_argnames="hyper")
 def learn(
-    learner: Learner, samples: Samples, learning_rate: jax.Array, entropy_bonus: jax.Array, hyper: Hyper
+    learner: Learner, samples: Samples, learning_rate: jax.Array, entropy_bonus: jax.Array, hyper: Hyperparameters
 ) -> tuple[Learner, Losses]:
-    """One epoch: every row is looked at once, in parts drawn anew.
+    """Runs one epoch over the samples, in minibatches drawn anew.
 
     Args:
-        learner: as the last epoch left it.
+        learner: the state after the last epoch.
         samples: B rows, a multiple of `hyper.minibatches`.
         learning_rate: of this epoch.
-        entropy_bonus: how much a nat of entropy is worth in this epoch.
-        hyper: as the learner was started with.
+        entropy_bonus: weight of the entropy in the loss of this epoch.
+        hyper: the ones the learner was started with.
     """
     key, shuffle = jax.random.split(learner.key)
     parts = jax.random.permutation(shuffle, len(samples.actions)).reshape(hyper.minibatches, -1)
+    optimizer = _optimizer(hyper, learning_rate)
 
     def step(state: tuple[Params, optax.OptState], rows: jax.Array) -> tuple[tuple[Params, optax.OptState], Losses]:
-        params, optimizer = state
+        params, optimizer_state = state
         part = Samples(*(column[rows] for column in samples))
         gradients, losses = jax.grad(_loss, has_aux=True)(params, part, entropy_bonus, hyper)
-        updates, optimizer = _optimizer(hyper).update(gradients, optimizer, params)
-        return (jax.tree.map(lambda old, update: old - learning_rate * update, params, updates), optimizer), losses
+        updates, optimizer_state = optimizer.update(gradients, optimizer_state, params)
+        return (optax.apply_updates(params, updates), optimizer_state), losses
 
-    (params, optimizer), losses = jax.lax.scan(step, (learner.params, learner.optimizer), parts)
-    return Learner(params, optimizer, key), Losses(*(values.mean() for values in losses))
+    (params, optimizer_state), losses = jax.lax.scan(step, (learner.params, learner.optimizer), parts)
+    return Learner(params, optimizer_state, key), Losses(*(values.mean() for values in losses))

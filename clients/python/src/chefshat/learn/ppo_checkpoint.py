@@ -1,6 +1,6 @@
-"""A training by PPO as a value and as a file: its plan, how far it has come, and all that it goes on from.
+"""A training by PPO as a value and as a file: its plan, its progress, and the state to resume from.
 
-What the file looks like is in `training_file`, training in `ppo_training`.
+The file format is in `training_file`, the training loop in `ppo_training`.
 """
 
 import dataclasses
@@ -9,33 +9,33 @@ import os
 from dataclasses import dataclass, field
 from typing import Any, Self
 
-import numpy as np
-
 from chefshat import pb
-from chefshat.learn import ppo, training_file
+from chefshat.learn import mlp, ppo, training_file
 from chefshat.learn.features import num_actions, table_width
-from chefshat.learn.network import Layer, Network
-from chefshat.learn.ppo import Hyper, Learner
+from chefshat.learn.network import Network
+from chefshat.learn.ppo import Hyperparameters, Learner
 from chefshat.learn.training_file import network_info, opened
 
-FORMAT = "chefshat-ppo-training-1"
+FORMAT = "chefshat-ppo-training-2"
+# With weights as (out, in), and with older names in the plan.
+OLD_FORMAT = "chefshat-ppo-training-1"
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What a training does.
+    """The settings of a training.
 
     Attributes:
-        games: games of self-play side by side.
-        opponent_games: further games, in which the policy holds seat 0 alone.
-        opponents: who holds the other seats of these.
-        steps: decisions in each game between two times of learning.
-        epochs: how often these are gone through.
-        learning_rate: at the beginning; it falls to a twentieth at the end.
-        entropy_bonus: at the beginning; it falls to a tenth at the end.
-        discount: what a decision later is worth, gamma.
-        trace: lambda of the advantage estimation.
-        evaluation_games: games against each opponent whenever it is looked how good the policy is.
+        games: parallel games of self-play.
+        opponent_games: further games, in which the policy plays only seat 0.
+        opponents: the built-in agent of the other seats of these.
+        steps: decisions in each game between two updates.
+        epochs: passes over the samples of an update.
+        learning_rate: initial; it decays linearly to a twentieth.
+        entropy_bonus: initial; it decays linearly to a tenth.
+        discount: factor of a reward one decision later, gamma.
+        gae_lambda: lambda of the generalised advantage estimation.
+        evaluation_games: games against each opponent in an evaluation.
         hyper: the networks and what else is compiled in.
     """
 
@@ -47,26 +47,27 @@ class Plan:
     learning_rate: float = 5e-4
     entropy_bonus: float = 0.01
     discount: float = 1.0
-    trace: float = 0.95
+    gae_lambda: float = 0.95
     evaluation_games: int = 400
-    hyper: Hyper = field(default_factory=Hyper)
+    hyper: Hyperparameters = field(default_factory=Hyperparameters)
 
     @classmethod
     def of(cls, plain: dict[str, Any]) -> Self:
-        """From what `dataclasses.asdict` and JSON made of it."""
+        """Restores a plan from the JSON of `dataclasses.asdict`, also of older versions."""
         hyper: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in plain["hyper"].items()}
-        return cls(**{**plain, "hyper": Hyper(**hyper)})
+        renamed = {"trace": "gae_lambda"}
+        return cls(**{renamed.get(key, key): value for key, value in plain.items()} | {"hyper": Hyperparameters(**hyper)})
 
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a training has come.
+    """The progress of a training.
 
     Attributes:
-        updates: times of learning.
+        updates: updates so far.
         decisions: decisions taken.
-        seconds: seconds it took, evaluations included.
-        runs: how often it was begun or gone on with.
+        seconds: seconds of training, evaluations included.
+        runs: times it was started or resumed.
     """
 
     updates: int = 0
@@ -77,14 +78,14 @@ class Progress:
 
 @dataclass(frozen=True)
 class Training:
-    """All that a training goes on from; its games begin anew.
+    """The state to resume a training from. Its games start anew.
 
     Attributes:
-        plan: what it does.
-        seed: where its chance comes from.
+        plan: the settings.
+        seed: the seed.
         rules: the rule set, every field set.
         learner: the networks and the optimiser.
-        progress: how far it has come.
+        progress: the progress so far.
         trained_by: the command, or the commands.
     """
 
@@ -96,19 +97,19 @@ class Training:
     trained_by: str
 
     def network(self, name: str) -> Network:
-        """The policy network."""
-        layers = [Layer(np.array(weight), np.array(bias)) for weight, bias in self.learner.params.policy]
+        """Returns the policy network."""
+        layers = mlp.to_layers(self.learner.params.policy)
         return Network(layers, network_info(self.rules, name, self.trained_by, input="table", output="actions", masked=True))
 
 
 def begin(plan: Plan, seed: int, rules: pb.RuleSet, trained_by: str) -> Training:
-    """A training that has learned nothing yet. `rules` has every field set."""
+    """Returns a new training. `rules` has every field set."""
     learner = ppo.start(seed, table_width(rules.players, rules.faces), num_actions(rules.faces), plan.hyper)
     return Training(plan, seed, rules, learner, Progress(), trained_by)
 
 
 def save(path: str | os.PathLike[str], training: Training) -> None:
-    """Writes a training to a file, whole or not at all. Raises OSError if it cannot be written."""
+    """Writes a training to a file atomically. Raises OSError if it cannot be written."""
     texts = {
         "plan": json.dumps(dataclasses.asdict(training.plan)),
         "progress": json.dumps(dataclasses.asdict(training.progress)),
@@ -119,10 +120,10 @@ def save(path: str | os.PathLike[str], training: Training) -> None:
 
 
 def load(path: str | os.PathLike[str]) -> Training:
-    """Reads a training from a file. Raises `TrainingFileError` if it is none, OSError if it cannot be read."""
-    with opened(path, FORMAT) as contents:
+    """Reads a training from a file. Raises `TrainingFileError` if it is not one, OSError if it cannot be read."""
+    with opened(path, FORMAT, OLD_FORMAT) as contents:
         texts = contents.texts
         plan, progress = Plan.of(json.loads(texts["plan"])), Progress(**json.loads(texts["progress"]))
         seed, rules = int(texts["seed"]), contents.rules
-        learner = contents.state(lambda: begin(plan, seed, rules, "").learner)
+        learner = contents.state(lambda: begin(plan, seed, rules, "").learner, transposed=contents.form == OLD_FORMAT)
         return Training(plan, seed, rules, learner, progress, texts["trained_by"])

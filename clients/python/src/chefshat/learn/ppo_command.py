@@ -22,7 +22,7 @@ from chefshat.errors import ChefsHatError, failed
 from chefshat.learn import network, ppo_checkpoint, runs
 from chefshat.learn.evaluation import Evaluation, evaluate
 from chefshat.learn.network import Network
-from chefshat.learn.ppo import Hyper
+from chefshat.learn.ppo import Hyperparameters
 from chefshat.learn.ppo_checkpoint import Plan, Training
 from chefshat.learn.ppo_training import Trainer
 from chefshat.learn.training_file import TrainingFileError
@@ -77,9 +77,9 @@ def _begun(options: argparse.Namespace) -> Training:
         epochs=options.epochs,
         learning_rate=options.learning_rate,
         entropy_bonus=options.entropy_bonus,
-        trace=options.trace,
+        gae_lambda=options.gae_lambda,
         evaluation_games=options.evaluation_games,
-        hyper=Hyper(
+        hyper=Hyperparameters(
             policy_widths=(options.width,) * 2,
             value_widths=(options.value_width,) * 2,
             clip=options.clip,

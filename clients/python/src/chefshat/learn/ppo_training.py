@@ -94,7 +94,7 @@ def play(collector: Collector, params: Params, chance: jax.Array, plan: Plan) ->
         return np.asarray(actions), np.asarray(log_probabilities), np.asarray(values)
 
     rollout = collector.collect(act)
-    gains, known = advantages(rollout, collector.players, discount=plan.discount, trace=plan.trace)
+    gains, known = advantages(rollout, collector.players, discount=plan.discount, gae_lambda=plan.gae_lambda)
     returns, weights = gains + rollout.values, known.astype(np.float32)
     columns: list[Any] = [rollout.inputs, rollout.actions, rollout.log_probabilities, gains, returns, weights]
     return Samples(*(column.reshape(-1, *column.shape[2:]) for column in columns))

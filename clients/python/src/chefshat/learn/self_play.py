@@ -130,14 +130,14 @@ class Collector:
         return Ends(endings.games, endings.seats, self._rewards[endings.places_taken.astype(np.intp) - 1])
 
 
-def advantages(rollout: Rollout, players: int, *, discount: float, trace: float) -> tuple[Floats, npt.NDArray[np.bool_]]:
+def advantages(rollout: Rollout, players: int, *, discount: float, gae_lambda: float) -> tuple[Floats, npt.NDArray[np.bool_]]:
     """How much better than expected each decision turned out, by generalised advantage estimation along the seat's own chain.
 
     Args:
         rollout: what was played.
         players: seats of a game.
         discount: what a decision later is worth, gamma.
-        trace: how far what came later is believed rather than the value network, lambda.
+        gae_lambda: how far what came later is believed rather than the value network, lambda.
 
     Returns:
         (steps, n) advantages; (steps, n) whether they are known: not that of the last decision in a chain that goes on after the
@@ -162,6 +162,6 @@ def advantages(rollout: Rollout, players: int, *, discount: float, trace: float)
         values = rollout.values[step, games]
         known[step, games] = follows[here]
         error = reward[here] + discount * value[here] - values
-        result[step, games] = np.where(follows[here], error + discount * trace * advantage[here], 0)
+        result[step, games] = np.where(follows[here], error + discount * gae_lambda * advantage[here], 0)
         reward[here], value[here], advantage[here], follows[here] = 0, values, result[step, games], True
     return result, known

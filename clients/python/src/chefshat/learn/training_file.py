@@ -1,10 +1,11 @@
-"""A training in a file: safetensors with every array that learning goes on from, to the last bit, and texts that say what it is.
+"""A training in a file: safetensors with every array that learning continues from, to the last bit, and texts as metadata.
 
-What the arrays and the texts mean is said where the training is: `checkpoint` (Deep Q), `ppo_checkpoint`. The network alone, which
-is what an agent needs, is in a file of its own (see `network`).
+The meaning of the arrays and texts is in `checkpoint` (Deep Q) and `ppo_checkpoint`. The network alone, which is what an agent
+needs, is in a file of its own (see `network`).
 """
 
 import os
+import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, Literal, TypeVar
@@ -24,19 +25,21 @@ State = TypeVar("State")
 
 
 class TrainingFileError(ValueError):
-    """A file is not a training of the format. The message names the file and what is wrong with it."""
+    """A file is not a training of the expected format. The message names the file and the problem."""
 
 
 class Contents:
-    """What an open file holds.
+    """The contents of an open file.
 
     Attributes:
+        form: the format.
         texts: the texts by name.
     """
 
     def __init__(self, file: Any, texts: Mapping[str, str]) -> None:  # noqa: ANN401 - safetensors has no types.
         self._file = file
         self.texts = texts
+        self.form = texts["format"]
 
     @property
     def rules(self) -> pb.RuleSet:
@@ -44,17 +47,24 @@ class Contents:
         return json_format.Parse(self.texts["rules"], pb.RuleSet())
 
     def tensor(self, name: str) -> np.ndarray[Any, Any]:
-        """One array."""
+        """Reads one array."""
         return np.asarray(self._file.get_tensor(name))
 
-    def state(self, make: Callable[[], State]) -> State:
-        """The arrays, put into the shape of what `make` would make. Nothing is made: it is only looked at what would be."""
+    def state(self, make: Callable[[], State], *, transposed: bool = False) -> State:
+        """Reads the arrays into the structure that `make` would return. `make` is only traced.
+
+        Args:
+            make: returns a state of the right structure and shapes.
+            transposed: whether the file has weights as (out, in).
+        """
         template = jax.eval_shape(make)
-        # Keys have a type of their own, which the plain numbers of the file do not say.
+        # Keys have a type of their own, which the plain numbers of the file do not show.
         are_keys = [_is_key(leaf) for leaf in jax.tree.leaves(template)]
         leaves = []
         for (name, leaf), is_key in zip(_named(jax.eval_shape(lambda: _plain(make()))), are_keys, strict=True):
             tensor = self.tensor(name)
+            if transposed and tensor.ndim == 2:
+                tensor = tensor.T
             if (tensor.shape, tensor.dtype) != (leaf.shape, leaf.dtype):
                 raise ValueError(f"its {name} is {tensor.dtype}{list(tensor.shape)}, not {leaf.dtype}{list(leaf.shape)}")
             leaves.append(jax.random.wrap_key_data(jnp.asarray(tensor)) if is_key else jnp.asarray(tensor))
@@ -63,17 +73,17 @@ class Contents:
 
 
 def save(path: str | os.PathLike[str], form: str, state: object, rules: pb.RuleSet, texts: Mapping[str, str]) -> None:
-    """Writes a training to a file, whole or not at all.
+    """Writes a training to a file atomically.
 
     Args:
-        path: where to; what stands there is replaced.
+        path: the file; an existing one is replaced.
         form: the name of the format.
-        state: arrays of jax in tuples.
+        state: arrays of jax in tuples and dictionaries.
         rules: the rule set.
-        texts: what else is to be said, by name.
+        texts: further metadata.
 
     Raises:
-        OSError: it cannot be written.
+        OSError: the file cannot be written.
     """
     metadata = {"format": form, "rules": rules_text(rules), **texts}
     tensors = {name: np.asarray(leaf) for name, leaf in _named(_plain(state))}
@@ -81,19 +91,19 @@ def save(path: str | os.PathLike[str], form: str, state: object, rules: pb.RuleS
 
 
 @contextmanager
-def opened(path: str | os.PathLike[str], form: str) -> Iterator[Contents]:
-    """A file of the format, to be read within the `with`.
+def opened(path: str | os.PathLike[str], *forms: str) -> Iterator[Contents]:
+    """Opens a file of one of the formats, the current one first.
 
     Raises:
-        TrainingFileError: it is none, or what it holds is not what it should.
-        OSError: it cannot be read.
+        TrainingFileError: the file is not of these formats, or its contents are wrong.
+        OSError: the file cannot be read.
     """
     check_readable(path, "training", "`python -m chefshat.learn ppo` or `deep-q` writes beside its network")
     try:
         with safetensors.safe_open(path, framework="np") as file:
             metadata = file.metadata() or {}
-            if metadata.get("format") != form:
-                raise ValueError(f"its format is {metadata.get('format')!r}, not {form!r}")
+            if metadata.get("format") not in forms:
+                raise ValueError(f"its format is {metadata.get('format')!r}, not {forms[0]!r}")
             yield Contents(file, metadata)
     except KeyError as missing:
         raise TrainingFileError(f"{os.fspath(path)} is no training: it has no {missing}") from missing
@@ -110,7 +120,7 @@ def network_info(
     output: Literal["turns", "actions"],
     masked: bool,
 ) -> NetworkInfo:
-    """What the numbers of a network mean that was trained by a rule set, its outputs as they come out of the last layer."""
+    """Describes a network trained under a rule set, without an activation of its outputs."""
     return NetworkInfo(
         input=input,
         output=output,
@@ -126,21 +136,26 @@ def network_info(
 
 
 def rules_text(rules: pb.RuleSet) -> str:
-    """A rule set as files have it: canonical protobuf JSON on one line."""
+    """Formats a rule set as canonical protobuf JSON on one line."""
     return json_format.MessageToJson(rules, indent=None)
 
 
-def _is_key(leaf: Any) -> bool:  # noqa: ANN401 - An array, or what one would be.
+def _is_key(leaf: Any) -> bool:  # noqa: ANN401 - An array or its shape.
     return bool(jnp.issubdtype(leaf.dtype, jax.dtypes.prng_key))
 
 
 def _plain(state: State) -> State:
-    """With keys as plain numbers, which a file can hold."""
+    """Converts keys to plain numbers, which a file can hold."""
     plain: State = jax.tree.map(lambda leaf: jax.random.key_data(leaf) if _is_key(leaf) else leaf, state)
     return plain
 
 
 def _named(state: object) -> list[tuple[str, Any]]:
-    """The arrays with their names, such as "online.0.1"."""
+    """Returns the arrays with their names in files, such as "online.0.1" for the bias of the first layer."""
+
+    def short(found: re.Match[str]) -> str:
+        return f"{found[1]}.{'0' if found[2] == 'kernel' else '1'}"
+
     leaves = jax.tree_util.tree_leaves_with_path(state)
-    return [(jax.tree_util.keystr(path, simple=True, separator="."), leaf) for path, leaf in leaves]
+    names = (jax.tree_util.keystr(path, simple=True, separator=".") for path, _ in leaves)
+    return [(re.sub(r"Dense_(\d+)\.(kernel|bias)", short, name), leaf) for name, (_, leaf) in zip(names, leaves, strict=True)]
