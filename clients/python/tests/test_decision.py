@@ -63,6 +63,17 @@ def test_views_show_what_was_sent() -> None:
     assert repr(view) == "Decision(seat=2, decision_id=9, kind=TURN)"
 
 
+def test_a_decision_says_what_the_rules_require() -> None:
+    play = pb.PlayRequirement(lowest_face=1, highest_face=6, fewest_cards=3, may_pass=True)
+    turn = Decision(pb.DecisionRequest(play_requirement=play, default_action=199), SeatInfo("", "", 0))
+    assert (turn.play_requirement, turn.gift_requirement, turn.default_action) == (play, None, 199)
+    gift = pb.GiftRequirement(number=1, total=2, receiver=3)
+    exchange = Decision(pb.DecisionRequest(gift_requirement=gift, default_action=210), SeatInfo("", "", 0))
+    assert (exchange.play_requirement, exchange.gift_requirement) == (None, gift)
+    offer = Decision(pb.DecisionRequest(special_action=pb.SPECIAL_ACTION_FOOD_FIGHT), SeatInfo("", "", 0))
+    assert offer.special_action == pb.SPECIAL_ACTION_FOOD_FIGHT
+
+
 def test_views_cannot_be_written_to() -> None:
     with pytest.raises(ValueError, match="read-only"):
         decision().hand[0] = 1

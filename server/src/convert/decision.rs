@@ -1,8 +1,12 @@
 //! Decisions: what is put to a seat, what it answers, what becomes of the answer.
 
-use chefshat_engine::{Board, BySeat, Cards, DecisionKind, Mask, Observation, RuleSet, Seat};
+use chefshat_engine::{
+    Board, BySeat, Cards, DecisionKind, Mask, Observation, Requirement, RuleSet, Seat,
+};
 use chefshat_proto::v1;
-use chefshat_records::convert::{FieldProblem, check_expression, role_from_number};
+use chefshat_records::convert::{
+    FieldProblem, check_expression, role_from_number, seat_number, special_to_proto,
+};
 use prost::Message as _;
 
 use crate::room::core::{Answered, Verdict};
@@ -67,6 +71,32 @@ pub fn observation_to_proto(observation: &Observation) -> v1::Observation {
         played: counts(observation.played, faces),
         gave: own(observation.gave),
         received: own(observation.received),
+    }
+}
+
+/// Fills in what the rules require of the decision.
+pub fn put_requirement(request: &mut v1::DecisionRequest, requirement: Requirement) {
+    match requirement {
+        Requirement::Play(play) => {
+            request.play_requirement = Some(v1::PlayRequirement {
+                lowest_face: play.lowest_face.into(),
+                highest_face: play.highest_face.into(),
+                fewest_cards: play.fewest_cards.into(),
+                golden_card: play.golden_card,
+                lone_joker: play.lone_joker,
+                may_pass: play.may_pass,
+            });
+        }
+        Requirement::Gift(gift) => {
+            request.gift_requirement = Some(v1::GiftRequirement {
+                number: gift.number.into(),
+                total: gift.total.map(u32::from),
+                receiver: seat_number(gift.receiver),
+            });
+        }
+        Requirement::SpecialAction(special) => {
+            request.set_special_action(special_to_proto(special));
+        }
     }
 }
 

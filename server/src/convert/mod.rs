@@ -17,7 +17,7 @@ mod vector;
 
 pub use decision::{
     annotations_from_proto, answer_result, decision_kind, expression_from_proto,
-    observation_from_proto, observation_to_proto,
+    observation_from_proto, observation_to_proto, put_requirement,
 };
 pub use log::{game_started, view};
 pub use name::name_to_show;

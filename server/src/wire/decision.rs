@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use chefshat_engine::{Cards, Observation, Viewer};
+use chefshat_engine::{Cards, Observation, Requirement, Viewer};
 use prost::bytes::BufMut;
 use prost::encoding::{WireType, encode_key, encode_varint};
 
@@ -52,6 +52,55 @@ pub fn encode_decision(
     if let Some(left) = core.attempts_left() {
         encode_key(7, WireType::Varint, out);
         encode_varint(left.into(), out);
+    }
+    let requirement = core
+        .requirement()
+        .expect("a decision is open in a game that has not ended");
+    put_requirement(out, requirement);
+    let default = core
+        .default_action()
+        .expect("an open decision has a default");
+    put_number(out, 11, default.index().into());
+}
+
+fn put_requirement(out: &mut Vec<u8>, requirement: Requirement) {
+    let put_message = |out: &mut Vec<u8>, field, numbers: &[(u32, u8)]| {
+        encode_key(field, WireType::LengthDelimited, out);
+        let length_at = out.len();
+        out.put_u8(0);
+        for &(field, number) in numbers {
+            put_number(out, field, number.into());
+        }
+        // Small numbers of small fields, two bytes each.
+        out[length_at] = u8::try_from(out.len() - length_at - 1).expect("seven bits");
+    };
+    match requirement {
+        Requirement::Play(play) => put_message(
+            out,
+            8,
+            &[
+                (1, play.lowest_face),
+                (2, play.highest_face),
+                (3, play.fewest_cards),
+                (4, play.golden_card.into()),
+                (5, play.lone_joker.into()),
+                (6, play.may_pass.into()),
+            ],
+        ),
+        Requirement::Gift(gift) => put_message(
+            out,
+            9,
+            &[
+                (1, gift.number),
+                // Never 0, so that one which is set is never left out.
+                (2, gift.total.unwrap_or(0)),
+                (
+                    3,
+                    u8::try_from(gift.receiver.index()).expect("a seat is below six"),
+                ),
+            ],
+        ),
+        Requirement::SpecialAction(special) => put_number(out, 10, special as u64),
     }
 }
 

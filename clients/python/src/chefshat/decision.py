@@ -143,6 +143,26 @@ class Decision:
         return np.flatnonzero(self.mask)
 
     @property
+    def play_requirement(self) -> pb.PlayRequirement | None:
+        """At a turn: what a play must be, and whether passing is legal; None for other kinds."""
+        return self.request.play_requirement if self.request.HasField("play_requirement") else None
+
+    @property
+    def gift_requirement(self) -> pb.GiftRequirement | None:
+        """In the exchange: which card is due, and for whom; None for other kinds."""
+        return self.request.gift_requirement if self.request.HasField("gift_requirement") else None
+
+    @property
+    def special_action(self) -> pb.SpecialAction.ValueType:
+        """The special action that `declare` declares; `pb.SPECIAL_ACTION_UNSPECIFIED` for other kinds of decision."""
+        return self.request.special_action
+
+    @property
+    def default_action(self) -> int:
+        """Index of the action that the server takes when the time runs out or no invalid attempts are left. Always legal."""
+        return self.request.default_action
+
+    @property
     def shift(self) -> int:
         """The current Shift, from 1."""
         return self.request.observation.shift

@@ -2,9 +2,12 @@
 //! default decision. Mask and reason are written apart, for speed; a property test holds them
 //! together.
 
+use super::start::{CHEF_GIFTS, SOUS_CHEF_GIFTS};
 use super::{Game, Refusal, Stage};
 use crate::patterns::{PATTERNS, turn_mask};
-use crate::{Action, Cards, Face, Mask, Move, Opening, Seat};
+use crate::{
+    Action, Cards, Face, GiftRequirement, Mask, Move, Opening, PlayRequirement, Requirement, Seat,
+};
 
 impl Game {
     /// The legal actions of the open decision; none if the game has ended.
@@ -32,6 +35,49 @@ impl Game {
             Stage::Exchange { giver, .. } => Some(default_gift(self.hands[giver], space)),
             Stage::Special(_) => Some(space.decline()),
             Stage::Over => None,
+        }
+    }
+
+    /// What the rules require of the open decision; `None` if the game has ended. It tells no card
+    /// of any hand, so everyone who may know of the decision may see it.
+    pub fn requirement(&self) -> Option<Requirement> {
+        match self.stage {
+            Stage::Turn(_) => Some(Requirement::Play(self.play_requirement())),
+            Stage::Exchange {
+                giver, chef_left, ..
+            } => Some(Requirement::Gift(self.gift_requirement(giver, chef_left))),
+            Stage::Special(seat) => Some(Requirement::SpecialAction(self.special_of(seat))),
+            Stage::Over => None,
+        }
+    }
+
+    fn play_requirement(&self) -> PlayRequirement {
+        let (top, board) = (self.rules.faces(), self.table.board);
+        let (opens, empty) = (self.table.is_first_turn(), board.face == 0);
+        PlayRequirement {
+            lowest_face: if opens { top } else { 1 },
+            highest_face: if empty { top } else { board.face - 1 },
+            fewest_cards: board.size.max(1),
+            golden_card: opens && self.rules.opening() == Opening::Golden,
+            lone_joker: empty && !opens,
+            may_pass: self.check_pass().is_ok(),
+        }
+    }
+
+    fn gift_requirement(&self, giver: Seat, chef_left: u8) -> GiftRequirement {
+        let (rank, most) = if chef_left > 0 {
+            (0, CHEF_GIFTS)
+        } else {
+            (1, SOUS_CHEF_GIFTS)
+        };
+        let number = self.gave[giver].len() + 1;
+        // The partner's hand decides how many cards are given. It can fall short only if all jokers
+        // of the deck leave too little room in it; that a last gift is due tells that it does not.
+        let certain = number == most || self.rules.hand_size() >= most + self.rules.jokers();
+        GiftRequirement {
+            number,
+            total: certain.then_some(most),
+            receiver: self.ranked_from_last(rank),
         }
     }
 

@@ -6,9 +6,9 @@ use crate::deal::opening_leader;
 use crate::{BySeat, Cards, Event, Move, Role, Seat, SeatOrder, SpecialAction};
 
 /// Cards that the Dishwasher gives to the Chef, and the Chef to the Dishwasher.
-const CHEF_GIFTS: u8 = 2;
+pub(super) const CHEF_GIFTS: u8 = 2;
 /// Cards that the Waiter gives to the Sous-Chef, and the Sous-Chef to the Waiter.
-const SOUS_CHEF_GIFTS: u8 = 1;
+pub(super) const SOUS_CHEF_GIFTS: u8 = 1;
 /// With fewer players there is neither Sous-Chef nor Waiter.
 const SOUS_CHEF_PLAYERS: usize = 4;
 
@@ -55,11 +55,16 @@ impl Game {
         on_event(Event::RolesAssigned { roles: self.roles });
     }
 
-    pub(super) fn declare(&mut self, seat: Seat, on_event: &mut impl FnMut(Event)) {
-        let special = match self.roles[seat] {
+    /// The special action that a seat may declare, by its role.
+    pub(super) fn special_of(&self, seat: Seat) -> SpecialAction {
+        match self.roles[seat] {
             Some(Role::Dishwasher) => SpecialAction::FoodFight,
             _ => SpecialAction::DinnerIsServed,
-        };
+        }
+    }
+
+    pub(super) fn declare(&mut self, seat: Seat, on_event: &mut impl FnMut(Event)) {
+        let special = self.special_of(seat);
         self.special = Some(special);
         on_event(Event::SpecialActionDeclared { seat, special });
         match special {
@@ -166,7 +171,7 @@ impl Game {
     }
 
     /// The seat so far from the Dishwasher upwards.
-    fn ranked_from_last(&self, rank: usize) -> Seat {
+    pub(super) fn ranked_from_last(&self, rank: usize) -> Seat {
         self.ranking.as_slice()[self.ranking.len() - 1 - rank]
     }
 

@@ -17,6 +17,7 @@ mod metrics;
 mod model;
 mod observation;
 mod properties;
+mod requirement;
 mod rewards;
 mod rules;
 mod scripts;

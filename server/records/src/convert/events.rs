@@ -124,7 +124,8 @@ fn roles_to_proto(roles: &BySeat<Option<Role>>) -> Vec<i32> {
         .collect()
 }
 
-fn special_to_proto(special: SpecialAction) -> v1::SpecialAction {
+/// The protocol's name for a special action.
+pub fn special_to_proto(special: SpecialAction) -> v1::SpecialAction {
     match special {
         SpecialAction::FoodFight => v1::SpecialAction::FoodFight,
         SpecialAction::DinnerIsServed => v1::SpecialAction::DinnerIsServed,

@@ -7,7 +7,7 @@ mod rewards;
 mod rules;
 mod start;
 
-pub use events::{By, event_kind, final_table, seat_cards, seat_number};
+pub use events::{By, event_kind, final_table, seat_cards, seat_number, special_to_proto};
 pub(crate) use expression::LAST_MS;
 pub use expression::check_expression;
 pub use rewards::{invalid_reward, with_rewards};

@@ -8,7 +8,7 @@ use chefshat_records::convert::{By, event_kind, final_table, rules_to_proto};
 use ratatui::backend::TestBackend;
 use ratatui::{Frame, Terminal};
 
-use crate::convert::{decision_kind, observation_to_proto};
+use crate::convert::{decision_kind, observation_to_proto, put_requirement};
 
 /// What a picture shows on a screen of this size, line by line, without the spaces at the ends.
 pub(in crate::cli) fn text(
@@ -127,15 +127,18 @@ impl Dealt {
         let decision = self.game.decision().unwrap();
         let observation = self.game.observe(Viewer::Seat(decision.seat));
         let rules = self.game.rules();
-        v1::DecisionRequest {
+        let mut request = v1::DecisionRequest {
             decision_id: self.asked,
             kind: decision_kind(decision.kind).into(),
             observation: Some(observation_to_proto(&observation)),
             action_mask: self.game.legal_actions().to_bytes(rules.actions().size()),
             time_left_ms: 30_000,
             bank_left_ms: 60_000,
-            invalid_attempts_left: None,
-        }
+            default_action: self.game.default_action().unwrap().index().into(),
+            ..v1::DecisionRequest::default()
+        };
+        put_requirement(&mut request, self.game.requirement().unwrap());
+        request
     }
 
     fn tell(&mut self, events: &[Event]) -> Vec<v1::GameEvent> {

@@ -16,7 +16,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use chefshat_arena::BuiltInAgent;
-use chefshat_engine::{Action, Decision, Event, Game, Mask, Observation, Seat, Viewer};
+use chefshat_engine::{
+    Action, Decision, Event, Game, Mask, Observation, Requirement, Seat, Viewer,
+};
 
 pub use answers::{
     AnswerInput, Answered, ExpressError, JoinError, LeaveError, SeatStanding, Verdict,
@@ -337,6 +339,16 @@ impl Core {
     /// Legal actions of the open decision.
     pub fn legal_actions(&self) -> Mask {
         self.game().map(Game::legal_actions).unwrap_or_default()
+    }
+
+    /// What the rules require of the open decision.
+    pub fn requirement(&self) -> Option<Requirement> {
+        self.game().and_then(Game::requirement)
+    }
+
+    /// The default decision.
+    pub fn default_action(&self) -> Option<Action> {
+        self.game().and_then(Game::default_action)
     }
 
     /// The seat a ticket's secret belongs to, in constant time for each seat.

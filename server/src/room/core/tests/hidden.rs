@@ -141,7 +141,7 @@ fn decision_request(
     let observation = core.observe(Viewer::Seat(open.decision.seat));
     let (time_left, bank_left) = core.time_left(now);
     let size = core.header().rules.actions().size();
-    v1::DecisionRequest {
+    let mut request = v1::DecisionRequest {
         decision_id: open.id,
         kind: convert::decision_kind(open.decision.kind).into(),
         observation: observation.map(|seen| convert::observation_to_proto(&seen)),
@@ -153,7 +153,11 @@ fn decision_request(
         time_left_ms: convert::millis(time_left),
         bank_left_ms: convert::millis(bank_left),
         invalid_attempts_left: core.attempts_left(),
-    }
+        default_action: core.default_action().expect("it is open").index().into(),
+        ..v1::DecisionRequest::default()
+    };
+    convert::put_requirement(&mut request, core.requirement().expect("it is open"));
+    request
 }
 
 #[test]

@@ -3,6 +3,7 @@
 isort:skip_file
 One decision of a seat: what it is asked, what it may see, what it answers."""
 
+from chefshat._gen.chefshat.v1 import rules_pb2 as _rules_pb2
 from collections import abc as _abc
 from google.protobuf import descriptor as _descriptor
 from google.protobuf import message as _message
@@ -211,6 +212,10 @@ class DecisionRequest(_message.Message):
     TIME_LEFT_MS_FIELD_NUMBER: _builtins.int
     BANK_LEFT_MS_FIELD_NUMBER: _builtins.int
     INVALID_ATTEMPTS_LEFT_FIELD_NUMBER: _builtins.int
+    PLAY_REQUIREMENT_FIELD_NUMBER: _builtins.int
+    GIFT_REQUIREMENT_FIELD_NUMBER: _builtins.int
+    SPECIAL_ACTION_FIELD_NUMBER: _builtins.int
+    DEFAULT_ACTION_FIELD_NUMBER: _builtins.int
     decision_id: _builtins.int
     """Counts up by one per seat, from 1. Name it in the answer."""
     kind: Global___DecisionKind.ValueType
@@ -225,9 +230,21 @@ class DecisionRequest(_message.Message):
     """Milliseconds left in the seat's time bank, when the request was written."""
     invalid_attempts_left: _builtins.int
     """Invalid attempts left before the default decision is taken; unset when unlimited."""
+    special_action: _rules_pb2.SpecialAction.ValueType
+    """The special action that `declare` declares. UNSPECIFIED for other kinds."""
+    default_action: _builtins.int
+    """Index of the action that the server takes when the time runs out or no invalid attempts are left. Always legal."""
     @_builtins.property
     def observation(self) -> Global___Observation:
         """What the seat may know."""
+
+    @_builtins.property
+    def play_requirement(self) -> Global___PlayRequirement:
+        """At a turn: what a play must be, and whether passing is legal. Unset for other kinds."""
+
+    @_builtins.property
+    def gift_requirement(self) -> Global___GiftRequirement:
+        """In the exchange: which card is due, and for whom. Unset for other kinds."""
 
     def __init__(
         self,
@@ -239,16 +256,101 @@ class DecisionRequest(_message.Message):
         time_left_ms: _builtins.int = ...,
         bank_left_ms: _builtins.int = ...,
         invalid_attempts_left: _builtins.int | None = ...,
+        play_requirement: Global___PlayRequirement | None = ...,
+        gift_requirement: Global___GiftRequirement | None = ...,
+        special_action: _rules_pb2.SpecialAction.ValueType = ...,
+        default_action: _builtins.int = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["_invalid_attempts_left", b"_invalid_attempts_left", "invalid_attempts_left", b"invalid_attempts_left", "observation", b"observation"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["_invalid_attempts_left", b"_invalid_attempts_left", "gift_requirement", b"gift_requirement", "invalid_attempts_left", b"invalid_attempts_left", "observation", b"observation", "play_requirement", b"play_requirement"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["_invalid_attempts_left", b"_invalid_attempts_left", "action_mask", b"action_mask", "bank_left_ms", b"bank_left_ms", "decision_id", b"decision_id", "invalid_attempts_left", b"invalid_attempts_left", "kind", b"kind", "observation", b"observation", "time_left_ms", b"time_left_ms"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_invalid_attempts_left", b"_invalid_attempts_left", "action_mask", b"action_mask", "bank_left_ms", b"bank_left_ms", "decision_id", b"decision_id", "default_action", b"default_action", "gift_requirement", b"gift_requirement", "invalid_attempts_left", b"invalid_attempts_left", "kind", b"kind", "observation", b"observation", "play_requirement", b"play_requirement", "special_action", b"special_action", "time_left_ms", b"time_left_ms"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType__invalid_attempts_left: _TypeAlias = _typing.Literal["invalid_attempts_left"]  # noqa: Y015
     _WhichOneofArgType__invalid_attempts_left: _TypeAlias = _typing.Literal["_invalid_attempts_left", b"_invalid_attempts_left"]  # noqa: Y015
     def WhichOneof(self, oneof_group: _WhichOneofArgType__invalid_attempts_left) -> _WhichOneofReturnType__invalid_attempts_left | None: ...
 
 Global___DecisionRequest: _TypeAlias = DecisionRequest  # noqa: Y015
+
+@_typing.final
+class PlayRequirement(_message.Message):
+    """What a play must be for the rules to allow it at this turn. A play of q cards of face f with j jokers is legal if the hand holds these
+    cards, lowest_face <= f <= highest_face and q + j >= fewest_cards. Follows from public facts alone, so it reveals no card
+    of a hand. F is the number of faces (standard 11).
+    """
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    LOWEST_FACE_FIELD_NUMBER: _builtins.int
+    HIGHEST_FACE_FIELD_NUMBER: _builtins.int
+    FEWEST_CARDS_FIELD_NUMBER: _builtins.int
+    GOLDEN_CARD_FIELD_NUMBER: _builtins.int
+    LONE_JOKER_FIELD_NUMBER: _builtins.int
+    MAY_PASS_FIELD_NUMBER: _builtins.int
+    lowest_face: _builtins.int
+    """The lowest face allowed, 1..F: F on the Shift's first turn (the opening), 1 on all others."""
+    highest_face: _builtins.int
+    """The highest face allowed, 0..F: F on an empty board, else one below the face on the board. 0: nothing beats the board."""
+    fewest_cards: _builtins.int
+    """The fewest cards allowed, jokers included, 1..=F+2: 1 on an empty board, else as many as lie on the board."""
+    golden_card: _builtins.bool
+    """The play includes the Golden card: on the Shift's first turn with OPENING_GOLDEN. The server plays the Golden card first, so every
+    legal play of this turn includes it.
+    """
+    lone_joker: _builtins.bool
+    """One joker may be played alone: on an empty board, except on the Shift's first turn."""
+    may_pass: _builtins.bool
+    """Passing is legal."""
+    def __init__(
+        self,
+        *,
+        lowest_face: _builtins.int = ...,
+        highest_face: _builtins.int = ...,
+        fewest_cards: _builtins.int = ...,
+        golden_card: _builtins.bool = ...,
+        lone_joker: _builtins.bool = ...,
+        may_pass: _builtins.bool = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["fewest_cards", b"fewest_cards", "golden_card", b"golden_card", "highest_face", b"highest_face", "lone_joker", b"lone_joker", "lowest_face", b"lowest_face", "may_pass", b"may_pass"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___PlayRequirement: _TypeAlias = PlayRequirement  # noqa: Y015
+
+@_typing.final
+class GiftRequirement(_message.Message):
+    """Which card of the exchange is due. Any card of the hand may be given."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    NUMBER_FIELD_NUMBER: _builtins.int
+    TOTAL_FIELD_NUMBER: _builtins.int
+    RECEIVER_FIELD_NUMBER: _builtins.int
+    number: _builtins.int
+    """Which of the seat's gifts in this exchange this is, from 1."""
+    total: _builtins.int
+    """How many cards the seat gives in this exchange, 1 or 2. Unset while the seat may not know: with very small hands its partner may hold
+    too few ingredient cards, and the seat gives as many cards as it receives.
+    """
+    receiver: _builtins.int
+    """The seat that receives the card."""
+    def __init__(
+        self,
+        *,
+        number: _builtins.int = ...,
+        total: _builtins.int | None = ...,
+        receiver: _builtins.int = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _typing.Literal["_total", b"_total", "total", b"total"]  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_total", b"_total", "number", b"number", "receiver", b"receiver", "total", b"total"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    _WhichOneofReturnType__total: _TypeAlias = _typing.Literal["total"]  # noqa: Y015
+    _WhichOneofArgType__total: _TypeAlias = _typing.Literal["_total", b"_total"]  # noqa: Y015
+    def WhichOneof(self, oneof_group: _WhichOneofArgType__total) -> _WhichOneofReturnType__total | None: ...
+
+Global___GiftRequirement: _TypeAlias = GiftRequirement  # noqa: Y015
 
 @_typing.final
 class Answer(_message.Message):
