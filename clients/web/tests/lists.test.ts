@@ -72,10 +72,10 @@ test("links are for seats that people can take, and stay with those who have sat
 
 test.each([
   [AnswerStatus.ACCEPTED, undefined, ""],
-  [AnswerStatus.INVALID, undefined, "This is not legal. Choose again."],
-  [AnswerStatus.INVALID, 1, "This is not legal. Choose again: 1 attempt is left."],
-  [AnswerStatus.INVALID, 0, "This is not legal. It was decided for you."],
-  [AnswerStatus.CLOSED, undefined, "Too late: this has been decided already."],
+  [AnswerStatus.INVALID, undefined, "This action is illegal. Choose again."],
+  [AnswerStatus.INVALID, 1, "This action is illegal. Choose again: 1 attempt left."],
+  [AnswerStatus.INVALID, 0, "This action is illegal. The default decision was taken for you."],
+  [AnswerStatus.CLOSED, undefined, "Too late: this has already been decided."],
 ])("an answer of status %i with %s attempts left is said as %j", (status, left, expected) => {
   const result = create(AnswerResultSchema, {
     status,

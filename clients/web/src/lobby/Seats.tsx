@@ -20,7 +20,7 @@ export function Seats({ room, mine }: { room: Room; mine?: number | undefined })
             <span class="seat-list-free">
               {participant.reservedFor === ParticipantKind.UNSPECIFIED
                 ? words.free
-                : words.keptFor(kindWord(participant.reservedFor))}
+                : words.reservedFor(kindWord(participant.reservedFor))}
             </span>
           ) : (
             <>

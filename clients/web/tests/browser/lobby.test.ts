@@ -13,10 +13,10 @@ useStage();
 test("a room is made, and who opens its invitation takes the seat kept for a person", async () => {
   const host = await person(browser);
   await host.page.goto(`${server.url}/`);
-  await host.page.getByRole("link", { name: "Make a room…" }).click();
+  await host.page.getByRole("link", { name: "Create a room…" }).click();
   await host.page.getByLabel("Name of the room").fill("Friday evening");
   await host.page.getByLabel("Seat 1").selectOption({ label: "Free for a person" });
-  await host.page.getByRole("button", { name: "Make the room" }).click();
+  await host.page.getByRole("button", { name: "Create the room" }).click();
   await host.page.waitForURL(/\/rooms\/[0-9a-f]{32}$/);
   await host.page.getByRole("heading", { name: "Friday evening" }).waitFor();
   await host.page.getByRole("img", { name: "QR code of the address" }).waitFor();
@@ -26,7 +26,7 @@ test("a room is made, and who opens its invitation takes the seat kept for a per
   const guest = await person(browser);
   await guest.page.goto(invitation);
   await guest.page.getByRole("button", { name: "Sit down" }).click();
-  await guest.page.getByText("Say how the others shall call you.").waitFor();
+  await guest.page.getByText("Enter a name.").waitFor();
   await guest.page.getByLabel("Your name").fill("Rosa");
   await guest.page.getByRole("button", { name: "Sit down" }).click();
   await guest.page.waitForURL(/\/rooms\//);
@@ -56,16 +56,16 @@ test("of many rooms the newest are shown, and more when they are asked for", asy
 test("what cannot be accepted is marked at its field, all of it at once", async () => {
   const { page } = await person(browser);
   await page.goto(`${server.url}/new`);
-  await page.getByText("Rules, faults and watching").click();
+  await page.getByText("Rules, errors and spectators").click();
   const invalid = () => page.locator('[aria-invalid="true"]').count();
   await page.getByLabel("Faces").fill("99");
   await page.getByLabel("Jokers").fill("many");
   await page.getByLabel("Points by place").fill("5, banana");
-  await page.getByRole("button", { name: "Make the room" }).click();
-  await page.getByText("Something cannot be accepted").waitFor();
-  await page.getByText("It must be from 4 to 15.").waitFor();
-  await page.getByText("Type a number here.").waitFor();
-  await page.getByText("Type whole numbers from 0 on with commas between them").waitFor();
+  await page.getByRole("button", { name: "Create the room" }).click();
+  await page.getByText("Some fields need correcting").waitFor();
+  await page.getByText("Must be between 4 and 15.").waitFor();
+  await page.getByText("Enter a number.").waitFor();
+  await page.getByText("Enter whole numbers of 0 or more, separated by commas").waitFor();
   expect(await invalid()).toBe(3);
   await page.waitForFunction(() => document.activeElement === document.querySelector('[aria-invalid="true"]'));
   // What only the server can tell is marked as well: so few cards cannot be dealt to so many.
@@ -73,14 +73,14 @@ test("what cannot be accepted is marked at its field, all of it at once", async 
   await page.getByLabel("Faces").fill("4");
   await page.getByLabel("Jokers").fill("0");
   await page.getByLabel("Points by place").fill("");
-  await page.getByRole("button", { name: "Make the room" }).click();
+  await page.getByRole("button", { name: "Create the room" }).click();
   await expect.poll(() => page.getByLabel("Faces").getAttribute("aria-invalid")).toBe("true");
 });
 
 test("a wrong code and an address that names nothing are answered in words", async () => {
   const { page } = await person(browser, { locale: "it-IT" });
   await page.goto(`${server.url}/join/22222222`);
-  await page.getByText("Nessuna stanza e nessun torneo in cui si possa entrare ha questo codice.").waitFor();
+  await page.getByText("Questo codice non corrisponde a nessuna stanza").waitFor();
   expect(await page.getByLabel("Il tuo nome").count()).toBe(0);
   await page.goto(`${server.url}/nowhere/at/all`);
   await page.getByRole("heading", { name: "Questa pagina non esiste" }).waitFor();
@@ -94,7 +94,7 @@ test("an invitation says which room it is for, and which names are taken there",
   await other.page.getByRole("heading", { name: "Sunday table" }).waitFor();
   await other.page.getByRole("listitem").filter({ hasText: "Ada" }).getByText("person", { exact: true }).waitFor();
   await other.page.getByLabel("Your name").fill("ada ");
-  await other.page.getByText("Somebody at this table is called ada already.").waitFor();
+  await other.page.getByText("Someone at this table is already called ada.").waitFor();
   await other.page.getByRole("button", { name: "Sit down" }).click();
   expect(new URL(other.page.url()).pathname).toBe(`/join/${code}`);
   await other.page.getByLabel("Your name").fill("Ben");
@@ -108,14 +108,14 @@ test("who leaves before the game gives the seat back, during it is told what bec
   await host.page.goto(`${server.url}/new`);
   await host.page.getByLabel("Name of the room").fill("To be left");
   await host.page.getByLabel("Seat 1").selectOption({ label: "Free for a person" });
-  await host.page.getByRole("button", { name: "Make the room" }).click();
+  await host.page.getByRole("button", { name: "Create the room" }).click();
   // No seat is free for an agent; and this address is this machine's alone.
-  await host.page.getByText("Only this machine can open this address.").waitFor();
+  await host.page.getByText("This address works on this machine only.").waitFor();
   expect(await host.page.getByText("For an agent, in a terminal").count()).toBe(0);
   await host.page.getByLabel("Your name").fill("Mia");
   await host.page.getByRole("button", { name: "Sit down" }).click();
   await host.page.getByRole("button", { name: "Leave or close the room…" }).click();
-  await host.page.getByText("Your seat becomes free for somebody else.").waitFor();
+  await host.page.getByText("Your seat becomes free for someone else.").waitFor();
   const room = host.page.url();
   await host.page.getByRole("button", { name: "Leave", exact: true }).click();
   await host.page.waitForURL(`${server.url}/`);
@@ -130,7 +130,7 @@ test("who leaves before the game gives the seat back, during it is told what bec
   const guest = await person(browser);
   await sitDown(guest.page, server, code, "Rosa");
   await guest.page.getByRole("button", { name: "Leave…" }).click();
-  await guest.page.getByText("after 3 in a row that ran out, the agent “random” plays for you").waitFor();
+  await guest.page.getByText("after 3 timeouts in a row, the agent “random” plays for you").waitFor();
   expect(await guest.page.getByRole("button", { name: "End the game" }).count()).toBe(0);
   await guest.page.getByRole("button", { name: "Stay" }).click();
 
@@ -147,10 +147,10 @@ test("the dialog of leaving stays open when the game begins meanwhile", async ()
   await sitDown(ada.page, server, code, "Ada");
   await ada.page.getByRole("button", { name: "Leave…" }).click();
   const dialog = ada.page.getByRole("dialog");
-  await dialog.getByText("Your seat becomes free for somebody else.").waitFor();
+  await dialog.getByText("Your seat becomes free for someone else.").waitFor();
   await sitDown(ben.page, server, code, "Ben");
   await ada.page.locator("[data-decision], .table").first().waitFor();
-  await dialog.getByText("after 3 in a row that ran out, the agent “random” plays for you").waitFor();
+  await dialog.getByText("after 3 timeouts in a row, the agent “random” plays for you").waitFor();
   await dialog.getByRole("button", { name: "Stay" }).click();
   await dialog.waitFor({ state: "detached" });
   expect([...ada.faults, ...ben.faults]).toEqual([]);
@@ -201,7 +201,7 @@ test("language and look are chosen and kept", async () => {
   const { page } = await person(browser);
   await page.goto(`${server.url}/`);
   await page.getByRole("button", { name: "Settings" }).click();
-  await page.getByLabel("Look").selectOption("dark");
+  await page.getByLabel("Theme").selectOption("dark");
   await page.getByLabel("Language").selectOption("it");
   await page.getByRole("heading", { name: "Impostazioni" }).waitFor();
   await page.keyboard.press("Escape");

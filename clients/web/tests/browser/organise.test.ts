@@ -10,20 +10,20 @@ useStage();
 test("a tournament is made on the page, joined from another, filled up, begun, played to its end", async () => {
   const host = await person(browser);
   await host.page.goto(`${server.url}/tournaments`);
-  await host.page.getByRole("link", { name: "Make a tournament…" }).click();
+  await host.page.getByRole("link", { name: "Create a tournament…" }).click();
   await host.page.getByLabel("Name of the tournament").fill("Spring cup");
   await host.page.getByRole("radio", { name: "Knockout" }).check();
   await host.page.getByLabel("greedy", { exact: true }).fill("2");
-  await host.page.getByText("2 agents of the server").waitFor();
-  await host.page.getByLabel("Seconds that agents of the server wait").fill("0");
+  await host.page.getByText("2 built-in agents").waitFor();
+  await host.page.getByLabel("Delay of built-in agents, in seconds").fill("0");
   await host.page.getByLabel("Time to decide").selectOption("noHurry");
-  await host.page.getByText("Deals, rules, faults and watching").click();
+  await host.page.getByText("Deals, rules, errors and spectators").click();
   await host.page.getByLabel("The game ends").selectOption("shifts");
   await host.page.getByLabel("Shifts", { exact: true }).fill("1");
-  await host.page.getByRole("button", { name: "Make the tournament" }).click();
+  await host.page.getByRole("button", { name: "Create the tournament" }).click();
   await host.page.waitForURL(/\/tournaments\/[0-9a-f]{32}$/);
   await host.page.getByText("2 have joined.").waitFor();
-  await host.page.getByText("To make 4, 2 agents “random” fill up.").waitFor();
+  await host.page.getByText("2 agents “random” are added to make 4.").waitFor();
   await host.page.getByRole("img", { name: "QR code of the address" }).waitFor();
   const invitation = await host.page.getByText(/\/tournaments\/[0-9a-f]{32}\?code=[0-9A-Z]{8}$/).textContent();
   if (!invitation) throw new Error("the invitation is empty");
@@ -32,19 +32,19 @@ test("a tournament is made on the page, joined from another, filled up, begun, p
   await guest.page.goto(invitation);
   // Nobody but the organiser's device begins or closes it.
   await guest.page.getByRole("button", { name: "Join the tournament" }).waitFor();
-  expect(await guest.page.getByRole("button", { name: "Begin the tournament" }).count()).toBe(0);
+  expect(await guest.page.getByRole("button", { name: "Start the tournament" }).count()).toBe(0);
   await guest.page.getByLabel("Your name").fill("Rosa");
   await guest.page.getByRole("button", { name: "Join the tournament" }).click();
-  await guest.page.getByText("You take part as Rosa.").waitFor();
+  await guest.page.getByText("You are taking part as Rosa.").waitFor();
 
-  await host.page.getByText("To make 4, 1 agent “random” fills up.").waitFor();
+  await host.page.getByText("1 agent “random” is added to make 4.").waitFor();
   const entrants = host.page.locator(".entrants li");
   await expect.poll(() => entrants.count()).toBe(3);
   await entrants.filter({ hasText: "Rosa" }).getByText("person", { exact: true }).waitFor();
   // The secret outlasts a reload.
   await host.page.reload();
-  await host.page.getByRole("button", { name: "Begin the tournament" }).click();
-  await host.page.getByText("being played").first().waitFor();
+  await host.page.getByRole("button", { name: "Start the tournament" }).click();
+  await host.page.getByText("in progress").first().waitFor();
 
   await playOn(guest.page, byClicks);
   await guest.page.getByRole("button", { name: "Back to the standings" }).click();
@@ -60,18 +60,18 @@ test("a tournament is made on the page, joined from another, filled up, begun, p
 test("what is refused is marked at its field, by the page and by the server", async () => {
   const { page } = await person(browser);
   await page.goto(`${server.url}/tournaments/new`);
-  const submit = page.getByRole("button", { name: "Make the tournament" });
+  const submit = page.getByRole("button", { name: "Create the tournament" });
   await submit.click();
-  await page.getByText("Give it a name.").waitFor();
+  await page.getByText("Enter a name.").waitFor();
   await page.getByLabel("Name of the tournament").fill("Friday league");
   await page.getByRole("radio", { name: "Swiss" }).check();
   await page.getByLabel("Rounds", { exact: true }).fill("2000");
   await submit.click();
-  await page.getByText("It must be from 1 to 1000.").waitFor();
+  await page.getByText("Must be between 1 and 1000.").waitFor();
   expect(await page.getByLabel("Rounds", { exact: true }).getAttribute("aria-invalid")).toBe("true");
   await page.getByLabel("Rounds", { exact: true }).fill("3");
   // So few cards cannot be dealt to so many, as the server alone can tell.
-  await page.getByLabel("Players at a table").selectOption("6");
+  await page.getByLabel("Players per table").selectOption("6");
   await page.getByLabel("Faces").fill("4");
   await page.getByLabel("Jokers").fill("0");
   await submit.click();
@@ -89,25 +89,25 @@ test("it begins by itself, its code alone leads to it, and its organiser closes 
   await host.page.getByLabel("Name of the tournament").fill("Open league");
   await host.page.getByRole("radio", { name: "Round robin" }).check();
   await host.page.getByLabel("trained", { exact: true }).fill("3");
-  await host.page.getByLabel("It begins").selectOption("joined");
+  await host.page.getByLabel("It starts").selectOption("joined");
   await host.page.getByLabel("Participants", { exact: true }).fill("4");
-  await host.page.getByRole("button", { name: "Make the tournament" }).click();
-  await host.page.getByText("It begins by itself when there are 4.").waitFor();
+  await host.page.getByRole("button", { name: "Create the tournament" }).click();
+  await host.page.getByText("It starts automatically when 4 have joined.").waitFor();
   const code = await host.page.locator(".invite-code").textContent();
 
   const guest = await person(browser);
   await guest.page.goto(`${server.url}/`);
   await guest.page.getByLabel("Join code").fill(code ?? "");
-  await guest.page.getByRole("button", { name: "Go on" }).click();
+  await guest.page.getByRole("button", { name: "Continue" }).click();
   // The code is not asked for again.
   await guest.page.getByRole("heading", { name: "Open league", level: 1 }).waitFor();
   await guest.page.getByLabel("Your name").fill("Ada");
   await guest.page.getByRole("button", { name: "Join the tournament" }).click();
   await guest.page.waitForURL(/\/tournaments\/[0-9a-f]{32}$/);
 
-  await host.page.getByText("being played").first().waitFor();
+  await host.page.getByText("in progress").first().waitFor();
   await host.page.getByRole("button", { name: "Close the tournament…" }).click();
-  await host.page.getByText("Games that are being played are aborted").waitFor();
+  await host.page.getByText("Running games are aborted").waitFor();
   await host.page.getByRole("button", { name: "Cancel" }).click();
   await host.page.getByRole("button", { name: "Close the tournament…" }).click();
   await host.page.getByRole("button", { name: "Close it now" }).click();

@@ -52,7 +52,7 @@ beforeAll(async () => {
   await seated.goto(`${server.url}/tournaments/new`);
   await seated.getByLabel("Name of the tournament").fill("My league");
   await seated.getByLabel("greedy", { exact: true }).fill("2");
-  await seated.getByRole("button", { name: "Make the tournament" }).click();
+  await seated.getByRole("button", { name: "Create the tournament" }).click();
   await seated.locator(".organiser").waitFor();
   ownId = new URL(seated.url()).pathname.split("/").at(-1) ?? "";
   await seated.goto(`${server.url}/rooms/${rooms.table}`);

@@ -22,7 +22,7 @@ beforeAll(async () => {
 test("scrubbing shows the hands and the choice that the record has at that decision", async () => {
   const { page, faults } = await person(browser);
   await page.goto(`${server.url}/replay/${gameId}`);
-  const slider = page.getByLabel("Moment of the game");
+  const slider = page.getByLabel("Position in the game");
   const all = lines.filter(({ line }) => line.case === "decision").length;
   await expect.poll(() => slider.getAttribute("aria-valuetext")).toBe(`0 of ${all} decisions taken`);
   const possible = page.locator(".replay-decision");
@@ -31,7 +31,7 @@ test("scrubbing shows the hands and the choice that the record has at that decis
   for (const share of [0.1, 0.35, 0.6, 0.85]) {
     await slider.fill(String(Math.round(share * last)));
     // From the end of a pizza or a Shift on to where somebody decides.
-    while ((await possible.count()) === 0) await page.getByRole("button", { name: "One moment on" }).click();
+    while ((await possible.count()) === 0) await page.getByRole("button", { name: "One step forward" }).click();
     const taken = Number((await slider.getAttribute("aria-valuetext"))?.split(" ")[0]);
     const { hands, decision } = before(taken + 1);
     expect(await shownHands(page)).toEqual(hands);
@@ -41,7 +41,7 @@ test("scrubbing shows the hands and the choice that the record has at that decis
       await possible.getByText(`${legalActions(decision.actionMask).length} legal action`).waitFor();
     }
   }
-  await page.getByLabel("Cards seen").selectOption({ label: "as spectators" });
+  await page.getByLabel("Cards shown").selectOption({ label: "as a spectator" });
   await expect.poll(() => shownHands(page)).toEqual([[], [], [], []]);
   await page.getByRole("button", { name: "To the end" }).click();
   await page.getByRole("heading", { name: "The game is over", level: 1 }).waitFor();
@@ -51,7 +51,7 @@ test("scrubbing shows the hands and the choice that the record has at that decis
 test("an address names a decision, and playing goes on from there", async () => {
   const { page } = await person(browser);
   await page.goto(`${server.url}/replay/${gameId}?decision=12`);
-  const slider = page.getByLabel("Moment of the game");
+  const slider = page.getByLabel("Position in the game");
   await expect.poll(() => slider.getAttribute("aria-valuetext")).toMatch(/^11 of /);
   await page.getByLabel("Speed").selectOption({ label: "× 8" });
   await page.getByRole("button", { name: "Play", exact: true }).click();

@@ -47,7 +47,7 @@ test("a person plays a whole Shift with the keyboard alone, and hears every turn
   await expectEnd(page, roomId, taken);
   await expect.poll(() => heard.join(" ").match(/Your turn\./g)?.length).toBe(taken);
   await expect.poll(() => heard.join(" ")).toContain("The game is over.");
-  await tabTo(page, (on) => on.label === "See the game again");
+  await tabTo(page, (on) => on.label === "Watch the replay");
   await page.keyboard.press("Enter");
   await page.waitForURL(/\/replay\//);
   expect(faults).toEqual([]);
@@ -122,7 +122,7 @@ test("a game goes on when the server is ended and started again in the middle", 
     if (already !== 2) return;
     const before = await seen(page);
     await server.restart();
-    await page.getByText("The server was restarted; the game goes on").waitFor();
+    await page.getByText("The server restarted; the game continues").waitFor();
     await page.locator("[data-decision]").waitFor();
     expect((await seen(page)).hand).toEqual(before.hand);
     restarts += 1;

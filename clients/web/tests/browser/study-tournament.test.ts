@@ -89,9 +89,9 @@ test("the organiser makes links, each for one participant; at one device one aft
   const { page, faults } = await person(browser);
   await page.goto(`${server.url}/tournaments/new`);
   await page.getByLabel("Name of the tournament").fill("Links");
-  await page.getByRole("button", { name: "Make the tournament" }).click();
+  await page.getByRole("button", { name: "Create the tournament" }).click();
   await page.getByText("Links for a study").click();
-  await page.getByLabel("Participants, one a line").fill("P01\nP02\nP02");
+  await page.getByLabel("Participants, one per line").fill("P01\nP02\nP02");
   await page.getByLabel("what happened").check();
   const links = await page.getByText(/\?code=[0-9A-Z]{8}&name=P0\d&hide=log$/).allTextContents();
   expect(links.map((link) => new URL(link).searchParams.get("name"))).toEqual(["P01", "P02"]);
@@ -100,16 +100,16 @@ test("the organiser makes links, each for one participant; at one device one aft
     await page.goto(links[index] ?? "");
     // The place of the one before is not lost without a question.
     if (index > 0) {
-      await page.getByText("when somebody else joins here, P01 can play no more games.").waitFor();
+      await page.getByText("If someone else joins here, P01 cannot play any more games.").waitFor();
       await page.getByRole("button", { name: `Take part as ${name}` }).click();
     }
-    await page.getByText(`You take part as ${name}.`).waitFor();
+    await page.getByText(`You are taking part as ${name}.`).waitFor();
     await page.getByRole("button", { name: "Join the tournament" }).click();
     await page.locator(".entrants-mine").filter({ hasText: name }).waitFor();
   }
   // A link that names nobody asks who is there.
   await page.goto((links[0] ?? "").replace("name=P01&", ""));
-  await page.getByRole("button", { name: "Go on as P02" }).click();
+  await page.getByRole("button", { name: "Continue as P02" }).click();
   await page.locator(".entrants-mine").filter({ hasText: "P02" }).waitFor();
   expect(faults).toEqual([]);
 });

@@ -68,10 +68,10 @@ test("a participant's link leads from the consent to the table, and to the quest
   await page.goto(`${server.url}/?lang=it`);
   await page.getByRole("button", { name: "Impostazioni" }).click();
   await page.getByRole("button", { name: "Dimentica tutto su questo dispositivo" }).click();
-  await page.getByRole("button", { name: "Dimentica", exact: true }).click();
+  await page.getByRole("button", { name: "Dimentica tutto", exact: true }).click();
   await page.waitForURL(`${server.url}/`);
   await page.goto(link.href);
-  await page.getByText("P07 si è già seduto al tavolo.").waitFor();
+  await page.getByText("P07 ha già un posto.").waitFor();
 
   const lines = (await recordOf(server, await gameOf(server, roomId))).map(({ line }) => line);
   const header = lines.flatMap((line) => (line.case === "header" ? line.value : []))[0];
@@ -87,7 +87,7 @@ test("who does not agree does not sit down", async () => {
   const { page } = await person(browser);
   await page.goto(`${server.url}/join/${code}?name=P08&consent=Read+this.`);
   await page.getByRole("button", { name: "I do not agree" }).click();
-  await page.getByText("You do not take part. Nothing was stored; you can close this page.").waitFor();
+  await page.getByText("You are not taking part. Nothing was stored; you can close this page.").waitFor();
   expect(await page.evaluate(() => localStorage.length)).toBe(0);
   // It was a slip: without loading the page again.
   await page.getByRole("button", { name: "Read it again" }).click();
@@ -168,18 +168,18 @@ test("who opens their link where another has the seat is asked, and by their lin
   const link = (name: string) => `${server.url}/join/${code}?name=${name}`;
   const table = new RegExp(`/rooms/${roomId}`);
   await page.goto(link("P01"));
-  await page.getByText("You take part as P01.").waitFor();
+  await page.getByText("You are taking part as P01.").waitFor();
   await page.getByRole("button", { name: "Sit down at the table" }).click();
   await page.waitForURL(table);
   await page.goto(link("P02"));
-  await page.getByRole("button", { name: "Go on as P01" }).click();
+  await page.getByRole("button", { name: "Continue as P01" }).click();
   await page.waitForURL(table);
   expect(await named()).toEqual(["P01"]);
   // While their seat is open in another page, too.
   const second = await page.context().newPage();
   await second.goto(link("P02"));
-  await second.getByRole("button", { name: "Give the seat of P01 back and take part as P02" }).click();
-  await second.getByText("You take part as P02.").waitFor();
+  await second.getByRole("button", { name: "Give up P01’s seat and take part as P02" }).click();
+  await second.getByText("You are taking part as P02.").waitFor();
   await second.getByRole("button", { name: "Sit down at the table" }).click();
   await second.waitForURL(table);
   await second.getByRole("listitem").filter({ hasText: "P02" }).getByText("(you)").waitFor();
@@ -191,7 +191,7 @@ test("who opens their link where another has the seat is asked, and by their lin
   await second.getByRole("listitem").filter({ hasText: "P02" }).getByText("(you)").waitFor();
   const other = await person(browser);
   await other.page.goto(link("P02"));
-  await other.page.getByText("P02 has sat down already.").waitFor();
+  await other.page.getByText("P02 already has a seat.").waitFor();
   expect(await other.page.getByRole("button", { name: "Sit down at the table" }).count()).toBe(0);
   expect(await named()).toEqual(["P02"]);
   expect([...faults, ...other.faults]).toEqual([]);
@@ -212,7 +212,7 @@ test("where its room is closed before a game, a study has no last questionnaire,
   const gone = "0".repeat(32);
   await page.evaluate((id) => localStorage.setItem(`chefshat.study.${id}`, "?hide=pages"), gone);
   await page.goto(`${server.url}/rooms/${gone}`);
-  await page.getByText("There is no such room any more.").waitFor();
+  await page.getByText("This room no longer exists.").waitFor();
   expect(await page.locator("html").getAttribute("data-hide")).toBe("pages");
   expect(await page.locator(".faulty").getByRole("link").count()).toBe(0);
 });
@@ -221,13 +221,13 @@ test("the host of a room makes links for its participants", async () => {
   const { page, faults } = await person(browser);
   await page.goto(`${server.url}/new`);
   await page.getByLabel("Seat 1").selectOption({ label: "Free for a person" });
-  await page.getByRole("button", { name: "Make the room" }).click();
+  await page.getByRole("button", { name: "Create the room" }).click();
   await page.getByText("Links for a study").click();
-  await page.getByLabel("Participants, one a line").fill("P01\nP02");
+  await page.getByLabel("Participants, one per line").fill("P01\nP02");
   await page.getByLabel("Seat of the first").selectOption("0");
   await page.getByLabel("what happened").check();
   await page.getByLabel("Address of a questionnaire after").fill("forms.example");
-  await page.getByText("This is no address that begins with https:// or http://.").waitFor();
+  await page.getByText("Enter an address that begins with https:// or http://.").waitFor();
   await page.getByLabel("Address of a questionnaire after").fill("https://forms.example/{name}");
   const link = await page.getByText(/name=P02&seat=1&hide=log&after=/).textContent();
   expect(new URL(link ?? "").searchParams.get("after")).toBe("https://forms.example/{name}");
@@ -238,15 +238,15 @@ test("each participant gets a room of their own like the one at hand, with all l
   const { page, faults } = await person(browser);
   await page.goto(`${server.url}/new`);
   await page.getByLabel("Name of the room").fill("Lab");
-  await page.getByText("Rules, faults and watching").click();
+  await page.getByText("Rules, errors and spectators").click();
   await page.getByLabel("Faces").fill("7");
-  await page.getByRole("button", { name: "Make the room" }).click();
+  await page.getByRole("button", { name: "Create the room" }).click();
   await page.getByText("Links for a study").click();
   await page.getByLabel("They play").selectOption("own");
-  await page.getByText("Say above who takes part.").waitFor();
-  await page.getByLabel("Participants, one a line").fill("P01-P03");
+  await page.getByText("Enter the participants above.").waitFor();
+  await page.getByLabel("Participants, one per line").fill("P01-P03");
   await page.getByLabel("what happened").check();
-  await page.getByRole("button", { name: "Make 3 rooms" }).click();
+  await page.getByRole("button", { name: "Create 3 rooms" }).click();
   await page.getByText(/name=P03&hide=log/).waitFor();
   const [table] = await Promise.all([
     page.waitForEvent("download"),
@@ -270,9 +270,9 @@ test("each participant gets a room of their own like the one at hand, with all l
   await page.getByText("Links for a study").click();
   await page.getByLabel("They play").selectOption("own");
   await page.getByText("name=P02&hide=log").waitFor();
-  await page.getByLabel("Participants, one a line").fill(`P01-P04\n${"x".repeat(65)}`);
-  await page.getByText("A name has at most 64 characters").waitFor();
-  await page.getByRole("button", { name: "Make 1 room" }).waitFor();
+  await page.getByLabel("Participants, one per line").fill(`P01-P04\n${"x".repeat(65)}`);
+  await page.getByText("A name can have at most 64 characters").waitFor();
+  await page.getByRole("button", { name: "Create 1 room" }).waitFor();
   // Also once the room at hand is closed.
   await page.getByRole("button", { name: "Close the room" }).click();
   await page.getByRole("button", { name: "Close the room" }).click();
@@ -301,7 +301,7 @@ test("a link without a name asks whose the seat is that this device has, and a s
   await page.getByRole("button", { name: "Take another seat" }).click();
   await page.getByRole("button", { name: "Sit down at the table" }).waitFor();
   await page.goto(link);
-  await page.getByRole("button", { name: "Go on as Ada" }).click();
+  await page.getByRole("button", { name: "Continue as Ada" }).click();
   await page.getByText("(you)").waitFor();
   // To the page a ticket that the server does not know any more is the same as one that it has never known.
   await page.evaluate(() => {

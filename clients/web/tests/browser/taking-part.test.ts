@@ -36,7 +36,7 @@ test("a person joins, plays every game of the tournament and sees the final stan
   const { page, faults } = await person(browser);
   await page.goto(`${server.url}/tournaments/${id}`);
   await page.getByRole("button", { name: "Join the tournament" }).click();
-  await page.getByText("Type the code that the organiser gave you.").waitFor();
+  await page.getByText("Enter the code that the organiser gave you.").waitFor();
   await page.getByLabel("Join code of the tournament").fill(code.toLowerCase());
   await page.getByLabel("Your name").fill("Rosa");
   await page.getByRole("button", { name: "Join the tournament" }).click();
@@ -49,7 +49,7 @@ test("a person joins, plays every game of the tournament and sees the final stan
     if (already === 1) await page.reload();
     else {
       await server.restart();
-      await page.getByText("The server was restarted; the game goes on").first().waitFor();
+      await page.getByText("The server restarted; the game continues").first().waitFor();
     }
     await page.locator(`[data-decision="${before}"]`).waitFor();
     interrupted += 1;
@@ -90,15 +90,15 @@ test("a code that is typed a second time leads back to the place that it has tak
   const typed = async () => {
     await page.goto(`${server.url}/join`);
     await page.getByLabel("Join code").fill(code);
-    await page.getByRole("button", { name: "Go on" }).click();
+    await page.getByRole("button", { name: "Continue" }).click();
     await page.waitForURL(new RegExp(`/tournaments/${id}`));
   };
   await typed();
   await page.getByLabel("Your name").fill("Rosa");
   await page.getByRole("button", { name: "Join the tournament" }).click();
-  await page.getByText("You take part as Rosa.").waitFor();
+  await page.getByText("You are taking part as Rosa.").waitFor();
   await typed();
-  await page.getByText("You take part as Rosa.").waitFor();
+  await page.getByText("You are taking part as Rosa.").waitFor();
   expect(await page.getByRole("button", { name: "Join the tournament" }).count()).toBe(0);
   const { tournament } = await clientsOf(server).tournaments.getTournament({ tournamentId: id });
   expect(tournament?.participants.map(({ name }) => name).filter((name) => name === "Rosa")).toEqual(["Rosa"]);

@@ -17,12 +17,12 @@ export const common = {
   settings: {
     title: "Settings",
     language: "Language",
-    look: "Look",
-    looks: { system: "As the system", light: "Light", dark: "Dark" },
+    look: "Theme",
+    looks: { system: "System", light: "Light", dark: "Dark" },
     forget: "Forget everything on this device",
     forgetSure:
-      "Your seats, places in tournaments, the rooms and tournaments you made, your name and settings? You cannot come back to them.",
-    forgetDo: "Forget it",
+      "This removes your seats, your places in tournaments, the rooms and tournaments you created, your name and your settings from this device. You cannot get them back.",
+    forgetDo: "Forget everything",
   },
   kinds: { agent: "agent", human: "person", robot: "robot", builtIn: "built-in agent", open: "free" },
   roles: { chef: "Chef", sousChef: "Sous-Chef", cook: "Cook", waiter: "Waiter", dishwasher: "Dishwasher" },
@@ -53,6 +53,6 @@ export const common = {
   loading: "Loading…",
   more: "More",
   showMore: "Show more",
-  pageNotLoaded: "This page could not be loaded. Check the connection, then load it again.",
-  notFound: { title: "There is no such page", text: "The address names nothing here.", link: "To the lobby" },
+  pageNotLoaded: "This page could not be loaded. Check your connection and reload.",
+  notFound: { title: "Page not found", text: "There is nothing at this address.", link: "Go to the lobby" },
 };

@@ -18,14 +18,14 @@ export const common: Texts["common"] = {
   settings: {
     title: "Impostazioni",
     language: "Lingua",
-    look: "Aspetto",
-    looks: { system: "Come il sistema", light: "Chiaro", dark: "Scuro" },
+    look: "Tema",
+    looks: { system: "Sistema", light: "Chiaro", dark: "Scuro" },
     forget: "Dimentica tutto su questo dispositivo",
     forgetSure:
-      "I tuoi posti, le iscrizioni ai tornei, le stanze e i tornei creati, il nome e le impostazioni? Non potrai tornarci.",
-    forgetDo: "Dimentica",
+      "Da questo dispositivo vengono eliminati i tuoi posti, le iscrizioni ai tornei, le stanze e i tornei creati, il nome e le impostazioni. Non potrai recuperarli.",
+    forgetDo: "Dimentica tutto",
   },
-  kinds: { agent: "agente", human: "persona", robot: "robot", builtIn: "agente incorporato", open: "libero" },
+  kinds: { agent: "agente", human: "persona", robot: "robot", builtIn: "agente integrato", open: "libero" },
   roles: { chef: "Chef", sousChef: "Sous-Chef", cook: "Cuoco", waiter: "Cameriere", dishwasher: "Lavapiatti" },
   faces: [
     "tartufo",
@@ -55,5 +55,5 @@ export const common: Texts["common"] = {
   more: "Altri",
   showMore: "Mostra altro",
   pageNotLoaded: "Non è stato possibile caricare questa pagina. Controlla la connessione e ricarica.",
-  notFound: { title: "Questa pagina non esiste", text: "L’indirizzo non porta a nulla.", link: "Alla sala" },
+  notFound: { title: "Questa pagina non esiste", text: "A questo indirizzo non c’è nulla.", link: "Vai alla sala" },
 };

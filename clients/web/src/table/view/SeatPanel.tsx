@@ -95,7 +95,7 @@ export function SeatPanel({ table, seat, own = false, deciding, kind, cards = tr
 /** For whom a free seat is kept. */
 function freeWords({ reservedFor }: SeatState): string {
   if (reservedFor === ParticipantKind.UNSPECIFIED) return t().table.freeSeat;
-  return t().lobby.seats.keptFor(kindWord(reservedFor));
+  return t().lobby.seats.reservedFor(kindWord(reservedFor));
 }
 
 interface ChipProps {
