@@ -176,7 +176,7 @@ def test_a_network_for_other_decks_does_not_play(real_address: str, tmp_path: Pa
         client.close_room(room.room.room_id, room.owner_token)
         others.join()
     assert code == 1
-    assert "plays with 4 players, 11 faces and 2 jokers; this game has 4, 7 and 2" in capsys.readouterr().err
+    assert "plays with 4 players, 11 faces and hands of 17 cards; this game has 4, 7 and 7" in capsys.readouterr().err
 
 
 def test_a_file_that_is_no_network_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,5 +1,6 @@
 """Network files: what is written is read, what is wrong is refused in words, and the fixtures shared with Rust still hold."""
 
+import contextlib
 import itertools
 import json
 from dataclasses import replace
@@ -10,9 +11,10 @@ import pytest
 import safetensors.numpy
 from hand_made import hand_made
 
-from chefshat import pb
+from chefshat import SeatInfo, pb
 from chefshat.learn import features, network
 from chefshat.learn.network import Layer, Network, NetworkFileError, NetworkInfo
+from chefshat.learn.play import NetworkAgent, RulesDoNotFit
 
 FIXTURES = Path(__file__).resolve().parents[3] / "tests" / "fixtures" / "network"
 INFO = NetworkInfo("table", "actions", "none", True, 4, 11, 2, '{"preset":"paper"}', "a name", "a command --with ünïcode")
@@ -164,6 +166,23 @@ def test_the_default_decisions() -> None:
     np.testing.assert_array_equal(
         network.default_decisions(case, case.kinds, np.eye(1, 27, 2, dtype=np.uint8).repeat(300, 0), faces=11), np.full(300, 16)
     )
+
+
+def test_a_network_fits_rules_with_as_many_players_faces_and_cards_dealt() -> None:
+    """The Rust tests read the same file."""
+    rows = json.loads((FIXTURES / "fits.json").read_text())
+    assert {row["fits"] for row in rows} == {True, False}
+    for row in rows:
+        agent = NetworkAgent(network.load(FIXTURES / f"{row['network']}.safetensors"))
+        rules = pb.RuleSet(players=row["players"], faces=row["faces"], jokers=row["jokers"])
+        seat = SeatInfo("", "", 0)
+        seat.game_started = pb.GameStarted(rules=rules, hand_size=row["hand_size"])
+        for check in (
+            lambda agent=agent, rules=rules: agent.check_rules(rules),
+            lambda agent=agent, seat=seat: agent.on_attached(seat),
+        ):
+            with contextlib.nullcontext() if row["fits"] else pytest.raises(RulesDoNotFit):
+                check()
 
 
 @pytest.mark.parametrize("name", ["table-actions", "classic-turns", "small-table"])

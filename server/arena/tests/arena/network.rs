@@ -244,6 +244,35 @@ fn decisions_without_an_output_are_taken_by_default() {
     assert!(others >= 33, "{others} gifts and special actions");
 }
 
+/// A rule set, and whether a network of the fixtures fits it.
+#[derive(Deserialize)]
+struct Fit {
+    network: String,
+    players: u8,
+    faces: u8,
+    jokers: u8,
+    hand_size: u8,
+    fits: bool,
+}
+
+/// Jokers matter only through the number of cards dealt: nothing else in the features depends on them.
+#[test]
+fn a_network_fits_rules_with_as_many_players_faces_and_cards_dealt() {
+    let rows = std::fs::read_to_string(fixture("fits.json")).unwrap();
+    for row in serde_json::from_str::<Vec<Fit>>(&rows).unwrap() {
+        let network = Network::load(&fixture(&format!("{}.safetensors", row.network))).unwrap();
+        let rules = RuleSetSpec {
+            players: row.players,
+            faces: row.faces,
+            jokers: row.jokers,
+            ..shifts(1)
+        };
+        let rules = rules.validate().unwrap();
+        assert_eq!(rules.hand_size(), row.hand_size);
+        assert_eq!(network.fits(&rules), row.fits, "{} {rules:?}", row.network);
+    }
+}
+
 #[test]
 fn unknown_games_are_played_as_greedy_would() {
     let network = NetworkFile::preferring(&[0.5; 214]).network();

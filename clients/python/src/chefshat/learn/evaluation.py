@@ -84,10 +84,11 @@ def evaluate(
         rules=rules,
         shift_statistics=True,
     ) as env:
-        trained_for = (network.info.players, network.info.faces, network.info.jokers)
-        if trained_for != (env.players, env.faces, env.jokers):
+        info = network.info
+        if not info.fits(env.players, env.faces, env.hand_size):
             raise ValueError(
-                f"the network knows (players, faces, jokers) {trained_for}, not {(env.players, env.faces, env.jokers)}"
+                f"the network plays with {info.players} players, {info.faces} faces and hands of {info.hand_size} cards, "
+                f"not with {env.players}, {env.faces} and {env.hand_size}"
             )
         others = env.players - 1
         names = (opponents,) * others if isinstance(opponents, str) else tuple(opponents) * (others if len(opponents) == 1 else 1)

@@ -87,6 +87,10 @@ class NetworkInfo:
         """Numbers of one row of outputs."""
         return features.turn_actions(self.faces) if self.output == "turns" else features.num_actions(self.faces)
 
+    def fits(self, players: int, faces: int, hand_size: int) -> bool:
+        """Whether games of this size have the features the network was trained on. The jokers only matter through the hand size."""
+        return (players, faces, hand_size) == (self.players, self.faces, self.hand_size)
+
     @classmethod
     def of(cls, metadata: Mapping[str, str]) -> Self:
         """Reads the metadata of a file. Raises `ValueError` saying what is missing or wrong."""

@@ -11,12 +11,12 @@ import numpy.typing as npt
 
 from chefshat import Agent, Client, Decision, SeatInfo, join_options, outcome, pb
 from chefshat.errors import exit_code
-from chefshat.learn import network
+from chefshat.learn import features, network
 from chefshat.learn.network import Network, NetworkFileError
 
 
 class RulesDoNotFit(ValueError):
-    """A network was trained for other numbers of players, faces or jokers than those of the game. The message names both."""
+    """The network was trained for games of another size. The message names both sizes."""
 
 
 class NetworkAgent(Agent):
@@ -26,11 +26,11 @@ class NetworkAgent(Agent):
         self._network = network
 
     def on_attached(self, seat: SeatInfo) -> None:
-        """Looks whether the network knows such games, if the game has begun; else the first decision does."""
+        """Checks that the network fits the game, if the game has started; otherwise the first decision does."""
         self._check(seat)
 
     def decide(self, request: Decision) -> int:
-        """The legal action with the highest output."""
+        """Returns the legal action with the highest output."""
         self._check(request.seat_info)
         kinds = np.array([request.kind], np.uint8)
         seats = np.array([request.seat], np.uint8)
@@ -39,15 +39,19 @@ class NetworkAgent(Agent):
 
     def _check(self, seat: SeatInfo) -> None:
         if seat.game_started is not None:
-            self.check_rules(seat.game_started.rules)
+            rules = seat.game_started.rules
+            self._check_size(rules.players, rules.faces, seat.game_started.hand_size)
 
     def check_rules(self, rules: pb.RuleSet) -> None:
-        """Raises RulesDoNotFit if the network was not trained for games of this rule set's numbers."""
+        """Raises RulesDoNotFit if the network does not fit games under these rules."""
+        self._check_size(rules.players, rules.faces, features.dealt(rules.players, rules.faces, rules.jokers))
+
+    def _check_size(self, players: int, faces: int, hand_size: int) -> None:
         info = self._network.info
-        if (rules.players, rules.faces, rules.jokers) != (info.players, info.faces, info.jokers):
+        if not info.fits(players, faces, hand_size):
             raise RulesDoNotFit(
-                f"the network {info.name!r} plays with {info.players} players, {info.faces} faces and {info.jokers} jokers; this "
-                f"game has {rules.players}, {rules.faces} and {rules.jokers}"
+                f"the network {info.name!r} plays with {info.players} players, {info.faces} faces and hands of {info.hand_size} "
+                f"cards; this game has {players}, {faces} and {hand_size}"
             )
 
 
