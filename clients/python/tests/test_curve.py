@@ -44,10 +44,10 @@ def test_the_command_draws(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     capsys.readouterr()
     assert command.main(["curve", str(log), "--out", str(out), "--json"]) == 1
     told = json.loads(capsys.readouterr().out)
-    assert (told["event"], "holds no look" in told["message"], str(log) in told["message"]) == ("error", True, True)
+    assert (told["event"], "has no evaluation" in told["message"], str(log) in told["message"]) == ("error", True, True)
     for no_log in ("garbage", "17", "[1]"):
         log.write_text(no_log)
         assert command.main(["curve", str(log), "--out", str(out)]) == 1
-        assert capsys.readouterr().err.startswith(f"error: {log}: this is no log")
+        assert capsys.readouterr().err.startswith(f"error: {log}: this is not a log")
     assert command.main(["curve", str(tmp_path / "missing"), "--out", str(out)]) == 1
     assert capsys.readouterr().err.startswith("error: there is no file")

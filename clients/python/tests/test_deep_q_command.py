@@ -56,7 +56,7 @@ def test_what_ctrl_c_ends_goes_on(
     _, said = running.communicate(timeout=LIMIT_S)
     assert running.returncode == 130, said
     assert "of 1,000,000 Shifts" in said
-    assert "--resume goes on" in said
+    assert "resume by the same command with --resume" in said
     assert "Traceback" not in said
 
     stopped = checkpoint.load(place.state)

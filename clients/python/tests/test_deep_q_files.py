@@ -92,7 +92,7 @@ def test_what_an_agent_does_not_see_has_no_weight() -> None:
 def test_what_is_no_training_is_refused(training: Training, tmp_path: Path) -> None:
     path = tmp_path / "t.training"
     path.write_bytes(b"nothing of the kind")
-    with pytest.raises(TrainingFileError, match=r"t\.training is no training"):
+    with pytest.raises(TrainingFileError, match=r"t\.training is not a training"):
         checkpoint.load(path)
     net = training.networks("n")[0]
     network.save(path, net.layers, net.info)

@@ -182,7 +182,7 @@ def test_a_network_for_other_decks_does_not_play(real_address: str, tmp_path: Pa
 def test_a_file_that_is_no_network_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "n").write_text("no")
     assert main(["play", str(tmp_path / "n"), "--address", "127.0.0.1:1", "--code", "C", "--name", "N"]) == 1
-    assert "is no network" in capsys.readouterr().err
+    assert "is not a network" in capsys.readouterr().err
 
 
 @pytest.mark.server

@@ -66,7 +66,7 @@ def test_wrong_metadata_is_refused_in_words(tmp_path: Path, change: dict[str, st
 def test_what_is_no_network_is_refused_in_words(tmp_path: Path) -> None:
     path = tmp_path / "n.safetensors"
     path.write_bytes(b"cards")
-    with pytest.raises(NetworkFileError, match="is no network"):
+    with pytest.raises(NetworkFileError, match="is not a network"):
         network.load(path)
     layers = chance_layers(INFO)
     tensors = {f"layer{i}.{key}": value for i, layer in enumerate(layers) for key, value in layer._asdict().items()}

@@ -126,7 +126,7 @@ def test_a_training_of_an_older_version_continues(tmp_path: Path) -> None:
 def test_what_is_no_training_is_refused_in_words(tmp_path: Path) -> None:
     path = tmp_path / "t"
     path.write_bytes(b"cards")
-    with pytest.raises(TrainingFileError, match="is no training"):
+    with pytest.raises(TrainingFileError, match="is not a training"):
         ppo_checkpoint.load(path)
     with pytest.raises(FileNotFoundError):
         ppo_checkpoint.load(tmp_path / "nothing")

@@ -50,7 +50,7 @@ def test_some_games_may_be_against_built_in_agents(real_address: str) -> None:
 def test_the_command_writes_its_files_and_goes_on(real_address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "small.safetensors"
     options = ["ppo", "--out", str(out), "--address", real_address, "--seed", "3", "--name", "small", "--json"]
-    plan = ["--games", "16", "--steps", "16", "--minibatches", "2", "--width", "8", "--looks", "2", "--evaluation-games", "4"]
+    plan = ["--games", "16", "--steps", "16", "--minibatches", "2", "--width", "8", "--evaluations", "2", "--evaluation-games", "4"]
     assert command.main([*options, *plan, "--decisions", "512"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert (told["event"], told["decisions"], told["updates"], told["runs"]) == ("trained", 512, 2, 1)
@@ -70,7 +70,7 @@ def test_the_command_writes_its_files_and_goes_on(real_address: str, tmp_path: P
     assert command.main([*options, "--rules", "rulebook", "--decisions", "1024"]) == 1
     assert "rules points" in json.loads(capsys.readouterr().out)["message"]
 
-    assert command.main([*options, "--looks", "2", "--decisions", "1024"]) == 0
+    assert command.main([*options, "--evaluations", "2", "--decisions", "1024"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert (told["decisions"], told["updates"], told["runs"]) == (1024, 4, 2)
     assert [evaluation["games"] for evaluation in told["evaluations"]] == [4, 4]

@@ -1,5 +1,5 @@
-"""Agents that learn: what a network sees (`features`), how it is kept in a file (`network`), and the ways of training one.
+"""Agents that learn: the features of a network (`features`), its file (`network`), and training.
 
-Needs the package's extra `learn`. Nothing is imported here, so that what only reads network files does not load JAX.
+Needs the package's extra `learn`. Imports nothing, so that programs that only read network files do not load JAX.
 `python -m chefshat.learn --help` lists the commands.
 """

@@ -1,7 +1,4 @@
-"""How a training went, as a picture: the points that the policy took at its looks, from the log that `ppo` writes.
-
-The log is written by `ppo_command`; the style of pictures is that of the experiments.
-"""
+"""The command `curve`: draws the points per Shift at each evaluation of a training, from the log that `ppo` writes."""
 
 import argparse
 import json
@@ -16,30 +13,30 @@ WIDTH_95 = 1.96
 
 
 def figure(log: str) -> Figure:
-    """The points per Shift at each look, over the decisions of the training, with 95% intervals.
+    """Returns the points per Shift at each evaluation, over the decisions of the training, with 95% intervals.
 
     Args:
         log: the log, JSON lines.
 
     Raises:
-        ValueError: it is no log, or holds no look.
+        ValueError: this is not a log, or it has no evaluation.
     """
     try:
         lines = [dict(json.loads(line)) for line in log.splitlines()]
     except (ValueError, TypeError) as error:
-        raise ValueError("this is no log; `python -m chefshat.learn ppo` writes one beside its network, as .jsonl") from error
-    looks = [line for line in lines if line.get("event") == "evaluation"]
+        raise ValueError("this is not a log; `python -m chefshat.learn ppo` writes one next to its network, as .jsonl") from error
+    evaluated = [line for line in lines if line.get("event") == "evaluation"]
     rules = [line["rules"] for line in lines if line.get("event") == "setup"]
-    if not looks:
-        raise ValueError("the log holds no look at the policy; was the training ended before its first?")
-    alike = Level(label="all alike", y=sum(rules[0]["points"]) / rules[0]["players"]) if rules else None
+    if not evaluated:
+        raise ValueError("the log has no evaluation; did the training end before the first?")
+    mean = Level(label="mean of all seats", y=sum(rules[0]["points"]) / rules[0]["players"]) if rules else None
     panels = []
-    for number, evaluation in enumerate(looks[0]["evaluations"]):
+    for number, evaluation in enumerate(evaluated[0]["evaluations"]):
         opponents = evaluation["opponents"]
-        shown = [look["evaluations"][number] for look in looks]
+        shown = [line["evaluations"][number] for line in evaluated]
         line = Line(
             label="the policy",
-            x=[look["decisions"] / 1e6 for look in looks],
+            x=[line["decisions"] / 1e6 for line in evaluated],
             y=[one["points"] for one in shown],
             low=[one["points"] - WIDTH_95 * one["standard_error"] for one in shown],
             high=[one["points"] + WIDTH_95 * one["standard_error"] for one in shown],
@@ -48,18 +45,18 @@ def figure(log: str) -> Figure:
             Panel(
                 title=f"Against {len(opponents)} {opponents[0]}",
                 x_label="decisions of the training, millions",
-                y_label="points a Shift",
+                y_label="points per Shift",
                 lines=[line],
-                levels=[alike] if alike else [],
+                levels=[mean] if mean else [],
             )
         )
-    return Figure(name="curve", title="Training by self-play: the policy at its looks", panels=panels)
+    return Figure(name="curve", title="Training by self-play: evaluations of the policy", panels=panels)
 
 
 def run(options: argparse.Namespace) -> int:
-    """The command. Returns the exit code."""
+    """Runs the command. Returns the exit code."""
     try:
-        check_readable(options.log, "log", "`python -m chefshat.learn ppo` writes beside its network, as .jsonl")
+        check_readable(options.log, "log", "`python -m chefshat.learn ppo` writes next to its network, as .jsonl")
         drawn = figure(options.log.read_text(encoding="utf-8"))
         write_whole(options.out, plots.png(drawn))
     except OSError as error:

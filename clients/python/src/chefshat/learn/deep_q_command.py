@@ -1,12 +1,13 @@
-"""The command `python -m chefshat.learn deep-q`: trains one Deep Q agent against three built-in ones, and writes what remains.
+"""The command `python -m chefshat.learn deep-q`: trains one Deep Q agent against three built-in ones.
 
-Two files: the network, which `play` and the server's own agents can play by, and what a training goes on from. They are written
-every so many Shifts, at the end, and when Ctrl-C ends it early. The agent is in `deep_q`, its games in `deep_q_training`.
+Writes two files: the network, which `play` and the server's agents can use, and a checkpoint to resume from. They are written every
+`--save-every` Shifts, at the end, and on Ctrl-C. The agent is in `deep_q`, its games are in `deep_q_training`.
 """
 
 import argparse
 import dataclasses
 import json
+import logging
 import sys
 from pathlib import Path
 from typing import Any
@@ -24,9 +25,11 @@ from chefshat.learn.deep_q_training import Played
 from chefshat.learn.training_file import TrainingFileError
 from chefshat.vector import VectorEnv
 
+LOG = logging.getLogger("chefshat.learn")
+
 
 class Stopped(Exception):
-    """The user has stopped the training, which has been saved after so many Shifts."""
+    """Ctrl-C stopped the training, which has been saved."""
 
     def __init__(self, shifts: int) -> None:
         super().__init__(f"stopped after {shifts:,} Shifts")
@@ -34,7 +37,7 @@ class Stopped(Exception):
 
 
 def run(options: argparse.Namespace) -> int:
-    """The command. Returns the exit code."""
+    """Runs the command. Returns the exit code."""
     out: Path = options.out
     state: Path = options.checkpoint or out.with_suffix(".training")
     try:
@@ -48,26 +51,26 @@ def run(options: argparse.Namespace) -> int:
         else:
             print(
                 f"interrupted after {stopped.shifts:,} of {options.shifts:,} Shifts; {out} and {state} are saved: "
-                "the same command with --resume goes on",
+                "resume by the same command with --resume",
                 file=sys.stderr,
             )
         return runs.INTERRUPTED
     except (ChefsHatError, TrainingFileError, OSError, ValueError) as error:
         return failed(error, as_json=options.json)
-    told = _told(played)
+    summary = _summary(played)
     if options.json:
-        print(json.dumps({"event": "trained", "file": str(out), "training": str(state), **told}))
+        print(json.dumps({"event": "trained", "file": str(out), "training": str(state), **summary}))
     else:
-        # Counts, because shares of a few Shifts would say more than is known.
-        won = f"won {told['won'] * told['last_shifts']:,.0f} of the last {told['last_shifts']:,}"
+        # Counts, because percentages of a few Shifts would suggest false precision.
+        won = f"won {summary['won'] * summary['last_shifts']:,.0f} of the last {summary['last_shifts']:,}"
         print(f"{out}: {options.shifts:,} Shifts")
-        print(f"  {won}, with a mean place of {told['mean_place']:.2f} and {told['wrong_per_shift']:.2f} wrong actions per Shift")
-        print(f"{state}: what the training goes on from with --resume")
+        print(f"  {won}, mean place {summary['mean_place']:.2f}, {summary['wrong_per_shift']:.2f} illegal actions per Shift")
+        print(f"{state}: checkpoint for --resume")
     return 0
 
 
 def _train(options: argparse.Namespace, state: Path) -> Played:
-    """Plays the Shifts that are left, and writes the files. Raises `Stopped` when the user stops it."""
+    """Plays the remaining Shifts, and writes the files. Raises `Stopped` on Ctrl-C."""
     before = _resumed(options, state) if options.resume else None
     parameters = _parameters(options)
     rules = pb.RuleSet(preset=options.rules)
@@ -88,7 +91,7 @@ def _train(options: argparse.Namespace, state: Path) -> Played:
         decisions="turns",
         invalid="ask_again",
         total_games=1,
-        # Who goes on plays other games than those that were played.
+        # A resumed training plays other games.
         seed=seed + runs.SEED_STEP * updates,
         rules=rules,
         shift_statistics=True,
@@ -105,62 +108,62 @@ def _train(options: argparse.Namespace, state: Path) -> Played:
             agents, commands = deep_q.start(config, [seed]), ""
         else:
             config, agents, commands = before.config, before.agents, before.trained_by
-        whole = pb.RuleSet()
-        whole.CopyFrom(env.rules)
-        whole.target_shifts = options.shifts
+        rules.CopyFrom(env.rules)
+        rules.target_shifts = options.shifts
         commands = runs.trained_by(commands, options.trained_by)
-        files = _Files(options, state, Training(config, agents, whole, commands, opponents, rewards, seed, shifts))
+        files = _Files(options, state, Training(config, agents, rules, commands, opponents, rewards, seed, shifts))
 
         def advance(more: int) -> None:
             files.shifts += more
             bar.update(more)
 
-        def look(agents: Agents) -> None:
+        def on_decision(agents: Agents) -> None:
             if interrupts.asked:
                 files.write(agents)
                 raise Stopped(files.shifts)
-            files.write_now_and_then(agents)
+            files.write_if_due(agents)
 
-        agents, played = deep_q_training.play(env, config, agents, advance=advance, look=look)
+        agents, played = deep_q_training.play(env, config, agents, advance=advance, on_decision=on_decision)
         files.write(agents)
         return played
 
 
 class _Files:
-    """The files of a training, written as it stands.
+    """Writes the files of a training.
 
     Attributes:
-        shifts: Shifts that were played so far.
+        shifts: Shifts played so far.
     """
 
     def __init__(self, options: argparse.Namespace, state: Path, begun: Training) -> None:
         self.shifts = begun.shifts
         self._options = options
         self._state = state
-        # Its agents are consumed by what they learn.
+        # Its agents are stale: learning consumes them.
         self._begun = begun
         self._written = begun.shifts
 
-    def write_now_and_then(self, agents: Agents) -> None:
-        """Writes them if enough Shifts have been played since the last time."""
+    def write_if_due(self, agents: Agents) -> None:
+        """Writes the files if enough Shifts have been played since the last time."""
         if self.shifts - self._written >= self._options.save_every:
             self.write(agents)
 
     def write(self, agents: Agents) -> None:
-        """Writes them."""
+        """Writes the files."""
         training = dataclasses.replace(self._begun, agents=agents, shifts=self.shifts)
         checkpoint.save(self._state, training)
         (net,) = training.networks(self._options.name)
         network.save(self._options.out, net.layers, net.info)
         self._written = self.shifts
+        LOG.info("saved %s after %d Shifts", self._state, self.shifts)
 
 
 def _resumed(options: argparse.Namespace, state: Path) -> Training:
-    """The training to go on with, which the options that were given do not contradict."""
+    """Loads the training to resume. Raises ValueError if the options contradict it."""
     before = checkpoint.load(runs.existing(state))
     config = before.config
-    kept = {"opponents": before.opponents, "rewards": before.rewards, "seed": before.seed, "mask": config.mask}
-    runs.refuse_contradictions(options.given, kept)
+    fixed = {"opponents": before.opponents, "rewards": before.rewards, "seed": before.seed, "mask": config.mask}
+    runs.refuse_contradictions(options.given, fixed)
     if "parameters" in options.given:
         asked = DeepQConfig(inputs=config.inputs, outputs=config.outputs, **{**_parameters(options), "mask": config.mask})
         runs.refuse_contradictions(dataclasses.asdict(asked), dataclasses.asdict(config))
@@ -172,13 +175,13 @@ def _resumed(options: argparse.Namespace, state: Path) -> Training:
 
 
 def _parameters(options: argparse.Namespace) -> dict[str, Any]:
-    """The hyper-parameters that are not standard: those of a file, and the mask."""
+    """Returns the hyper-parameters that differ from the default: those of a file, and the mask."""
     if options.parameters is None:
         return {"mask": options.mask}
     check_readable(options.parameters, "file of hyper-parameters", "`python -m chefshat.learn tune` writes")
     try:
         plain = json.loads(options.parameters.read_text(encoding="utf-8"))
-    except ValueError:  # No text, or none of JSON.
+    except ValueError:  # Not UTF-8 or not JSON.
         plain = None
     found = plain.get("parameters") if isinstance(plain, dict) else None
     known = {field.name for field in dataclasses.fields(DeepQConfig)} - {"inputs", "outputs", "mask"}
@@ -189,8 +192,8 @@ def _parameters(options: argparse.Namespace) -> dict[str, Any]:
     return {**found, **({"hidden": tuple(found["hidden"])} if "hidden" in found else {}), "mask": options.mask}
 
 
-def _told(played: Played) -> dict[str, float]:
-    """How good it was in the last tenth of the Shifts."""
+def _summary(played: Played) -> dict[str, float]:
+    """Summarises the last tenth of the Shifts."""
     seats = {name: counted[0, :, 0] for name, counted in played.of_seats.items()}
     last = max(1, len(seats["places"]) // 10)
     return {

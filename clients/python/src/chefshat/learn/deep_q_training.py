@@ -1,8 +1,8 @@
-"""Deep Q agents at the seats of a `VectorEnv`: what they did and what came of it, brought together and learned from, step by step.
+"""Deep Q agents at the seats of a `VectorEnv`: pairs their decisions with the outcomes and learns from them, step by step.
 
-Every seat that the client plays, in every game, has an agent of its own: the agent at the k-th client seat of game g is number
-g * seats + k of the stack. Agents of different games never meet, so that repetitions of an experiment run side by side. How an
-agent decides and learns is in `deep_q`; what is counted of a Shift is the server's business.
+Every client seat of every game has its own agent: the agent at the k-th client seat of game g is number g * seats + k of the
+stack. Agents of different games never meet, so that repetitions of an experiment run in parallel. Deciding and learning are in
+`deep_q`; the statistics of a Shift come from the server.
 """
 
 from collections.abc import Callable, Mapping
@@ -21,25 +21,25 @@ Ids: TypeAlias = npt.NDArray[np.int32]
 Floats: TypeAlias = npt.NDArray[np.float32]
 Mask: TypeAlias = npt.NDArray[np.bool_]
 
-# What a Shift's statistics say of the Shift, and of each of its seats.
+# Statistics of a Shift, and of each seat in it.
 OF_SHIFTS = ("starters", "pizzas", "laps", "turns", "adjudicated")
 OF_SEATS = ("places", "points", "valid", "wrong", "passes", "reward_sums")
 
 
 class LockStep:
-    """A stack of agents and, of each, the decision that nothing has come of yet.
+    """A stack of agents, with the open decision of each: the one whose outcome is not known yet.
 
     Attributes:
         agents: the stack. May be replaced between calls.
     """
 
     def __init__(self, config: DeepQConfig, agents: Agents, rows: int, *, explore: bool = True, learn: bool = True) -> None:
-        """Takes the agents over.
+        """Takes ownership of the agents.
 
         Args:
             config: their hyper-parameters.
             agents: the stack.
-            rows: the most agents that decide at a time. Calls with fewer are filled up to it.
+            rows: maximum number of agents that decide at a time. Calls with fewer are padded.
             explore: whether they explore.
             learn: whether they learn.
         """
@@ -54,9 +54,9 @@ class LockStep:
         self._open = np.zeros(number, np.bool_)
 
     def end(self, ids: Ids, rewards: Floats) -> None:
-        """Tells agents that their episodes have ended, and what they were rewarded with since they decided.
+        """Ends the episodes of agents, with their rewards since their last decision.
 
-        Episodes of an agent that has decided nothing in them are ignored, so also a second one of the same agent.
+        Ignores episodes without a decision of the agent, and so also a second one of the same agent.
         """
         ids, first = np.unique(ids, return_index=True)
         rewards = rewards[first]
@@ -65,14 +65,14 @@ class LockStep:
             self._close(ids[part], rewards[part], None, None)
 
     def decide(self, ids: Ids, rewards: Floats, states: Floats, masks: Mask, attempts: Ids) -> npt.NDArray[np.int32]:
-        """Lets agents learn from their last decisions and take their next.
+        """Lets agents learn from their last decisions and take the next ones.
 
         Args:
             ids: (rows,) the agents, each once, at most as many as `rows` of the constructor.
             rewards: (rows,) since their last decision of the episode.
-            states: (rows, inputs) what they see.
+            states: (rows, inputs) their observations.
             masks: (rows, outputs) the legal actions.
-            attempts: (rows,) wrong actions at this decision so far.
+            attempts: (rows,) illegal actions at this decision so far.
 
         Returns:
             (rows,) the actions.
@@ -89,14 +89,14 @@ class LockStep:
         return actions
 
     def _close(self, ids: Ids, rewards: Floats, states: Floats | None, masks: Mask | None) -> None:
-        """Learns from the decisions of those who have one open; without a next state these were their episodes' last."""
+        """Learns from the open decisions of agents; without next states their episodes have ended."""
         rows = np.flatnonzero(self._open[ids])
         if len(rows) == 0 or not self._learn:
             self._open[ids] = False
             return
         closed = ids[rows]
         config = self._config
-        # Without a next state there is nothing to see and nothing to do.
+        # Ended episodes have no next state.
         next_states = np.zeros((0, config.inputs), np.float32) if states is None else states[rows]
         next_masks = np.zeros((0, config.outputs), np.bool_) if masks is None else masks[rows]
         transitions = Transitions(
@@ -111,7 +111,7 @@ class LockStep:
         self._open[ids] = False
 
     def _padded(self, ids: Ids) -> Ids:
-        """The ids filled up with an agent that does not exist."""
+        """Pads the ids with an agent that does not exist."""
         padded = np.full(self._rows, len(self._open), np.int32)
         padded[: len(ids)] = ids
         return padded
@@ -119,13 +119,13 @@ class LockStep:
 
 @dataclass(frozen=True)
 class Played:
-    """What was counted of each Shift. G games of S Shifts among N seats.
+    """The statistics of every Shift. G games of S Shifts with N seats.
 
     Attributes:
         of_shifts: (G, S) arrays by the names in `OF_SHIFTS`.
         of_seats: (G, S, N) arrays by the names in `OF_SEATS`.
         rules: the rule set, every field set.
-        most_attempts: the most wrong actions that one decision of a learning agent took.
+        most_attempts: maximum number of illegal actions at one decision of a learning agent.
     """
 
     of_shifts: Mapping[str, npt.NDArray[Any]]
@@ -143,24 +143,24 @@ def play(
     learn: bool = True,
     idle_pass_is_wrong: bool = False,
     advance: Callable[[int], object] = lambda shifts: None,
-    look: Callable[[Agents], object] = lambda agents: None,
+    on_decision: Callable[[Agents], object] = lambda agents: None,
 ) -> tuple[Agents, Played]:
     """Plays all games of an env to their ends and lets the agents learn.
 
     Args:
-        env: fresh, with decisions "turns", episode "shift", Shift statistics, a reward scheme and as many games in all as side by
-            side, of a fixed number of Shifts. Agents without a mask need invalid "ask_again".
+        env: fresh, with decisions "turns", episode "shift", Shift statistics, a reward scheme, `total_games` equal to `games`, and
+            a fixed number of Shifts. Agents without a mask need invalid "ask_again".
         config: the agents' hyper-parameters.
         agents: one for each client seat of each game.
         explore: whether they explore.
         learn: whether they learn.
-        idle_pass_is_wrong: whether passing counts as a wrong action where something else is legal, and is none of those that are
-            taken by chance after too many wrong ones. Needs invalid "ask_again".
-        advance: told how many more Shifts have ended.
-        look: shown the agents before each decision. It may raise, which ends it all, but not keep them, for learning consumes them.
+        idle_pass_is_wrong: whether passing counts as illegal where another action is legal. Needs invalid "ask_again".
+        advance: called with the number of Shifts that have ended since the last call.
+        on_decision: called with the agents before each decision. Learning consumes them, so it must not keep them. It may raise to
+            end the run.
 
     Returns:
-        The agents, and what was counted.
+        The agents, and the statistics.
 
     Raises:
         ValueError: env, config and agents do not fit each other.
@@ -179,7 +179,7 @@ def play(
             stack.end(_ids(endings.games, seat_index[endings.seats], seats), endings.rewards)
         if batch.done:
             return stack.agents, log.played()
-        look(stack.agents)
+        on_decision(stack.agents)
         states = features.classic(batch.observations, batch.mask_bits, faces=env.faces, hand_size=env.hand_size)
         masks = states[:, -config.outputs :] != 0
         if idle_pass_is_wrong:
@@ -187,12 +187,12 @@ def play(
         actions = stack.decide(
             _ids(batch.games, seat_index[batch.seats], seats), batch.rewards, states, masks, batch.attempts.astype(np.int32)
         )
-        # The server would take an idle pass for valid.
+        # To the server an idle pass is legal.
         batch = env.step(_wrong_as_illegal(actions, masks) if idle_pass_is_wrong else actions)
 
 
 class _Log:
-    """The Shifts that have ended so far."""
+    """Collects the statistics of the Shifts."""
 
     def __init__(self, env: VectorEnv) -> None:
         self._env = env
@@ -205,22 +205,22 @@ class _Log:
         self._most_attempts = 0
 
     def add(self, batch: Batch) -> int:
-        """Keeps what a batch says; returns how many Shifts have ended."""
+        """Adds the Shifts of a batch. Returns their number."""
         if len(batch):
             self._most_attempts = max(self._most_attempts, int(batch.attempts.max()))
         ended = batch.shifts
         if ended is None or len(ended) == 0:
             return 0
         at = (ended.games.astype(np.intp), ended.shifts.astype(np.intp) - 1)
-        for name, kept in (*self._of_shifts.items(), *self._of_seats.items()):
-            kept[at] = getattr(ended, name)
+        for name, array in (*self._of_shifts.items(), *self._of_seats.items()):
+            array[at] = getattr(ended, name)
         self._ended[at] = True
         return len(ended)
 
     def played(self) -> Played:
-        """All of them."""
+        """Returns the statistics of all Shifts."""
         if not self._ended.all():
-            raise RuntimeError(f"only {int(self._ended.sum())} of {self._ended.size} Shifts were counted")
+            raise RuntimeError(f"only {int(self._ended.sum())} of {self._ended.size} Shifts ended")
         return Played(self._of_shifts, self._of_seats, self._env.rules, self._most_attempts)
 
 
@@ -228,12 +228,12 @@ def _check(env: VectorEnv, config: DeepQConfig, agents: Agents) -> None:
     wanted = env.games * len(env.client_seats)
     if len(agents.epsilon) != wanted:
         raise ValueError(
-            f"{len(agents.epsilon)} agents for {env.games} games of {len(env.client_seats)} seats: {wanted} are needed"
+            f"{len(agents.epsilon)} agents for {env.games} games of {len(env.client_seats)} seats: {wanted} are required"
         )
     width = features.classic_width(env.faces, env.hand_size)
     if (config.inputs, config.outputs) != (width, env.turn_actions):
         raise ValueError(
-            f"agents of {config.inputs} inputs and {config.outputs} outputs cannot play by this rule set, which needs {width} and "
+            f"agents have {config.inputs} inputs and {config.outputs} outputs, but this rule set requires {width} and "
             f"{env.turn_actions}"
         )
     if env.rules.target_shifts < 1:
@@ -241,14 +241,14 @@ def _check(env: VectorEnv, config: DeepQConfig, agents: Agents) -> None:
 
 
 def _without_idle_passes(masks: Mask) -> Mask:
-    """The legal actions, of which a pass is none where something else is legal."""
+    """Removes the pass from the legal actions where another action is legal."""
     right = masks.copy()
     right[:, -1] &= masks.sum(axis=1) == 1
     return right
 
 
 def _wrong_as_illegal(actions: npt.NDArray[np.int32], right: Mask) -> npt.NDArray[np.int32]:
-    """The actions, with an illegal one in place of each that is not right. No hand is so rich that every play is legal."""
+    """Replaces each action that is not right by an illegal one. There is one, because no hand makes every play legal."""
     chosen = np.take_along_axis(right, actions[:, np.newaxis], axis=1)[:, 0]
     return np.where(chosen, actions, np.argmin(right, axis=1)).astype(np.int32)
 
@@ -259,7 +259,7 @@ def _ids(games: npt.NDArray[np.uint32], seat_index: Ids, seats: int) -> Ids:
 
 
 def _filled(rows: int, array: npt.NDArray[Any]) -> Any:  # noqa: ANN401 - a numpy array where jax's types want one of jax
-    """A copy with so many rows, those beyond the array zero."""
+    """Returns a copy padded with zeros to `rows` rows."""
     filled = np.zeros((rows, *array.shape[1:]), array.dtype)
     filled[: len(array)] = array
     return filled

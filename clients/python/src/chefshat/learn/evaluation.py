@@ -1,7 +1,7 @@
-"""How good a network is: one seat of it against three others, over whole games.
+"""The command `evaluate`: plays a network on one seat against built-in agents, over whole games.
 
-Deals are not played again with seats rotated here: `chefshat compare` (the program) does that, and so needs far fewer Shifts for
-the same certainty. How a network decides is in `network`. The command is `python -m chefshat.learn evaluate`.
+`chefshat compare` (the program) repeats deals with rotated seats, and so needs far fewer Shifts for the same certainty. How a
+network decides is in `network`.
 """
 
 import argparse
@@ -18,21 +18,21 @@ from chefshat.learn import network as network_file
 from chefshat.learn.network import Network, NetworkFileError
 from chefshat.vector import Rules, Seed, VectorEnv
 
-# Games played side by side.
+# Parallel games.
 SIDE_BY_SIDE = 256
 
 
 @dataclass(frozen=True)
 class Evaluation:
-    """What came out.
+    """The result of an evaluation.
 
     Attributes:
-        opponents: who held the other seats.
+        opponents: the agents of the other seats.
         games: games played.
         shifts: Shifts played.
         points: points per Shift of the network's seat.
-        standard_error: of `points`; the Shifts of a game depend on each other through the roles, and are not taken for independent.
-        places: how often each place was taken, first to last.
+        standard_error: of `points`; games count as independent, the Shifts of one game do not (roles connect them).
+        places: counts of each place, first to last.
     """
 
     opponents: tuple[str, ...]
@@ -58,19 +58,19 @@ def evaluate(
     rules: Rules = None,
     address: str | None = None,
 ) -> Evaluation:
-    """Plays games with the network on seat 0: deals make all seats alike.
+    """Plays games with the network on seat 0; random deals make all seats equal.
 
     Args:
-        network: who plays; it takes the legal action with the highest output.
+        network: takes the legal action with the highest output.
         opponents: built-in agents of the other seats, one name for all or one for each.
-        games: how many games.
-        seed: where deals come from.
+        games: number of games.
+        seed: seed of the deals.
         rules: the rule set.
-        address: of a server; None: one of this process's own.
+        address: of a server; None: a server started by this process.
 
     Raises:
         ChefsHatError: the server refused, or there is none.
-        ValueError: the network was trained for other sizes than the rule set's.
+        ValueError: the network was trained for games of another size.
     """
     with VectorEnv(
         address,
@@ -97,7 +97,7 @@ def evaluate(
         points: list[npt.NDArray[np.uint32]] = []
         places: list[npt.NDArray[np.uint8]] = []
         while True:
-            assert batch.shifts is not None, "the environment was asked for them"
+            assert batch.shifts is not None, "shift_statistics is set"
             indices.append(batch.shifts.indices)
             points.append(batch.shifts.points[:, 0])
             places.append(batch.shifts.places[:, 0])
@@ -109,7 +109,7 @@ def evaluate(
 
 
 def run(options: argparse.Namespace) -> int:
-    """The command. Returns the exit code."""
+    """Runs the command. Returns the exit code."""
     try:
         trained = network_file.load(options.file)
         found = evaluate(
@@ -128,9 +128,9 @@ def summed_up(
     points: npt.NDArray[np.uint32],
     taken: npt.NDArray[np.intp],
 ) -> Evaluation:
-    """What came out, from the games' indices, the points of each Shift and the number of times that each place was taken."""
+    """Summarises the game index and points of each Shift, and the count of each place."""
     mean = float(points.mean())
-    # Points over what was to be expected of so many Shifts, summed over each game: the games are independent.
+    # Points above the mean, summed over each game: the games are independent.
     over = np.bincount(indices, weights=points - mean, minlength=games)
     error = float(np.sqrt(games / max(games - 1, 1) * np.square(over).sum()) / len(points))
     return Evaluation(opponents, games, len(points), mean, error, tuple(int(count) for count in taken))

@@ -1,8 +1,8 @@
-"""What a network sees: columns of observations turned into rows of numbers, all rows of a batch at once.
+"""The inputs of a network: converts columns of observations to rows of numbers, a whole batch at once.
 
 Two forms exist: `classic`, the paper's vector, and `table`, everything a seat may know. Networks are in `network`; `chefshat` (the
-program) computes the same numbers in Rust. So that both are equal to the last bit, every number is 0, 1 or one division of two
-small integers in single precision.
+program) computes the same numbers in Rust. Every number is 0, 1 or one division of two small integers in single precision, so that
+both are equal to the last bit.
 """
 
 from functools import cache
@@ -11,13 +11,13 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-# Jokers a deck can hold; counts of jokers are divided by it.
+# Maximum number of jokers in a deck; counts of jokers are divided by it.
 MAX_JOKERS = 2
 # Values of Role, "no role" included.
 ROLES = 6
 # Decision kinds: turn, exchange, special action.
 KINDS = 3
-# Points and pizzas above these count as these.
+# Higher points and pizza numbers are clipped to these.
 MAX_POINTS = 15
 MAX_PIZZAS = 30
 
@@ -27,7 +27,7 @@ Floats = npt.NDArray[np.float32]
 
 
 class Columns(Protocol):
-    """The columns of observations that features are made of: `chefshat.vector.Observations` is one. R rows, N seats, F faces."""
+    """The columns that features need; `chefshat.vector.Observations` has them. R rows, N seats, F faces."""
 
     @property
     def pizzas(self) -> Counts:
@@ -79,32 +79,32 @@ class Columns(Protocol):
 
 
 def turn_actions(faces: int) -> int:
-    """T, the number of actions of a turn: 200 for 11 faces."""
+    """Returns T, the number of actions of a turn: 200 for 11 faces."""
     return 3 * faces * (faces + 1) // 2 + 2
 
 
 def num_actions(faces: int) -> int:
-    """A, the number of all actions: 214 for 11 faces."""
+    """Returns A, the number of all actions: 214 for 11 faces."""
     return turn_actions(faces) + faces + 3
 
 
 def dealt(players: int, faces: int, jokers: int) -> int:
-    """H, the cards dealt to a hand: 17 for four players, 11 faces and 2 jokers."""
+    """Returns H, the cards dealt to a hand: 17 for four players, 11 faces and 2 jokers."""
     return (faces * (faces + 1) // 2 + jokers) // players
 
 
 def classic_width(faces: int, hand_size: int) -> int:
-    """Numbers in a row of `classic`, F + H + T: the paper's 228 for 11 faces and 17 cards."""
+    """Returns the width of `classic`, F + H + T: the paper's 228 for 11 faces and 17 cards."""
     return faces + hand_size + turn_actions(faces)
 
 
 def table_width(players: int, faces: int) -> int:
-    """Numbers in a row of `table`: 334 for four players and 11 faces."""
+    """Returns the width of `table`: 334 for four players and 11 faces."""
     return 6 * (faces + 1) + 5 + (4 + ROLES) * players + KINDS + num_actions(faces)
 
 
 def classic(observations: Columns, mask_bits: Bytes, *, faces: int, hand_size: int, out: Floats | None = None) -> Floats:
-    """The paper's vector: the board, the own hand, the legal actions of a turn.
+    """Computes the paper's vector: the board, the own hand, the legal actions of a turn.
 
     Board (F slots): the cards of the play ascending, jokers as F+1, cut off after F slots; an empty board is F+2 in slot 0. Hand (H
     slots): ascending, zeros first. Both are divided by F+2. Then the first T bits of the mask as 0 or 1.
@@ -130,7 +130,7 @@ def classic(observations: Columns, mask_bits: Bytes, *, faces: int, hand_size: i
     cards[:, 0] = np.where(face[:, 0] == 0, faces + 2, cards[:, 0])
     np.divide(cards, scale, out=out[:, :faces], casting="unsafe")
 
-    # Slot i holds the lowest face that, with all faces below it, counts more cards than lie in the slots before i.
+    # Slot i holds the lowest face whose cards, together with those of all lower faces, outnumber the slots before i.
     below = np.cumsum(observations.hands, axis=1, dtype=np.int16)
     rank = np.arange(hand_size, dtype=np.int16) - (hand_size - below[:, -1:])
     held = np.ones((rows, hand_size), np.uint8)
@@ -154,7 +154,7 @@ def table(
     hand_size: int,
     out: Floats | None = None,
 ) -> Floats:
-    """Everything a seat may know, seen from its chair: arrays of seats begin with the own seat and go on to its left.
+    """Computes everything a seat may know, from its perspective: arrays of seats begin with the own seat and continue to its left.
 
     In this order: hand (F+1; counts of face f divided by f, of jokers by 2), holds the Golden card (1), face on the board, one-hot
     0..F+1 (F+2), cards on it / F (1), jokers on it / 2 (1), cards left / H (N), passed (N), places / N (N), roles, one-hot of 0..5
@@ -205,7 +205,7 @@ def table(
     block(ROLES * players)[:] = roles.reshape(rows, ROLES * players)
     ratio(by_seat(np.minimum(observations.points, MAX_POINTS).astype(np.uint8)), MAX_POINTS)
     ratio(observations.played, counts)
-    # A count can only pass the deck's where the jokers are fewer than two, or in a record that is wrong: no wrap-around then.
+    # A count exceeds the deck's only in a wrong record; clipping prevents a wrap-around.
     seen = observations.hands + observations.played
     ratio(_deck(faces) - np.minimum(seen, _deck(faces)), counts)
     ratio(observations.gave, 2)
@@ -219,11 +219,11 @@ def table(
 
 @cache
 def _deck(faces: int) -> Bytes:
-    """Cards of each face, two jokers last."""
+    """Returns the cards of each face, two jokers last."""
     return np.append(np.arange(1, faces + 1), MAX_JOKERS).astype(np.uint8)
 
 
 @cache
 def _rotation(players: int) -> npt.NDArray[np.intp]:
-    """Row s: the seats from s to the left."""
+    """Returns a table whose row s lists the seats from s to the left."""
     return (np.arange(players)[:, np.newaxis] + np.arange(players)) % players

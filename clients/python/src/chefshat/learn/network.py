@@ -1,9 +1,8 @@
-"""A trained network as a file: safetensors, small enough to be carried about, read by this package and by `chefshat` (the program).
+"""A trained network as a safetensors file, read by this package and by `chefshat` (the program).
 
-The file's tensors are `layer0.weight` (out, in), `layer0.bias` (out,), `layer1.weight` and so on, in float32 or float16; between
-layers stands max(0, x), which is 0 where x is no number. Its metadata, all text, say what the numbers mean: `NetworkInfo`. Also
-here: computing the outputs with numpy, and the action that an agent takes by them. Training is not here, nor the state from which a
-training goes on.
+The file's tensors are `layer0.weight` (out, in), `layer0.bias` (out,), `layer1.weight` and so on, in float32 or float16. Between
+layers is max(0, x), which is 0 where x is NaN. The metadata are texts and describe the network: `NetworkInfo`. Also here: computing
+the outputs with numpy, and choosing an action. Training is elsewhere, and so are checkpoints of a training.
 """
 
 import json
@@ -28,7 +27,7 @@ Actions = npt.NDArray[np.uint16]
 
 
 class NetworkFileError(ValueError):
-    """A file is not a network of this format. The message names the file and what is wrong with it."""
+    """A file is not a network of this format. The message names the file and the problem."""
 
 
 class Layer(NamedTuple):
@@ -43,19 +42,19 @@ AnyLayer: TypeAlias = Layer | tuple[npt.NDArray[np.floating], npt.NDArray[np.flo
 
 @dataclass(frozen=True)
 class NetworkInfo:
-    """What a network's numbers mean.
+    """The description of a network.
 
     Attributes:
-        input: which function of `features` makes its input.
-        output: "actions": a number for each of the A actions; "turns": for the T actions of a turn alone, other decisions are the
-            default ones.
-        output_activation: what is applied to the last layer's numbers. What is played does not depend on it.
-        masked: whether it was trained to choose among legal actions alone. Agents that play it do so either way.
+        input: the function of `features` that computes its input.
+        output: "actions": an output for each of the A actions; "turns": for the T actions of a turn; at other decisions the agent
+            takes the default action.
+        output_activation: activation of the last layer. It does not affect the actions chosen.
+        masked: whether it was trained to choose only among legal actions. Agents that play it always do.
         players: seats of the rule set, N.
         faces: faces of the deck, F.
         jokers: jokers of the deck.
-        rules: the rule set it was trained by, as canonical protobuf JSON of `pb.RuleSet`.
-        name: what the agent is called.
+        rules: the rule set it was trained under, as canonical protobuf JSON of `pb.RuleSet`.
+        name: name of the agent.
         trained_by: the command that trained it.
     """
 
@@ -93,7 +92,7 @@ class NetworkInfo:
 
     @classmethod
     def of(cls, metadata: Mapping[str, str]) -> Self:
-        """Reads the metadata of a file. Raises `ValueError` saying what is missing or wrong."""
+        """Reads the metadata of a file. Raises `ValueError` if something is missing or wrong."""
 
         def one_of(key: str, *allowed: str) -> str:
             value = metadata.get(key)
@@ -122,21 +121,21 @@ class NetworkInfo:
         )
 
     def metadata(self) -> dict[str, str]:
-        """The metadata of a file."""
+        """Returns the metadata of a file."""
         texts = {key: str(value) for key, value in asdict(self).items()}
         return {"format": FORMAT, **texts, "masked": json.dumps(self.masked)}
 
 
 class Network:
-    """Layers and what they mean, computed with numpy in float32.
+    """A network, computed with numpy in float32.
 
     Attributes:
         layers: the layers in float32, first to last.
-        info: what the numbers mean.
+        info: the description.
     """
 
     def __init__(self, layers: Sequence[AnyLayer], info: NetworkInfo) -> None:
-        """Raises `ValueError` if the layers do not fit each other or the meaning."""
+        """Raises `ValueError` if the layers do not fit each other or the description."""
         self.layers = tuple(Layer(weight.astype(np.float32), bias.astype(np.float32)) for weight, bias in layers)
         self.info = info
         if not self.layers:
@@ -154,7 +153,7 @@ class Network:
     def inputs(
         self, observations: features.Columns, seats: features.Bytes, kinds: features.Bytes, mask_bits: features.Bytes
     ) -> Floats:
-        """The network's input, (R, `info.input_width`) float32."""
+        """Computes the network's input, (R, `info.input_width`) float32."""
         info = self.info
         if info.input == "classic":
             return features.classic(observations, mask_bits, faces=info.faces, hand_size=info.hand_size)
@@ -163,12 +162,12 @@ class Network:
         )
 
     def outputs(self, inputs: Floats) -> Floats:
-        """The network's output for each row of features, (R, `info.output_width`) float32."""
+        """Computes the network's output for each row of features, (R, `info.output_width`) float32."""
         sums = self._sums(inputs)
         return np.tanh(sums) if self.info.output_activation == "tanh" else sums
 
     def _sums(self, inputs: Floats) -> Floats:
-        """The outputs before their activation."""
+        """Computes the outputs before their activation."""
         values = inputs
         for number, (weight, bias) in enumerate(self.layers):
             values = (np.fmax(values, 0) if number else values) @ weight.T + bias
@@ -190,13 +189,13 @@ class Network:
 
 
 def best_legal(outputs: Floats, mask_bits: features.Bytes) -> Actions:
-    """The legal action with the highest output, the lowest index of equal ones: (R,) u16; 0 where none of the outputs is legal.
+    """Returns the legal action with the highest output, (R,) u16: the lowest index of equal ones; 0 where no output is legal.
 
-    An output that is no number, because weights are too large to be summed, counts as the lowest.
+    NaN, from the overflow of large weights, counts as the lowest output.
     """
     legal = np.unpackbits(mask_bits, axis=1, count=outputs.shape[1], bitorder="little").view(np.bool_)
     best = np.argmax(np.where(legal & ~np.isnan(outputs), outputs, -np.inf), axis=1)
-    # Where every legal output is the lowest, forbidden ones are equal to them.
+    # Where every legal output is the lowest, illegal ones are equal to them.
     allowed = np.take_along_axis(legal, best[:, np.newaxis], axis=1)[:, 0]
     chosen: Actions = np.where(allowed, best, np.argmax(legal, axis=1)).astype(np.uint16)
     return chosen
@@ -233,21 +232,21 @@ def save(
     *,
     dtype: type[np.float16] | type[np.float32] = np.float32,
 ) -> None:
-    """Writes a network to a file, whole or not at all.
+    """Writes a network to a file atomically.
 
     Args:
-        path: where to; what stands there is replaced.
+        path: the file; an existing one is replaced.
         layers: (weight, bias) of each layer, first to last.
-        info: what the numbers mean.
-        dtype: how the numbers are kept.
+        info: the description.
+        dtype: type of the numbers in the file.
 
     Raises:
-        ValueError: the layers do not fit each other or the meaning, or hold numbers that `dtype` cannot.
-        OSError: it could not be written.
+        ValueError: the layers do not fit each other or the description, or contain numbers out of the range of `dtype`.
+        OSError: the file cannot be written.
     """
     tensors: dict[str, npt.NDArray[np.floating]] = {}
     for number, (weight, bias) in enumerate(Network(layers, info).layers):
-        # A number that is too large becomes infinite, which is refused below in words.
+        # Overflow gives infinity, which is refused below.
         with np.errstate(over="ignore"):
             tensors[f"layer{number}.weight"], tensors[f"layer{number}.bias"] = weight.astype(dtype), bias.astype(dtype)
     if not all(np.isfinite(tensor).all() for tensor in tensors.values()):
@@ -267,6 +266,6 @@ def load(path: str | os.PathLike[str]) -> Network:
             raise ValueError("its tensors are not pairs of weight and bias in float16 or float32")
         return Network(layers, info)
     except KeyError as missing:
-        raise NetworkFileError(f"{os.fspath(path)} is no network: it has no tensor {missing}") from missing
+        raise NetworkFileError(f"{os.fspath(path)} is not a network: it has no tensor {missing}") from missing
     except (ValueError, safetensors.SafetensorError) as error:
-        raise NetworkFileError(f"{os.fspath(path)} is no network: {error}") from error
+        raise NetworkFileError(f"{os.fspath(path)} is not a network: {error}") from error

@@ -1,7 +1,7 @@
-"""An agent that plays by a network from a file, in any room of a server whose rule set has the sizes it was trained for.
+"""The command `play`, and its agent, which plays by a network from a file in games of the size the network was trained for.
 
-It takes the legal action with the highest output, and the default decision where the network has no say; so it never takes a wrong
-action, however it was trained. The command `python -m chefshat.learn play` takes part with it in rooms and tournaments.
+It takes the legal action with the highest output, and the default action where the network has no outputs, so it never takes an
+illegal action.
 """
 
 import argparse
@@ -56,7 +56,7 @@ class NetworkAgent(Agent):
 
 
 class Row:
-    """The observation of one decision as columns of one row, as `features` takes them."""
+    """The observation of one decision as columns of one row, for `features`."""
 
     def __init__(self, request: Decision) -> None:
         none = np.zeros(request.faces + 1, np.uint8)
@@ -70,13 +70,13 @@ class Row:
         self.roles = _row(request.roles)
         self.points = np.minimum(request.points, np.iinfo(np.uint32).max).astype(np.uint32)[np.newaxis]
         self.played = _row(request.played)
-        # Nothing given or received is left out of the message.
+        # The message omits empty gifts.
         self.gave = _row(request.gave if len(request.gave) else none)
         self.received = _row(request.received if len(request.received) else none)
 
 
 def run(options: argparse.Namespace) -> int:
-    """The command: plays one game in a room, or a tournament to its end, and prints the standings. Returns the exit code."""
+    """Runs the command: plays a game or a tournament, and prints the standings. Returns the exit code."""
     (way,) = join_options.ways(options.parser, options)
 
     def play() -> int:

@@ -1,7 +1,7 @@
-"""Training by self-play: games are played, what happened is learned from, again and again.
+"""Training by self-play: plays games and learns from them, in turns.
 
-The policy that is trained holds every seat of most games, and one seat against built-in agents in some if the plan says so. How
-games are played for it is in `self_play`, how it learns in `ppo`; files are in `ppo_checkpoint`, the command in `ppo_command`.
+The policy plays all seats of most games and, if the plan says so, one seat against built-in agents in others. Collecting games is
+in `self_play`, learning in `ppo`, files are in `ppo_checkpoint`, the command is in `ppo_command`.
 """
 
 import dataclasses
@@ -24,14 +24,14 @@ from chefshat.vector import VectorEnv
 
 
 class Trainer:
-    """A training at work; a context manager, whose games end with it."""
+    """A running training; a context manager that ends its games."""
 
     def __init__(self, training: Training, *, address: str | None = None) -> None:
-        """Begins the games. Raises `ChefsHatError` if there is no server for them or it refuses."""
+        """Starts the games. Raises `ChefsHatError` if there is no server or it refuses."""
         plan = training.plan
         runs = training.progress.runs + 1
         self.training = dataclasses.replace(training, progress=dataclasses.replace(training.progress, runs=runs))
-        # Every time it goes on it plays other games.
+        # Every resumption plays other games.
         first_seed = training.seed + SEED_STEP * runs
         kinds: list[tuple[int, dict[str, Any]]] = [(plan.games, {})]
         if plan.opponent_games:
@@ -60,37 +60,36 @@ class Trainer:
             env.close()
 
     def update(self, done: float) -> dict[str, float]:
-        """Plays and learns once. Returns means of the last epoch by name.
+        """Plays and learns once. Returns the losses of the last epoch by name.
 
         Args:
-            done: share of the training that is done, 0..=1, on which the learning rate and the entropy bonus depend.
+            done: share of the training that is done, 0..=1; determines the learning rate and the entropy bonus.
         """
         began = time.monotonic()
         plan, learner = self.training.plan, self.training.learner
         before = sum(collector.decisions for collector in self._collectors)
-        key, *chances = jax.random.split(learner.key, 1 + len(self._collectors))
-        parts = [play(collector, learner.params, chance, plan) for collector, chance in zip(self._collectors, chances, strict=True)]
+        key, *keys = jax.random.split(learner.key, 1 + len(self._collectors))
+        parts = [play(collector, learner.params, key, plan) for collector, key in zip(self._collectors, keys, strict=True)]
         samples, learner = joined(parts), learner._replace(key=key)
         learning_rate = jnp.float32(plan.learning_rate * (1 - 0.95 * done))
         entropy_bonus = jnp.float32(plan.entropy_bonus * (1 - 0.9 * done))
         for _ in range(plan.epochs):
             learner, losses = ppo.learn(learner, samples, learning_rate, entropy_bonus, plan.hyper)
-        told = {name: float(value) for name, value in losses._asdict().items()}
         progress = self.training.progress
         decisions = sum(collector.decisions for collector in self._collectors) - before
         progress = Progress(
             progress.updates + 1, progress.decisions + decisions, progress.seconds + time.monotonic() - began, progress.runs
         )
         self.training = dataclasses.replace(self.training, learner=learner, progress=progress)
-        return told
+        return {name: float(value) for name, value in losses._asdict().items()}
 
 
-def play(collector: Collector, params: Params, chance: jax.Array, plan: Plan) -> Samples:
-    """Plays `plan.steps` batches. Returns what is to be learned from: numpy arrays, good until the collector plays again."""
+def play(collector: Collector, params: Params, key: jax.Array, plan: Plan) -> Samples:
+    """Plays `plan.steps` batches. Returns the samples: numpy arrays, valid until the collector plays again."""
     numbers = itertools.count()
 
     def act(inputs: Floats) -> tuple[npt.NDArray[np.int32], Floats, Floats]:
-        actions, log_probabilities, values = ppo.act(params, jax.random.fold_in(chance, next(numbers)), inputs)
+        actions, log_probabilities, values = ppo.act(params, jax.random.fold_in(key, next(numbers)), inputs)
         return np.asarray(actions), np.asarray(log_probabilities), np.asarray(values)
 
     rollout = collector.collect(act)
@@ -101,10 +100,10 @@ def play(collector: Collector, params: Params, chance: jax.Array, plan: Plan) ->
 
 
 def joined(parts: Sequence[Samples]) -> Samples:
-    """All of them, as numpy arrays, with advantages of mean 0 and deviation 1."""
+    """Joins samples into one, as numpy arrays, with advantages normalised to mean 0 and standard deviation 1."""
     columns: list[Any] = [np.concatenate(column) if len(parts) > 1 else column[0] for column in zip(*parts, strict=True)]
     samples = Samples(*columns)
     counted = samples.advantages[samples.weights > 0]
     if len(counted) == 0:
-        raise ValueError("what came of no decision is known yet: play more steps between two times of learning (--steps)")
+        raise ValueError("no decision has an outcome yet: play more steps between two updates (--steps)")
     return samples._replace(advantages=(samples.advantages - counted.mean()) / (counted.std() + 1e-8))

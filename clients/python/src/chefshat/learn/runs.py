@@ -1,6 +1,6 @@
-"""What the commands that train have in common: base seeds, full rule sets, going on with a training, and Ctrl-C.
+"""What the training commands share: base seeds, full rule sets, resuming a training, and Ctrl-C.
 
-How a training is kept in a file is in `training_file`; what it does, in the modules of the agents.
+The file of a training is in `training_file`, the training itself in the modules of the agents.
 """
 
 import signal
@@ -15,34 +15,34 @@ from google.protobuf.json_format import MessageToDict
 from chefshat import pb
 from chefshat.vector import Rules, VectorEnv
 
-# Seeds that users choose are below 2^31. What must not play the same games adds multiples of this to them.
+# Seeds given by users are below 2^31. Adding multiples of this gives other games.
 SEED_STEP = 2**32
-# Deals that policies are looked at with, the same every time; trainings use base seeds from 2^32 on.
+# Base seed of all evaluations; trainings use base seeds from 2^32 on.
 EVALUATION_SEED = 20_200_612
-# Characters of the commands that a file remembers. `chefshat` reads at most 16 KiB of such a text, and a character may be 4 bytes.
+# Maximum characters of the commands in a file. `chefshat` reads at most 16 KiB of such a text, and a character may be 4 bytes.
 MAX_TRAINED_BY = 4_000
 LEFT_OUT = " [...] "
-# The exit code of a command that Ctrl-C has ended.
+# The exit code of a command ended by Ctrl-C.
 INTERRUPTED = 130
 
 
 def full_rules(rules: Rules, address: str | None) -> pb.RuleSet:
-    """A rule set with every field set, as the server understands it."""
+    """Returns a rule set with every field set by the server."""
     with VectorEnv(address, 1, rules=rules, seed=0) as env:
         return env.rules
 
 
 def existing(training: Path) -> Path:
-    """The file of a training that is to go on. Raises FileNotFoundError, saying what to do, if it is not there."""
+    """Returns the checkpoint to resume from. Raises FileNotFoundError, saying what to do, if it does not exist."""
     if not training.exists():
-        raise FileNotFoundError(f"{training} does not exist: there is nothing to go on from; leave out --resume to begin")
+        raise FileNotFoundError(f"{training} does not exist: there is nothing to resume; leave out --resume to start a training")
     return training
 
 
 def trained_by(before: str, command: str) -> str:
-    """The commands of a training that goes on: who wants to train the same again needs them all.
+    """Appends a command to those of a resumed training: reproducing it takes all of them.
 
-    Of more than `MAX_TRAINED_BY` characters the first half and the last remain.
+    Cuts the middle out of more than `MAX_TRAINED_BY` characters.
     """
     commands = f"{before}; {command}" if before else command
     if len(commands) <= MAX_TRAINED_BY:
@@ -51,44 +51,42 @@ def trained_by(before: str, command: str) -> str:
     return commands[:half] + LEFT_OUT + commands[-half:]
 
 
-def refuse_contradictions(given: Mapping[str, object], kept: Mapping[str, object]) -> None:
-    """Compares options that were given with what a training has that is to go on.
+def refuse_contradictions(given: Mapping[str, object], fixed: Mapping[str, object]) -> None:
+    """Compares the options given with the settings of the training to resume.
 
     Args:
-        given: options by their names in Python; those that `kept` does not have are free.
-        kept: what the training has, by the same names.
+        given: options by their names in Python; those that `fixed` lacks may have any value.
+        fixed: the settings of the training, by the same names.
 
     Raises:
-        ValueError: they differ. The message says in what.
+        ValueError: they differ. The message lists the differences.
     """
     differing = [
-        f"{name.replace('_', ' ')} {kept[name]}, not {value}"
+        f"{name.replace('_', ' ')} {fixed[name]}, not {value}"
         for name, value in given.items()
-        if name in kept and kept[name] != value
+        if name in fixed and fixed[name] != value
     ]
     if differing:
-        raise ValueError(
-            f"the training to go on from has {'; '.join(differing)}: leave the options out that say so, or begin without --resume"
-        )
+        raise ValueError(f"the training to resume has {'; '.join(differing)}: leave these options out, or start without --resume")
 
 
-def refuse_other_rules(asked: pb.RuleSet, kept: pb.RuleSet) -> None:
-    """Compares full rule sets, but for what ends a game. Raises ValueError if they differ; the message says in what."""
+def refuse_other_rules(asked: pb.RuleSet, fixed: pb.RuleSet) -> None:
+    """Compares full rule sets, except for what ends a game. Raises ValueError if they differ; the message lists the differences."""
 
     def plain(rules: pb.RuleSet) -> dict[str, Any]:
         fields = MessageToDict(rules, preserving_proto_field_name=True, always_print_fields_with_no_presence=True)
         return {f"rules {name}": value for name, value in fields.items() if name not in ("target_points", "target_shifts")}
 
-    refuse_contradictions(plain(asked), plain(kept))
+    refuse_contradictions(plain(asked), plain(fixed))
 
 
 class Interrupts:
-    """While it is entered, Ctrl-C asks to stop where it suits; a second one interrupts at once.
+    """Defers Ctrl-C while entered: the first one sets `asked`, a second one interrupts at once.
 
-    Outside of the main thread, where no signals arrive, it does nothing.
+    Does nothing outside of the main thread, where no signals arrive.
 
     Attributes:
-        asked: whether it was asked to stop.
+        asked: whether Ctrl-C was pressed.
     """
 
     def __init__(self) -> None:

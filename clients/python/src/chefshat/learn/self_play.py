@@ -1,7 +1,7 @@
-"""Playing to learn: one policy on all of a client's seats in many games, and what each of its decisions turned out to be worth.
+"""Self-play: one policy on all of a client's seats in many games, and the advantages of its decisions.
 
-An episode is a Shift. A seat's decisions in it form a chain of their own; the reward comes once, at the end of the Shift,
-from the place taken. How a policy acts and learns is not here (see `ppo`).
+An episode is a Shift. The decisions of one seat in it form a chain; the reward comes once, at the end of the Shift, from the place
+taken. Acting and learning are in `ppo`.
 """
 
 from collections.abc import Callable, Sequence
@@ -21,12 +21,12 @@ Act: TypeAlias = Callable[[Floats], tuple[npt.NDArray[np.integer], Floats, Float
 
 @dataclass(frozen=True)
 class Ends:
-    """Chains that ended between two batches, in the order in which they did.
+    """Chains that ended between two batches, in order.
 
     Attributes:
         games: (E,) the game.
         seats: (E,) the seat.
-        rewards: (E,) what the place was worth.
+        rewards: (E,) the reward for the place taken.
     """
 
     games: npt.NDArray[np.uint32]
@@ -36,16 +36,16 @@ class Ends:
 
 @dataclass(frozen=True)
 class Rollout:
-    """`steps` batches of n games. The arrays are used again for the next rollout.
+    """`steps` batches of n games. The arrays are reused for the next rollout.
 
     Attributes:
         inputs: (steps, n, width) features; 1 where a row has never been present.
-        actions: (steps, n) what was decided.
-        log_probabilities: (steps, n) of that.
-        values: (steps, n) what the value network said.
-        seats: (steps, n) who decided.
-        present: (steps, n) whether the game waited for the client at all.
-        ends: for each step, what ended after its decisions and before the next ones.
+        actions: (steps, n) the actions taken.
+        log_probabilities: (steps, n) of these actions.
+        values: (steps, n) outputs of the value network.
+        seats: (steps, n) the deciding seats.
+        present: (steps, n) whether the game waited for the client.
+        ends: for each step, the chains that ended after its decisions and before the next ones.
     """
 
     inputs: Floats
@@ -58,20 +58,20 @@ class Rollout:
 
 
 def place_rewards(points: Sequence[int]) -> Floats:
-    """What a place is worth, by place from 0: its points less the mean of all, divided by those of the first. They add up to 0."""
+    """Returns the reward of each place, from 0: its points minus the mean, divided by the winner's points. They add up to 0."""
     worth = np.array(points, np.float64)
     worth -= worth.mean()
     return np.array(worth / points[0], np.float32)
 
 
 class Collector:
-    """Plays on where it stopped and keeps what happened, `steps` batches at a time.
+    """Collects rollouts of `steps` batches, each continuing the games of the last.
 
-    Its environment has episodes of a Shift, asks for all decisions and leaves out forced ones.
+    Its environment has episodes of a Shift, asks for all decisions and skips forced ones.
     """
 
     def __init__(self, env: VectorEnv, games: int, steps: int) -> None:
-        """Begins with the environment's first batch."""
+        """Starts with the environment's first batch."""
         self._env = env
         self._batch: Batch = env.reset()
         self._rewards = place_rewards(env.rules.points)
@@ -90,11 +90,11 @@ class Collector:
         self._rows = np.empty((games, width), np.float32)
         #: Seats of a game.
         self.players = env.players
-        #: Decisions taken since the beginning.
+        #: Decisions taken so far.
         self.decisions = 0
 
     def collect(self, act: Act) -> Rollout:
-        """Plays. What it returns is good until the next call."""
+        """Plays one rollout. The result is valid until the next call."""
         rollout = self._rollout
         rollout.ends.clear()
         for step in range(len(rollout.actions)):
@@ -131,21 +131,21 @@ class Collector:
 
 
 def advantages(rollout: Rollout, players: int, *, discount: float, gae_lambda: float) -> tuple[Floats, npt.NDArray[np.bool_]]:
-    """How much better than expected each decision turned out, by generalised advantage estimation along the seat's own chain.
+    """Estimates the advantage of each decision by generalised advantage estimation (GAE) along the seat's chain.
 
     Args:
-        rollout: what was played.
+        rollout: the games.
         players: seats of a game.
-        discount: what a decision later is worth, gamma.
-        gae_lambda: how far what came later is believed rather than the value network, lambda.
+        discount: gamma.
+        gae_lambda: lambda: 0 trusts the value network alone, 1 the rewards alone.
 
     Returns:
-        (steps, n) advantages; (steps, n) whether they are known: not that of the last decision in a chain that goes on after the
-        rollout. Its value is what those before it lead to.
+        (steps, n) advantages; (steps, n) whether they are known: unknown for the last decision of a chain that continues after the
+        rollout. The decisions before it bootstrap from its value.
     """
     shape = rollout.values.shape
     result, known = np.zeros(shape, np.float32), np.zeros(shape, np.bool_)
-    # What follows the decision looked at, for each game and seat.
+    # What follows the current decision, for each game and seat.
     reward, value, advantage = (np.zeros((shape[1], players), np.float32) for _ in range(3))
     follows = np.zeros((shape[1], players), np.bool_)
     for step in reversed(range(shape[0])):

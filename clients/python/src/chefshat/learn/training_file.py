@@ -106,9 +106,9 @@ def opened(path: str | os.PathLike[str], *forms: str) -> Iterator[Contents]:
                 raise ValueError(f"its format is {metadata.get('format')!r}, not {forms[0]!r}")
             yield Contents(file, metadata)
     except KeyError as missing:
-        raise TrainingFileError(f"{os.fspath(path)} is no training: it has no {missing}") from missing
+        raise TrainingFileError(f"{os.fspath(path)} is not a training: it has no {missing}") from missing
     except (ValueError, TypeError, safetensors.SafetensorError, json_format.ParseError) as error:
-        raise TrainingFileError(f"{os.fspath(path)} is no training: {error}") from error
+        raise TrainingFileError(f"{os.fspath(path)} is not a training: {error}") from error
 
 
 def network_info(

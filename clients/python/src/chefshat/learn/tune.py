@@ -1,11 +1,11 @@
-"""The command `python -m chefshat.learn tune`: looks for good hyper-parameters of the Deep Q agent by TPE, as the 2020 paper did.
+"""The command `python -m chefshat.learn tune`: searches hyper-parameters of the Deep Q agent by TPE, as the 2020 paper did.
 
-Every trial trains a few agents, each in a game of its own, with one set of parameters; what counts is the mean, over the agents, of
-what they do in the second half of their Shifts. The tree-structured Parzen estimator proposes the next set. The file of results is
-written after every trial, so an interrupted run keeps what it has found.
+Every trial trains a few agents, each in its own game, with one set of parameters. Its value is the mean of the agents' scores in
+the second half of their Shifts. The tree-structured Parzen estimator proposes the next set. The results are written after every
+trial, so an interrupted run loses nothing.
 
-The best of many values is partly the luckiest. So at the end the best set and the paper's are trained once more, with other deals
-and other chance: these values are not chosen, and can be compared.
+The best of many values is partly luck. So at the end the best set and the paper's are trained once more, with other seeds: these
+values are not selected, and can be compared.
 """
 
 import argparse
@@ -31,14 +31,14 @@ FORMAT = "chefshat-tune-1"
 
 @dataclass(frozen=True)
 class Trial:
-    """One set of parameters and what came of training with it.
+    """One set of parameters and the result of training with it.
 
     Attributes:
         number: from 0.
-        parameters: those that were looked for, by the names of `DeepQConfig`.
-        value: what was to be made as large as possible: the mean over the agents.
-        least: the least of the agents.
-        most: the most of them.
+        parameters: the searched parameters, by the names of `DeepQConfig`.
+        value: the objective, to be maximised: the mean over the agents.
+        least: the lowest score of an agent.
+        most: the highest.
     """
 
     number: int
@@ -49,12 +49,12 @@ class Trial:
 
     @classmethod
     def of(cls, number: int, config: DeepQConfig, values: list[float]) -> Self:
-        """From the values of the agents."""
-        return cls(number, _looked_for(config), float(np.mean(values)), min(values), max(values))
+        """Summarises the scores of the agents."""
+        return cls(number, _searched(config), float(np.mean(values)), min(values), max(values))
 
 
 def run(options: argparse.Namespace) -> int:
-    """The command. Returns the exit code."""
+    """Runs the command. Returns the exit code."""
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     study = optuna.create_study(direction="maximize", sampler=optuna.samplers.TPESampler(seed=options.seed))
     # The paper's own parameters are tried first.
@@ -82,18 +82,18 @@ def run(options: argparse.Namespace) -> int:
         print(json.dumps({"event": "tuned", "file": str(options.out), **_as_json(options, trials, again)}))
     else:
         print(as_table(trials, goal(options)))
-        print("Trained once more, with other deals and other chance:")
+        print("Trained once more, with other seeds:")
         for trial in again:
             whose = "the paper's parameters" if trial.number == 0 else "the best parameters"
             print(f"  {trial.value:.1%} ({trial.least:.1%} to {trial.most:.1%}): trial {trial.number}, {whose}")
-        print(f"written: {options.out}; train with them: python -m chefshat.learn deep-q --parameters {options.out} --out FILE")
+        print(f"wrote {options.out}; train with it: python -m chefshat.learn deep-q --parameters {options.out} --out FILE")
     return 0
 
 
 def evaluate(options: argparse.Namespace, config: DeepQConfig, *, afresh: bool = False) -> list[float]:
-    """Trains agents with these parameters; what each of them achieved in the second half of its Shifts, 0..=1.
+    """Trains agents with these parameters. Returns the score of each in the second half of its Shifts, 0..=1.
 
-    All trials have the same deals and agents' chance; `afresh` has others.
+    All trials have the same seeds; `afresh` has others.
     """
     first = options.seed + options.agents * afresh
     seeds = [first + number for number in range(options.agents)]
@@ -117,7 +117,7 @@ def evaluate(options: argparse.Namespace, config: DeepQConfig, *, afresh: bool =
 
 
 def achieved(options: argparse.Namespace, played: Played) -> list[float]:
-    """What counts, by agent: the share of valid actions if they learn what is valid, else the share of Shifts won."""
+    """Returns the scores: the share of valid actions with the rewards "validity", else the share of Shifts won."""
     second = slice(options.shifts // 2, None)
     seats = {name: counted[:, second, 0] for name, counted in played.of_seats.items()}
     if options.rewards == "validity":
@@ -127,17 +127,17 @@ def achieved(options: argparse.Namespace, played: Played) -> list[float]:
 
 
 def goal(options: argparse.Namespace) -> str:
-    """What counts, in words."""
+    """Names the score."""
     return "valid actions" if options.rewards == "validity" else "Shifts won"
 
 
 def best(trials: list[Trial]) -> Trial:
-    """The trial with the highest value, the first of equal ones."""
+    """Returns the trial with the highest value, the first of equal ones."""
     return max(trials, key=lambda trial: trial.value)
 
 
 def as_table(trials: list[Trial], what: str) -> str:
-    """The trials for people, the best first."""
+    """Formats the trials, best first."""
     names = list(trials[0].parameters)
     rows = [["trial", what, "least to most", *names]]
     for trial in sorted(trials, key=lambda trial: -trial.value):
@@ -149,7 +149,7 @@ def as_table(trials: list[Trial], what: str) -> str:
 
 
 def _proposed(trial: optuna.Trial) -> DeepQConfig:
-    """The parameters that the estimator proposes."""
+    """Returns the parameters that the estimator proposes."""
     return DeepQConfig(
         hidden=(
             trial.suggest_categorical("first_layer", [64, 128, 256]),
@@ -166,14 +166,14 @@ def _proposed(trial: optuna.Trial) -> DeepQConfig:
 
 
 def _as_proposed(config: DeepQConfig) -> dict[str, Any]:
-    """Parameters under the names that `_proposed` asks for."""
-    found = _looked_for(config)
+    """Returns the parameters under the names that `_proposed` uses."""
+    found = _searched(config)
     found["first_layer"], found["second_layer"] = found.pop("hidden")
     return found
 
 
-def _looked_for(config: DeepQConfig) -> dict[str, Any]:
-    """Those parameters of a config that are looked for."""
+def _searched(config: DeepQConfig) -> dict[str, Any]:
+    """Returns the searched parameters of a config."""
     names = ("hidden", "batch_size", "memory_size", "discount", "learning_rate", "epsilon_decay", "epsilon_end", "target_every")
     return {name: getattr(config, name) for name in names}
 
@@ -188,9 +188,9 @@ def _as_json(options: argparse.Namespace, trials: list[Trial], again: list[Trial
         "command": options.trained_by,
         "goal": goal(options),
         "best": best(trials).number,
-        # Under this name `deep-q --parameters` finds them.
+        # `deep-q --parameters` reads this key.
         "parameters": best(trials).parameters,
         "trials": [dataclasses.asdict(trial) for trial in trials],
-        # Empty while there are trials to come.
+        # Empty until the last trial has ended.
         "trained_afresh": [dataclasses.asdict(trial) for trial in again],
     }
