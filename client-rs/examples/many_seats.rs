@@ -2,13 +2,13 @@
 //!
 //! `cargo run -p chefshat-client --example many_seats -- [SERVER]`
 
-use chefshat_client::{Action, Agent, Client, RandomAgent, legal_actions, v1};
+use chefshat_client::{ActionId, Agent, Client, RandomAgent, legal_actions, v1};
 
 /// Plays the first legal action: of the rarest face that goes, as few cards as possible.
 struct First;
 
 impl Agent for First {
-    fn decide(&mut self, request: &v1::DecisionRequest) -> Action {
+    fn decide(&mut self, request: &v1::DecisionRequest) -> ActionId {
         legal_actions(request)
             .next()
             .expect("some action is always legal")

@@ -5,12 +5,11 @@ use std::fmt;
 
 use crate::{Outcome, v1};
 
-/// An action as the protocol numbers it: the index of a bit in [`v1::DecisionRequest::action_mask`]. `Client::action_table` gives the
-/// text of each.
+/// The index of an action: of a bit in [`v1::DecisionRequest::action_mask`]. `Client::action_table` gives the text of each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Action(pub u32);
+pub struct ActionId(pub u32);
 
-impl fmt::Display for Action {
+impl fmt::Display for ActionId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.0.fmt(f)
     }
@@ -27,7 +26,7 @@ impl fmt::Display for Action {
 pub trait Agent: Send {
     /// Chooses an action, any of [`legal_actions`](crate::legal_actions). Called again with the same request if the server refused
     /// the answer and the decision is still open; `invalid_attempts_left` is then brought up to date, the times are as first told.
-    fn decide(&mut self, request: &v1::DecisionRequest) -> Action;
+    fn decide(&mut self, request: &v1::DecisionRequest) -> ActionId;
 
     /// What to record with the decision just made; asked right after [`Agent::decide`]. See [`v1::Annotations`] for the limits.
     fn annotate(&mut self) -> Option<v1::Annotations> {
@@ -52,7 +51,7 @@ pub trait Agent: Send {
 macro_rules! forward_agent {
     ($($generics:tt)*) => {
         impl $($generics)* {
-            fn decide(&mut self, request: &v1::DecisionRequest) -> Action {
+            fn decide(&mut self, request: &v1::DecisionRequest) -> ActionId {
                 (**self).decide(request)
             }
             fn annotate(&mut self) -> Option<v1::Annotations> {

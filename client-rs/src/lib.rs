@@ -20,7 +20,7 @@ mod spectate;
 mod tournaments;
 mod vector;
 
-pub use agent::{Action, Agent};
+pub use agent::{ActionId, Agent};
 pub use backoff::{Backoff, FIRST_DELAY, GIVE_UP_AFTER, MAX_DELAY};
 pub use chefshat_proto::v1;
 pub use client::Client;

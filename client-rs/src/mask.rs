@@ -1,10 +1,10 @@
 //! Reading the mask of legal actions: bit i%8 of byte i/8 is action i. An empty mask (the seat asked for none) has no legal actions
 //! here; the server still knows them.
 
-use crate::{Action, v1};
+use crate::{ActionId, v1};
 
 /// The legal actions of a decision, ascending.
-pub fn legal_actions(request: &v1::DecisionRequest) -> impl Iterator<Item = Action> + '_ {
+pub fn legal_actions(request: &v1::DecisionRequest) -> impl Iterator<Item = ActionId> + '_ {
     (0u32..)
         .zip(&request.action_mask)
         .flat_map(|(index, &byte)| {
@@ -12,7 +12,7 @@ pub fn legal_actions(request: &v1::DecisionRequest) -> impl Iterator<Item = Acti
             std::iter::from_fn(move || {
                 let bit = (rest != 0).then(|| rest.trailing_zeros())?;
                 rest &= rest - 1;
-                Some(Action(8 * index + bit))
+                Some(ActionId(8 * index + bit))
             })
         })
 }
@@ -23,7 +23,7 @@ pub fn legal_count(request: &v1::DecisionRequest) -> usize {
 }
 
 /// The legal action with `n` legal ones below it; `None` if there are not that many.
-pub fn nth_legal(request: &v1::DecisionRequest, n: usize) -> Option<Action> {
+pub fn nth_legal(request: &v1::DecisionRequest, n: usize) -> Option<ActionId> {
     nth_in(&request.action_mask, n)
 }
 
@@ -33,7 +33,7 @@ pub fn count_in(mask: &[u8]) -> usize {
 }
 
 /// The action of a mask with `n` of its actions below it; `None` if there are not that many.
-pub fn nth_in(mask: &[u8], n: usize) -> Option<Action> {
+pub fn nth_in(mask: &[u8], n: usize) -> Option<ActionId> {
     let mut left = n;
     for (index, word) in (0u32..).zip(words(mask)) {
         let ones = word.count_ones() as usize;
@@ -42,7 +42,7 @@ pub fn nth_in(mask: &[u8], n: usize) -> Option<Action> {
             for _ in 0..left {
                 rest &= rest - 1;
             }
-            return Some(Action(64 * index + rest.trailing_zeros()));
+            return Some(ActionId(64 * index + rest.trailing_zeros()));
         }
         left -= ones;
     }
@@ -59,7 +59,7 @@ fn words(mask: &[u8]) -> impl Iterator<Item = u64> + '_ {
 }
 
 /// Whether an action is legal in a decision.
-pub fn is_legal(request: &v1::DecisionRequest, action: Action) -> bool {
+pub fn is_legal(request: &v1::DecisionRequest, action: ActionId) -> bool {
     let byte = usize::try_from(action.0 / 8)
         .ok()
         .and_then(|index| request.action_mask.get(index));
@@ -85,12 +85,12 @@ mod tests {
                 action_mask: mask.to_vec(),
                 ..Default::default()
             };
-            let expected: Vec<Action> = expected.iter().copied().map(Action).collect();
+            let expected: Vec<ActionId> = expected.iter().copied().map(ActionId).collect();
             assert_eq!(legal_actions(&request).collect::<Vec<_>>(), expected);
             assert_eq!(legal_count(&request), expected.len());
-            let nth: Vec<Action> = (0..).map_while(|n| nth_legal(&request, n)).collect();
+            let nth: Vec<ActionId> = (0..).map_while(|n| nth_legal(&request, n)).collect();
             assert_eq!(nth, expected);
-            for action in (0..40).map(Action).chain([Action(u32::MAX)]) {
+            for action in (0..40).map(ActionId).chain([ActionId(u32::MAX)]) {
                 assert_eq!(is_legal(&request, action), expected.contains(&action));
             }
         }

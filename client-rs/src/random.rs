@@ -3,7 +3,7 @@
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
-use crate::{Action, Agent, count_in, nth_in, v1};
+use crate::{ActionId, Agent, count_in, nth_in, v1};
 
 /// Actions of a turn in the standard numbering, until the start of the game names another.
 const STANDARD_TURN_ACTIONS: u32 = 200;
@@ -30,7 +30,7 @@ impl RandomAgent {
     }
 
     /// One of the actions of a mask; `None` if it has none.
-    pub fn choose(&mut self, mask: &[u8]) -> Option<Action> {
+    pub fn choose(&mut self, mask: &[u8]) -> Option<ActionId> {
         let n = self.below(u32::try_from(count_in(mask)).unwrap_or(u32::MAX));
         nth_in(mask, n as usize)
     }
@@ -43,13 +43,13 @@ impl RandomAgent {
 }
 
 impl Agent for RandomAgent {
-    fn decide(&mut self, request: &v1::DecisionRequest) -> Action {
+    fn decide(&mut self, request: &v1::DecisionRequest) -> ActionId {
         self.choose(&request.action_mask).unwrap_or_else(|| {
             if request.kind() == v1::DecisionKind::Turn {
-                Action(self.below(self.turn_actions))
+                ActionId(self.below(self.turn_actions))
             } else {
                 let others = self.actions.saturating_sub(self.turn_actions);
-                Action(self.turn_actions.saturating_add(self.below(others)))
+                ActionId(self.turn_actions.saturating_add(self.below(others)))
             }
         })
     }
@@ -89,7 +89,7 @@ mod tests {
     #[test]
     fn same_seed_same_choices() {
         let request = request(&[0xff; 27], v1::DecisionKind::Turn);
-        let play = |seed| -> Vec<Action> {
+        let play = |seed| -> Vec<ActionId> {
             let mut agent = RandomAgent::new(seed);
             (0..50).map(|_| agent.decide(&request)).collect()
         };

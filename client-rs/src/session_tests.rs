@@ -9,7 +9,7 @@ mod participant;
 use super::*;
 use crate::v1::game_event::Kind;
 use crate::v1::seat_command::Command;
-use crate::{Action, Ending, Entropy};
+use crate::{ActionId, Ending, Entropy};
 
 /// Answers with the actions it was given, in order, and writes down all that reaches it.
 struct Scripted {
@@ -24,10 +24,10 @@ impl Scripted {
 }
 
 impl Agent for Scripted {
-    fn decide(&mut self, request: &v1::DecisionRequest) -> Action {
+    fn decide(&mut self, request: &v1::DecisionRequest) -> ActionId {
         let left = request.invalid_attempts_left;
         self.note(format!("decide {} {left:?}", request.decision_id));
-        Action(
+        ActionId(
             self.actions
                 .pop_front()
                 .expect("asked more often than scripted"),

@@ -9,7 +9,7 @@ use crate::client::MAX_RESPONSE_BYTES;
 use crate::v1::run_request::Request;
 use crate::v1::run_response::Response;
 use crate::v1::vector_service_client::VectorServiceClient;
-use crate::{Action, Client, Error, v1};
+use crate::{ActionId, Client, Error, v1};
 
 /// Games that a server steps for this client.
 #[derive(Debug)]
@@ -67,7 +67,7 @@ impl VectorGames {
     /// `ACTIONS_REFUSED`, and `ILLEGAL_ACTION` where that is an error; either ends the games. `STEP_GIVEN_UP` when a call was dropped.
     pub async fn step(
         &mut self,
-        actions: impl IntoIterator<Item = Action>,
+        actions: impl IntoIterator<Item = ActionId>,
     ) -> Result<Box<v1::VectorBatch>, Error> {
         // An action beyond 16 bits is as illegal as the largest of them.
         let column: Vec<u8> = (actions.into_iter())

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};
 
-use chefshat_client::{Action, Agent, Outcome};
+use chefshat_client::{ActionId, Agent, Outcome};
 use chefshat_proto::v1::{self, record_line::Line};
 use tokio::sync::watch;
 
@@ -110,7 +110,7 @@ impl<A> Noted<A> {
 }
 
 impl<A: Agent> Agent for Noted<A> {
-    fn decide(&mut self, request: &v1::DecisionRequest) -> Action {
+    fn decide(&mut self, request: &v1::DecisionRequest) -> ActionId {
         let action = self.agent.decide(request);
         let key = self.key(request.decision_id);
         let mut sent = self.ledger.sent.lock().expect("nobody panics");

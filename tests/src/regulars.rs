@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use chefshat_client::{
-    Action, Agent, Backoff, Client, Ending, Error, Outcome, PlayError, PlayOptions, RandomAgent,
+    ActionId, Agent, Backoff, Client, Ending, Error, Outcome, PlayError, PlayOptions, RandomAgent,
 };
 use chefshat_proto::v1::{self, seat_config::FilledBy};
 use futures::FutureExt as _;
@@ -232,7 +232,7 @@ struct Paced<A> {
 }
 
 impl<A: Agent> Agent for Paced<A> {
-    fn decide(&mut self, request: &v1::DecisionRequest) -> Action {
+    fn decide(&mut self, request: &v1::DecisionRequest) -> ActionId {
         let thinking = self.pace.mul_f64(self.random.random());
         tokio::task::block_in_place(|| std::thread::sleep(thinking));
         self.agent.decide(request)

@@ -4,7 +4,7 @@ use std::sync::mpsc::{Sender, channel};
 use std::time::Duration;
 
 use chefshat_client::v1::{self, game_event::Kind, seat_update::Update};
-use chefshat_client::{Action, Agent, Backoff, PlayError, PlayOptions};
+use chefshat_client::{ActionId, Agent, Backoff, PlayError, PlayOptions};
 use tonic::Status;
 
 use crate::fake::{Fake, Line, connect, event, listen};
@@ -20,9 +20,9 @@ impl Tens {
 }
 
 impl Agent for Tens {
-    fn decide(&mut self, request: &v1::DecisionRequest) -> Action {
+    fn decide(&mut self, request: &v1::DecisionRequest) -> ActionId {
         self.note(format!("decide {}", request.decision_id));
-        Action(10 * u32::try_from(request.decision_id).unwrap())
+        ActionId(10 * u32::try_from(request.decision_id).unwrap())
     }
     fn on_event(&mut self, event: &v1::GameEvent) {
         self.note(format!("event {}", event.sequence));

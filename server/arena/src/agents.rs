@@ -4,7 +4,7 @@
 
 use std::sync::Arc;
 
-use chefshat_engine::{Action, ActionSpace, DecisionKind, Mask, Move, Observation, Role};
+use chefshat_engine::{Action, ActionId, ActionSpace, DecisionKind, Mask, Observation, Role};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
 
@@ -117,12 +117,12 @@ impl BuiltInAgent {
     ///
     /// # Panics
     /// When `legal` is empty: there is no decision to take.
-    pub fn decide(&mut self, observation: &Observation, legal: &Mask) -> Action {
+    pub fn decide(&mut self, observation: &Observation, legal: &Mask) -> ActionId {
         let space = ActionSpace::new(observation.faces).expect("an observation has 4 to 15 faces");
         let turn = observation.kind == Some(DecisionKind::Turn);
         match &mut self.mind {
             Mind::Kind(AgentKind::RandomUnmasked, chance) if turn => {
-                Action::new(chance.below(space.turn_actions()))
+                ActionId::new(chance.below(space.turn_actions()))
             }
             Mind::Kind(AgentKind::Random | AgentKind::RandomUnmasked, chance) => {
                 chance.uniform(legal)
@@ -140,7 +140,7 @@ impl BuiltInAgent {
 struct Chance(ChaCha8Rng);
 
 impl Chance {
-    fn uniform(&mut self, legal: &Mask) -> Action {
+    fn uniform(&mut self, legal: &Mask) -> ActionId {
         assert!(!legal.is_empty(), "a decision has a legal action");
         let count = u16::try_from(legal.len()).expect("a mask has below 400 actions");
         legal
@@ -158,12 +158,12 @@ impl Chance {
 
 /// Prefers, in this order: no jokers, the least rare face, many cards; a pass only when nothing can be played. Gives its least rare
 /// card. Declares where an exchange would cost it cards.
-pub(crate) fn greedy(observation: &Observation, legal: &Mask, space: ActionSpace) -> Action {
+pub(crate) fn greedy(observation: &Observation, legal: &Mask, space: ActionSpace) -> ActionId {
     let role = observation.seat.and_then(|seat| observation.roles[seat]);
     legal
         .iter()
         .max_by_key(|action| match space.decode(*action) {
-            Some(Move::Play {
+            Some(Action::Play {
                 face,
                 quantity,
                 jokers,
@@ -173,14 +173,14 @@ pub(crate) fn greedy(observation: &Observation, legal: &Mask, space: ActionSpace
                 i16::from(face.get()),
                 i16::from(quantity),
             ),
-            Some(Move::LoneJoker) => (3, -1, -1, 0),
-            Some(Move::Give(face)) => (3, 0, i16::from(face.get()), 0),
-            Some(Move::GiveJoker) => (2, 0, 0, 0),
-            Some(Move::Declare) if matches!(role, Some(Role::Waiter | Role::Dishwasher)) => {
+            Some(Action::LoneJoker) => (3, -1, -1, 0),
+            Some(Action::Give(face)) => (3, 0, i16::from(face.get()), 0),
+            Some(Action::GiveJoker) => (2, 0, 0, 0),
+            Some(Action::Declare) if matches!(role, Some(Role::Waiter | Role::Dishwasher)) => {
                 (3, 0, 0, 0)
             }
-            Some(Move::Decline) => (2, 0, 0, 0),
-            Some(Move::Pass | Move::Declare) | None => (1, 0, 0, 0),
+            Some(Action::Decline) => (2, 0, 0, 0),
+            Some(Action::Pass | Action::Declare) | None => (1, 0, 0, 0),
         })
         .expect("a decision has a legal action")
 }

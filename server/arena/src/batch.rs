@@ -4,8 +4,8 @@
 use std::num::NonZeroU32;
 
 use chefshat_engine::{
-    Action, BySeat, Decision, Event, MAX_SEATS, MetricsRecorder, RewardScheme, RuleSet, Seat, Seed,
-    ShiftMetrics, Standings,
+    ActionId, BySeat, Decision, Event, MAX_SEATS, MetricsRecorder, RewardScheme, RuleSet, Seat,
+    Seed, ShiftMetrics, Standings,
 };
 use thiserror::Error;
 
@@ -196,11 +196,11 @@ impl Listener for Adder<'_> {
         }
     }
 
-    fn on_decision(&mut self, _: Decision, _: Action) {
+    fn on_decision(&mut self, _: Decision, _: ActionId) {
         self.table.decisions += 1;
     }
 
-    fn on_invalid(&mut self, decision: Decision, _: Action) {
+    fn on_invalid(&mut self, decision: Decision, _: ActionId) {
         if is_wrong_action(decision) {
             self.recorder.wrong(decision.seat);
         }

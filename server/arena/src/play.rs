@@ -4,8 +4,8 @@
 use std::num::NonZeroU32;
 
 use chefshat_engine::{
-    Action, Decision, DecisionKind, Event, Game, Mask, Observation, RuleSet, Seat, Seed, Standings,
-    Viewer,
+    ActionId, Decision, DecisionKind, Event, Game, Mask, Observation, RuleSet, Seat, Seed,
+    Standings, Viewer,
 };
 
 /// Somebody who hears everything that happens in a game, private things included. Each method does nothing unless it is written.
@@ -16,12 +16,12 @@ pub trait Listener {
     }
 
     /// A decision is about to be taken with this legal action, whose events follow.
-    fn on_decision(&mut self, decision: Decision, action: Action) {
+    fn on_decision(&mut self, decision: Decision, action: ActionId) {
         let _ = (decision, action);
     }
 
     /// A seat answered a decision with an action that is not legal.
-    fn on_invalid(&mut self, decision: Decision, action: Action) {
+    fn on_invalid(&mut self, decision: Decision, action: ActionId) {
         let _ = (decision, action);
     }
 }
@@ -30,9 +30,9 @@ pub trait Listener {
 #[derive(Clone, Eq, PartialEq, Debug)]
 pub struct PlayedDecision {
     /// The action.
-    pub action: Action,
+    pub action: ActionId,
     /// Invalid attempts before it.
-    pub attempts: Vec<Action>,
+    pub attempts: Vec<ActionId>,
     /// Whether it is the default, taken because there were too many of them.
     pub by_default: bool,
 }
@@ -45,7 +45,7 @@ pub fn play(
     rules: RuleSet,
     seed: Seed,
     max_invalid_attempts: Option<NonZeroU32>,
-    mut decide: impl FnMut(Seat, &Observation, &Mask) -> Action,
+    mut decide: impl FnMut(Seat, &Observation, &Mask) -> ActionId,
     listener: &mut impl Listener,
 ) -> Standings {
     let mut game = Game::new(rules, seed, |event| listener.on_event(&event));

@@ -3,7 +3,7 @@
 
 use std::collections::HashMap;
 
-use chefshat_engine::{Action, ActionSpace, Cards, Face, Mask, Observation, Seat};
+use chefshat_engine::{ActionId, ActionSpace, Cards, Face, Mask, Observation, Seat};
 
 /// One decision of a recorded player.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -13,7 +13,7 @@ pub struct RecordedDecision {
     /// What was legal.
     pub legal: Mask,
     /// What was decided.
-    pub action: Action,
+    pub action: ActionId,
     /// Whether the player decided it. Otherwise it was decided for the player (by the clock, after invalid attempts, by a substitute):
     /// that is repeated where it was decided, and is no model elsewhere.
     pub own: bool,
@@ -101,7 +101,7 @@ impl RecordedPlayer {
     ///
     /// # Panics
     /// When `legal` is empty or no decision is open for the seat of the observation.
-    pub fn decide(&self, observation: &Observation, legal: &Mask) -> Action {
+    pub fn decide(&self, observation: &Observation, legal: &Mask) -> ActionId {
         self.repeated(observation, legal)
             .or_else(|| self.most_similar(observation, legal))
             .or_else(|| observation.default_action(legal))
@@ -109,7 +109,7 @@ impl RecordedPlayer {
     }
 
     /// What it did where it saw exactly this.
-    fn repeated(&self, observation: &Observation, legal: &Mask) -> Option<Action> {
+    fn repeated(&self, observation: &Observation, legal: &Mask) -> Option<ActionId> {
         self.by_glance
             .get(&glance(observation))?
             .iter()
@@ -119,9 +119,9 @@ impl RecordedPlayer {
     }
 
     /// What it did where it saw what is most like this.
-    fn most_similar(&self, observation: &Observation, legal: &Mask) -> Option<Action> {
+    fn most_similar(&self, observation: &Observation, legal: &Mask) -> Option<ActionId> {
         let now = space(observation);
-        let mut best: Option<(u64, Action)> = None;
+        let mut best: Option<(u64, ActionId)> = None;
         let own = self.decisions.iter().filter(|then| then.own);
         for then in own.take(MAX_MODELS) {
             if then.observation.kind != observation.kind {

@@ -4,11 +4,11 @@
 use std::fmt;
 
 use crate::patterns::{PLAYS, play_offset};
-use crate::{Action, Face, MAX_FACES};
+use crate::{ActionId, Face, MAX_FACES};
 
-/// What an action means.
+/// What a seat does at a decision: a play, a pass, a gift, or its answer to a special action.
 #[derive(Copy, Clone, Eq, PartialEq, Hash, Debug)]
-pub enum Move {
+pub enum Action {
     /// Play cards of one face, with jokers or without.
     Play {
         /// The face.
@@ -32,21 +32,21 @@ pub enum Move {
     Declare,
 }
 
-impl fmt::Display for Move {
+impl fmt::Display for Action {
     /// The text of the action, for instance `C11;Q3;J1`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Move::Play {
+            Action::Play {
                 face,
                 quantity,
                 jokers,
             } => write!(f, "C{face};Q{quantity};J{jokers}"),
-            Move::LoneJoker => f.write_str("C0;Q0;J1"),
-            Move::Pass => f.write_str("pass"),
-            Move::Give(face) => write!(f, "give C{face}"),
-            Move::GiveJoker => f.write_str("give J"),
-            Move::Decline => f.write_str("decline"),
-            Move::Declare => f.write_str("declare"),
+            Action::LoneJoker => f.write_str("C0;Q0;J1"),
+            Action::Pass => f.write_str("pass"),
+            Action::Give(face) => write!(f, "give C{face}"),
+            Action::GiveJoker => f.write_str("give J"),
+            Action::Decline => f.write_str("decline"),
+            Action::Declare => f.write_str("declare"),
         }
     }
 }
@@ -100,46 +100,46 @@ impl ActionSpace {
     }
 
     /// Playing one joker alone.
-    pub const fn lone_joker(self) -> Action {
-        Action::new(self.plays())
+    pub const fn lone_joker(self) -> ActionId {
+        ActionId::new(self.plays())
     }
 
     /// Passing.
-    pub const fn pass(self) -> Action {
-        Action::new(self.plays() + 1)
+    pub const fn pass(self) -> ActionId {
+        ActionId::new(self.plays() + 1)
     }
 
     /// Giving one card of a face, or `None` if the deck has no such face.
-    pub const fn give(self, face: Face) -> Option<Action> {
+    pub const fn give(self, face: Face) -> Option<ActionId> {
         if face.get() <= self.faces {
-            Some(Action::new(self.turn_actions() + face.get() as u16 - 1))
+            Some(ActionId::new(self.turn_actions() + face.get() as u16 - 1))
         } else {
             None
         }
     }
 
     /// Giving one joker.
-    pub const fn give_joker(self) -> Action {
-        Action::new(self.turn_actions() + self.faces as u16)
+    pub const fn give_joker(self) -> ActionId {
+        ActionId::new(self.turn_actions() + self.faces as u16)
     }
 
     /// Declining the special action.
-    pub const fn decline(self) -> Action {
-        Action::new(self.turn_actions() + self.faces as u16 + 1)
+    pub const fn decline(self) -> ActionId {
+        ActionId::new(self.turn_actions() + self.faces as u16 + 1)
     }
 
     /// Declaring the special action.
-    pub const fn declare(self) -> Action {
-        Action::new(self.turn_actions() + self.faces as u16 + 2)
+    pub const fn declare(self) -> ActionId {
+        ActionId::new(self.turn_actions() + self.faces as u16 + 2)
     }
 
-    /// What an action means, or `None` if there is no such action.
+    /// The action with this index, or `None` if there is none.
     #[inline]
-    pub fn decode(self, action: Action) -> Option<Move> {
-        let (index, plays) = (action.index(), self.plays());
+    pub fn decode(self, id: ActionId) -> Option<Action> {
+        let (index, plays) = (id.index(), self.plays());
         if index < plays {
             let [face, quantity, jokers] = PLAYS[usize::from(index)];
-            return Some(Move::Play {
+            return Some(Action::Play {
                 face: Face::of(face),
                 quantity,
                 jokers,
@@ -147,20 +147,20 @@ impl ActionSpace {
         }
         let faces = u16::from(self.faces);
         match index - plays {
-            0 => Some(Move::LoneJoker),
-            1 => Some(Move::Pass),
-            rest if rest < 2 + faces => Some(Move::Give(Face::of((rest - 1) as u8))),
-            rest if rest == 2 + faces => Some(Move::GiveJoker),
-            rest if rest == 3 + faces => Some(Move::Decline),
-            rest if rest == 4 + faces => Some(Move::Declare),
+            0 => Some(Action::LoneJoker),
+            1 => Some(Action::Pass),
+            rest if rest < 2 + faces => Some(Action::Give(Face::of((rest - 1) as u8))),
+            rest if rest == 2 + faces => Some(Action::GiveJoker),
+            rest if rest == 3 + faces => Some(Action::Decline),
+            rest if rest == 4 + faces => Some(Action::Declare),
             _ => None,
         }
     }
 
-    /// The number of a move, or `None` if no deck of this many faces has such a move.
-    pub fn encode(self, meaning: Move) -> Option<Action> {
-        match meaning {
-            Move::Play {
+    /// The index of an action, or `None` if no deck of this many faces has such an action.
+    pub fn encode(self, action: Action) -> Option<ActionId> {
+        match action {
+            Action::Play {
                 face,
                 quantity,
                 jokers,
@@ -169,57 +169,57 @@ impl ActionSpace {
                     && (1..=face.get()).contains(&quantity)
                     && jokers <= crate::MAX_JOKERS;
                 exists.then(|| {
-                    Action::new(
+                    ActionId::new(
                         play_offset(face.get()) + 3 * u16::from(quantity - 1) + u16::from(jokers),
                     )
                 })
             }
-            Move::LoneJoker => Some(self.lone_joker()),
-            Move::Pass => Some(self.pass()),
-            Move::Give(face) => self.give(face),
-            Move::GiveJoker => Some(self.give_joker()),
-            Move::Decline => Some(self.decline()),
-            Move::Declare => Some(self.declare()),
+            Action::LoneJoker => Some(self.lone_joker()),
+            Action::Pass => Some(self.pass()),
+            Action::Give(face) => self.give(face),
+            Action::GiveJoker => Some(self.give_joker()),
+            Action::Decline => Some(self.decline()),
+            Action::Declare => Some(self.declare()),
         }
     }
 
-    /// The text of an action, or `None` if there is no such action.
-    pub fn text(self, action: Action) -> Option<String> {
-        self.decode(action).map(|meaning| meaning.to_string())
+    /// The text of the action with this index, or `None` if there is none.
+    pub fn text(self, id: ActionId) -> Option<String> {
+        self.decode(id).map(|action| action.to_string())
     }
 
-    /// The action with this text, or `None` if there is none. Only the exact text is understood.
-    pub fn parse(self, text: &str) -> Option<Action> {
-        let meaning = parse_move(text)?;
-        // Writing it again refuses spellings like `C01;Q1;J0` that would be understood otherwise.
-        (meaning.to_string() == text)
-            .then(|| self.encode(meaning))
+    /// The index of the action with this text, or `None` if there is none. Only the exact text counts.
+    pub fn parse(self, text: &str) -> Option<ActionId> {
+        let action = parse_action(text)?;
+        // Comparing the text refuses spellings such as `C01;Q1;J0`.
+        (action.to_string() == text)
+            .then(|| self.encode(action))
             .flatten()
     }
 
-    /// All actions, ascending.
-    pub fn iter(self) -> impl ExactSizeIterator<Item = Action> {
-        (0..self.size()).map(Action::new)
+    /// The indices of all actions, ascending.
+    pub fn iter(self) -> impl ExactSizeIterator<Item = ActionId> {
+        (0..self.size()).map(ActionId::new)
     }
 }
 
-fn parse_move(text: &str) -> Option<Move> {
+fn parse_action(text: &str) -> Option<Action> {
     match text {
-        "C0;Q0;J1" => return Some(Move::LoneJoker),
-        "pass" => return Some(Move::Pass),
-        "give J" => return Some(Move::GiveJoker),
-        "decline" => return Some(Move::Decline),
-        "declare" => return Some(Move::Declare),
+        "C0;Q0;J1" => return Some(Action::LoneJoker),
+        "pass" => return Some(Action::Pass),
+        "give J" => return Some(Action::GiveJoker),
+        "decline" => return Some(Action::Decline),
+        "declare" => return Some(Action::Declare),
         _ => {}
     }
     if let Some(face) = text.strip_prefix("give C") {
-        return Some(Move::Give(Face::new(face.parse().ok()?)?));
+        return Some(Action::Give(Face::new(face.parse().ok()?)?));
     }
     let mut parts = text.split(';');
     let face = Face::new(parts.next()?.strip_prefix('C')?.parse().ok()?)?;
     let quantity = parts.next()?.strip_prefix('Q')?.parse().ok()?;
     let jokers = parts.next()?.strip_prefix('J')?.parse().ok()?;
-    parts.next().is_none().then_some(Move::Play {
+    parts.next().is_none().then_some(Action::Play {
         face,
         quantity,
         jokers,

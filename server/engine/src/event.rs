@@ -1,7 +1,7 @@
 //! What happens in a game, and the one place that decides what a viewer may see of it. Events of
 //! rooms (somebody sat down, a connection was lost) do not live here.
 
-use crate::{Action, BySeat, Cards, Role, Seat, SeatOrder, SpecialAction, Standings};
+use crate::{ActionId, BySeat, Cards, Role, Seat, SeatOrder, SpecialAction, Standings};
 
 /// One thing that happened in a game. What only some viewers may see stands in fields that can be
 /// left out ([`Event::seen_by`]); what must not even be known to have happened, such as a declined
@@ -43,7 +43,7 @@ pub enum Event {
         /// The seat.
         seat: Seat,
         /// The action it took.
-        action: Action,
+        action: ActionId,
         /// The face played, F+1 for a joker alone.
         face: u8,
         /// Cards of that face played, 0 for a joker alone.

@@ -65,15 +65,14 @@ impl fmt::Display for Face {
     }
 }
 
-/// The number of a decision a player takes, as an agent sends it: just an index, which may be out
-/// of range of an [`crate::ActionSpace`].
+/// The index of an action in an [`crate::ActionSpace`], unchecked: it may be out of range.
 #[derive(Copy, Clone, Eq, PartialEq, Ord, PartialOrd, Hash, Debug)]
-pub struct Action(u16);
+pub struct ActionId(u16);
 
-impl Action {
-    /// The action with this index.
-    pub const fn new(index: u16) -> Action {
-        Action(index)
+impl ActionId {
+    /// Wraps an index.
+    pub const fn new(index: u16) -> ActionId {
+        ActionId(index)
     }
 
     /// The index.
@@ -82,7 +81,7 @@ impl Action {
     }
 }
 
-impl fmt::Display for Action {
+impl fmt::Display for ActionId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.0.fmt(f)
     }

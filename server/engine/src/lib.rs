@@ -1,7 +1,7 @@
 //! The rule engine of Chef's Hat: pure values, nothing else.
 //!
 //! A validated [`RuleSet`] and a [`Seed`] make a [`Game`]. A game says whose decision is open
-//! ([`Game::decision`]) and what is legal ([`Game::legal_actions`]), takes an [`Action`]
+//! ([`Game::decision`]) and what is legal ([`Game::legal_actions`]), takes an [`ActionId`]
 //! ([`Game::apply`]), tells what happened as [`Event`]s and gives any seat its [`Observation`].
 //! What a viewer may see of an event is decided in [`Event::seen_by`] alone.
 //!
@@ -40,13 +40,13 @@ mod rewards;
 mod roles;
 mod rules;
 
-pub use actions::{ActionSpace, Move};
+pub use actions::{Action, ActionSpace};
 pub use by_seat::BySeat;
 pub use cards::Cards;
 pub use deal::{Card, Deal, Seed};
 pub use event::{Event, Viewer};
 pub use game::{ActionError, Decision, DecisionKind, Game, Refusal, Script, ScriptError};
-pub use ids::{Action, Face, Seat};
+pub use ids::{ActionId, Face, Seat};
 pub use mask::Mask;
 pub use metrics::{MetricsRecorder, SeatMetrics, ShiftMetrics};
 pub use observation::{Board, Observation};

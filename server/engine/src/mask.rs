@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::Action;
+use crate::ActionId;
 
 /// Words of a set.
 pub(crate) const WORDS: usize = 6;
@@ -25,7 +25,7 @@ impl Mask {
     pub const CAPACITY: u16 = 64 * WORDS as u16;
 
     /// The actions of an iterator; those beyond [`Mask::CAPACITY`] are left out.
-    pub fn from_actions(actions: impl IntoIterator<Item = Action>) -> Mask {
+    pub fn from_actions(actions: impl IntoIterator<Item = ActionId>) -> Mask {
         let mut mask = Mask::EMPTY;
         for action in actions {
             if action.index() < Mask::CAPACITY && !mask.contains(action) {
@@ -36,7 +36,7 @@ impl Mask {
     }
 
     /// Whether an action is in the set.
-    pub fn contains(&self, action: Action) -> bool {
+    pub fn contains(&self, action: ActionId) -> bool {
         let index = usize::from(action.index());
         self.words
             .get(index / 64)
@@ -54,7 +54,7 @@ impl Mask {
     }
 
     /// The actions, ascending.
-    pub fn iter(&self) -> impl Iterator<Item = Action> + use<> {
+    pub fn iter(&self) -> impl Iterator<Item = ActionId> + use<> {
         self.words
             .into_iter()
             .enumerate()
@@ -62,14 +62,14 @@ impl Mask {
                 std::iter::from_fn(move || {
                     let bit = (word != 0).then(|| word.trailing_zeros() as u16)?;
                     word &= word - 1;
-                    Some(Action::new(64 * index as u16 + bit))
+                    Some(ActionId::new(64 * index as u16 + bit))
                 })
             })
     }
 
     /// The action that `k` others of the set come before, or `None` if there are no more than `k`.
     #[inline]
-    pub fn nth(&self, k: usize) -> Option<Action> {
+    pub fn nth(&self, k: usize) -> Option<ActionId> {
         if k >= self.len() {
             return None;
         }
@@ -82,7 +82,7 @@ impl Mask {
             let sums = byte_sums(word);
             let count = (sums >> 56) as u32;
             if left < count {
-                return Some(Action::new(64 * index as u16 + select(word, sums, left)));
+                return Some(ActionId::new(64 * index as u16 + select(word, sums, left)));
             }
             left -= count;
         }
@@ -126,7 +126,7 @@ impl Mask {
     }
 
     /// Adds an action that is not in the set yet.
-    pub(crate) fn insert(&mut self, action: Action) {
+    pub(crate) fn insert(&mut self, action: ActionId) {
         let index = usize::from(action.index());
         debug_assert!(!self.contains(action));
         self.words[index / 64] |= 1 << (index % 64);
@@ -139,8 +139,8 @@ impl Mask {
     }
 }
 
-impl FromIterator<Action> for Mask {
-    fn from_iter<I: IntoIterator<Item = Action>>(actions: I) -> Mask {
+impl FromIterator<ActionId> for Mask {
+    fn from_iter<I: IntoIterator<Item = ActionId>>(actions: I) -> Mask {
         Mask::from_actions(actions)
     }
 }
@@ -148,7 +148,7 @@ impl FromIterator<Action> for Mask {
 impl fmt::Debug for Mask {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_set()
-            .entries(self.iter().map(Action::index))
+            .entries(self.iter().map(ActionId::index))
             .finish()
     }
 }

@@ -3,7 +3,7 @@
 //! ([`crate::Game::legal_actions`]).
 
 use crate::game::default_gift;
-use crate::{Action, ActionSpace, BySeat, Cards, DecisionKind, Mask, Role, Seat};
+use crate::{ActionId, ActionSpace, BySeat, Cards, DecisionKind, Mask, Role, Seat};
 
 /// What lies on the board.
 #[derive(Copy, Clone, Eq, PartialEq, Debug, Default)]
@@ -58,7 +58,7 @@ pub struct Observation {
 impl Observation {
     /// The default decision ([`crate::Game::default_action`]) as it follows from what the seat sees
     /// and from its legal actions. `None` if no decision is open for the seat, or nothing is legal.
-    pub fn default_action(&self, legal: &Mask) -> Option<Action> {
+    pub fn default_action(&self, legal: &Mask) -> Option<ActionId> {
         let space = ActionSpace::of(self.faces);
         let default = match self.kind? {
             DecisionKind::Turn => space.pass(),

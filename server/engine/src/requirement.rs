@@ -2,7 +2,7 @@
 //! know that the decision is open: it follows from public facts and from no card in a hand. A
 //! client that has it needs no rules of its own. How a game fills it in is in `game::legal`.
 
-use crate::{Move, Seat, SpecialAction};
+use crate::{Action, Seat, SpecialAction};
 
 /// What the rules require of a decision.
 #[derive(Copy, Clone, Eq, PartialEq, Hash, Debug)]
@@ -35,9 +35,9 @@ pub struct PlayRequirement {
 
 impl PlayRequirement {
     /// Whether an action meets the requirement, whatever the hand holds. Only plays and passes do.
-    pub fn allows(&self, action: Move) -> bool {
+    pub fn allows(&self, action: Action) -> bool {
         match action {
-            Move::Play {
+            Action::Play {
                 face,
                 quantity,
                 jokers,
@@ -45,9 +45,9 @@ impl PlayRequirement {
                 (self.lowest_face..=self.highest_face).contains(&face.get())
                     && quantity + jokers >= self.fewest_cards
             }
-            Move::LoneJoker => self.lone_joker,
-            Move::Pass => self.may_pass,
-            Move::Give(_) | Move::GiveJoker | Move::Decline | Move::Declare => false,
+            Action::LoneJoker => self.lone_joker,
+            Action::Pass => self.may_pass,
+            Action::Give(_) | Action::GiveJoker | Action::Decline | Action::Declare => false,
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use chefshat_engine::{Action, Game, RuleSet, Script, Seed};
+use chefshat_engine::{ActionId, Game, RuleSet, Script, Seed};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 
 use crate::convert::{FieldProblem, rules_from_proto, script_from_proto, seat_cards};
@@ -30,7 +30,7 @@ pub struct TakenOver {
     /// Deals every Shift that begins with or between these decisions.
     pub seed: Seed,
     /// The decisions.
-    pub actions: Vec<Action>,
+    pub actions: Vec<ActionId>,
 }
 
 /// Why no game can branch from a record at a point.
@@ -159,7 +159,7 @@ struct Beginning {
     /// Decisions taken so far.
     decisions: u64,
     /// The actions of those up to the point.
-    actions: Vec<Action>,
+    actions: Vec<ActionId>,
     first_deal: Option<FirstDeal>,
     /// For each Shift, the number of the decision that it began with; 0: none.
     shifts: Vec<u64>,
@@ -182,7 +182,7 @@ impl Beginning {
                     self.at_point = moment.game.cloned();
                 } else if self.decisions < point {
                     let action = u16::try_from(decision.action).unwrap_or(u16::MAX);
-                    self.actions.push(Action::new(action));
+                    self.actions.push(ActionId::new(action));
                 }
                 self.decisions += 1;
             }
@@ -248,7 +248,7 @@ impl Seeds {
     }
 
     /// The decisions from the first on, each with its seed.
-    fn parts(&self, actions: &[Action]) -> Vec<TakenOver> {
+    fn parts(&self, actions: &[ActionId]) -> Vec<TakenOver> {
         let mut parts = vec![TakenOver {
             seed: self.of_shift(0),
             actions: Vec::new(),

@@ -1,6 +1,6 @@
 //! What a recorded player decided, and what it knew when it did. How an agent plays from that is not known here.
 
-use chefshat_engine::{Action, Mask, Observation, Seat, Viewer};
+use chefshat_engine::{ActionId, Mask, Observation, Seat, Viewer};
 use chefshat_proto::v1::{self, record_line::Line};
 
 use crate::convert::{seat_from_number, seat_number};
@@ -14,7 +14,7 @@ pub struct PlayerDecision {
     /// What was legal.
     pub legal: Mask,
     /// What was decided.
-    pub action: Action,
+    pub action: ActionId,
     /// Whether the player decided it; otherwise the clock, too many invalid attempts or a substitute did.
     pub own: bool,
 }
@@ -73,7 +73,7 @@ fn decision_of(moment: &Moment<'_>, seat: Seat) -> Option<PlayerDecision> {
     Some(PlayerDecision {
         observation: game.observe(Viewer::Seat(seat)),
         legal: game.legal_actions(),
-        action: Action::new(u16::try_from(decision.action).ok()?),
+        action: ActionId::new(u16::try_from(decision.action).ok()?),
         own: !matches!(
             decision.source(),
             Timeout | Invalid | Disconnected | Substitute

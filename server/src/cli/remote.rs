@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use chefshat_arena::{AgentKind, BuiltInAgent};
-use chefshat_client::{Action, Agent, nth_legal, v1};
+use chefshat_client::{ActionId, Agent, nth_legal, v1};
 use chefshat_engine::{Mask, RuleSet, Seat};
 use chefshat_records::convert::rules_from_proto;
 use sha2::{Digest as _, Sha256};
@@ -37,7 +37,7 @@ impl RemoteAgent {
     }
 
     /// What the agent would do; an error when the request does not fit the rules that the server told.
-    fn consider(&mut self, request: &v1::DecisionRequest) -> Result<Action, String> {
+    fn consider(&mut self, request: &v1::DecisionRequest) -> Result<ActionId, String> {
         let (Some(rules), Some(seat)) = (self.rules, self.seat) else {
             return Err("the server asked before it said what is played".into());
         };
@@ -52,18 +52,18 @@ impl RemoteAgent {
             .filter(|mask| !mask.is_empty())
             .ok_or("the mask of legal actions cannot be read")?;
         let action = self.agent.decide(&observation, &legal);
-        Ok(Action(action.index().into()))
+        Ok(ActionId(action.index().into()))
     }
 }
 
 impl Agent for RemoteAgent {
-    fn decide(&mut self, request: &v1::DecisionRequest) -> Action {
+    fn decide(&mut self, request: &v1::DecisionRequest) -> ActionId {
         if !self.pace.is_zero() {
             tokio::task::block_in_place(|| std::thread::sleep(self.pace));
         }
         self.consider(request).unwrap_or_else(|problem| {
             warn!(problem, "playing the first legal action instead");
-            nth_legal(request, 0).unwrap_or(Action(0))
+            nth_legal(request, 0).unwrap_or(ActionId(0))
         })
     }
 
@@ -227,7 +227,7 @@ mod tests {
             ..v1::Attached::default()
         });
         assert_eq!(remote.decide(&request(&game)).0, u32::from(first.index()));
-        assert_eq!(remote.decide(&v1::DecisionRequest::default()), Action(0));
+        assert_eq!(remote.decide(&v1::DecisionRequest::default()), ActionId(0));
     }
 
     #[test]

@@ -225,11 +225,11 @@ fn rewards(entry: &LogEntry, viewer: Viewer) -> Vec<v1::SeatReward> {
 }
 
 /// Face, quantity and jokers of a play, from its action.
-fn played(core: &Core, action: chefshat_engine::Action) -> (u8, u8, u8) {
-    use chefshat_engine::Move;
+fn played(core: &Core, action: chefshat_engine::ActionId) -> (u8, u8, u8) {
+    use chefshat_engine::Action;
     let rules = &core.header().rules;
     match rules.actions().decode(action) {
-        Some(Move::Play {
+        Some(Action::Play {
             face,
             quantity,
             jokers,

@@ -1,6 +1,6 @@
 //! How a game begins, as messages and back: scripted hands, and what is taken over from another game's record.
 
-use chefshat_engine::{Action, RuleSet, Seed};
+use chefshat_engine::{ActionId, RuleSet, Seed};
 use chefshat_proto::v1;
 use chefshat_records::convert::{FieldProblem, script_from_proto, script_to_proto};
 
@@ -50,7 +50,7 @@ pub fn start_to_proto(start: &GameStart, faces: u8) -> Option<v1::GameStart> {
 /// The first field that makes no sense.
 pub fn start_from_proto(
     start: &v1::GameStart,
-    actions: &[Action],
+    actions: &[ActionId],
     rules: &RuleSet,
 ) -> Result<GameStart, FieldProblem> {
     let script = (start.scripted.as_ref())
@@ -65,7 +65,7 @@ pub fn start_from_proto(
 fn branch(
     point: &v1::BranchPoint,
     parts: &[v1::TakenOver],
-    mut actions: &[Action],
+    mut actions: &[ActionId],
 ) -> Result<Branch, FieldProblem> {
     let problem = |message: &str| FieldProblem::new("taken_over", message);
     let mut taken_over = Vec::with_capacity(parts.len());

@@ -351,14 +351,14 @@ pub fn setup_seeds(
 mod tests {
     use chefshat_arena::game_seed;
     use chefshat_arena::vector::{MAX_SEATS_PLAYED, VectorGames};
-    use chefshat_engine::{Action, DecisionKind, Role};
+    use chefshat_engine::{ActionId, DecisionKind, Role};
     use prost::Message as _;
 
     use super::*;
     use crate::config::MAX_VECTOR_BATCH_BYTES;
     use crate::convert::decision_kind;
 
-    fn actions(batch: &Batch) -> Vec<Action> {
+    fn actions(batch: &Batch) -> Vec<ActionId> {
         let width = batch.masks.len() / batch.rows as usize;
         let first = |mask: &[u8]| {
             let mask = chefshat_engine::Mask::from_bytes(mask).unwrap();
@@ -407,7 +407,7 @@ mod tests {
             let mut actions = actions(&batch);
             for (action, kind) in actions.iter_mut().zip(&batch.kinds) {
                 if i32::from(*kind) == i32::from(v1::DecisionKind::SpecialAction) {
-                    *action = Action::new(213);
+                    *action = ActionId::new(213);
                 }
             }
             batch = games.step(&actions).unwrap();

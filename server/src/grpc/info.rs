@@ -6,7 +6,7 @@ use std::sync::Arc;
 use chefshat_arena::AgentKind;
 use chefshat_arena::tournament::{MAX_GAMES, MAX_PARTICIPANTS};
 use chefshat_arena::vector::MAX_SEATS_PLAYED;
-use chefshat_engine::{Action, ActionSpace, RULES_VERSION, RuleSetSpec};
+use chefshat_engine::{ActionId, ActionSpace, RULES_VERSION, RuleSetSpec};
 use chefshat_proto::v1::{self, server_service_server::ServerService};
 use chefshat_records::convert::{FieldProblem, action_space, rules_to_proto};
 use tonic::{Request, Response, Status};
@@ -119,7 +119,7 @@ impl ServerService for Info {
         Ok(Response::new(v1::GetActionTableResponse {
             action_space: Some(action_space(&space)),
             texts: (0..space.size())
-                .filter_map(|index| space.text(Action::new(index)))
+                .filter_map(|index| space.text(ActionId::new(index)))
                 .collect(),
         }))
     }

@@ -9,7 +9,7 @@ use chefshat_arena::AgentKind;
 use chefshat_arena::vector::{
     Batch, InvalidActions, PlayedGame, Start, StepError, VectorGames, VectorSetup,
 };
-use chefshat_engine::{Action, RuleSet, Seed};
+use chefshat_engine::{ActionId, RuleSet, Seed};
 use chefshat_proto::v1::{
     self, run_request::Request as Asked, run_response::Response as Said,
     vector_service_server::VectorService, vector_setup,
@@ -120,7 +120,7 @@ impl From<Status> for End {
 
 /// What a client asked of its games.
 enum Move {
-    Actions(Vec<Action>),
+    Actions(Vec<ActionId>),
     Reset(Reset),
 }
 
@@ -361,7 +361,7 @@ fn record_parts(setup: &VectorSetup, played: &PlayedGame) -> Vec<v1::VectorRecor
     parts
 }
 
-fn actions(message: &v1::VectorActions) -> Result<Vec<Action>, Status> {
+fn actions(message: &v1::VectorActions) -> Result<Vec<ActionId>, Status> {
     let (actions, rest) = message.actions.as_chunks::<2>();
     if !rest.is_empty() {
         let words = "the column is not whole: 2 bytes for each action";
@@ -372,7 +372,7 @@ fn actions(message: &v1::VectorActions) -> Result<Vec<Action>, Status> {
     }
     let actions = actions.iter();
     Ok(actions
-        .map(|bytes| Action::new(u16::from_le_bytes(*bytes)))
+        .map(|bytes| ActionId::new(u16::from_le_bytes(*bytes)))
         .collect())
 }
 

@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use chefshat_engine::{Action, Event, Seat};
+use chefshat_engine::{ActionId, Event, Seat};
 
 use crate::store::journal::{AbortReason, SeatedParticipant, Source};
 
@@ -41,7 +41,7 @@ pub enum Happening {
         /// The seat.
         seat: Seat,
         /// The action.
-        action: Action,
+        action: ActionId,
         /// Cards left in its hand.
         cards_left: u8,
         /// How it came about.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use chefshat_arena::{AgentKind, RecordedPlayer};
-use chefshat_engine::{Action, RuleSet, Script, Seat};
+use chefshat_engine::{ActionId, RuleSet, Script, Seat};
 pub use chefshat_records::branch::TakenOver;
 use chefshat_records::seeds::SeedPlan;
 
@@ -230,7 +230,7 @@ pub struct Decided {
     /// The seat.
     pub seat: Seat,
     /// The action.
-    pub action: Action,
+    pub action: ActionId,
     /// Who or what took it.
     pub source: Source,
     /// Measured decision time, microseconds; 0 for built-in agents.

@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use chefshat_client::{Action, Agent, Client, RandomAgent, v1};
+use chefshat_client::{ActionId, Agent, Client, RandomAgent, v1};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
@@ -19,7 +19,7 @@ const OTHER: &str = "Bruno";
 struct Talker(RandomAgent, String);
 
 impl Agent for Talker {
-    fn decide(&mut self, request: &v1::DecisionRequest) -> Action {
+    fn decide(&mut self, request: &v1::DecisionRequest) -> ActionId {
         self.0.decide(request)
     }
 

@@ -3,7 +3,7 @@
 
 use std::time::{Duration, Instant};
 
-use chefshat_client::{Action, Client, RandomAgent, VectorGames};
+use chefshat_client::{ActionId, Client, RandomAgent, VectorGames};
 use chefshat_proto::v1;
 use comfy_table::{Table, presets};
 use serde::Serialize;
@@ -268,7 +268,7 @@ impl Stream {
         Ok((self, done))
     }
 
-    async fn step(&mut self, actions: Vec<Action>) -> Result<(), LoadError> {
+    async fn step(&mut self, actions: Vec<ActionId>) -> Result<(), LoadError> {
         let stepped = self.games.step(actions).await;
         self.batch = stepped.map_err(|error| LoadError::Protocol(error.to_string()))?;
         Ok(())

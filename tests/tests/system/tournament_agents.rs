@@ -5,7 +5,7 @@ use std::net::SocketAddr;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
-use chefshat_client::{Action, Agent, Client, Outcome, PlayError, RandomAgent};
+use chefshat_client::{ActionId, Agent, Client, Outcome, PlayError, RandomAgent};
 use chefshat_proto::v1;
 use chefshat_tests::{TestServer, one_shift, patiently};
 use futures::future::join_all;
@@ -163,7 +163,7 @@ struct Cutting {
 }
 
 impl Agent for Cutting {
-    fn decide(&mut self, request: &v1::DecisionRequest) -> Action {
+    fn decide(&mut self, request: &v1::DecisionRequest) -> ActionId {
         assert!(
             self.asked.insert(request.decision_id),
             "asked once for each"

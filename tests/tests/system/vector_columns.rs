@@ -88,7 +88,7 @@ async fn every_column_says_what_the_engine_says() {
                 game.legal_actions().to_bytes(214)
             );
             let action = u16::try_from(actions[row].0).expect("an action");
-            game.apply(chefshat_engine::Action::new(action), |event| {
+            game.apply(chefshat_engine::ActionId::new(action), |event| {
                 if let Event::ShiftEnded {
                     pizzas,
                     laps,

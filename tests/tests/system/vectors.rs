@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use chefshat_arena::game_seed;
-use chefshat_client::{Action, Client, RandomAgent, VectorGames};
+use chefshat_client::{ActionId, Client, RandomAgent, VectorGames};
 use chefshat_engine::{Game, RuleSetSpec, Seed};
 use chefshat_proto::v1::{self, record_line::Line, vector_setup::Seeds, vector_setup::Start};
 use chefshat_records::replay::replay;
@@ -26,7 +26,7 @@ fn masks(batch: &v1::VectorBatch) -> impl Iterator<Item = &[u8]> {
     batch.action_masks.chunks(width.max(1))
 }
 
-fn choose(agent: &mut RandomAgent, batch: &v1::VectorBatch) -> Vec<Action> {
+fn choose(agent: &mut RandomAgent, batch: &v1::VectorBatch) -> Vec<ActionId> {
     masks(batch)
         .map(|mask| agent.choose(mask).expect("something is legal"))
         .collect()
@@ -35,7 +35,7 @@ fn choose(agent: &mut RandomAgent, batch: &v1::VectorBatch) -> Vec<Action> {
 pub(crate) async fn play_on(
     games: &mut VectorGames,
     mut batch: Box<v1::VectorBatch>,
-    mut look: impl FnMut(&v1::VectorBatch, &[Action]),
+    mut look: impl FnMut(&v1::VectorBatch, &[ActionId]),
 ) -> Box<v1::VectorBatch> {
     let mut agent = RandomAgent::new(5);
     while !batch.done {
@@ -127,7 +127,7 @@ async fn games_of_a_batch_have_the_records_of_the_engine_alone() {
             }
             let action = u16::try_from(decision.action).expect("an action");
             alone
-                .apply(chefshat_engine::Action::new(action), |_| {})
+                .apply(chefshat_engine::ActionId::new(action), |_| {})
                 .expect("legal");
         }
         assert!(alone.is_over() && own.next().is_none() && decisions > 100);
@@ -318,7 +318,7 @@ async fn what_makes_no_sense_is_refused_in_words() {
 
     let (mut games, batch) = client.vector(standard()).await.expect("games");
     let error = games
-        .step([Action(0)])
+        .step([ActionId(0)])
         .await
         .expect_err("one action for two rows");
     assert_eq!(error.reason(), Some("ACTIONS_REFUSED"));
@@ -326,12 +326,12 @@ async fn what_makes_no_sense_is_refused_in_words() {
     drop((games, batch));
     let (mut games, _) = client.vector(standard()).await.expect("games");
     let error = games
-        .step([Action(199), Action(70_000)])
+        .step([ActionId(199), ActionId(70_000)])
         .await
         .expect_err("no such action");
     assert_eq!(error.reason(), Some("ILLEGAL_ACTION"));
     assert_eq!(error.metadata()["row"], "0");
-    let gone = games.step([Action(0), Action(0)]).await;
+    let gone = games.step([ActionId(0), ActionId(0)]).await;
     let gone = gone.expect_err("the stream has ended");
     assert_eq!(gone.reason(), Some("STEP_GIVEN_UP"));
     let column = |game: u32| game.to_le_bytes().to_vec();
@@ -346,7 +346,7 @@ async fn what_makes_no_sense_is_refused_in_words() {
         let reset = v1::VectorReset { games, all, seeds };
         let error = stepped.reset(reset).await.expect_err("refused");
         assert_eq!(error.reason(), Some("RESET_REFUSED"));
-        let error = stepped.step([Action(0), Action(0)]).await;
+        let error = stepped.step([ActionId(0), ActionId(0)]).await;
         let error = error.expect_err("the games have ended");
         assert_eq!(error.reason(), Some("STEP_GIVEN_UP"));
     }
@@ -378,8 +378,14 @@ async fn attempts_are_asked_again_and_recorded() {
         let answers = choose(&mut agent, &batch);
         // Game 0 never answers with a legal action: gifts are for the exchange.
         let own = batch.games.as_chunks::<4>().0.iter().zip(answers);
-        let answers: Vec<Action> = own
-            .map(|(game, action)| if *game == [0; 4] { Action(200) } else { action })
+        let answers: Vec<ActionId> = own
+            .map(|(game, action)| {
+                if *game == [0; 4] {
+                    ActionId(200)
+                } else {
+                    action
+                }
+            })
             .collect();
         batch = games.step(answers).await.expect("asked again");
     }

@@ -1,6 +1,6 @@
 //! Replaying a vector of a whole game.
 
-use chefshat_engine::{Action, Event, Game, Seed, SpecialAction};
+use chefshat_engine::{ActionId, Event, Game, Seed, SpecialAction};
 use serde::{Deserialize, Serialize};
 
 use super::compare::{Disagreement, agree};
@@ -60,7 +60,7 @@ pub(super) fn check(vector: GameVector) -> Result<u64, LineError> {
             .into());
         };
         agree(&at("seat"), Some(step), seat, decision.seat.index())?;
-        let mask: Vec<u16> = game.legal_actions().iter().map(Action::index).collect();
+        let mask: Vec<u16> = game.legal_actions().iter().map(ActionId::index).collect();
         if *legal != mask {
             let expected = format!("{legal:?}");
             let got = format!("{mask:?}{}", difference(legal, &mask));
@@ -68,7 +68,7 @@ pub(super) fn check(vector: GameVector) -> Result<u64, LineError> {
         }
         let mut end = None;
         let on_event = |event: Event| end = shift_end(&event).or(end.take());
-        if let Err(error) = game.apply(Action::new(*action), on_event) {
+        if let Err(error) = game.apply(ActionId::new(*action), on_event) {
             return Err(
                 in_words(&at("action"), step, action.to_string(), error.to_string()).into(),
             );

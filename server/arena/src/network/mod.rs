@@ -7,7 +7,7 @@ mod layers;
 
 use std::sync::{Arc, LazyLock};
 
-use chefshat_engine::{Action, ActionSpace, DecisionKind, Mask, Observation, RuleSet};
+use chefshat_engine::{ActionId, ActionSpace, DecisionKind, Mask, Observation, RuleSet};
 
 use crate::agents::greedy;
 pub use features::table_features;
@@ -126,7 +126,7 @@ impl Network {
     ///
     /// # Panics
     /// When `legal` is empty: there is no decision to take.
-    pub fn decide(&self, observation: &Observation, legal: &Mask) -> Action {
+    pub fn decide(&self, observation: &Observation, legal: &Mask) -> ActionId {
         if !self.knows(observation) {
             let space =
                 ActionSpace::new(observation.faces).expect("an observation has 4 to 15 faces");

@@ -2,7 +2,7 @@
 //! tournament and the seed alone, never on the number of threads.
 
 use chefshat_engine::{
-    Action, Decision, Event, MAX_SEATS, MetricsRecorder, RuleSet, Seat, Seed, ShiftMetrics,
+    ActionId, Decision, Event, MAX_SEATS, MetricsRecorder, RuleSet, Seat, Seed, ShiftMetrics,
 };
 use rayon::prelude::*;
 use thiserror::Error;
@@ -139,11 +139,11 @@ impl Listener for Witness {
         }
     }
 
-    fn on_decision(&mut self, decision: Decision, _: Action) {
+    fn on_decision(&mut self, decision: Decision, _: ActionId) {
         self.seats[decision.seat.index()].decisions += 1;
     }
 
-    fn on_invalid(&mut self, decision: Decision, _: Action) {
+    fn on_invalid(&mut self, decision: Decision, _: ActionId) {
         if is_wrong_action(decision) {
             self.seats[decision.seat.index()].wrong_actions += 1;
         }

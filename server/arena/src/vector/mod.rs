@@ -6,7 +6,7 @@ mod columns;
 mod setup;
 mod slot;
 
-use chefshat_engine::{Action, Seat};
+use chefshat_engine::{ActionId, Seat};
 use thiserror::Error;
 
 pub use columns::{Batch, Beginnings, Endings, ObservationColumns, Shifts, Totals};
@@ -48,7 +48,7 @@ pub enum StepError {
         /// Its seat.
         seat: Seat,
         /// The action.
-        action: Action,
+        action: ActionId,
     },
     /// A game to begin anew that there is not.
     #[error("there is no game {game}: the games are 0 to {last}")]
@@ -105,7 +105,7 @@ impl VectorGames {
     ///
     /// # Errors
     /// If there is not one action for each row, or one is illegal where that is an error.
-    pub fn step(&mut self, actions: &[Action]) -> Result<Batch, StepError> {
+    pub fn step(&mut self, actions: &[ActionId]) -> Result<Batch, StepError> {
         if actions.len() != self.open.len() {
             return Err(StepError::Actions {
                 given: actions.len(),
@@ -195,7 +195,7 @@ impl VectorGames {
         self.finished(batch)
     }
 
-    fn check(&self, actions: &[Action]) -> Result<(), StepError> {
+    fn check(&self, actions: &[ActionId]) -> Result<(), StepError> {
         let answers = self.open.iter().zip(actions).enumerate();
         for (row, (&game, &action)) in answers {
             let slot = &self.slots[game as usize];

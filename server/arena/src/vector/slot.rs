@@ -2,7 +2,7 @@
 //! rewards, ended episodes and counts. Several games together, and the form of what is told, are decided beside this.
 
 use chefshat_engine::{
-    Action, BySeat, Decision, Event, Game, MAX_SEATS, Mask, MetricsRecorder, Move, Seat, Seed,
+    Action, ActionId, BySeat, Decision, Event, Game, MAX_SEATS, Mask, MetricsRecorder, Seat, Seed,
     Standings, Viewer,
 };
 
@@ -49,7 +49,7 @@ struct Table {
     /// What happened by the last decision.
     events: Vec<Event>,
     /// Attempts at the decision being taken, if they are kept.
-    attempts: Vec<Action>,
+    attempts: Vec<ActionId>,
     decisions: Vec<PlayedDecision>,
     /// Number of decisions and attempts in `decisions`.
     kept: u64,
@@ -105,7 +105,7 @@ impl Slot {
     }
 
     /// The seat whose open decision does not allow this action.
-    pub(super) fn refuses(&self, action: Action) -> Option<Seat> {
+    pub(super) fn refuses(&self, action: ActionId) -> Option<Seat> {
         let open = self.table.as_ref()?.open.as_ref()?;
         (!open.legal.contains(action)).then_some(open.decision.seat)
     }
@@ -113,7 +113,7 @@ impl Slot {
     /// Takes the owner's answer to the open decision.
     pub(super) fn answer(
         &mut self,
-        action: Action,
+        action: ActionId,
         setup: &VectorSetup,
         batch: &mut Batch,
         totals: &mut Totals,
@@ -192,7 +192,7 @@ impl Slot {
     /// Takes a legal action and tells what it brought.
     fn take(
         &mut self,
-        action: Action,
+        action: ActionId,
         by_default: bool,
         setup: &VectorSetup,
         batch: &mut Batch,
@@ -320,7 +320,7 @@ impl Table {
         setup: &VectorSetup,
         decision: Decision,
         budget: &mut u64,
-    ) -> Option<(Action, bool)> {
+    ) -> Option<(ActionId, bool)> {
         *budget = budget.saturating_sub(1);
         let seat = decision.seat;
         let owned = setup.agents()[seat].is_none();
@@ -364,7 +364,7 @@ impl Table {
     }
 
     /// An attempt of the owner that is not legal.
-    fn refuse(&mut self, setup: &VectorSetup, decision: Decision, action: Action) {
+    fn refuse(&mut self, setup: &VectorSetup, decision: Decision, action: ActionId) {
         if is_wrong_action(decision) {
             if let Some(recorder) = &mut self.recorder {
                 recorder.wrong(decision.seat);
@@ -379,7 +379,7 @@ impl Table {
     }
 
     /// Whether this action may be the Shift's last: it reaches the limit of turns, or leaves one seat with cards.
-    fn may_end_shift(&self, action: Action) -> bool {
+    fn may_end_shift(&self, action: ActionId) -> bool {
         let rules = self.game.rules();
         if self.game.shift_turns() + 1 >= rules.max_turns() {
             return true;
@@ -394,10 +394,10 @@ impl Table {
             return false;
         };
         let size = match rules.actions().decode(action) {
-            Some(Move::Play {
+            Some(Action::Play {
                 quantity, jokers, ..
             }) => quantity + jokers,
-            Some(Move::LoneJoker) => 1,
+            Some(Action::LoneJoker) => 1,
             _ => return false,
         };
         one.1.len() == size || other.1.len() == size

@@ -3,7 +3,7 @@
 
 use chefshat_arena::{AgentKind, Batch, BuiltInAgent};
 use chefshat_engine::{
-    Action, ActionSpace, BySeat, Decision, DecisionKind, Game, Mask, Observation, Role,
+    ActionId, ActionSpace, BySeat, Decision, DecisionKind, Game, Mask, Observation, Role,
     RuleSetSpec, Seat, Seed, Viewer,
 };
 
@@ -220,6 +220,6 @@ fn greedy_beats_random_and_random_is_fair() {
 #[should_panic(expected = "a decision has a legal action")]
 fn no_legal_action_is_no_decision() {
     let observation = observation(DecisionKind::Turn, None);
-    let _: Action =
+    let _: ActionId =
         BuiltInAgent::new(AgentKind::Random, [0; 32]).decide(&observation, &Mask::EMPTY);
 }

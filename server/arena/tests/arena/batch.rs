@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use chefshat_arena::{AgentKind, Batch, BatchError, BatchTable, Listener, agent_seed, game_seed};
 use chefshat_engine::{
-    Action, Decision, Event, RewardScheme, RuleSet, RuleSetSpec, Seat, Seed, Stop,
+    ActionId, Decision, Event, RewardScheme, RuleSet, RuleSetSpec, Seat, Seed, Stop,
 };
 use rayon::ThreadPoolBuilder;
 
@@ -149,7 +149,7 @@ fn nothing_is_lost_in_adding_up() {
 /// Writes down what happens in a game.
 #[derive(Default, PartialEq, Debug)]
 struct Diary {
-    decisions: Vec<(Decision, Action)>,
+    decisions: Vec<(Decision, ActionId)>,
     invalid: u64,
     shifts: u64,
     turns: u64,
@@ -165,11 +165,11 @@ impl Listener for Diary {
         }
     }
 
-    fn on_decision(&mut self, decision: Decision, action: Action) {
+    fn on_decision(&mut self, decision: Decision, action: ActionId) {
         self.decisions.push((decision, action));
     }
 
-    fn on_invalid(&mut self, _: Decision, _: Action) {
+    fn on_invalid(&mut self, _: Decision, _: ActionId) {
         self.invalid += 1;
     }
 }

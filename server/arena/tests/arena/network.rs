@@ -11,7 +11,7 @@ use chefshat_arena::{
     table_features,
 };
 use chefshat_engine::{
-    Action, Board, BySeat, Cards, DecisionKind, Game, Mask, Observation, Role, RuleSetSpec, Seat,
+    ActionId, Board, BySeat, Cards, DecisionKind, Game, Mask, Observation, Role, RuleSetSpec, Seat,
     Seed, Stop, Viewer,
 };
 use safetensors::Dtype;
@@ -80,7 +80,7 @@ impl Row {
     }
 
     fn mask(&self) -> Mask {
-        self.legal.iter().copied().map(Action::new).collect()
+        self.legal.iter().copied().map(ActionId::new).collect()
     }
 }
 
@@ -212,7 +212,7 @@ fn outputs_that_are_no_numbers_never_win() {
         let network = overflowing(broken.clone());
         let (mut mixed, mut without) = (0, 0);
         for (observation, legal) in &seen {
-            let sound = |action: &Action| !broken.contains(&usize::from(action.index()));
+            let sound = |action: &ActionId| !broken.contains(&usize::from(action.index()));
             let count = legal.iter().filter(sound).count();
             mixed += u32::from(count > 0 && count < legal.len());
             without += u32::from(count == 0 && legal.len() > 1);

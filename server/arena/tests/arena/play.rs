@@ -3,7 +3,7 @@
 use std::num::NonZeroU32;
 
 use chefshat_arena::{Listener, play};
-use chefshat_engine::{Action, Decision, DecisionKind, Event, RuleSetSpec, Seed, Stop};
+use chefshat_engine::{ActionId, Decision, DecisionKind, Event, RuleSetSpec, Seed, Stop};
 
 #[derive(Default)]
 struct Counts {
@@ -22,11 +22,11 @@ impl Listener for Counts {
         }
     }
 
-    fn on_decision(&mut self, _: Decision, _: Action) {
+    fn on_decision(&mut self, _: Decision, _: ActionId) {
         self.decisions += 1;
     }
 
-    fn on_invalid(&mut self, _: Decision, _: Action) {
+    fn on_invalid(&mut self, _: Decision, _: ActionId) {
         self.invalid += 1;
     }
 }
@@ -43,7 +43,7 @@ fn who_never_answers_legally_plays_by_defaults() {
         spec.validate().unwrap(),
         Seed([9; 32]),
         limit,
-        |_, _, _| Action::new(u16::MAX),
+        |_, _, _| ActionId::new(u16::MAX),
         &mut counts,
     );
     assert!(counts.ended);

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use chefshat_arena::{AgentKind, BuiltInAgent, Listener, RecordedDecision, RecordedPlayer, play};
 use chefshat_engine::{
-    Action, ActionSpace, Decision, DecisionKind, Game, Mask, Observation, RuleSet, RuleSetSpec,
+    ActionId, ActionSpace, Decision, DecisionKind, Game, Mask, Observation, RuleSet, RuleSetSpec,
     Seat, Seed, Stop, Viewer,
 };
 
@@ -112,7 +112,7 @@ fn no_two_decisions_look_the_same_to_a_seat() {
 struct Steps(u32);
 
 impl Listener for Steps {
-    fn on_decision(&mut self, _: Decision, _: Action) {
+    fn on_decision(&mut self, _: Decision, _: ActionId) {
         self.0 += 1;
     }
 }
@@ -152,7 +152,7 @@ fn space() -> ActionSpace {
     ActionSpace::new(11).unwrap()
 }
 
-fn action(text: &str) -> Action {
+fn action(text: &str) -> ActionId {
     space().parse(text).unwrap_or_else(|| panic!("{text}"))
 }
 
@@ -271,7 +271,7 @@ fn what_makes_no_sense_is_left_out() {
     let mut nobodys = sound.clone();
     nobodys.observation.seat = None;
     let illegal = RecordedDecision {
-        action: Action::new(9999),
+        action: ActionId::new(9999),
         ..sound.clone()
     };
     let player = RecordedPlayer::new([closed, nobodys, sound.clone(), illegal]);

@@ -3,7 +3,7 @@
 use thiserror::Error;
 
 use super::DecisionKind;
-use crate::{Action, Face, Move};
+use crate::{Action, ActionId, Face};
 
 /// Why an action was not taken. The game is as it was.
 #[derive(Copy, Clone, Eq, PartialEq, Debug, Error)]
@@ -15,7 +15,7 @@ pub enum ActionError {
     #[error("action {action} does not exist: actions are numbered below {size}")]
     OutOfRange {
         /// The action attempted.
-        action: Action,
+        action: ActionId,
         /// Number of actions.
         size: u16,
     },
@@ -23,7 +23,7 @@ pub enum ActionError {
     #[error("`{attempted}` is no answer to {}", question(*kind))]
     WrongKind {
         /// The action attempted.
-        attempted: Move,
+        attempted: Action,
         /// The kind of decision that is open.
         kind: DecisionKind,
     },
@@ -31,14 +31,14 @@ pub enum ActionError {
     #[error("`{attempted}` is not legal: {reason}")]
     NotLegal {
         /// The action attempted.
-        attempted: Move,
+        attempted: Action,
         /// Why it is forbidden.
         reason: Refusal,
     },
 }
 
 impl ActionError {
-    pub(super) fn not_legal(attempted: Move, reason: Refusal) -> ActionError {
+    pub(super) fn not_legal(attempted: Action, reason: Refusal) -> ActionError {
         ActionError::NotLegal { attempted, reason }
     }
 }

@@ -6,7 +6,8 @@ use super::start::{CHEF_GIFTS, SOUS_CHEF_GIFTS};
 use super::{Game, Refusal, Stage};
 use crate::patterns::{PATTERNS, turn_mask};
 use crate::{
-    Action, Cards, Face, GiftRequirement, Mask, Move, Opening, PlayRequirement, Requirement, Seat,
+    Action, ActionId, Cards, Face, GiftRequirement, Mask, Opening, PlayRequirement, Requirement,
+    Seat,
 };
 
 impl Game {
@@ -27,7 +28,7 @@ impl Game {
     /// The decision that is taken for a seat that takes none: pass if that is legal, else the
     /// lowest legal turn; give the highest plain face, else the Golden card, else a joker; decline.
     /// `None` if the game has ended.
-    pub fn default_action(&self) -> Option<Action> {
+    pub fn default_action(&self) -> Option<ActionId> {
         let space = self.rules.actions();
         match self.stage {
             Stage::Turn(seat) if self.check_pass().is_err() => self.legal_turns(seat).nth(0),
@@ -179,10 +180,10 @@ impl Game {
         }
     }
 
-    pub(super) fn check_gift(&self, giver: Seat, gift: Move) -> Result<(), Refusal> {
+    pub(super) fn check_gift(&self, giver: Seat, gift: Action) -> Result<(), Refusal> {
         let hand = self.hands[giver];
         let held = match gift {
-            Move::Give(face) => hand.count(face),
+            Action::Give(face) => hand.count(face),
             _ => hand.jokers(),
         };
         if held > 0 {
@@ -202,7 +203,7 @@ impl Game {
 }
 
 /// Gives the highest plain face, else the Golden card, else a joker.
-pub(crate) fn default_gift(hand: Cards, space: crate::ActionSpace) -> Action {
+pub(crate) fn default_gift(hand: Cards, space: crate::ActionSpace) -> ActionId {
     let mut plain = hand;
     if hand.has_golden() {
         plain.remove_counts(space.faces(), 1, 0);

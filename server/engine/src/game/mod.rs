@@ -17,8 +17,8 @@ pub(crate) use legal::default_gift;
 pub use script::{Script, ScriptError};
 
 use crate::{
-    Action, BySeat, Cards, Deal, Event, Move, Role, RuleSet, Seat, SeatOrder, Seed, SpecialAction,
-    Standings, Stop,
+    Action, ActionId, BySeat, Cards, Deal, Event, Role, RuleSet, Seat, SeatOrder, Seed,
+    SpecialAction, Standings, Stop,
 };
 use table::Table;
 
@@ -151,7 +151,7 @@ impl Game {
     #[inline]
     pub fn apply(
         &mut self,
-        action: Action,
+        action: ActionId,
         mut on_event: impl FnMut(Event),
     ) -> Result<(), ActionError> {
         let Some(decision) = self.decision() else {
@@ -167,7 +167,7 @@ impl Game {
         match (self.stage, meaning) {
             (
                 Stage::Turn(seat),
-                Move::Play {
+                Action::Play {
                     face,
                     quantity,
                     jokers,
@@ -177,12 +177,12 @@ impl Game {
                     .map_err(|reason| ActionError::not_legal(meaning, reason))?;
                 self.play_face(seat, action, face, quantity, jokers, &mut on_event);
             }
-            (Stage::Turn(seat), Move::LoneJoker) => {
+            (Stage::Turn(seat), Action::LoneJoker) => {
                 self.check_lone_joker(seat)
                     .map_err(|reason| ActionError::not_legal(meaning, reason))?;
                 self.play_lone_joker(seat, action, &mut on_event);
             }
-            (Stage::Turn(seat), Move::Pass) => {
+            (Stage::Turn(seat), Action::Pass) => {
                 self.check_pass()
                     .map_err(|reason| ActionError::not_legal(meaning, reason))?;
                 self.pass(seat, &mut on_event);
@@ -193,14 +193,14 @@ impl Game {
                     chef_left,
                     sous_chef_left,
                 },
-                Move::Give(_) | Move::GiveJoker,
+                Action::Give(_) | Action::GiveJoker,
             ) => {
                 self.check_gift(giver, meaning)
                     .map_err(|reason| ActionError::not_legal(meaning, reason))?;
                 self.give(giver, meaning, chef_left, sous_chef_left, &mut on_event);
             }
-            (Stage::Special(_), Move::Decline) => self.start_exchange(&mut on_event),
-            (Stage::Special(seat), Move::Declare) => self.declare(seat, &mut on_event),
+            (Stage::Special(_), Action::Decline) => self.start_exchange(&mut on_event),
+            (Stage::Special(seat), Action::Declare) => self.declare(seat, &mut on_event),
             _ => {
                 return Err(ActionError::WrongKind {
                     attempted: meaning,

@@ -3,7 +3,7 @@
 use super::table::Table;
 use super::{Game, Stage};
 use crate::deal::opening_leader;
-use crate::{BySeat, Cards, Event, Move, Role, Seat, SeatOrder, SpecialAction};
+use crate::{Action, BySeat, Cards, Event, Role, Seat, SeatOrder, SpecialAction};
 
 /// Cards that the Dishwasher gives to the Chef, and the Chef to the Dishwasher.
 pub(super) const CHEF_GIFTS: u8 = 2;
@@ -115,14 +115,14 @@ impl Game {
     pub(super) fn give(
         &mut self,
         giver: Seat,
-        gift: Move,
+        gift: Action,
         chef_left: u8,
         sous_chef_left: u8,
         on_event: &mut impl FnMut(Event),
     ) {
         let hand = &mut self.hands[giver];
         let card = match gift {
-            Move::Give(face) => hand.take_face(face, 1),
+            Action::Give(face) => hand.take_face(face, 1),
             _ => hand.take_joker(),
         };
         self.gave[giver].add(card);

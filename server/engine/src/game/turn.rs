@@ -4,13 +4,13 @@
 use super::table::bit;
 use super::{Game, Stage};
 use crate::observation::Board;
-use crate::{Action, Event, Face, Opening, PassScope, Seat};
+use crate::{ActionId, Event, Face, Opening, PassScope, Seat};
 
 impl Game {
     pub(super) fn play_face(
         &mut self,
         seat: Seat,
-        action: Action,
+        action: ActionId,
         face: Face,
         quantity: u8,
         jokers: u8,
@@ -49,7 +49,7 @@ impl Game {
     pub(super) fn play_lone_joker(
         &mut self,
         seat: Seat,
-        action: Action,
+        action: ActionId,
         on_event: &mut impl FnMut(Event),
     ) {
         let joker = self.hands[seat].take_joker();

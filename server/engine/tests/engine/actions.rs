@@ -1,6 +1,6 @@
 //! The numbering of actions and its texts.
 
-use chefshat_engine::{Action, ActionSpace, Face, Move};
+use chefshat_engine::{Action, ActionId, ActionSpace, Face};
 
 #[test]
 fn standard_table() {
@@ -27,8 +27,8 @@ fn standard_table() {
         (213, "declare"),
     ];
     for (index, text) in table {
-        assert_eq!(space.text(Action::new(index)).as_deref(), Some(text));
-        assert_eq!(space.parse(text), Some(Action::new(index)));
+        assert_eq!(space.text(ActionId::new(index)).as_deref(), Some(text));
+        assert_eq!(space.parse(text), Some(ActionId::new(index)));
     }
     let named = [
         space.lone_joker(),
@@ -37,7 +37,7 @@ fn standard_table() {
         space.decline(),
         space.declare(),
     ];
-    assert_eq!(named.map(Action::index), [198, 199, 211, 212, 213]);
+    assert_eq!(named.map(ActionId::index), [198, 199, 211, 212, 213]);
 }
 
 #[test]
@@ -60,8 +60,8 @@ fn texts_and_moves_both_ways_for_every_number_of_faces() {
             assert!(texts.insert(text), "every text is unique");
             checked += 1;
         }
-        assert_eq!(space.text(Action::new(space.size())), None);
-        assert_eq!(space.text(Action::new(u16::MAX)), None);
+        assert_eq!(space.text(ActionId::new(space.size())), None);
+        assert_eq!(space.text(ActionId::new(u16::MAX)), None);
     }
     assert_eq!(
         checked,
@@ -78,8 +78,8 @@ fn play_numbers_follow_the_formula() {
         for quantity in 1..=face {
             for jokers in 0..=2u8 {
                 let (f, q, j) = (u16::from(face), u16::from(quantity), u16::from(jokers));
-                let action = Action::new(3 * (f * (f - 1) / 2 + q - 1) + j);
-                let play = Move::Play {
+                let action = ActionId::new(3 * (f * (f - 1) / 2 + q - 1) + j);
+                let play = Action::Play {
                     face: Face::new(face).unwrap(),
                     quantity,
                     jokers,
@@ -120,7 +120,7 @@ fn other_texts_are_not_understood() {
     }
     assert_eq!(space.give(Face::new(12).unwrap()), None);
     assert_eq!(
-        space.encode(Move::Play {
+        space.encode(Action::Play {
             face: Face::new(3).unwrap(),
             quantity: 4,
             jokers: 0

@@ -1,6 +1,6 @@
 //! What a player is told when an action is not taken.
 
-use chefshat_engine::{Action, Game, Opening, RuleSetSpec, Script, Seat, Seed, Stop};
+use chefshat_engine::{ActionId, Game, Opening, RuleSetSpec, Script, Seat, Seed, Stop};
 
 use crate::support::{act, hands, order};
 
@@ -81,7 +81,7 @@ fn refusals_in_words() {
         "`C3;Q1;J2` is not legal: the hand does not hold these cards"
     );
 
-    let beyond = game.apply(Action::new(39), |_| {}).unwrap_err();
+    let beyond = game.apply(ActionId::new(39), |_| {}).unwrap_err();
     assert_eq!(
         beyond.to_string(),
         "action 39 does not exist: actions are numbered below 39"

@@ -1,10 +1,10 @@
 //! Sets of actions and their bytes.
 
-use chefshat_engine::{Action, Mask};
+use chefshat_engine::{ActionId, Mask};
 use proptest::prelude::*;
 
 fn mask(indices: &[u16]) -> Mask {
-    indices.iter().copied().map(Action::new).collect()
+    indices.iter().copied().map(ActionId::new).collect()
 }
 
 #[test]
@@ -25,8 +25,8 @@ fn bytes_are_little_in_bit_order() {
 #[test]
 fn actions_beyond_the_capacity_are_not_in_a_set() {
     assert_eq!(mask(&[383, 384, u16::MAX]), mask(&[383]));
-    assert!(!mask(&[383]).contains(Action::new(384)));
-    assert!(!mask(&[383]).contains(Action::new(u16::MAX)));
+    assert!(!mask(&[383]).contains(ActionId::new(384)));
+    assert!(!mask(&[383]).contains(ActionId::new(u16::MAX)));
 }
 
 proptest! {
@@ -34,7 +34,7 @@ proptest! {
 
     #[test]
     fn a_mask_is_a_set(indices in prop::collection::btree_set(0u16..384, 0..200)) {
-        let sorted: Vec<Action> = indices.iter().copied().map(Action::new).collect();
+        let sorted: Vec<ActionId> = indices.iter().copied().map(ActionId::new).collect();
         let mask: Mask = sorted.iter().copied().collect();
         prop_assert_eq!(mask.len(), sorted.len());
         prop_assert_eq!(mask.is_empty(), sorted.is_empty());
@@ -45,7 +45,7 @@ proptest! {
         prop_assert_eq!(mask.nth(sorted.len()), None);
         prop_assert_eq!(mask.nth(usize::MAX), None);
         for index in 0..400 {
-            prop_assert_eq!(mask.contains(Action::new(index)), indices.contains(&index));
+            prop_assert_eq!(mask.contains(ActionId::new(index)), indices.contains(&index));
         }
         prop_assert_eq!(Mask::from_bytes(&mask.to_bytes(384)), Some(mask));
     }

@@ -43,7 +43,11 @@ fn the_standard_vector_has_228_numbers() {
         .collect();
     assert_eq!(vector[11..28], hand[..]);
     let legal: Vec<f32> = (0..200)
-        .map(|index| f32::from(u8::from(mask.contains(chefshat_engine::Action::new(index)))))
+        .map(|index| {
+            f32::from(u8::from(
+                mask.contains(chefshat_engine::ActionId::new(index)),
+            ))
+        })
         .collect();
     assert_eq!(vector[28..], legal[..]);
     assert_eq!(vector[28..].iter().sum::<f32>(), mask.len() as f32);

@@ -1,7 +1,7 @@
 //! What must hold in every game: for any rule set that makes sense, any seed and any way of
 //! playing.
 
-use chefshat_engine::{Action, Game, Mask, RuleSet, Seed, Stop, Viewer};
+use chefshat_engine::{ActionId, Game, Mask, RuleSet, Seed, Stop, Viewer};
 use proptest::prelude::*;
 
 use crate::model::Model;
@@ -28,7 +28,7 @@ fn any_policy() -> impl Strategy<Value = Policy> {
     ]
 }
 
-fn choose(policy: Policy, game: &Game, chance: &mut Chance) -> Action {
+fn choose(policy: Policy, game: &Game, chance: &mut Chance) -> ActionId {
     let mask = game.legal_actions();
     let choice = match policy {
         Policy::Random => return chance.legal_action(game),
@@ -73,7 +73,7 @@ proptest! {
         while !game.is_over() {
             let mask = game.legal_actions();
             prop_assert!(!mask.is_empty());
-            let allowed = |action: &Action| model.allows(&game, &texts[usize::from(action.index())]);
+            let allowed = |action: &ActionId| model.allows(&game, &texts[usize::from(action.index())]);
             let plain: Mask = space.iter().filter(allowed).collect();
             prop_assert_eq!(mask, plain);
             prop_assert!(mask.contains(game.default_action().unwrap()));
@@ -102,7 +102,7 @@ proptest! {
         while !game.is_over() && steps < 150 {
             let mask = game.legal_actions();
             for index in (0..size + 3).chain([u16::MAX]) {
-                let action = Action::new(index);
+                let action = ActionId::new(index);
                 let mut tried = game.clone();
                 let mut events = 0;
                 match tried.apply(action, |_| events += 1) {

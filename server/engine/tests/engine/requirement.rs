@@ -1,8 +1,8 @@
 //! What a decision requires says the same as the mask of legal actions, and tells no hidden card.
 
 use chefshat_engine::{
-    Cards, Event, Game, GiftRequirement, Move, Opening, PlayRequirement, Requirement, RuleSetSpec,
-    Seat, Seed, SpecialAction,
+    Action, Cards, Event, Game, GiftRequirement, Opening, PlayRequirement, Requirement,
+    RuleSetSpec, Seat, Seed, SpecialAction,
 };
 use proptest::prelude::*;
 
@@ -10,24 +10,24 @@ use crate::start::{HANDS, ORDER, second_shift, spec};
 use crate::support::{Chance, act, any_rules, hands};
 
 /// Whether a hand holds the cards of a play or a gift.
-fn holds(hand: Cards, action: Move) -> bool {
+fn holds(hand: Cards, action: Action) -> bool {
     match action {
-        Move::Play {
+        Action::Play {
             face,
             quantity,
             jokers,
         } => hand.count(face) >= quantity && hand.jokers() >= jokers,
-        Move::LoneJoker | Move::GiveJoker => hand.jokers() > 0,
-        Move::Give(face) => hand.count(face) > 0,
-        Move::Pass | Move::Decline | Move::Declare => true,
+        Action::LoneJoker | Action::GiveJoker => hand.jokers() > 0,
+        Action::Give(face) => hand.count(face) > 0,
+        Action::Pass | Action::Decline | Action::Declare => true,
     }
 }
 
-fn allows(requirement: Requirement, action: Move) -> bool {
+fn allows(requirement: Requirement, action: Action) -> bool {
     match requirement {
         Requirement::Play(play) => play.allows(action),
-        Requirement::Gift(_) => matches!(action, Move::Give(_) | Move::GiveJoker),
-        Requirement::SpecialAction(_) => matches!(action, Move::Declare | Move::Decline),
+        Requirement::Gift(_) => matches!(action, Action::Give(_) | Action::GiveJoker),
+        Requirement::SpecialAction(_) => matches!(action, Action::Declare | Action::Decline),
     }
 }
 

@@ -2,8 +2,8 @@
 //! a game at random.
 
 use chefshat_engine::{
-    Action, BySeat, Cards, Event, Game, Opening, PassScope, RuleSet, RuleSetSpec, Seat, SeatOrder,
-    Seed, Stop,
+    ActionId, BySeat, Cards, Event, Game, Opening, PassScope, RuleSet, RuleSetSpec, Seat,
+    SeatOrder, Seed, Stop,
 };
 use proptest::prelude::*;
 use serde::Deserialize;
@@ -130,7 +130,7 @@ impl Chance {
     }
 
     /// A legal action of the open decision, uniformly.
-    pub(crate) fn legal_action(&mut self, game: &Game) -> Action {
+    pub(crate) fn legal_action(&mut self, game: &Game) -> ActionId {
         let mask = game.legal_actions();
         mask.nth(self.below(mask.len()))
             .expect("an open decision has a legal action")

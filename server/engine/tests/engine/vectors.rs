@@ -3,7 +3,7 @@
 
 use std::path::PathBuf;
 
-use chefshat_engine::{Action, Card, Deal, Event, Game, Seat, SpecialAction};
+use chefshat_engine::{ActionId, Card, Deal, Event, Game, Seat, SpecialAction};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
@@ -114,12 +114,12 @@ fn games() {
             assert_eq!(decision.seat.index(), *seat, "game {line}, step {step}");
             let mask = game.legal_actions();
             assert_eq!(
-                mask.iter().map(Action::index).collect::<Vec<_>>(),
+                mask.iter().map(ActionId::index).collect::<Vec<_>>(),
                 *legal,
                 "game {line}, step {step}"
             );
             assert_eq!(mask.len(), legal.len(), "game {line}, step {step}");
-            game.apply(Action::new(*action), &mut on_event).unwrap();
+            game.apply(ActionId::new(*action), &mut on_event).unwrap();
         }
         assert!(game.is_over(), "game {line}");
         assert_eq!(shifts, vector.shifts, "game {line}");

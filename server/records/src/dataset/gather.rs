@@ -7,7 +7,7 @@
 
 use std::sync::Arc;
 
-use chefshat_engine::{Action, BySeat, Game, Move, RewardScheme, Seat, Viewer};
+use chefshat_engine::{Action, ActionId, BySeat, Game, RewardScheme, Seat, Viewer};
 use chefshat_proto::v1::{self, DecisionKind, DecisionSource, game_event::Kind, record_line::Line};
 
 use super::column::Value;
@@ -174,16 +174,16 @@ impl Gatherer {
         let rules = info.rule_set;
         let seat = Seat::new(record.seat as usize);
         let seen = game.observe(Viewer::Seat(seat));
-        let action = Action::new(u16::try_from(record.action).expect("a decision that replays"));
+        let action = ActionId::new(u16::try_from(record.action).expect("a decision that replays"));
         let is_turn = record.kind() == DecisionKind::Turn;
         let mut rewards = Rewards::default();
         let mut invalid_rewards = Rewards::default();
         if is_turn {
             let shed = match rules.actions().decode(action) {
-                Some(Move::Play {
+                Some(Action::Play {
                     quantity, jokers, ..
                 }) => quantity + jokers,
-                Some(Move::LoneJoker) => 1,
+                Some(Action::LoneJoker) => 1,
                 _ => 0,
             };
             let left = seen.cards_left[seat].saturating_sub(shed);

@@ -1,7 +1,7 @@
 //! The look-up table of a decision, as in the paper's figure of possible actions: every action of a turn by face, quantity and jokers,
 //! and what is to be said of it for one hand at one moment. A value; how it is drawn is in `figure_svg`.
 
-use chefshat_engine::{Action, Cards, Face, Game, Mask, Move, Seat};
+use chefshat_engine::{Action, ActionId, Cards, Face, Game, Mask, Seat};
 
 use super::chronicle::{Chronicle, Participant};
 use super::scene::{Card, Demand, Now, Scene};
@@ -94,10 +94,10 @@ impl Figure {
             .collect();
         let gives = (1..=faces)
             .filter_map(Face::new)
-            .map(Move::Give)
-            .chain((jokers > 0).then_some(Move::GiveJoker))
+            .map(Action::Give)
+            .chain((jokers > 0).then_some(Action::GiveJoker))
             .map(|gift| table.state(gift));
-        let special = [Move::Declare, Move::Decline];
+        let special = [Action::Declare, Action::Decline];
         Some(Figure {
             caption: scene.caption,
             seat,
@@ -110,8 +110,8 @@ impl Figure {
             board: scene.board,
             demand,
             plays,
-            lone_joker: (jokers > 0).then(|| table.state(Move::LoneJoker)),
-            pass: table.state(Move::Pass),
+            lone_joker: (jokers > 0).then(|| table.state(Action::LoneJoker)),
+            pass: table.state(Action::Pass),
             gives: if decision.kind == DecisionKind::Exchange {
                 gives.collect()
             } else {
@@ -138,24 +138,24 @@ struct Table {
 
 impl Table {
     fn play(&self, face: Face, quantity: u8, jokers: u8) -> State {
-        self.state(Move::Play {
+        self.state(Action::Play {
             face,
             quantity,
             jokers,
         })
     }
 
-    fn state(&self, meaning: Move) -> State {
-        let action: Option<Action> = self.space.encode(meaning);
+    fn state(&self, meaning: Action) -> State {
+        let action: Option<ActionId> = self.space.encode(meaning);
         let in_hand = match meaning {
-            Move::Play {
+            Action::Play {
                 face,
                 quantity,
                 jokers,
             } => self.hand.count(face) >= quantity && self.hand.jokers() >= jokers,
-            Move::LoneJoker | Move::GiveJoker => self.hand.jokers() > 0,
-            Move::Give(face) => self.hand.count(face) > 0,
-            Move::Pass | Move::Decline | Move::Declare => true,
+            Action::LoneJoker | Action::GiveJoker => self.hand.jokers() > 0,
+            Action::Give(face) => self.hand.count(face) > 0,
+            Action::Pass | Action::Decline | Action::Declare => true,
         };
         if action.is_some_and(|action| self.legal.contains(action)) {
             State::Legal
@@ -169,13 +169,13 @@ impl Table {
     }
 
     /// Whether the rules allow a move now to a hand that holds its cards.
-    fn allowed(&self, meaning: Move) -> bool {
+    fn allowed(&self, meaning: Action) -> bool {
         match (meaning, self.demand) {
-            (Move::Pass, _) => self.may_pass,
-            (Move::LoneJoker, demand) => demand == Some(Demand::Anything),
-            (Move::Play { .. }, None) => false,
+            (Action::Pass, _) => self.may_pass,
+            (Action::LoneJoker, demand) => demand == Some(Demand::Anything),
+            (Action::Play { .. }, None) => false,
             (
-                Move::Play {
+                Action::Play {
                     face,
                     quantity,
                     jokers,
@@ -188,7 +188,7 @@ impl Table {
                     face.get() <= most && quantity + jokers >= size
                 }
             },
-            (Move::Give(_) | Move::GiveJoker | Move::Decline | Move::Declare, _) => true,
+            (Action::Give(_) | Action::GiveJoker | Action::Decline | Action::Declare, _) => true,
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Checking a decision's line against the game as it stood before it: whose it was, what was legal, how it can have come about, and what
 //! time it can have taken.
 
-use chefshat_engine::{Action, ActionSpace, DecisionKind, Game, Mask, Seat};
+use chefshat_engine::{ActionId, ActionSpace, DecisionKind, Game, Mask, Seat};
 use chefshat_proto::v1::{self, DecisionSource as Source};
 
 use super::header::Setup;
@@ -46,7 +46,7 @@ impl Asked<'_> {
     ///
     /// # Errors
     /// The first field that does not fit, in words.
-    pub(super) fn check(&self, record: &v1::DecisionRecord) -> Result<Action, String> {
+    pub(super) fn check(&self, record: &v1::DecisionRecord) -> Result<ActionId, String> {
         let seat = seat_number(self.seat);
         if record.seat != seat {
             return Err(must_be("seat", record.seat, seat));
@@ -71,7 +71,7 @@ impl Asked<'_> {
         Ok(action)
     }
 
-    fn check_action(&self, record: &v1::DecisionRecord) -> Result<Action, String> {
+    fn check_action(&self, record: &v1::DecisionRecord) -> Result<ActionId, String> {
         let space = self.setup.rules.actions();
         let legal = self.game.legal_actions();
         if self.hand_known {
@@ -119,7 +119,7 @@ impl Asked<'_> {
         ))
     }
 
-    fn check_source(&self, record: &v1::DecisionRecord, action: Action) -> Result<(), String> {
+    fn check_source(&self, record: &v1::DecisionRecord, action: ActionId) -> Result<(), String> {
         let source = Source::try_from(record.source).unwrap_or_default();
         let name = source.as_str_name();
         if self.taken_over != (source == Source::Recorded) {
@@ -220,8 +220,8 @@ pub(crate) fn kind_to_proto(kind: DecisionKind) -> v1::DecisionKind {
 }
 
 /// The action with a number; one that is out of every range, where the number is.
-pub(crate) fn number(action: u32) -> Action {
-    Action::new(u16::try_from(action).unwrap_or(u16::MAX))
+pub(crate) fn number(action: u32) -> ActionId {
+    ActionId::new(u16::try_from(action).unwrap_or(u16::MAX))
 }
 
 fn check_mask(found: &[u8], legal: &Mask, space: ActionSpace) -> Result<(), String> {
@@ -242,11 +242,11 @@ fn check_mask(found: &[u8], legal: &Mask, space: ActionSpace) -> Result<(), Stri
             .is_some_and(|byte| byte >> (action % 8) & 1 == 1)
     };
     let wrong =
-        (0..space.size()).find(|&action| said(action) != legal.contains(Action::new(action)));
+        (0..space.size()).find(|&action| said(action) != legal.contains(ActionId::new(action)));
     Err(match wrong {
         Some(action) => format!(
             "actionMask says that {} is {}legal, but it is{}",
-            space.text(Action::new(action)).unwrap_or_default(),
+            space.text(ActionId::new(action)).unwrap_or_default(),
             if said(action) { "" } else { "not " },
             if said(action) { " not" } else { "" },
         ),

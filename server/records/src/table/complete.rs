@@ -102,7 +102,7 @@ impl Completer {
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test fails by it")]
 mod tests {
-    use chefshat_engine::{Face, Move, RuleSetSpec};
+    use chefshat_engine::{Action, Face, RuleSetSpec};
 
     use super::*;
 
@@ -117,7 +117,7 @@ mod tests {
         let rules = spec.validate().unwrap();
         let seats: Vec<Seat> = (0..6).map(Seat::new).collect();
         let order = SeatOrder::from_slice(&seats);
-        let opening = Move::Play {
+        let opening = Action::Play {
             face: Face::new(15).unwrap(),
             quantity: 2,
             jokers: 0,

@@ -1,7 +1,7 @@
 //! What is told of a Shift at a real table: hands, gifts and turns, as far as anybody wrote them down, each with the line that tells it. A
 //! record tells them in its own lines; a transcript in its rows. What follows from them is worked out in `complete`.
 
-use chefshat_engine::{BySeat, Cards, Face, Move, RuleSet, Seat};
+use chefshat_engine::{Action, BySeat, Cards, Face, RuleSet, Seat};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 
 use crate::convert::{cards_from_numbers, seat_from_number};
@@ -19,11 +19,11 @@ pub(crate) enum Fact {
     /// A seat was dealt two jokers, and declared its special action or declined.
     Special { seat: Seat, declared: bool },
     /// A seat chose this card to give.
-    Gives(Seat, Move),
+    Gives(Seat, Action),
     /// All that a seat gave, if that is known. The exchange is complete.
     Given(Seat, Option<Cards>),
     /// A seat played or passed.
-    Turn(Seat, Move),
+    Turn(Seat, Action),
 }
 
 /// What is told of one Shift, in order.
@@ -110,11 +110,11 @@ fn note_line(rules: &RuleSet, line: &Line, mut note: impl FnMut(Fact)) {
                 (seat(decision.seat), rules.actions().decode(action))
             {
                 match meaning {
-                    Move::Declare | Move::Decline => note(Fact::Special {
+                    Action::Declare | Action::Decline => note(Fact::Special {
                         seat,
-                        declared: meaning == Move::Declare,
+                        declared: meaning == Action::Declare,
                     }),
-                    Move::Give(_) | Move::GiveJoker => note(Fact::Gives(seat, meaning)),
+                    Action::Give(_) | Action::GiveJoker => note(Fact::Gives(seat, meaning)),
                     turn => note(Fact::Turn(seat, turn)),
                 }
             }
@@ -142,16 +142,16 @@ fn note_line(rules: &RuleSet, line: &Line, mut note: impl FnMut(Fact)) {
 }
 
 /// Counts the cards of a move. More than any deck has are as good as one too many.
-fn add_move(counts: &mut Counts, cards: Move) {
+fn add_move(counts: &mut Counts, cards: Action) {
     let (face, quantity, jokers) = match cards {
-        Move::Play {
+        Action::Play {
             face,
             quantity,
             jokers,
         } => (Some(face), quantity, jokers),
-        Move::Give(face) => (Some(face), 1, 0),
-        Move::LoneJoker | Move::GiveJoker => (None, 0, 1),
-        Move::Pass | Move::Decline | Move::Declare => (None, 0, 0),
+        Action::Give(face) => (Some(face), 1, 0),
+        Action::LoneJoker | Action::GiveJoker => (None, 0, 1),
+        Action::Pass | Action::Decline | Action::Declare => (None, 0, 0),
     };
     if let Some(face) = face {
         let count = &mut counts[index(face)];

@@ -1,7 +1,7 @@
 //! A transcript of a real table becomes a record. The engine plays what is told; the first row that the rules do not allow, or that cannot
 //! be with the cards of the deck, is named.
 
-use chefshat_engine::{ActionSpace, BySeat, DecisionKind, Event, Game, Move, Role, Seat};
+use chefshat_engine::{Action, ActionSpace, BySeat, DecisionKind, Event, Game, Role, Seat};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 use sha2::{Digest as _, Sha256};
 
@@ -50,7 +50,7 @@ struct Importing {
     decisions: BySeat<u64>,
     elapsed_ms: u64,
     /// Cards that seats gave by their own choice and that the engine has not asked for yet.
-    gifts: Vec<(Seat, Move, u64)>,
+    gifts: Vec<(Seat, Action, u64)>,
     attempts: Vec<(Seat, u32)>,
     ruled: Ruled,
 }
@@ -139,9 +139,9 @@ impl Importing {
             Seen::Special(declared) => {
                 self.is_current(row)?;
                 let decision = if *declared {
-                    Move::Declare
+                    Action::Declare
                 } else {
-                    Move::Decline
+                    Action::Decline
                 };
                 self.decide(row.line, row.seat, decision, row.took_us)?;
                 self.take_gifts(row.line)
@@ -189,7 +189,7 @@ impl Importing {
         &mut self,
         line: usize,
         seat: Seat,
-        decision: Move,
+        decision: Action,
         took_us: u64,
     ) -> Result<(), TranscriptError> {
         let at = |problem: String| wrong(line, problem);

@@ -2,7 +2,7 @@
 //! would deal. Decisions that nobody wrote down are taken silently, as the completion has them; what is not known is left out of the events.
 
 use chefshat_engine::{
-    Action, BySeat, Deal, DecisionKind, Event, Face, Game, Move, RuleSet, Script, ScriptError,
+    Action, ActionId, BySeat, Deal, DecisionKind, Event, Face, Game, RuleSet, Script, ScriptError,
     Seat, SeatOrder, Seed,
 };
 use chefshat_proto::v1;
@@ -271,7 +271,9 @@ impl Table {
             let silent = match open.kind {
                 DecisionKind::Turn => None,
                 kind if self.is_told(open.seat, kind) => None,
-                DecisionKind::SpecialAction if self.goes_on_after(open.kind) => Some(Move::Decline),
+                DecisionKind::SpecialAction if self.goes_on_after(open.kind) => {
+                    Some(Action::Decline)
+                }
                 DecisionKind::Exchange if self.goes_on_after(open.kind) => {
                     self.next_gift(game, plan, open.seat)
                 }
@@ -290,7 +292,7 @@ impl Table {
         told.of_kind(kind).is_some_and(|told| *told > 0)
     }
 
-    fn take(&self, game: &mut Game, action: Action, events: &mut Vec<Event>) -> bool {
+    fn take(&self, game: &mut Game, action: ActionId, events: &mut Vec<Event>) -> bool {
         game.apply(action, |event| events.push(event)).is_ok()
     }
 
@@ -306,7 +308,7 @@ impl Table {
     }
 
     /// The next card of a seat's planned gift.
-    fn next_gift(&self, game: &Game, plan: &Plan, seat: Seat) -> Option<Move> {
+    fn next_gift(&self, game: &Game, plan: &Plan, seat: Seat) -> Option<Action> {
         let gave = game.gave()[seat];
         let faces = (1..=self.rules.faces()).filter_map(Face::new);
         let mut planned = plan.gifts[seat];
@@ -314,8 +316,8 @@ impl Table {
         faces
             .into_iter()
             .find(|&face| planned[index(face)] > gave.count(face))
-            .map(Move::Give)
-            .or((planned[JOKER] > 0).then_some(Move::GiveJoker))
+            .map(Action::Give)
+            .or((planned[JOKER] > 0).then_some(Action::GiveJoker))
     }
 }
 

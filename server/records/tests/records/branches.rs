@@ -1,7 +1,7 @@
 //! Branching from records and reading players out of them: what is taken over plays the beginning of the game again, whatever the game
 //! itself began with, and points that make no sense are refused.
 
-use chefshat_engine::{Action, Game, RuleSet, RuleSetSpec, Script, Seat, Seed, Stop, Viewer};
+use chefshat_engine::{ActionId, Game, RuleSet, RuleSetSpec, Script, Seat, Seed, Stop, Viewer};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 use chefshat_records::branch::{Branch, BranchError, TakenOver, branch_of};
 use chefshat_records::players::{PlayerError, recorded_player};
@@ -27,11 +27,11 @@ fn record() -> Vec<v1::RecordLine> {
 }
 
 /// The recorded game before each of its decisions.
-fn course(lines: &[v1::RecordLine]) -> Vec<(Game, Action)> {
+fn course(lines: &[v1::RecordLine]) -> Vec<(Game, ActionId)> {
     let mut course = Vec::new();
     walk(lines, |moment| {
         if let (Line::Decision(decision), Some(game)) = (moment.entry, moment.game) {
-            let action = Action::new(u16::try_from(decision.action).unwrap());
+            let action = ActionId::new(u16::try_from(decision.action).unwrap());
             course.push((game.clone(), action));
         }
     })
@@ -92,7 +92,7 @@ fn a_branch_goes_on_with_other_deals_or_the_same() {
 #[test]
 fn a_branch_of_a_branch_knows_which_seed_dealt_what() {
     let first = record();
-    let shift_of = |course: &[(Game, Action)], shift| {
+    let shift_of = |course: &[(Game, ActionId)], shift| {
         course
             .iter()
             .position(|(game, _)| game.shift() == shift)

@@ -11,7 +11,7 @@ mod rows;
 
 use std::path::PathBuf;
 
-use chefshat_engine::{Action, Game, MetricsRecorder, RewardScheme, RuleSet, RuleSetSpec, Seat};
+use chefshat_engine::{ActionId, Game, MetricsRecorder, RewardScheme, RuleSet, RuleSetSpec, Seat};
 use chefshat_engine::{Seed, ShiftMetrics, Stop};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 use chefshat_records::dataset::{Export, ExportError, Exported, Filter, Format, Layout};
@@ -187,7 +187,7 @@ fn counted(lines: &[v1::RecordLine], scheme: RewardScheme) -> Vec<ShiftMetrics> 
                 recorder.wrong(Seat::new(decision.seat as usize));
             }
         }
-        let action = Action::new(u16::try_from(decision.action).unwrap());
+        let action = ActionId::new(u16::try_from(decision.action).unwrap());
         let note = |event| shifts.extend(recorder.on_event(&event));
         game.apply(action, note).unwrap();
     }

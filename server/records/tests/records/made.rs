@@ -1,6 +1,6 @@
 //! Records made for tests: a game is played by random choices, and written down as a server writes it.
 
-use chefshat_engine::{Action, BySeat, DecisionKind, Event, Game, RuleSet, Script, Seed};
+use chefshat_engine::{ActionId, BySeat, DecisionKind, Event, Game, RuleSet, Script, Seed};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 use chefshat_records::branch::Branch;
 use chefshat_records::convert::{
@@ -46,7 +46,7 @@ impl Making<'_> {
             })));
         }
         lines.event(Kind::GameStarted(Box::new(self.started())));
-        let taken_over: Vec<(Seed, Action)> = self
+        let taken_over: Vec<(Seed, ActionId)> = self
             .branch
             .iter()
             .flat_map(|branch| &branch.taken_over)
@@ -105,7 +105,7 @@ impl Making<'_> {
             decisions += 1;
             let space = self.rules.actions();
             let illegal = (0..space.size())
-                .find(|action| !legal.contains(Action::new(*action)))
+                .find(|action| !legal.contains(ActionId::new(*action)))
                 .unwrap();
             let attempts = match source {
                 v1::DecisionSource::Invalid => ATTEMPTS as usize,

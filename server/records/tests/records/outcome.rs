@@ -119,7 +119,7 @@ fn what_was_counted_by_hand_is_told() {
 
 #[test]
 fn the_performance_score_is_that_of_the_engine() {
-    use chefshat_engine::{Action, Game, MetricsRecorder, Seed};
+    use chefshat_engine::{ActionId, Game, MetricsRecorder, Seed};
     let lines = dealt();
     let mut recorder = MetricsRecorder::new(rules(), None);
     let mut scores = Vec::new();
@@ -135,7 +135,7 @@ fn the_performance_score_is_that_of_the_engine() {
     let mut game = Game::new(rules(), Seed([7; 32]), &mut note);
     for line in &lines {
         if let Some(Line::Decision(decision)) = &line.line {
-            let action = Action::new(u16::try_from(decision.action).unwrap());
+            let action = ActionId::new(u16::try_from(decision.action).unwrap());
             game.apply(action, &mut note).unwrap();
         }
     }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use chefshat_client::v1::{self, game_event::Kind, seat_update::Update};
-use chefshat_engine::{Action, Seat, Viewer};
+use chefshat_engine::{ActionId, Seat, Viewer};
 use ratatui::crossterm::event::KeyCode;
 
 use super::super::terminal::look::Look;
@@ -78,7 +78,7 @@ impl Friday {
         self.tell(Update::Events(v1::EventBatch { events }));
     }
 
-    fn apply(&mut self, action: Action) {
+    fn apply(&mut self, action: ActionId) {
         let events = self.dealt.get_mut(&self.game).unwrap().apply(action);
         self.tell(Update::Events(v1::EventBatch { events }));
     }
@@ -119,7 +119,7 @@ impl Friday {
         let Do::Answer { action, .. } = what else {
             panic!("{what:?} is no answer");
         };
-        self.apply(Action::new(u16::try_from(action).unwrap()));
+        self.apply(ActionId::new(u16::try_from(action).unwrap()));
     }
 
     pub(super) fn screen(&self) -> String {

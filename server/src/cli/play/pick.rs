@@ -2,7 +2,7 @@
 //! is, and why not, where the server does not take it. What is legal is the server's word (its mask); only the reasons are found here.
 
 use chefshat_client::v1;
-use chefshat_engine::{Action, ActionSpace, Face, Mask, Move, Opening, RuleSet};
+use chefshat_engine::{Action, ActionId, ActionSpace, Face, Mask, Opening, RuleSet};
 
 use super::super::numbers::counted;
 use super::super::terminal::hand::{Hand, Stack};
@@ -56,7 +56,7 @@ impl Decision {
     }
 
     /// Whether an action is legal.
-    pub(super) fn is_legal(&self, action: Action) -> bool {
+    pub(super) fn is_legal(&self, action: ActionId) -> bool {
         self.legal.contains(action)
     }
 
@@ -66,7 +66,7 @@ impl Decision {
     }
 
     /// The action that is picked, legal or not.
-    pub(super) fn picked(&self) -> Option<Action> {
+    pub(super) fn picked(&self) -> Option<ActionId> {
         if self.kind() == v1::DecisionKind::SpecialAction {
             return Some(if self.at == 0 {
                 self.space.declare()
@@ -84,7 +84,7 @@ impl Decision {
         if stack.joker {
             return (self.quantity == 1).then(|| self.space.lone_joker());
         }
-        self.space.encode(Move::Play {
+        self.space.encode(Action::Play {
             face: face(stack)?,
             quantity: self.quantity,
             jokers: self.jokers,
@@ -92,12 +92,12 @@ impl Decision {
     }
 
     /// Passing, where this decision knows it.
-    pub(super) fn pass(&self) -> Action {
+    pub(super) fn pass(&self) -> ActionId {
         self.space.pass()
     }
 
     /// Declaring the special action, and declining.
-    pub(super) fn declare(&self) -> [Action; 2] {
+    pub(super) fn declare(&self) -> [ActionId; 2] {
         [self.space.declare(), self.space.decline()]
     }
 
@@ -107,17 +107,17 @@ impl Decision {
         self.legal.iter().filter_map(move |action| {
             let stack = stack?;
             match self.space.decode(action)? {
-                Move::Play {
+                Action::Play {
                     face,
                     quantity,
                     jokers,
                 } if !stack.joker && u32::from(face.get()) == stack.face => {
                     Some((quantity, jokers))
                 }
-                Move::Give(face) if !stack.joker && u32::from(face.get()) == stack.face => {
+                Action::Give(face) if !stack.joker && u32::from(face.get()) == stack.face => {
                     Some((1, 0))
                 }
-                Move::LoneJoker | Move::GiveJoker if stack.joker => Some((1, 0)),
+                Action::LoneJoker | Action::GiveJoker if stack.joker => Some((1, 0)),
                 _ => None,
             }
         })

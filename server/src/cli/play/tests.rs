@@ -1,7 +1,7 @@
 //! Games played by keys alone, and what the screen shows of them.
 
 use chefshat_client::v1::{self, seat_command::Command, seat_update::Update};
-use chefshat_engine::{Action, DecisionKind, RuleSetSpec, Seat, Stop, Viewer};
+use chefshat_engine::{ActionId, DecisionKind, RuleSetSpec, Seat, Stop, Viewer};
 use ratatui::crossterm::event::KeyCode;
 
 use super::super::terminal::look::Look;
@@ -43,7 +43,7 @@ impl Evening {
         self.app.take(Input::Key(Key::Code(code)), self.now_ms)
     }
 
-    pub(super) fn apply(&mut self, action: Action) {
+    pub(super) fn apply(&mut self, action: ActionId) {
         let events = self.dealt.apply(action);
         self.tell(Update::Events(v1::EventBatch { events }));
     }
@@ -85,7 +85,7 @@ impl Evening {
             status: v1::AnswerStatus::Accepted.into(),
             ..v1::AnswerResult::default()
         }));
-        self.apply(Action::new(u16::try_from(action).unwrap()));
+        self.apply(ActionId::new(u16::try_from(action).unwrap()));
     }
 
     pub(super) fn screen(&self) -> String {
@@ -142,7 +142,7 @@ fn whole_games_are_played_by_keys() {
 }
 
 /// All that can be picked: the legal actions, and how many others, each with its reason.
-fn everything_picked(evening: &mut Evening) -> (Vec<Action>, usize) {
+fn everything_picked(evening: &mut Evening) -> (Vec<ActionId>, usize) {
     let legal = evening.dealt.game.legal_actions();
     let (mut reached, mut refused) = (Vec::new(), 0);
     let stacks = evening.app.open.as_ref().unwrap().decision.stacks.len();

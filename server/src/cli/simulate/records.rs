@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use chefshat_arena::{AgentKind, Batch, Listener, PlayedDecision};
-use chefshat_engine::{Action, Decision};
+use chefshat_engine::{ActionId, Decision};
 use chefshat_records::jsonl::{self, RecordFileError};
 
 use crate::convert::Played;
@@ -40,15 +40,15 @@ pub(super) fn write(batch: &Batch, index: u64, folder: &Path) -> Result<(), Reco
 struct Notes {
     limit: Option<usize>,
     decisions: Vec<PlayedDecision>,
-    attempts: Vec<Action>,
+    attempts: Vec<ActionId>,
 }
 
 impl Listener for Notes {
-    fn on_invalid(&mut self, _: Decision, action: Action) {
+    fn on_invalid(&mut self, _: Decision, action: ActionId) {
         self.attempts.push(action);
     }
 
-    fn on_decision(&mut self, _: Decision, action: Action) {
+    fn on_decision(&mut self, _: Decision, action: ActionId) {
         let attempts = std::mem::take(&mut self.attempts);
         self.decisions.push(PlayedDecision {
             action,

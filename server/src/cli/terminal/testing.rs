@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use chefshat_client::v1::{self, game_event::Kind, record_line};
-use chefshat_engine::{Action, Event, Game, RuleSetSpec, Seed, Viewer};
+use chefshat_engine::{ActionId, Event, Game, RuleSetSpec, Seed, Viewer};
 use chefshat_records::convert::{By, event_kind, final_table, rules_to_proto};
 use ratatui::backend::TestBackend;
 use ratatui::{Frame, Terminal};
@@ -115,7 +115,7 @@ impl Dealt {
     }
 
     /// Takes an action; what the seat is told of it.
-    pub(in crate::cli) fn apply(&mut self, action: Action) -> Vec<v1::GameEvent> {
+    pub(in crate::cli) fn apply(&mut self, action: ActionId) -> Vec<v1::GameEvent> {
         let mut events = Vec::new();
         self.game.apply(action, |event| events.push(event)).unwrap();
         self.tell(&events)

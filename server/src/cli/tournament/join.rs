@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use chefshat_arena::{AgentKind, BuiltInAgent};
-use chefshat_client::{Action, Agent, Client, Outcome, v1};
+use chefshat_client::{ActionId, Agent, Client, Outcome, v1};
 use clap::Args;
 
 use super::super::agent::{outcome_in_words, outcome_json};
@@ -152,7 +152,7 @@ struct Teller {
 }
 
 impl Agent for Teller {
-    fn decide(&mut self, request: &v1::DecisionRequest) -> Action {
+    fn decide(&mut self, request: &v1::DecisionRequest) -> ActionId {
         self.agent.decide(request)
     }
 

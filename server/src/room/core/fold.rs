@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use chefshat_engine::{Action, DecisionKind, Event, Game, Seat, Seed};
+use chefshat_engine::{ActionId, DecisionKind, Event, Game, Seat, Seed};
 
 use super::{Answered, Core, LastAnswer, MAX_GAME_CHANGES, OpenDecision, State, Verdict};
 use crate::room::log::{ByWhom, GameHappening, Happening, MAX_GAME_EVENTS};
@@ -305,7 +305,7 @@ impl Core {
     pub(super) fn decided(
         &self,
         seat: Seat,
-        action: Action,
+        action: ActionId,
         source: Source,
         time: Duration,
         bank_left: Duration,

@@ -17,7 +17,7 @@ use std::time::Duration;
 
 use chefshat_arena::BuiltInAgent;
 use chefshat_engine::{
-    Action, Decision, Event, Game, Mask, Observation, Requirement, Seat, Viewer,
+    ActionId, Decision, Event, Game, Mask, Observation, Requirement, Seat, Viewer,
 };
 
 pub use answers::{
@@ -347,7 +347,7 @@ impl Core {
     }
 
     /// The default decision.
-    pub fn default_action(&self) -> Option<Action> {
+    pub fn default_action(&self) -> Option<ActionId> {
         self.game().and_then(Game::default_action)
     }
 
@@ -412,8 +412,8 @@ impl Core {
         self.unkept.push(Entry { at: now, change });
     }
 
-    fn action_from(number: u32) -> Action {
+    fn action_from(number: u32) -> ActionId {
         // What does not fit is out of range of every action space, and is refused as that.
-        Action::new(u16::try_from(number).unwrap_or(u16::MAX))
+        ActionId::new(u16::try_from(number).unwrap_or(u16::MAX))
     }
 }

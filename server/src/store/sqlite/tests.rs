@@ -11,7 +11,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use chefshat_arena::AgentKind;
-use chefshat_engine::{Action, RULES_VERSION, RuleSetSpec, Seat, Seed};
+use chefshat_engine::{ActionId, RULES_VERSION, RuleSetSpec, Seat, Seed};
 use chefshat_proto::v1;
 use chefshat_records::seeds::SeedPlan;
 use futures::FutureExt as _;
@@ -62,11 +62,11 @@ fn header(game: u8, durability: Durability) -> GameHeader {
                 taken_over: vec![
                     TakenOver {
                         seed: Seed([1; 32]),
-                        actions: vec![Action::new(3), Action::new(199)],
+                        actions: vec![ActionId::new(3), ActionId::new(199)],
                     },
                     TakenOver {
                         seed: Seed([2; 32]),
-                        actions: vec![Action::new(7)],
+                        actions: vec![ActionId::new(7)],
                     },
                 ],
             }),
@@ -107,7 +107,7 @@ fn entries() -> Vec<Entry> {
         },
         Change::Decided(Decided {
             seat,
-            action: Action::new(213),
+            action: ActionId::new(213),
             source: Source::Recorded,
             time_us: u64::MAX,
             bank_left_ms: 17,

@@ -5,7 +5,7 @@ use std::num::NonZeroU64;
 
 use chefshat_arena::vector::{Episode, InvalidActions, Seeds, Start, VectorGames, VectorSetup};
 use chefshat_arena::{AgentKind, BuiltInAgent, game_seed};
-use chefshat_engine::{Action, Game, RewardScheme, RuleSetSpec, Stop, Viewer};
+use chefshat_engine::{ActionId, Game, RewardScheme, RuleSetSpec, Stop, Viewer};
 
 use super::*;
 
@@ -57,7 +57,7 @@ fn rewards_add_up_to_what_the_shifts_say() {
                 let mut actions = some_actions(&batch);
                 for (row, action) in actions.iter_mut().enumerate() {
                     if batch.kinds[row] == 1 && (batch.step + row as u64).is_multiple_of(5) {
-                        *action = Action::new(201);
+                        *action = ActionId::new(201);
                     }
                 }
                 batch = games.step(&actions).unwrap();

@@ -7,7 +7,9 @@ use chefshat_arena::vector::{
     VectorSetup,
 };
 use chefshat_arena::{AgentKind, game_seed};
-use chefshat_engine::{Action, DecisionKind, Game, RewardScheme, RuleSetSpec, Script, Seat, Stop};
+use chefshat_engine::{
+    ActionId, DecisionKind, Game, RewardScheme, RuleSetSpec, Script, Seat, Stop,
+};
 
 use super::*;
 
@@ -15,10 +17,10 @@ use super::*;
 fn an_invalid_action_is_refused_or_asked_again() {
     let (mut games, batch) = VectorGames::new(all_client(2));
     let mut actions = some_actions(&batch);
-    actions[1] = Action::new(199);
+    actions[1] = ActionId::new(199);
     let refused = games.step(&actions).unwrap_err();
     assert!(
-        matches!(refused, StepError::Illegal { row: 1, game: 1, action, .. } if action == Action::new(199)),
+        matches!(refused, StepError::Illegal { row: 1, game: 1, action, .. } if action == ActionId::new(199)),
         "{refused}"
     );
     assert!(refused.to_string().contains("action 199 is not legal"));
@@ -37,7 +39,7 @@ fn an_invalid_action_is_refused_or_asked_again() {
     let (mut games, batch) = VectorGames::new(setup);
     let opener = batch.seats[1];
     let right = some_actions(&batch)[0];
-    let wrong = Action::new(199);
+    let wrong = ActionId::new(199);
     let first = games.step(&[right, wrong]).unwrap();
     assert_eq!(
         (
@@ -217,7 +219,7 @@ fn what_is_kept_for_records_is_bounded() {
     let (mut games, mut batch) = VectorGames::new(setup);
     let mut steps = 0u64;
     let error = loop {
-        let actions: Vec<Action> = masks(&batch)
+        let actions: Vec<ActionId> = masks(&batch)
             .iter()
             .map(|mask| mask.iter().last().unwrap())
             .collect();

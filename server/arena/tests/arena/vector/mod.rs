@@ -6,7 +6,7 @@ mod play;
 
 use chefshat_arena::AgentKind;
 use chefshat_arena::vector::{Batch, PlayedGame, Seeds, VectorGames, VectorSetup};
-use chefshat_engine::{Action, Mask, RuleSet, RuleSetSpec};
+use chefshat_engine::{ActionId, Mask, RuleSet, RuleSetSpec};
 
 fn rules() -> RuleSet {
     RuleSetSpec::default().validate().unwrap()
@@ -58,12 +58,12 @@ fn masks(batch: &Batch) -> Vec<Mask> {
 }
 
 /// A policy without a generator: which legal action depends on the step and the row.
-fn some_action(mask: &Mask, step: u64, row: usize) -> Action {
+fn some_action(mask: &Mask, step: u64, row: usize) -> ActionId {
     let number = (step.wrapping_mul(31) + row as u64 * 17 + 5).wrapping_mul(0x9e37_79b9) >> 16;
     mask.nth(number as usize % mask.len()).unwrap()
 }
 
-fn some_actions(batch: &Batch) -> Vec<Action> {
+fn some_actions(batch: &Batch) -> Vec<ActionId> {
     (masks(batch).iter().enumerate())
         .map(|(row, mask)| some_action(mask, batch.step, row))
         .collect()

@@ -5,7 +5,7 @@ use std::num::NonZeroU64;
 
 use chefshat_arena::vector::{Seeds, Start, StepError, VectorGames, VectorSetup};
 use chefshat_arena::{AgentKind, BuiltInAgent, Listener, agent_seed, game_seed};
-use chefshat_engine::{Action, Decision, DecisionKind, Game, Mask, Script, Seat, Viewer};
+use chefshat_engine::{ActionId, Decision, DecisionKind, Game, Mask, Script, Seat, Viewer};
 
 use super::*;
 
@@ -23,7 +23,7 @@ fn every_game_goes_as_it_goes_alone() {
     .unwrap()
     .with_records(true);
     // The mask, hand and cards left that were shown, and the answer, game by game.
-    type Shown = (Mask, Vec<u8>, Vec<u8>, Action);
+    type Shown = (Mask, Vec<u8>, Vec<u8>, ActionId);
     let mut rows: BTreeMap<u64, Vec<Shown>> = BTreeMap::new();
     let mut indices: BTreeMap<u32, u64> = BTreeMap::new();
     let played = play_out(setup, |_, batch| {
@@ -74,9 +74,9 @@ fn every_game_goes_as_it_goes_alone() {
 
 #[test]
 fn with_the_owner_as_a_built_in_agent_the_games_are_those_of_a_batch() {
-    struct Taken(Vec<Action>);
+    struct Taken(Vec<ActionId>);
     impl Listener for Taken {
-        fn on_decision(&mut self, _: Decision, action: Action) {
+        fn on_decision(&mut self, _: Decision, action: ActionId) {
             self.0.push(action);
         }
     }
@@ -141,7 +141,7 @@ fn with_the_owner_as_a_built_in_agent_the_games_are_those_of_a_batch() {
     for game in played {
         let mut taken = Taken(Vec::new());
         alone.play_game(game.index, &mut taken);
-        let actions: Vec<Action> = game.decisions.iter().map(|taken| taken.action).collect();
+        let actions: Vec<ActionId> = game.decisions.iter().map(|taken| taken.action).collect();
         assert_eq!(actions, taken.0);
     }
 }

@@ -1,6 +1,6 @@
 //! Cards as they are written in a transcript.
 
-use chefshat_engine::{Cards, Face, Move};
+use chefshat_engine::{Action, Cards, Face};
 
 use crate::table::facts::{Counts, JOKER, index};
 
@@ -39,21 +39,21 @@ pub(super) fn cards(text: &str, faces: u8) -> Result<Cards, String> {
 }
 
 /// A written play: cards of one face with any jokers, or one joker alone.
-pub(super) fn play(text: &str, faces: u8) -> Result<Move, String> {
+pub(super) fn play(text: &str, faces: u8) -> Result<Action, String> {
     let kinds = kinds(text, faces)?;
     let jokers = kinds.iter().filter(|kind| kind.is_none()).count();
     let mut faces = kinds.into_iter().flatten();
     let small =
         |count: usize| u8::try_from(count).map_err(|_| "these are too many cards".to_owned());
     match faces.next() {
-        None if jokers == 1 => Ok(Move::LoneJoker),
+        None if jokers == 1 => Ok(Action::LoneJoker),
         None => Err("jokers are played with cards of a face, or one of them alone".into()),
         Some(face) => {
             let rest: Vec<Face> = faces.collect();
             if rest.iter().any(|other| *other != face) {
                 return Err("a play is cards of one face, with any jokers".into());
             }
-            Ok(Move::Play {
+            Ok(Action::Play {
                 face,
                 quantity: small(rest.len() + 1)?,
                 jokers: small(jokers)?,

@@ -1,6 +1,6 @@
 //! The rows of a Shift: who did what, when.
 
-use chefshat_engine::{Cards, Move, RuleSet, Seat};
+use chefshat_engine::{Action, Cards, RuleSet, Seat};
 use chefshat_proto::v1;
 
 use super::TranscriptError;
@@ -33,11 +33,11 @@ pub(in crate::table) enum Seen {
     /// It declared its special action, or said that it does not.
     Special(bool),
     /// What it gave in the exchange; `None` if nobody saw.
-    Gives(Option<(Cards, Vec<Move>)>),
+    Gives(Option<(Cards, Vec<Action>)>),
     /// What it tried to play and took back, because the rules forbid it.
-    Tries(Move),
+    Tries(Action),
     /// A play or a pass.
-    Turn(Move),
+    Turn(Action),
     /// The place it took.
     Finishes(u8),
     /// What it showed.
@@ -68,14 +68,14 @@ pub(super) fn row(cells: &Cells<'_>, rules: &RuleSet) -> Result<Row, TranscriptE
                     gift,
                     moves
                         .into_iter()
-                        .map(|kind| kind.map_or(Move::GiveJoker, Move::Give))
+                        .map(|kind| kind.map_or(Action::GiveJoker, Action::Give))
                         .collect(),
                 ))
             }
         }),
         "tries" => Seen::Tries(play(cells.need("value")?, faces).map_err(wrong)?),
         "plays" => Seen::Turn(play(cells.need("value")?, faces).map_err(wrong)?),
-        "passes" => Seen::Turn(Move::Pass),
+        "passes" => Seen::Turn(Action::Pass),
         "finishes" => Seen::Finishes(
             u8::try_from(cells.number::<u32>("value")?)
                 .map_err(|_| wrong("there is no such place".into()))?,
@@ -90,7 +90,7 @@ pub(super) fn row(cells: &Cells<'_>, rules: &RuleSet) -> Result<Row, TranscriptE
     };
     let valued = !matches!(
         seen,
-        Seen::Special(_) | Seen::Turn(Move::Pass) | Seen::Expresses(_)
+        Seen::Special(_) | Seen::Turn(Action::Pass) | Seen::Expresses(_)
     );
     if !valued && cells.cells.contains_key("value") {
         return Err(wrong(format!("`{what}` has no value")));

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use chefshat_engine::{
-    BySeat, Cards, DecisionKind, Game, Move, RuleSetSpec, Script, Seat, SeatOrder, Seed, Stop,
+    Action, BySeat, Cards, DecisionKind, Game, RuleSetSpec, Script, Seat, SeatOrder, Seed, Stop,
     Viewer,
 };
 use chefshat_proto::v1::{self, record_line::Line};
@@ -275,7 +275,7 @@ fn with_and_without_special_actions(players: u8, seed: u8) -> [Vec<v1::RecordLin
         while let Some(open) = game.decision() {
             let legal = game.legal_actions();
             let action = if open.kind == DecisionKind::SpecialAction {
-                rules.actions().encode(Move::Decline).unwrap()
+                rules.actions().encode(Action::Decline).unwrap()
             } else {
                 others += 1;
                 legal.nth(others * 7 % legal.len()).unwrap()

@@ -1,6 +1,6 @@
 //! The look-up table of a decision: it agrees with the mask and is for the seat that decides.
 
-use chefshat_engine::{Action, DecisionKind, Game, Move, Seed, Viewer};
+use chefshat_engine::{Action, ActionId, DecisionKind, Game, Seed, Viewer};
 use chefshat_records::picture::{Demand, Eyes, Figure, FilmError, State, figure_at};
 
 use super::{chronicle, fixture, rules};
@@ -33,14 +33,14 @@ fn the_look_up_table_agrees_with_the_mask() {
 fn check(game: &Game, figure: &Figure) {
     let (space, mask) = (game.rules().actions(), game.legal_actions());
     let hand = game.hands()[figure.seat];
-    let mut told: Vec<(Move, State)> = vec![(Move::Pass, figure.pass)];
-    told.extend(figure.lone_joker.map(|state| (Move::LoneJoker, state)));
+    let mut told: Vec<(Action, State)> = vec![(Action::Pass, figure.pass)];
+    told.extend(figure.lone_joker.map(|state| (Action::LoneJoker, state)));
     for (face, quantities) in (1..).zip(&figure.plays) {
         let face = chefshat_engine::Face::new(face).unwrap();
         assert_eq!(quantities.len(), usize::from(face.get()));
         for (quantity, states) in (1..).zip(quantities) {
             for (jokers, &state) in (0..).zip(states) {
-                let play = Move::Play {
+                let play = Action::Play {
                     face,
                     quantity,
                     jokers,
@@ -66,14 +66,14 @@ fn check(game: &Game, figure: &Figure) {
         }
     }
     let faces = (1..=figure.faces).filter_map(chefshat_engine::Face::new);
-    let gifts = faces.map(Move::Give).chain([Move::GiveJoker]);
+    let gifts = faces.map(Action::Give).chain([Action::GiveJoker]);
     told.extend(gifts.zip(figure.gives.iter().copied()));
     told.extend(
-        [Move::Declare, Move::Decline]
+        [Action::Declare, Action::Decline]
             .into_iter()
             .zip(figure.special.iter().copied()),
     );
-    let mut legal: Vec<Action> = told
+    let mut legal: Vec<ActionId> = told
         .iter()
         .filter(|(_, state)| *state == State::Legal)
         .map(|(meaning, _)| space.encode(*meaning).unwrap())

@@ -86,7 +86,7 @@ fn play_both(
         each(plain, swapped);
         let (seat, id) = plain.open();
         assert_eq!(swapped.open(), (seat, id));
-        let common: Vec<Action> = plain
+        let common: Vec<ActionId> = plain
             .core
             .legal_actions()
             .iter()

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_engine::{Action, RULES_VERSION, RuleSetSpec, Seat, Stop};
+use chefshat_engine::{ActionId, RULES_VERSION, RuleSetSpec, Seat, Stop};
 use chefshat_records::seeds::SeedPlan;
 
 use super::{AnswerInput, Answered, ConnectionId, Core, State, Verdict};
@@ -148,7 +148,7 @@ impl Table {
     fn illegal(&self) -> u32 {
         let legal = self.core.legal_actions();
         (0..500)
-            .find(|number| !legal.contains(Action::new(*number)))
+            .find(|number| !legal.contains(ActionId::new(*number)))
             .expect("not everything is legal")
             .into()
     }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use chefshat_arena::AgentKind;
-use chefshat_engine::{Action, Seat};
+use chefshat_engine::{ActionId, Seat};
 
 use super::{AnswerInput, Core, OPEN, Table, Verdict, ms, one_shift};
 use crate::room::core::{BadJournal, ConnectionId, JOIN_HOLD, RECALL_TIME, State};
@@ -140,7 +140,7 @@ fn built_in_agents_do_what_they_would_have_done() {
         table.pass_time(Duration::from_secs(60));
         assert_eq!(table.core.state(), State::Finished);
         table.assert_replays();
-        let actions: Vec<(Seat, Action)> = table
+        let actions: Vec<(Seat, ActionId)> = table
             .journal
             .iter()
             .filter_map(|entry| match &entry.change {
@@ -323,7 +323,7 @@ fn a_journal_that_does_not_fit_is_refused() {
     let damages: [(&str, Damage); 4] = [
         ("not legal", |change| {
             if let Change::Decided(decided) = change {
-                decided.action = Action::new(9_999);
+                decided.action = ActionId::new(9_999);
             }
         }),
         ("of this seat", |change| {

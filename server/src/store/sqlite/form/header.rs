@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use chefshat_engine::Action;
+use chefshat_engine::ActionId;
 use chefshat_proto::v1;
 use chefshat_records::convert::{FieldProblem, rules_from_proto, rules_to_proto};
 use chefshat_records::seeds::SeedPlan;
@@ -94,7 +94,7 @@ pub(in crate::store::sqlite) fn header_from_bytes(bytes: &[u8]) -> Result<GameHe
     let field = |problem: FieldProblem| Unreadable(problem.to_string());
     let rules = rules_from_proto(&form.rules.unwrap_or_default()).map_err(field)?;
     let actions = form.actions_taken_over.iter().copied().map(action);
-    let actions: Vec<Action> = actions.collect::<Result<_, _>>()?;
+    let actions: Vec<ActionId> = actions.collect::<Result<_, _>>()?;
     let start = form.start.unwrap_or_default();
     Ok(GameHeader {
         room_id: Id(array(&form.room_id, "the room's id")?),

@@ -6,7 +6,7 @@ mod entry;
 mod header;
 mod tournament;
 
-use chefshat_engine::Action;
+use chefshat_engine::ActionId;
 use chefshat_proto::v1;
 use prost::Message as _;
 
@@ -59,9 +59,9 @@ pub(super) fn lines_from_bytes(mut bytes: &[u8]) -> Result<Vec<v1::RecordLine>, 
     Ok(lines)
 }
 
-fn action(number: u32) -> Result<Action, Unreadable> {
+fn action(number: u32) -> Result<ActionId, Unreadable> {
     u16::try_from(number)
-        .map(Action::new)
+        .map(ActionId::new)
         .map_err(|_| Unreadable::new(format!("{number} is no action")))
 }
 
