@@ -9,8 +9,8 @@ use tracing::{error, info};
 
 use crate::config::MAX_RECORDS_IN_HAND;
 use crate::convert;
-use crate::ids::Id;
 use crate::store::Store;
+use chefshat_room::ids::Id;
 
 /// Writes records to the folder of records of a data directory.
 #[derive(Clone)]
@@ -55,8 +55,8 @@ impl Filing {
         };
         let written = tokio::task::spawn_blocking(move || {
             let lines = convert::lines_of(&kept);
-            let path = chefshat_records::jsonl::path_of(&data_dir, &game.to_string());
-            chefshat_records::jsonl::write(&path, &lines).map(|()| path)
+            let path = chefshat_record::jsonl::path_of(&data_dir, &game.to_string());
+            chefshat_record::jsonl::write(&path, &lines).map(|()| path)
         })
         .await;
         match written {

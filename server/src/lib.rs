@@ -2,15 +2,12 @@
 //! line of the binary `chefshat`. The game itself lives in `chefshat-engine`, what is played offline in `chefshat-arena`, the form of
 //! records in `chefshat-records`.
 
-pub mod cli;
 pub mod config;
 pub mod connections;
 pub mod convert;
-pub mod examiner;
 pub mod filing;
 pub mod grpc;
 pub mod host;
-pub mod ids;
 pub mod outbox;
 pub mod room;
 pub mod rooms;

@@ -312,7 +312,7 @@ mod tests {
     use chefshat_proto::v1::GameEvent;
     use futures::{FutureExt as _, StreamExt as _};
 
-    use super::*;
+    use crate::outbox::*;
 
     type Pieces = Vec<SpectatorServiceWatchResponse>;
 

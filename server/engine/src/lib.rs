@@ -34,11 +34,13 @@ mod metrics;
 mod observation;
 mod order;
 mod patterns;
+mod played;
 mod presets;
 mod requirement;
 mod rewards;
 mod roles;
 mod rules;
+mod seed_plan;
 
 pub use actions::{Action, ActionSpace};
 pub use by_seat::BySeat;
@@ -51,6 +53,7 @@ pub use mask::Mask;
 pub use metrics::{MetricsRecorder, SeatMetrics, ShiftMetrics};
 pub use observation::{Board, Observation};
 pub use order::{SeatOrder, Standings};
+pub use played::{PlayedDecision, RecordedDecision, TakenOver};
 pub use requirement::{GiftRequirement, PlayRequirement, Requirement};
 pub use rewards::RewardScheme;
 pub use roles::{Role, SpecialAction};
@@ -64,3 +67,4 @@ pub const MAX_SEATS: usize = 6;
 pub const MAX_FACES: u8 = 15;
 /// The most jokers a deck can have.
 pub const MAX_JOKERS: u8 = 2;
+pub use seed_plan::{MAX_ENTROPY, SeedPlan};

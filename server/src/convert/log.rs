@@ -1,20 +1,20 @@
 //! The log of a room as events of the protocol, as a viewer may see them. What of the engine's events a viewer may see is decided by
 //! `Event::seen_by`; rewards are withheld here, because only rooms have them.
 
+use chefshat_engine::SeedPlan;
 use chefshat_engine::{Event, Game, Seat, Viewer};
 use chefshat_proto::v1::{self, game_event::Kind};
-use chefshat_records::convert::{
+use chefshat_record::convert::{
     By, action_space, event_kind, final_table, rules_to_proto, seat_number,
 };
-use chefshat_records::seeds::SeedPlan;
 use prost::Message as _;
 
 use super::decision::source_to_proto;
 use super::policy::policy_of;
 use super::room::{kind_to_proto, participants};
-use crate::room::core::Core;
-use crate::room::log::{ByWhom, Happening, LogEntry};
-use crate::store::journal::AbortReason;
+use chefshat_room::Core;
+use chefshat_room::journal::AbortReason;
+use chefshat_room::log::{ByWhom, Happening, LogEntry};
 
 /// The event at a position of the log (from 0), as `viewer` may see it; `None` beyond the end.
 pub fn view(core: &Core, position: usize, viewer: Viewer) -> Option<v1::GameEvent> {
@@ -142,7 +142,7 @@ pub(super) fn abort_reason(reason: AbortReason) -> v1::AbortReason {
 
 /// For events that no decision stands behind alone.
 const UNDECIDED: ByWhom = ByWhom {
-    source: crate::store::journal::Source::Agent,
+    source: chefshat_room::journal::Source::Agent,
     time_us: 0,
     reward: None,
 };

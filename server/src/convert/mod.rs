@@ -4,7 +4,6 @@
 mod decision;
 mod log;
 mod name;
-mod played;
 mod players;
 mod policy;
 mod ratings;
@@ -15,15 +14,11 @@ mod start;
 mod tournament;
 mod vector;
 
-pub use decision::{
-    annotations_from_proto, answer_result, decision_kind, expression_from_proto,
-    observation_from_proto, observation_to_proto, put_requirement,
-};
+pub use decision::{annotations_from_proto, answer_result, expression_from_proto};
 pub use log::{game_started, view};
 pub use name::name_to_show;
-pub use played::{MAX_RECORDED_ATTEMPTS, Played};
 pub use players::recorded_player;
-pub use policy::{millis, policy_from_proto, policy_to_proto};
+pub use policy::{millis, policy_from_proto, policy_to_proto, simulation_policy};
 pub use ratings::{leaderboard, rating_to_proto};
 pub use record::{lines_of, record_lines, summary};
 pub use room::{

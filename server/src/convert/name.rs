@@ -1,6 +1,6 @@
 //! Names to show, of rooms, tournaments and those who play: which are taken.
 
-use chefshat_records::convert::FieldProblem;
+use chefshat_record::convert::FieldProblem;
 
 use crate::config::MAX_NAME_CHARS;
 

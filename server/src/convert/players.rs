@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
-use chefshat_arena::{RecordedDecision, RecordedPlayer};
+use chefshat_agents::RecordedPlayer;
 use chefshat_proto::v1;
-use chefshat_records::players::{self, PlayerError};
+use chefshat_record::players;
+use chefshat_record::players::PlayerError;
 
 /// The player of a seat of a recorded game, for `BuiltInAgent::replay`.
 ///
@@ -14,12 +15,6 @@ pub fn recorded_player(
     lines: &[v1::RecordLine],
     seat: u32,
 ) -> Result<Arc<RecordedPlayer>, PlayerError> {
-    let decisions = players::recorded_player(lines, seat)?.into_iter();
-    let player = RecordedPlayer::new(decisions.map(|decision| RecordedDecision {
-        observation: decision.observation,
-        legal: decision.legal,
-        action: decision.action,
-        own: decision.own,
-    }));
-    Ok(Arc::new(player))
+    let decisions = players::recorded_player(lines, seat)?;
+    Ok(Arc::new(RecordedPlayer::new(decisions)))
 }

@@ -3,14 +3,15 @@
 use std::ops::RangeInclusive;
 use std::time::Duration;
 
-use chefshat_arena::AgentKind;
+use chefshat_agents::AgentKind;
+use chefshat_engine::RewardScheme;
 use chefshat_proto::v1;
-use chefshat_records::convert::{FieldProblem, reward_scheme_from_proto, reward_scheme_to_proto};
+use chefshat_record::convert::{FieldProblem, reward_scheme_from_proto, reward_scheme_to_proto};
 
 use super::room::{kind_from_proto, kind_to_proto};
-use crate::room::core::{Core, State};
-use crate::room::policy::{AbortPolicy, Durability, KindClock, Policy};
-use crate::store::journal::ParticipantKind;
+use chefshat_room::journal::ParticipantKind;
+use chefshat_room::policy::{AbortPolicy, Durability, KindClock, Policy};
+use chefshat_room::{Core, State};
 
 /// A day, the longest time a policy may name, milliseconds.
 const DAY_MS: u32 = 86_400_000;
@@ -122,6 +123,20 @@ pub fn policy_to_proto(policy: &Policy) -> v1::RoomPolicy {
     }
 }
 
+/// The policy of a game that is played without a room, where nobody waits for anybody: only its limits and rewards mean something.
+pub fn simulation_policy(
+    max_invalid_attempts: Option<u32>,
+    reward_scheme: Option<RewardScheme>,
+) -> v1::RoomPolicy {
+    policy_to_proto(&Policy {
+        max_invalid_attempts,
+        reward_scheme,
+        pace: Some(Duration::ZERO),
+        clocks: Vec::new(),
+        ..Policy::default()
+    })
+}
+
 /// Clocks for kinds of participants, each kind at most once. Times that were chosen for the room are everybody's, also people's.
 fn clocks(policy: &v1::RoomPolicy) -> Result<Vec<KindClock>, FieldProblem> {
     let mut clocks: Vec<KindClock> = Vec::new();
@@ -188,4 +203,45 @@ fn in_range(
 
 pub(super) fn unknown(field: &'static str, value: i32) -> FieldProblem {
     FieldProblem::new(field, format!("{value} is not a value of this enum"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn people_have_more_time_unless_somebody_says_otherwise() {
+        let policy = Policy::default();
+        let times = |kind| {
+            (
+                policy.decision_time_of(Some(kind)),
+                policy.bank_of(Some(kind)),
+            )
+        };
+        assert_eq!(
+            times(ParticipantKind::Human),
+            (
+                Duration::from_millis(60_000),
+                Duration::from_millis(300_000)
+            )
+        );
+        assert_eq!(
+            times(ParticipantKind::Agent),
+            (Duration::from_millis(10_000), Duration::from_millis(60_000))
+        );
+        let chosen = v1::RoomPolicy {
+            decision_time_ms: Some(2000),
+            ..v1::RoomPolicy::default()
+        };
+        let read =
+            |message: v1::RoomPolicy| policy_from_proto(&message).expect("the policy makes sense");
+        let chosen = read(chosen);
+        for policy in [&policy, &chosen] {
+            assert_eq!(read(policy_to_proto(policy)), *policy);
+        }
+        assert_eq!(
+            chosen.decision_time_of(Some(ParticipantKind::Human)),
+            Duration::from_millis(2000)
+        );
+    }
 }

@@ -1,8 +1,8 @@
 //! Ratings as everybody sees them. How they come about is in `chefshat-arena`, which games count in `chefshat-records`.
 
-use chefshat_arena::ratings::{Rated, Ratings};
 use chefshat_proto::v1;
-use chefshat_records::outcome::Identity;
+use chefshat_record::outcome::Identity;
+use chefshat_tournament::ratings::{Rated, Ratings};
 
 /// A rating and how many games it came from.
 pub fn rating_to_proto(rated: &Rated) -> v1::Rating {

@@ -5,18 +5,19 @@ use std::sync::Arc;
 
 use chefshat_engine::Viewer;
 use chefshat_proto::v1::{self, record_line::Line};
-use chefshat_records::convert::{action_space, invalid_reward, rules_to_proto, seat_number};
-use chefshat_records::jsonl::FORMAT_VERSION;
+use chefshat_record::convert::{action_space, invalid_reward, rules_to_proto, seat_number};
+use chefshat_record::jsonl::FORMAT_VERSION;
 use prost::Message as _;
 
-use super::decision::{decision_kind, mask_bytes, source_to_proto};
+use super::decision::{mask_bytes, source_to_proto};
 use super::log::{standings, view};
 use super::policy::policy_of;
 use super::room::{aborted_because, participants, series_id, state_to_proto, tournament_id};
 use super::start::{origin, start_to_proto};
-use crate::room::core::Core;
 use crate::store::KeptGame;
-use crate::store::journal::{Change, Decided, Entry, GameHeader};
+use chefshat_record::convert::decision_kind;
+use chefshat_room::Core;
+use chefshat_room::journal::{Change, Decided, Entry, GameHeader};
 
 /// Every line of the record of a game, from its header and its journal.
 pub fn record_lines(header: &Arc<GameHeader>, journal: &[Entry]) -> Vec<v1::RecordLine> {

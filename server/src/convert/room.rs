@@ -2,18 +2,18 @@
 
 use std::collections::BTreeMap;
 
-use chefshat_arena::BuiltInAgent;
+use chefshat_agents::BuiltInAgent;
 use chefshat_engine::{MAX_SEATS, RuleSet, Seat};
 use chefshat_proto::v1::{self, seat_config::FilledBy};
-use chefshat_records::convert::{FieldProblem, rules_to_proto, seat_number};
+use chefshat_record::convert::{FieldProblem, rules_to_proto, seat_number};
 
 use super::log::abort_reason;
 use super::name::name_to_show;
 use super::policy::{agent, policy_of};
 use super::start::{branch_point, origin};
-use crate::ids::Id;
-use crate::room::core::{Core, State};
-use crate::store::journal::{Fill, GameHeader, ParticipantKind, RecordedSeat};
+use chefshat_room::ids::Id;
+use chefshat_room::journal::{Fill, GameHeader, ParticipantKind, RecordedSeat};
+use chefshat_room::{Core, State};
 
 /// What fills the seats of a new room; none given means that all are open.
 ///

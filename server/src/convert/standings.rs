@@ -1,8 +1,8 @@
 //! Standings of a tournament as everybody sees them, with ratings and how sure their order is. How they come about is in `chefshat-arena`.
 
-use chefshat_arena::ratings::Ratings;
-use chefshat_arena::tournament::Tournament;
 use chefshat_proto::v1;
+use chefshat_tournament::Tournament;
+use chefshat_tournament::ratings::Ratings;
 
 use super::{number, rating_to_proto};
 

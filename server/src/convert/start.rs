@@ -2,10 +2,10 @@
 
 use chefshat_engine::{ActionId, RuleSet, Seed};
 use chefshat_proto::v1;
-use chefshat_records::convert::{FieldProblem, script_from_proto, script_to_proto};
+use chefshat_record::convert::{FieldProblem, script_from_proto, script_to_proto};
 
-use crate::ids::Id;
-use crate::store::journal::{Branch, GameHeader, GameStart, TakenOver};
+use chefshat_room::ids::Id;
+use chefshat_room::journal::{Branch, GameHeader, GameStart, TakenOver};
 
 /// Where a game comes from.
 pub(super) fn origin(header: &GameHeader) -> v1::GameOrigin {

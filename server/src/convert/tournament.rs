@@ -1,19 +1,19 @@
 //! What a tournament is to be, checked, and tournaments as everybody sees them.
 
-use chefshat_arena::AgentKind;
-use chefshat_arena::tournament::{
-    Deals, EntrantKind, Format, Game, GameState, MAX_PARTICIPANTS, Settings, State, Tournament,
-};
+use chefshat_agents::AgentKind;
 use chefshat_engine::RuleSet;
 use chefshat_proto::v1;
-use chefshat_records::convert::{FieldProblem, rules_from_proto, rules_to_proto};
+use chefshat_record::convert::{FieldProblem, rules_from_proto, rules_to_proto};
+use chefshat_tournament::{
+    Deals, EntrantKind, Format, Game, GameState, MAX_PARTICIPANTS, Settings, State, Tournament,
+};
 
 use super::number;
 use super::policy::{agent, policy_from_proto, policy_to_proto, unknown};
 use super::room::{kind_from_proto, kind_to_proto};
-use crate::ids::Id;
-use crate::room::policy::{AbortPolicy, Policy};
-use crate::store::journal::ParticipantKind;
+use chefshat_room::ids::Id;
+use chefshat_room::journal::ParticipantKind;
+use chefshat_room::policy::{AbortPolicy, Policy};
 
 /// What is taken where a request does not say.
 const STANDARD_PARTICIPANTS: u32 = 64;

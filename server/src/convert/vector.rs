@@ -3,21 +3,21 @@
 
 use std::num::{NonZeroU32, NonZeroU64};
 
-use chefshat_arena::AgentKind;
-use chefshat_arena::vector::{
-    Batch, Decisions, Episode, InvalidActions, ObservationColumns, Seeds, SetupError, Start,
-    VectorSetup,
-};
+use chefshat_agents::AgentKind;
 use chefshat_engine::{RuleSet, RuleSetSpec, Seed, Stop};
 use chefshat_proto::v1::{self, vector_reset, vector_setup};
-use chefshat_records::convert::{
+use chefshat_record::convert::{
     FieldProblem, action_space, reward_scheme_from_proto, rules_to_proto, seat_from_number,
     seat_number,
 };
+use chefshat_simulation::vector::{
+    Batch, Decisions, Episode, InvalidActions, ObservationColumns, Seeds, SetupError, Start,
+    VectorSetup,
+};
 
-use super::played::MAX_RECORDED_ATTEMPTS;
 use super::policy::{agent, unknown};
 use crate::config::{MAX_HOSTED_SHIFTS, MAX_VECTOR_RECORDED_GAMES, MAX_VECTOR_SEEDS};
+use chefshat_record::convert::MAX_RECORDED_ATTEMPTS;
 
 /// The games a message asks for, its rules, start and seeds having been looked at.
 ///
@@ -349,14 +349,14 @@ pub fn setup_seeds(
 
 #[cfg(test)]
 mod tests {
-    use chefshat_arena::game_seed;
-    use chefshat_arena::vector::{MAX_SEATS_PLAYED, VectorGames};
+    use chefshat_agents::game_seed;
     use chefshat_engine::{ActionId, DecisionKind, Role};
+    use chefshat_simulation::vector::{MAX_SEATS_PLAYED, VectorGames};
     use prost::Message as _;
 
-    use super::*;
     use crate::config::MAX_VECTOR_BATCH_BYTES;
-    use crate::convert::decision_kind;
+    use crate::convert::vector::*;
+    use chefshat_record::convert::decision_kind;
 
     fn actions(batch: &Batch) -> Vec<ActionId> {
         let width = batch.masks.len() / batch.rows as usize;

@@ -80,7 +80,7 @@ async fn send(sender: &Sender, message: FollowTournamentResponse) -> Result<(), 
 mod tests {
     use tonic_types::StatusExt as _;
 
-    use super::*;
+    use crate::grpc::follow::*;
 
     #[tokio::test(start_paused = true)]
     async fn a_follower_that_takes_nothing_in_is_given_up() {

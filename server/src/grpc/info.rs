@@ -3,12 +3,12 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use chefshat_arena::AgentKind;
-use chefshat_arena::tournament::{MAX_GAMES, MAX_PARTICIPANTS};
-use chefshat_arena::vector::MAX_SEATS_PLAYED;
+use chefshat_agents::AgentKind;
 use chefshat_engine::{ActionId, ActionSpace, RULES_VERSION, RuleSetSpec};
 use chefshat_proto::v1::{self, server_service_server::ServerService};
-use chefshat_records::convert::{FieldProblem, action_space, rules_to_proto};
+use chefshat_record::convert::{FieldProblem, action_space, rules_to_proto};
+use chefshat_simulation::vector::MAX_SEATS_PLAYED;
+use chefshat_tournament::{MAX_GAMES, MAX_PARTICIPANTS};
 use tonic::{Request, Response, Status};
 
 use super::status::field;

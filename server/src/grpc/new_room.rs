@@ -3,21 +3,21 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use chefshat_arena::RecordedPlayer;
+use chefshat_agents::RecordedPlayer;
 use chefshat_engine::{RuleSet, Stop};
 use chefshat_proto::v1::{self, create_room_request::Start};
-use chefshat_records::branch::{BranchError, branch_of};
-use chefshat_records::convert::{FieldProblem, rules_from_proto, script_from_proto, seat_number};
+use chefshat_record::branch::{BranchError, branch_of};
+use chefshat_record::convert::{FieldProblem, rules_from_proto, script_from_proto, seat_number};
 use tonic::{Code, Status};
 
 use super::recorded::Recorded;
 use super::status::{field, status};
 use crate::config::MAX_HOSTED_SHIFTS;
 use crate::convert;
-use crate::ids::Id;
-use crate::room::policy::{Durability, Policy};
 use crate::rooms::NewRoom;
-use crate::store::journal::{Branch, Fill, GameStart};
+use chefshat_room::ids::Id;
+use chefshat_room::journal::{Branch, Fill, GameStart};
+use chefshat_room::policy::{Durability, Policy};
 
 /// Rules, start and fixed game seed of a new room.
 struct Beginning {

@@ -1,6 +1,6 @@
 //! Lists that are given out page by page: how much of one page is asked for, and where it begins.
 
-use chefshat_records::convert::FieldProblem;
+use chefshat_record::convert::FieldProblem;
 use tonic::Status;
 
 use super::status::field;

@@ -8,7 +8,7 @@ use std::pin::Pin;
 use std::sync::Arc;
 
 use chefshat_proto::v1::{self, act_request};
-use chefshat_records::convert::FieldProblem;
+use chefshat_record::convert::FieldProblem;
 use futures::{Stream, StreamExt as _};
 use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
@@ -17,13 +17,13 @@ use tonic::{Request, Response, Status, Streaming};
 use super::status::{Refusal, field, ticket_unknown};
 use crate::config::{HEARTBEAT, MAX_SEATS_PER_WATCH};
 use crate::convert;
-use crate::ids::Token;
 use crate::outbox::{Outbox, OutboxStream};
 use crate::room::SeatAction;
 use crate::rooms::Rooms;
 use crate::tournaments::Tournaments;
 use crate::wire::Updates;
 use crate::wire::service::play_service_server::PlayService;
+use chefshat_room::ids::Token;
 use reader::Reader;
 
 /// The service.

@@ -10,9 +10,9 @@ use tonic::{Code, Status};
 use super::status::{self, status};
 use crate::config::MAX_RECORDS_IN_HAND;
 use crate::convert::lines_of;
-use crate::ids::Id;
 use crate::rooms::Rooms;
 use crate::store::StoreError;
+use chefshat_room::ids::Id;
 
 /// Why a record is withheld for a while.
 pub(super) const SERIES_OPEN: &str = "SERIES_OPEN";

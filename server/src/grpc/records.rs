@@ -5,10 +5,10 @@ use std::pin::Pin;
 use std::sync::Arc;
 
 use chefshat_proto::v1::{self, record_service_server::RecordService};
-use chefshat_records::convert::FieldProblem;
-use chefshat_records::jsonl::excess;
-use chefshat_records::replay;
-use chefshat_records::summary::summary;
+use chefshat_record::convert::FieldProblem;
+use chefshat_record::jsonl::excess;
+use chefshat_record::replay;
+use chefshat_record::summary::summary;
 use futures::Stream;
 use prost::Message as _;
 use tokio::sync::{Semaphore, mpsc};
@@ -23,8 +23,8 @@ use crate::config::{
     IMPORT_TIMEOUT, MAX_IMPORT_BYTES, MAX_IMPORT_LINES, MAX_IMPORTS, MAX_RECORDS_SENT,
     RECORD_SEND_TIMEOUT,
 };
-use crate::ids::Id;
 use crate::store::Part;
+use chefshat_room::ids::Id;
 
 /// Lines in one message, and bytes, but for a single line of more: well below what gRPC clients accept.
 const LINES_PER_MESSAGE: usize = 512;

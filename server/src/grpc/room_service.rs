@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use chefshat_proto::v1::{self, room_service_server::RoomService};
-use chefshat_records::convert::{FieldProblem, seat_number};
+use chefshat_record::convert::{FieldProblem, seat_number};
 use tonic::{Code, Request, Response, Status};
 
 use super::new_room::new_room;
@@ -11,10 +11,10 @@ use super::pages;
 use super::recorded::Recorded;
 use super::status::{self, Refusal, field, room_unknown, ticket_unknown};
 use crate::convert;
-use crate::ids::{Id, Token};
 use crate::room::{Handle, JoinRequest};
 use crate::rooms::Rooms;
-use crate::store::journal::ParticipantKind;
+use chefshat_room::ids::{Id, Token};
+use chefshat_room::journal::ParticipantKind;
 
 /// Rooms looked at for one page.
 const ROOMS_LOOKED_AT: usize = 200;

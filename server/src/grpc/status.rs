@@ -4,13 +4,13 @@
 use std::collections::HashMap;
 
 use chefshat_proto::v1;
-use chefshat_records::convert::FieldProblem;
+use chefshat_record::convert::FieldProblem;
 use tonic::{Code, Status};
 use tonic_types::{ErrorDetails, StatusExt as _};
 
-use crate::room::core::{ExpressError, JoinError, LeaveError};
 use crate::room::{RoomGone, SpectateError};
 use crate::rooms::CreateError;
+use chefshat_room::{ExpressError, JoinError, LeaveError};
 
 /// Domain of every `ErrorInfo`.
 const DOMAIN: &str = "chefshat";

@@ -3,9 +3,9 @@
 use std::pin::Pin;
 use std::sync::Arc;
 
-use chefshat_arena::tournament::{BeginProblem, JoinProblem};
 use chefshat_proto::v1::{self, tournament_service_server::TournamentService};
-use chefshat_records::convert::FieldProblem;
+use chefshat_record::convert::FieldProblem;
+use chefshat_tournament::{BeginProblem, JoinProblem};
 use futures::Stream;
 use tokio::sync::{Semaphore, mpsc};
 use tokio_stream::wrappers::ReceiverStream;
@@ -19,9 +19,9 @@ use super::recorded::Recorded;
 use super::status::{disk_nearly_full, field, shutting_down, status, store_failed};
 use crate::config::{MAX_FOLLOWERS, MAX_GAMES_PAGE, MAX_LEADERBOARD_LINES, MAX_RESULTS_IN_HAND};
 use crate::convert;
-use crate::ids::{Id, random_bytes};
-use crate::store::journal::ParticipantKind;
 use crate::tournaments::{CreateProblem, Entry, Hosted, Leaderboard, Stopped, Tournaments};
+use chefshat_room::ids::{Id, random_bytes};
+use chefshat_room::journal::ParticipantKind;
 
 /// Games of a page, and lines of a leaderboard, where a request does not say.
 const STANDARD_LINES: u32 = 100;
@@ -68,7 +68,7 @@ impl TournamentCalls {
         let hosted = match id {
             "" => self.tournaments.by_code(join_code),
             id => Some(self.find(id)?)
-                .filter(|hosted| crate::ids::normal_code(join_code) == hosted.join_code()),
+                .filter(|hosted| chefshat_room::ids::normal_code(join_code) == hosted.join_code()),
         };
         hosted.ok_or_else(|| {
             status(

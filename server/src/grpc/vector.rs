@@ -1,21 +1,21 @@
 //! `VectorService`: games of a client's own, stepped in batches on a thread pool of their own, so that rooms keep their clocks. How the games
-//! go is decided in `chefshat_arena::vector`; here streams are read and written, and the records of games are cut into messages.
+//! go is decided in `chefshat_simulation::vector`; here streams are read and written, and the records of games are cut into messages.
 
 use std::panic::AssertUnwindSafe;
 use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_arena::AgentKind;
-use chefshat_arena::vector::{
-    Batch, InvalidActions, PlayedGame, Start, StepError, VectorGames, VectorSetup,
-};
+use chefshat_agents::AgentKind;
 use chefshat_engine::{ActionId, RuleSet, Seed};
 use chefshat_proto::v1::{
     self, run_request::Request as Asked, run_response::Response as Said,
     vector_service_server::VectorService, vector_setup,
 };
-use chefshat_records::branch::{BranchError, branch_of};
-use chefshat_records::convert::{FieldProblem, rules_from_proto, script_from_proto};
+use chefshat_record::branch::{BranchError, branch_of};
+use chefshat_record::convert::{FieldProblem, rules_from_proto, script_from_proto};
+use chefshat_simulation::vector::{
+    Batch, InvalidActions, PlayedGame, Start, StepError, VectorGames, VectorSetup,
+};
 use prost::Message as _;
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 use tokio::sync::mpsc::error::SendTimeoutError;
@@ -32,8 +32,10 @@ use crate::config::{
     MAX_VECTOR_SEATS_IN_ALL, MAX_VECTOR_STREAMS, VECTOR_IDLE_TIMEOUT, VECTOR_SEND_TIMEOUT,
     VECTOR_SETUP_TIMEOUT,
 };
-use crate::convert::{self, Played, Reset};
-use crate::ids::random_bytes;
+use crate::convert;
+use crate::convert::Reset;
+use chefshat_record::convert::Played;
+use chefshat_room::ids::random_bytes;
 
 /// Messages that wait for a client that reads slowly. It has at most one batch to answer, so more are parts of records.
 const SEND_AHEAD: usize = 4;
@@ -329,16 +331,17 @@ fn moved(games: &mut VectorGames, asked: Move) -> Result<Batch, StepError> {
 
 /// The record of a game, in parts.
 fn record_parts(setup: &VectorSetup, played: &PlayedGame) -> Vec<v1::VectorRecord> {
+    let limit = match setup.invalid_actions() {
+        InvalidActions::AskAgain { limit } => limit.map(|limit| limit.get()),
+        InvalidActions::Error => None,
+    };
     let record = Played {
         by: "vector",
         rules: setup.rules(),
         agents: &setup.agents().map(|agent| agent.map(AgentKind::name)),
         seed: played.seed,
         scheme: setup.scheme(),
-        max_invalid_attempts: match setup.invalid_actions() {
-            InvalidActions::AskAgain { limit } => limit.map(|limit| limit.get()),
-            InvalidActions::Error => None,
-        },
+        policy: &convert::simulation_policy(limit, setup.scheme()),
         decisions: &played.decisions,
     };
     let mut parts = vec![v1::VectorRecord::default()];
@@ -481,7 +484,7 @@ fn too_late(reason: &str, what: &str, limit: Duration, advice: &str) -> Status {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use crate::grpc::vector::*;
 
     #[tokio::test]
     async fn work_that_panics_ends_nothing_but_itself() {

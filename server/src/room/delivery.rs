@@ -9,16 +9,16 @@ use std::time::Duration;
 use chefshat_engine::{Event, Seat, Viewer};
 use chefshat_proto::v1::{self, seat_update::Update};
 
-use chefshat_records::convert::seat_number;
+use chefshat_record::convert::seat_number;
 
 use tonic::Status;
 
-use super::core::{ConnectionId, Core};
-use super::log::Happening;
 use crate::convert;
-use crate::ids::Token;
 use crate::outbox::{HandStamp, OnSpace, Outbox, Pile as _};
 use crate::wire::{Events, Updates, encode_decision, put_event};
+use chefshat_room::ids::Token;
+use chefshat_room::log::Happening;
+use chefshat_room::{ConnectionId, Core};
 
 /// Events that gather for a seat before they are sent without a decision.
 pub const MAX_HELD_EVENTS: usize = 128;
@@ -307,7 +307,7 @@ pub fn snapshot(core: &Core, viewer: Viewer) -> v1::Snapshot {
         game_started: core.game().map(|_| convert::game_started(core)),
         observation: core
             .observe(viewer)
-            .map(|observation| convert::observation_to_proto(&observation)),
+            .map(|observation| chefshat_record::convert::observation_to_proto(&observation)),
         next_sequence: u64::try_from(core.log().len()).unwrap_or(u64::MAX) + 1,
     }
 }

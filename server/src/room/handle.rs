@@ -9,12 +9,12 @@ use chefshat_proto::v1::{self, SpectatorServiceWatchResponse};
 use tokio::sync::{mpsc, oneshot};
 use tokio::time::Instant;
 
-use super::core::{ConnectionId, ExpressError, JoinError, LeaveError};
 use super::delivery::Wishes;
-use crate::ids::{Id, Token};
 use crate::outbox::{OnSpace, Outbox};
-use crate::store::journal::{AbortReason, ParticipantKind};
 use crate::wire::Updates;
+use chefshat_room::ids::{Id, Token};
+use chefshat_room::journal::{AbortReason, ParticipantKind};
+use chefshat_room::{ConnectionId, ExpressError, JoinError, LeaveError};
 
 /// The room is gone: closed, ended long ago, or stopped because its store failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]

@@ -2,11 +2,8 @@
 //! it that receives, keeps, and only then tells; `delivery` is how what happened reaches streams.
 
 mod clock;
-pub mod core;
 pub mod delivery;
 mod handle;
-pub mod log;
-pub mod policy;
 mod spectators;
 mod task;
 #[cfg(test)]

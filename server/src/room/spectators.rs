@@ -5,11 +5,11 @@ use std::sync::Arc;
 use chefshat_engine::Viewer;
 use chefshat_proto::v1::{self, SpectatorServiceWatchResponse};
 
-use super::core::Core;
 use super::delivery::snapshot;
 use crate::convert;
 use crate::grpc::status;
 use crate::outbox::{OnSpace, Outbox};
+use chefshat_room::Core;
 use tonic::Status;
 
 /// Events that may happen while a spectator's stream has no space, before it is cut off.

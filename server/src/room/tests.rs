@@ -5,26 +5,26 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 use std::time::Duration;
 
+use chefshat_engine::SeedPlan;
 use chefshat_engine::{RULES_VERSION, RuleSetSpec, Seat, Stop};
 use chefshat_proto::v1::{self, seat_update::Update};
-use chefshat_records::seeds::SeedPlan;
 use futures::StreamExt as _;
 use prost::Message as _;
 use tokio::time::Instant;
 use tokio_util::task::TaskTracker;
 
-use super::core::{ConnectionId, Core};
 use super::delivery::Wishes;
-use super::policy::{AbortPolicy, Policy};
 use super::{
     AttachRequest, Handle, JoinRequest, RoomClock, RoomWatcher, SeatAction, TaskContext, go_on,
 };
 use crate::filing::Filing;
-use crate::ids::{Id, SecretHash, Token};
 use crate::outbox::{Outbox, OutboxStream};
-use crate::store::journal::{Fill, GameHeader, GameStart, ParticipantKind};
 use crate::store::{MemoryStore, Store as _};
 use crate::wire::Updates;
+use chefshat_room::ids::{Id, SecretHash, Token};
+use chefshat_room::journal::{Fill, GameHeader, GameStart, ParticipantKind};
+use chefshat_room::policy::{AbortPolicy, Policy};
+use chefshat_room::{ConnectionId, Core};
 
 struct Nobody;
 

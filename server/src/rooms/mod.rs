@@ -10,21 +10,21 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, Weak};
 use std::time::Duration;
 
-use chefshat_arena::RecordedPlayer;
+use chefshat_agents::RecordedPlayer;
+use chefshat_engine::SeedPlan;
 use chefshat_engine::{RULES_VERSION, RuleSet, Seat};
-use chefshat_records::seeds::SeedPlan;
 use tokio::sync::Notify;
 use tokio::sync::futures::Notified;
 use tokio_util::task::TaskTracker;
 
 use crate::config::ServerConfig;
 use crate::filing::Filing;
-use crate::ids::{Id, Token, join_code, normal_code, random_bytes};
-use crate::room::core::Core;
-use crate::room::policy::{Durability, Policy};
 use crate::room::{Handle, RoomClock, RoomWatcher, TaskContext, go_on, since_epoch_ms};
-use crate::store::journal::{Fill, GameHeader, GameStart, SeatedParticipant, TournamentGame};
 use crate::store::{Store, StoreError};
+use chefshat_room::Core;
+use chefshat_room::ids::{Id, Token, join_code, normal_code, random_bytes};
+use chefshat_room::journal::{Fill, GameHeader, GameStart, SeatedParticipant, TournamentGame};
+use chefshat_room::policy::{Durability, Policy};
 use table::{Entry, Table};
 
 /// What a new room is to be.

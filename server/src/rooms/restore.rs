@@ -5,18 +5,18 @@ use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_arena::RecordedPlayer;
+use chefshat_agents::RecordedPlayer;
 use chefshat_engine::RULES_VERSION;
-use chefshat_records::convert::seat_number;
+use chefshat_record::convert::seat_number;
 use tracing::{error, info, warn};
 
 use super::{Entry, Rooms};
 use crate::convert;
-use crate::ids::Id;
-use crate::room::core::Core;
 use crate::room::{RoomClock, go_on, since_epoch_ms};
-use crate::store::journal::Fill;
 use crate::store::{LeftGame, Store, StoreError};
+use chefshat_room::Core;
+use chefshat_room::ids::Id;
+use chefshat_room::journal::Fill;
 
 impl Rooms {
     /// Takes up the games that were going on when the server ended, and says how many. One that cannot be gone on with is left as it is, and

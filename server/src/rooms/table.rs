@@ -4,8 +4,8 @@
 use std::collections::{BTreeMap, HashMap};
 
 use super::CreateError;
-use crate::ids::Id;
 use crate::room::Handle;
+use chefshat_room::ids::Id;
 
 #[derive(Default)]
 pub(super) struct Table {

@@ -3,9 +3,9 @@
 use chefshat_engine::RuleSetSpec;
 
 use super::*;
-use crate::ids::SecretHash;
 use crate::store::FailingStore;
-use crate::store::journal::ParticipantKind;
+use chefshat_room::ids::SecretHash;
+use chefshat_room::journal::ParticipantKind;
 
 #[tokio::test]
 async fn who_is_seated_by_a_tournament_is_kept_with_the_room() {

@@ -8,10 +8,10 @@ use futures::FutureExt as _;
 use futures::future::{BoxFuture, ready};
 use tokio::sync::watch;
 
-use super::journal::{Entry, GameHeader};
 use super::tournaments::{KeptTournament, TournamentEntry, TournamentHeader};
 use super::{Journal, KeptGame, LeftGame, MemoryStore, Part, Store, StoreError};
-use crate::ids::Id;
+use chefshat_room::ids::Id;
+use chefshat_room::journal::{Entry, GameHeader};
 
 /// A memory store whose appends fail from a certain one on.
 #[derive(Debug)]

@@ -7,10 +7,10 @@ use chefshat_proto::v1;
 use futures::FutureExt as _;
 use futures::future::{BoxFuture, pending, ready};
 
-use super::journal::{Entry, GameHeader};
 use super::tournaments::{KeptTournament, TournamentEntry, TournamentHeader};
 use super::{Journal, KeptGame, LeftGame, Part, Store, StoreError, lets_through};
-use crate::ids::Id;
+use chefshat_room::ids::Id;
+use chefshat_room::journal::{Entry, GameHeader};
 
 /// Finished games that are kept; older ones are forgotten.
 pub const MAX_FINISHED_GAMES: usize = 1_000;

@@ -2,7 +2,6 @@
 //! taken it.
 
 mod failing;
-pub mod journal;
 mod memory;
 mod sqlite;
 pub mod tournaments;
@@ -16,8 +15,8 @@ pub use failing::FailingStore;
 pub use memory::{MAX_FINISHED_ENTRIES, MAX_FINISHED_GAMES, MemoryStore};
 pub use sqlite::{ForgetError, Forgetting, Forgotten, OpenError, SqliteStore};
 
-use crate::ids::Id;
-use journal::{Entry, GameHeader, TournamentGame};
+use chefshat_room::ids::Id;
+use chefshat_room::journal::{Entry, GameHeader, TournamentGame};
 use tournaments::{KeptTournament, TournamentEntry, TournamentHeader};
 
 /// Why a store could not do what it was asked, and what to do about it.

@@ -1,10 +1,10 @@
 //! What a tournament is kept as: its header, and everything that moved it. Where its games stand is kept with the games. The form on disk
 //! belongs to the store that writes one; here are the values.
 
-use chefshat_arena::tournament::Change;
 use chefshat_proto::v1;
+use chefshat_tournament::Change;
 
-use crate::ids::{Id, SecretHash};
+use chefshat_room::ids::{Id, SecretHash};
 
 /// Everything about a tournament that stands before anybody joins.
 #[derive(Debug, Clone)]

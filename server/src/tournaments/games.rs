@@ -4,9 +4,9 @@
 
 use std::collections::BTreeMap;
 
-use chefshat_arena::tournament::{Ended, Game, SeatPlayed};
 use chefshat_proto::v1;
-use chefshat_records::outcome;
+use chefshat_record::outcome;
+use chefshat_tournament::{Ended, Game, SeatPlayed};
 use futures::future::join_all;
 use tokio::time::Instant;
 use tracing::warn;
@@ -15,11 +15,11 @@ use super::hosted::Call;
 use super::task::Task;
 use crate::config::{MAX_NAME_CHARS, TOURNAMENT_RETRY};
 use crate::convert;
-use crate::ids::Id;
 use crate::rooms::{CreateError, NewRoom, Seating};
 use crate::store::StoreError;
-use crate::store::journal::{Fill, GameStart, SeatedParticipant, TournamentGame};
 use crate::store::tournaments::TournamentEntry;
+use chefshat_room::ids::Id;
+use chefshat_room::journal::{Fill, GameStart, SeatedParticipant, TournamentGame};
 
 impl Task {
     /// Gives a game a room, which is made when that is kept.

@@ -3,20 +3,20 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard};
 
-use chefshat_arena::tournament::{BeginProblem, JoinProblem, Tournament};
 use chefshat_proto::v1;
+use chefshat_tournament::{BeginProblem, JoinProblem, Tournament};
 use sha2::{Digest as _, Sha256};
 use tokio::sync::{mpsc, oneshot, watch};
 
 use super::shown::Shown;
 use crate::convert::{self, TournamentPlan};
 use crate::grpc::status::calls_not_taken;
-use crate::ids::{Id, SecretHash, Token};
 use crate::outbox::Outbox;
 use crate::rooms::Rooms;
-use crate::store::journal::ParticipantKind;
 use crate::store::tournaments::TournamentHeader;
 use crate::wire::Updates;
+use chefshat_room::ids::{Id, SecretHash, Token};
+use chefshat_room::journal::ParticipantKind;
 
 /// What a stream is told that is attached to a participant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

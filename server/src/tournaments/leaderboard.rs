@@ -6,10 +6,10 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_arena::BuiltInAgent;
-use chefshat_arena::ratings::Ratings;
+use chefshat_agents::BuiltInAgent;
 use chefshat_proto::v1;
-use chefshat_records::outcome::Identity;
+use chefshat_record::outcome::Identity;
+use chefshat_tournament::ratings::Ratings;
 use tokio::time::Instant;
 
 use super::shared::{NotWorkedOut, Shared};
@@ -135,7 +135,7 @@ fn rated(summary: &v1::RecordSummary) -> Option<Vec<(Identity, u32)>> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use crate::tournaments::leaderboard::*;
 
     fn board(ended: u64, took: Duration) -> Board {
         Board {

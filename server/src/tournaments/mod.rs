@@ -1,5 +1,5 @@
 //! The tournaments of a server: making them, finding them, going on with them after the server ended. Who plays whom and what counts is
-//! decided in `chefshat_arena::tournament`; a tournament is moved by its `task`.
+//! decided in `chefshat_tournament`; a tournament is moved by its `task`.
 
 mod games;
 mod hosted;
@@ -14,10 +14,8 @@ mod tests;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard};
 
-use chefshat_arena::tournament::{
-    Change, Entrant, EntrantKind, SettingsProblem, State, Tournament,
-};
-use chefshat_records::convert::FieldProblem;
+use chefshat_record::convert::FieldProblem;
+use chefshat_tournament::{Change, Entrant, EntrantKind, SettingsProblem, State, Tournament};
 use tokio::sync::{mpsc, watch};
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
@@ -29,11 +27,11 @@ pub use shared::NotWorkedOut;
 
 use crate::config::{MAX_TOURNAMENTS, TOURNAMENT_MAILBOX};
 use crate::convert::{self, TournamentPlan};
-use crate::ids::{Id, Token, join_code, normal_code, random_bytes};
 use crate::room::since_epoch_ms;
 use crate::rooms::Rooms;
 use crate::store::StoreError;
 use crate::store::tournaments::{KeptTournament, TournamentEntry, TournamentHeader};
+use chefshat_room::ids::{Id, Token, join_code, normal_code, random_bytes};
 use hosted::Moving;
 use shown::Shown;
 use table::Table;
@@ -293,7 +291,7 @@ fn built_in(plan: &TournamentPlan) -> Vec<Entrant> {
             built_in: Some(*kind),
             filler: false,
             stateless: true,
-            max_games: chefshat_arena::tournament::MAX_GAMES_AT_A_TIME,
+            max_games: chefshat_tournament::MAX_GAMES_AT_A_TIME,
         });
     }
     entrants

@@ -61,7 +61,7 @@ mod tests {
 
     use tokio::sync::Notify;
 
-    use super::*;
+    use crate::tournaments::shared::*;
 
     #[tokio::test]
     async fn it_is_worked_out_once_for_all_who_ask() {

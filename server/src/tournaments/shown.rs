@@ -3,9 +3,9 @@
 
 use std::sync::Arc;
 
-use chefshat_arena::ratings::Ratings;
-use chefshat_arena::tournament::{Format, Game, GameState, State, Tournament};
 use chefshat_proto::v1;
+use chefshat_tournament::ratings::Ratings;
+use chefshat_tournament::{Format, Game, GameState, State, Tournament};
 use tokio::sync::Semaphore;
 
 use super::hosted::Hosted;

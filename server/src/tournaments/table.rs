@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::hosted::Hosted;
 use crate::config::MAX_TOURNAMENTS;
-use crate::ids::Id;
+use chefshat_room::ids::Id;
 
 #[derive(Debug, Default)]
 pub(super) struct Table {

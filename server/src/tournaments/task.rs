@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_arena::tournament::{Change, Entrant, JoinProblem, State, Tournament};
+use chefshat_tournament::{Change, Entrant, JoinProblem, State, Tournament};
 use tokio::sync::mpsc;
 use tokio::time::{Instant, sleep_until};
 use tracing::{error, info};
@@ -15,10 +15,10 @@ use super::games::plays_itself;
 use super::hosted::{Call, Connection, Entry, Hosted, Message};
 use crate::config::TOURNAMENT_OPEN_TIME;
 use crate::convert;
-use crate::ids::{Id, Token};
 use crate::rooms::Rooms;
 use crate::store::StoreError;
 use crate::store::tournaments::TournamentEntry;
+use chefshat_room::ids::{Id, Token};
 
 /// Messages that are taken before what follows from them is worked out.
 const MESSAGES_AT_A_TIME: usize = 64;

@@ -141,7 +141,7 @@ fn word(text: &str) -> HeaderValue {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use crate::web::answer::*;
 
     fn built(name: &str) -> Option<File> {
         let (media_type, text) = match name {

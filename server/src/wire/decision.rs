@@ -7,8 +7,9 @@ use chefshat_engine::{Cards, Observation, Requirement, Viewer};
 use prost::bytes::BufMut;
 use prost::encoding::{WireType, encode_key, encode_varint};
 
-use crate::convert::{decision_kind, millis};
-use crate::room::core::{Core, OpenDecision};
+use crate::convert::millis;
+use chefshat_record::convert::decision_kind;
+use chefshat_room::{Core, OpenDecision};
 
 /// Encodes the open decision as it is put to its seat.
 pub fn encode_decision(

@@ -3,6 +3,8 @@
 //! both have their updates in field 1). What stands in an update is said elsewhere: here is only how it lies on the wire.
 
 mod decision;
+#[cfg(test)]
+mod hidden_tests;
 
 use chefshat_proto::v1::{self, seat_update::Update};
 use prost::Message;
@@ -224,8 +226,8 @@ fn start_delimited(bytes: &mut Vec<u8>, field: u32, length: usize) {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::outbox::Pile as _;
+    use crate::wire::*;
 
     fn event(sequence: u64) -> v1::GameEvent {
         v1::GameEvent {

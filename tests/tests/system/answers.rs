@@ -177,7 +177,7 @@ async fn nothing_said_along_with_an_answer_spoils_the_record() {
     finish(seats).await;
     let game_id = created.room.expect("a room").game_id;
     let data = server.stop().await;
-    let path = chefshat_records::jsonl::path_of(data.path(), &game_id);
-    let record = chefshat_records::jsonl::read(&path).expect("it was written and reads back");
-    chefshat_records::replay::replay(&record).expect("it replays");
+    let path = chefshat_record::jsonl::path_of(data.path(), &game_id);
+    let record = chefshat_record::jsonl::read(&path).expect("it was written and reads back");
+    chefshat_record::replay::replay(&record).expect("it replays");
 }

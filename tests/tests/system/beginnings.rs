@@ -1,7 +1,7 @@
 //! Games from given hands, recorded players in games that they do not know, and beginnings that are refused.
 
 use chefshat_proto::v1::{self, create_room_request::Start, game_event::Kind};
-use chefshat_records::convert::{script_from_proto, script_to_proto};
+use chefshat_record::convert::{script_from_proto, script_to_proto};
 use chefshat_tests::TestServer;
 
 use crate::played::{all_recorded, built_in, ended, original, point, recorded};

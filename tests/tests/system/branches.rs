@@ -2,7 +2,7 @@
 
 use chefshat_client::Client;
 use chefshat_proto::v1::{self, game_event::Kind, seat_config::FilledBy};
-use chefshat_records::replay::replay;
+use chefshat_record::replay::replay;
 use chefshat_tests::{Launch, StreamSeat, TestServer, patiently, play_on};
 
 use crate::played::{

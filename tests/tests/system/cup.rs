@@ -245,9 +245,9 @@ fn places(lines: &[v1::RecordLine]) -> BTreeMap<u32, u32> {
 fn scores(data: &Path, games: &[v1::TournamentGame]) -> BTreeMap<u32, u64> {
     let mut scores = BTreeMap::new();
     for game in games {
-        let path = chefshat_records::jsonl::path_of(data, &game.game_id);
-        let lines = chefshat_records::jsonl::read(&path).expect("it was written");
-        chefshat_records::replay::replay(&lines).expect("it replays");
+        let path = chefshat_record::jsonl::path_of(data, &game.game_id);
+        let lines = chefshat_record::jsonl::read(&path).expect("it was written");
+        chefshat_record::replay::replay(&lines).expect("it replays");
         let mut placed: Vec<(bool, u32, u32)> = (places(&lines).into_iter())
             .map(|(seat, place)| {
                 let line = &game.seats[seat as usize];
@@ -331,7 +331,7 @@ async fn a_tournament_of_sixteen_goes_on_after_sigkill_and_counts_every_game_onc
     let mut kept = BTreeSet::new();
     for entry in std::fs::read_dir(folder.path().join("records")).expect("there are records") {
         let path = entry.expect("an entry").path();
-        let lines = chefshat_records::jsonl::read(&path).expect("a record");
+        let lines = chefshat_record::jsonl::read(&path).expect("a record");
         if let Some(Line::Header(header)) = &lines[0].line
             && header.tournament_id == id
         {

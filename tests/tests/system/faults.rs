@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use chefshat_client::Client;
 use chefshat_proto::v1::{self, record_line::Line, seat_update::Update};
-use chefshat_records::{jsonl, replay};
+use chefshat_record::{jsonl, replay};
 use chefshat_tests::{
     Ended, Habit, Launch, Ledger, Process, Regulars, SmallDisk, StreamSeat, first_legal,
     first_to_hear, is_legal, one_shift, patiently, room_of_four, skip,

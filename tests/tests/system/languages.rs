@@ -4,7 +4,7 @@ use std::process::{Output, Stdio};
 
 use chefshat_client::Client;
 use chefshat_proto::v1;
-use chefshat_records::{jsonl, replay};
+use chefshat_record::{jsonl, replay};
 use chefshat_tests::{Launch, patiently, set_up};
 use serde_json::Value;
 use tokio::process::Command;

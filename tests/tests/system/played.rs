@@ -6,7 +6,7 @@ use chefshat_engine::{DecisionKind, Game};
 use chefshat_proto::v1::{
     self, create_room_request::Start, game_event::Kind, record_line::Line, seat_config::FilledBy,
 };
-use chefshat_records::replay::{replay, walk};
+use chefshat_record::replay::{replay, walk};
 use chefshat_tests::patiently;
 
 pub(crate) fn built_in(name: &str) -> v1::SeatConfig {

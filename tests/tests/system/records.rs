@@ -150,7 +150,7 @@ async fn records_are_listed_in_pages_and_streamed_whole() {
         let mut apart = Vec::new();
         for summary in &oldest_first {
             let lines = record(&mut service, &summary.game_id).await.expect("held");
-            let replayed = chefshat_records::replay::replay(&lines).expect("it replays");
+            let replayed = chefshat_record::replay::replay(&lines).expect("it replays");
             assert_eq!(replayed.standings, summary.standings);
             assert_eq!(replayed.decisions, summary.decisions);
             assert_eq!(summary.shifts, 1);
@@ -235,11 +235,8 @@ async fn a_record_is_carried_from_one_server_to_another() {
             "{refused}"
         );
         let folder = second.stop().await;
-        let file = chefshat_records::jsonl::path_of(folder.path(), &games[0]);
-        assert_eq!(
-            chefshat_records::jsonl::read(&file).expect("written"),
-            lines
-        );
+        let file = chefshat_record::jsonl::path_of(folder.path(), &games[0]);
+        assert_eq!(chefshat_record::jsonl::read(&file).expect("written"), lines);
     }
     first.stop().await;
 }

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use chefshat_client::{Backoff, Client, PlayOptions, RandomAgent};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line, seat_update::Update};
-use chefshat_records::{jsonl, replay};
+use chefshat_record::{jsonl, replay};
 use chefshat_tests::{
     Habit, Launch, PATIENCE, Regulars, StreamSeat, patiently, random_agents, room_of_four,
 };

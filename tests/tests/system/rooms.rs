@@ -5,7 +5,7 @@ use chefshat_engine::RuleSetSpec;
 use chefshat_proto::v1::{
     self, game_event::Kind, record_line::Line, record_service_client::RecordServiceClient,
 };
-use chefshat_records::{jsonl, replay};
+use chefshat_record::{jsonl, replay};
 use chefshat_tests::{
     StreamSeat, TestServer, attach_all, one_shift, patiently, play_on, random_agents, room_of_four,
 };

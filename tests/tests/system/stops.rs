@@ -44,9 +44,9 @@ async fn a_shutdown_in_mid_game_aborts_it_as_such() {
         assert!(seat.next_or_end().await.expect("a clean end").is_none());
     }
     let data = server.stop().await;
-    let path = chefshat_records::jsonl::path_of(data.path(), &game_id);
-    let record = chefshat_records::jsonl::read(&path).expect("an aborted game has a record");
-    let replayed = chefshat_records::replay::replay(&record).expect("it replays");
+    let path = chefshat_record::jsonl::path_of(data.path(), &game_id);
+    let record = chefshat_record::jsonl::read(&path).expect("an aborted game has a record");
+    let replayed = chefshat_record::replay::replay(&record).expect("it replays");
     assert_eq!(replayed.state, v1::RoomState::Aborted);
 }
 

@@ -91,7 +91,7 @@ async fn open_and_alike(server: &TestServer, client: &Client, games: &[v1::Tourn
     let mut seeds = BTreeSet::new();
     for game in games {
         let lines = client.record(&game.game_id).await.expect("it is open now");
-        chefshat_records::replay::replay(&lines).expect("it replays");
+        chefshat_record::replay::replay(&lines).expect("it replays");
         let reveal = lines.iter().rev().find_map(|line| match &line.line {
             Some(Line::Event(event)) => match &event.kind {
                 Some(Kind::GameEnded(ended)) => ended.reveal.clone(),

@@ -267,7 +267,7 @@ async fn the_server_seats_a_participant_in_each_of_its_games() {
         };
         assert_eq!(header.tournament_id, id_of(&created));
         assert!(header.seats.iter().any(|seat| seat.name == "Ada"));
-        chefshat_records::replay::replay(&lines).expect("it replays");
+        chefshat_record::replay::replay(&lines).expect("it replays");
     }
 }
 

@@ -1,9 +1,9 @@
 //! The columns of a client's own games: every one of them says what the engine says of the same game.
 
-use chefshat_arena::game_seed;
+use chefshat_agents::game_seed;
 use chefshat_engine::{Event, Game, RuleSetSpec, Viewer};
 use chefshat_proto::v1;
-use chefshat_server::convert::{decision_kind, observation_to_proto};
+use chefshat_record::convert::{decision_kind, observation_to_proto};
 use chefshat_tests::TestServer;
 
 use crate::vectors::{play_on, setup};

@@ -3,11 +3,11 @@
 
 use std::collections::BTreeMap;
 
-use chefshat_arena::game_seed;
+use chefshat_agents::game_seed;
 use chefshat_client::{ActionId, Client, RandomAgent, VectorGames};
 use chefshat_engine::{Game, RuleSetSpec, Seed};
 use chefshat_proto::v1::{self, record_line::Line, vector_setup::Seeds, vector_setup::Start};
-use chefshat_records::replay::replay;
+use chefshat_record::replay::replay;
 use chefshat_tests::{TestServer, patiently};
 
 use crate::played::{ended, original};

@@ -3,7 +3,7 @@
 
 import "./drawing.css";
 
-const files = import.meta.glob<string>("../../../../server/records/src/picture/symbols/*.svg", {
+const files = import.meta.glob<string>("../../../../server/assets/symbols/*.svg", {
   query: "?raw",
   import: "default",
   eager: true,

@@ -9,9 +9,9 @@ use chefshat_proto::v1::{self, seat_update::Update};
 use super::reader::{Reader, too_many_seats};
 use crate::convert;
 use crate::grpc::status::ticket_unknown;
-use crate::ids::{Id, Token};
 use crate::tournaments::{Call, Connection, Hosted};
 use crate::wire::Updates;
+use chefshat_room::ids::{Id, Token};
 
 /// First handle of the seats that the server attaches by itself.
 pub(super) const FIRST_CALLED: u32 = 1 << 31;

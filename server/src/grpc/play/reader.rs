@@ -7,9 +7,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::task::Poll;
 
+use chefshat_engine::MAX_ENTROPY;
 use chefshat_proto::v1::{self, seat_command::Command, seat_update::Update};
-use chefshat_records::convert::FieldProblem;
-use chefshat_records::seeds::MAX_ENTROPY;
+use chefshat_record::convert::FieldProblem;
 use futures::StreamExt as _;
 use tokio::sync::mpsc;
 use tokio::time::Instant;
@@ -19,14 +19,14 @@ use super::participants::{BoundParticipant, FIRST_CALLED};
 use super::{answer_action, express_action};
 use crate::config::{MAX_CALLS_WAITING, MAX_COMMANDS_PER_MESSAGE, MAX_SEATS_PER_STREAM};
 use crate::grpc::status::{field, refused, room_gone, status, ticket_unknown};
-use crate::ids::Token;
 use crate::outbox::Outbox;
-use crate::room::core::ConnectionId;
 use crate::room::delivery::Wishes;
 use crate::room::{AttachRequest, Handle, RoomGone, SeatAction};
 use crate::rooms::Rooms;
 use crate::tournaments::{Call, Tournaments};
 use crate::wire::Updates;
+use chefshat_room::ConnectionId;
+use chefshat_room::ids::Token;
 
 /// A seat that is attached to a stream.
 pub(super) struct BoundSeat {

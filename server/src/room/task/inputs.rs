@@ -11,10 +11,10 @@ use super::Task;
 use super::outputs::{Release, answer};
 use crate::convert;
 use crate::grpc::status::{Refusal, refused};
-use crate::ids::Token;
-use crate::room::core::{AnswerInput, Answered, ConnectionId, JoinError};
 use crate::room::handle::{Acted, AttachRequest, JoinRequest, Joined, Message, SeatAction};
-use crate::store::journal::{AbortReason, SeatedParticipant};
+use chefshat_room::ids::Token;
+use chefshat_room::journal::{AbortReason, SeatedParticipant};
+use chefshat_room::{AnswerInput, Answered, ConnectionId, JoinError};
 
 impl Task {
     pub(super) fn receive(&mut self, message: Message) {

@@ -17,14 +17,14 @@ use self::outputs::Release;
 use crate::config::ROOM_MAILBOX;
 use crate::filing::Filing;
 use crate::grpc::status;
-use crate::ids::Id;
 use crate::outbox::OnSpace;
 use crate::room::RoomClock;
-use crate::room::core::Core;
 use crate::room::delivery::{Attachment, PublicLog};
 use crate::room::handle::{Handle, Message, TellSpace};
 use crate::room::spectators::Spectator;
 use crate::store::{Journal, Store};
+use chefshat_room::Core;
+use chefshat_room::ids::Id;
 
 /// Inputs that are applied before the store is asked once for all of them.
 const INPUTS_PER_COMMIT: usize = 64;

@@ -13,11 +13,11 @@ use super::Task;
 use crate::convert;
 use crate::grpc::status;
 use crate::outbox::HandStamp;
-use crate::room::core::{ConnectionId, JoinError, LeaveError, State};
 use crate::room::delivery::{Attachment, is_urgent};
 use crate::room::handle::{Acted, AttachRequest, Joined, SpectateError, SpectateRequest};
 use crate::room::spectators::{MAX_SPECTATORS, Spectator};
 use crate::store::StoreError;
+use chefshat_room::{ConnectionId, JoinError, LeaveError, State};
 
 /// What is told once the changes are kept.
 pub(super) enum Release {

@@ -3,10 +3,10 @@
 
 use std::path::Path;
 
-use chefshat_arena::tournament::Change as TournamentChange;
 use chefshat_proto::v1;
-use chefshat_records::convert::seat_number;
-use chefshat_records::pseudonym::{OwnSeats, Pseudonym, TakenOut};
+use chefshat_record::convert::seat_number;
+use chefshat_record::pseudonym::{OwnSeats, Pseudonym, TakenOut};
+use chefshat_tournament::Change as TournamentChange;
 use prost::Message as _;
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
 use sqlx::{Connection as _, Row as _};
@@ -14,10 +14,10 @@ use sqlx::{Connection as _, Row as _};
 use super::errors::explain;
 use super::form::{self, Unreadable};
 use super::open::{self, Opened};
-use crate::ids::Id;
 use crate::store::StoreError;
-use crate::store::journal::{Change, Entry};
 use crate::store::tournaments::TournamentEntry;
+use chefshat_room::ids::Id;
+use chefshat_room::journal::{Change, Entry};
 
 /// The database of a data directory while somebody is taken out of it: no server has the directory meanwhile.
 pub struct Forgetting(Opened);

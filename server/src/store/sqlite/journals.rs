@@ -10,8 +10,8 @@ use tokio::sync::{mpsc, oneshot};
 
 use super::form;
 use super::writer::{Order, Pending, Row};
-use crate::store::journal::{Entry, GameHeader};
 use crate::store::{Journal, StoreError};
+use chefshat_room::journal::{Entry, GameHeader};
 
 /// The way to the writer.
 #[derive(Clone)]

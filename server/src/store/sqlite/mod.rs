@@ -26,11 +26,11 @@ use tracing::error;
 pub use forget::{ForgetError, Forgetting, Forgotten};
 pub use open::OpenError;
 
-use super::journal::{Entry, GameHeader};
 use super::tournaments::{KeptTournament, TournamentEntry, TournamentHeader};
 use super::{Journal, KeptGame, LeftGame, Part, Store, StoreError};
-use crate::ids::Id;
-use crate::room::policy::Durability;
+use chefshat_room::ids::Id;
+use chefshat_room::journal::{Entry, GameHeader};
+use chefshat_room::policy::Durability;
 use errors::explain;
 use journals::{DurableJournal, EphemeralJournal, Orders};
 use reader::Reader;

@@ -13,10 +13,10 @@ use tracing::error;
 use super::errors::explain;
 use super::form::{self, FORM, Unreadable};
 use super::journals::{DurableJournal, Orders};
-use crate::ids::Id;
-use crate::store::journal::{Entry, GameHeader};
 use crate::store::tournaments::{KeptTournament, TournamentEntry};
 use crate::store::{KeptGame, LeftGame, Part, StoreError};
+use chefshat_room::ids::Id;
+use chefshat_room::journal::{Entry, GameHeader};
 
 /// Games that had ended of which the rooms are there again; the last ones, since of earlier ones everybody has heard.
 const MOST_ENDED: i64 = 256;

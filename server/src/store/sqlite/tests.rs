@@ -10,22 +10,22 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_arena::AgentKind;
+use chefshat_agents::AgentKind;
+use chefshat_engine::SeedPlan;
 use chefshat_engine::{ActionId, RULES_VERSION, RuleSetSpec, Seat, Seed};
 use chefshat_proto::v1;
-use chefshat_records::seeds::SeedPlan;
 use futures::FutureExt as _;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
 use sqlx::{Connection as _, Executor as _};
 
 use super::{OpenError, SqliteStore, form, open};
-use crate::ids::{Id, SecretHash};
-use crate::room::policy::{Durability, Policy};
-use crate::store::journal::{
+use crate::store::{KeptGame, Part, Store};
+use chefshat_room::ids::{Id, SecretHash};
+use chefshat_room::journal::{
     AbortReason, Branch, Change, Decided, Entry, Fill, GameHeader, GameStart, ParticipantKind,
     RecordedSeat, SeatedParticipant, Source, TakenOver,
 };
-use crate::store::{KeptGame, Part, Store};
+use chefshat_room::policy::{Durability, Policy};
 
 fn header(game: u8, durability: Durability) -> GameHeader {
     GameHeader {

@@ -12,10 +12,10 @@ use tracing::error;
 
 use super::errors::explain;
 use super::form::{self, FORM};
-use crate::ids::Id;
 use crate::room::since_epoch_ms;
 use crate::store::StoreError;
 use crate::store::tournaments::TournamentEntry;
+use chefshat_room::ids::Id;
 
 /// Orders that wait for the writer.
 pub(super) const QUEUE: usize = 1_024;

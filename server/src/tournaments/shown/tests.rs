@@ -3,18 +3,18 @@
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 
-use chefshat_arena::AgentKind;
-use chefshat_arena::tournament::{
+use chefshat_agents::AgentKind;
+use chefshat_engine::MAX_SEATS;
+use chefshat_tournament::{
     Change, Ended, Entrant, EntrantKind, MAX_GAMES_AT_A_TIME, MAX_PARTICIPANTS, SeatPlayed,
 };
-use chefshat_engine::MAX_SEATS;
 use prost::Message as _;
 use tokio::sync::{mpsc, watch};
 
 use super::*;
 use crate::config::MAX_NAME_CHARS;
-use crate::ids::{Id, Token};
 use crate::tournaments::hosted::Moving;
+use chefshat_room::ids::{Id, Token};
 
 /// What standard gRPC clients take, bytes.
 const STANDARD_LIMIT: usize = 4 * 1024 * 1024;
@@ -57,7 +57,7 @@ impl Hosted {
                 id,
                 settings: convert::settings_to_proto(&"🍕".repeat(MAX_NAME_CHARS), &plan),
                 created_at_ms: 1,
-                join_code: crate::ids::join_code(),
+                join_code: chefshat_room::ids::join_code(),
                 owner: Token::random(id).hash(),
                 deal_secret: [2; 32],
             },

@@ -3,12 +3,12 @@
 use std::time::Duration;
 
 use chefshat_engine::Seat;
-use chefshat_records::convert::seat_number;
+use chefshat_record::convert::seat_number;
 use prost::Message;
 
 use super::{Unreadable, action, array};
-use crate::ids::SecretHash;
-use crate::store::journal::{
+use chefshat_room::ids::SecretHash;
+use chefshat_room::journal::{
     AbortReason, Change, Decided, Entry, ParticipantKind, SeatedParticipant, Source,
 };
 

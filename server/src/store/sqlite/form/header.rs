@@ -3,15 +3,15 @@
 use std::collections::BTreeMap;
 
 use chefshat_engine::ActionId;
+use chefshat_engine::SeedPlan;
 use chefshat_proto::v1;
-use chefshat_records::convert::{FieldProblem, rules_from_proto, rules_to_proto};
-use chefshat_records::seeds::SeedPlan;
+use chefshat_record::convert::{FieldProblem, rules_from_proto, rules_to_proto};
 use prost::Message;
 
 use super::{Unreadable, action, array};
 use crate::convert;
-use crate::ids::{Id, SecretHash};
-use crate::store::journal::{GameHeader, TournamentGame};
+use chefshat_room::ids::{Id, SecretHash};
+use chefshat_room::journal::{GameHeader, TournamentGame};
 
 #[derive(Clone, PartialEq, Message)]
 struct HeaderForm {

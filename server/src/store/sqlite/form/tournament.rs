@@ -1,15 +1,13 @@
 //! Tournaments: headers and what moved them.
 
-use chefshat_arena::AgentKind;
-use chefshat_arena::tournament::{
-    Change, Entrant, EntrantKind, GameResult, SeatPlayed, SeatResult,
-};
+use chefshat_agents::AgentKind;
 use chefshat_proto::v1;
+use chefshat_tournament::{Change, Entrant, EntrantKind, GameResult, SeatPlayed, SeatResult};
 use prost::Message;
 
 use super::{Unreadable, array};
-use crate::ids::{Id, SecretHash};
 use crate::store::tournaments::{TournamentEntry, TournamentHeader};
+use chefshat_room::ids::{Id, SecretHash};
 
 #[derive(Clone, PartialEq, Message)]
 struct HeaderForm {

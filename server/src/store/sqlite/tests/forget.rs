@@ -1,6 +1,6 @@
 //! Taking somebody out of the database. What becomes of whole games and their files is tested with the command line.
 
-use chefshat_records::pseudonym::Pseudonym;
+use chefshat_record::pseudonym::Pseudonym;
 
 use super::*;
 use crate::store::Forgetting;

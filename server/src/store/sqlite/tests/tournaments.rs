@@ -1,12 +1,10 @@
 //! Tournaments: what is kept of them is found again, in a form that stays readable.
 
-use chefshat_arena::tournament::{
-    Change, Entrant, EntrantKind, GameResult, SeatPlayed, SeatResult,
-};
+use chefshat_tournament::{Change, Entrant, EntrantKind, GameResult, SeatPlayed, SeatResult};
 
 use super::*;
-use crate::store::journal::TournamentGame;
 use crate::store::tournaments::{TournamentEntry, TournamentHeader};
+use chefshat_room::journal::TournamentGame;
 
 fn cup(number: u8) -> TournamentHeader {
     TournamentHeader {

@@ -1,0 +1,16 @@
+//! The built-in agents: random, greedy, trained, replay; the network files that `trained` and others play from; and playing one game with agents
+//! on its seats. Many games, and what they add up to, are in `chefshat-simulation`.
+
+mod built_in;
+mod network;
+mod play;
+mod recorded;
+mod seeds;
+
+pub use built_in::{AgentKind, BuiltInAgent};
+pub use network::{
+    MAX_FILE_BYTES, Network, NetworkError, NetworkInfo, NetworkInput, NetworkOutput, table_features,
+};
+pub use play::{Listener, is_wrong_action, play};
+pub use recorded::{MAX_MODELS, RecordedPlayer};
+pub use seeds::{agent_seed, game_seed, seating_agent_seed};

@@ -1,0 +1,122 @@
+//! The arithmetic of a network: dense layers in 32-bit floats, laid out so that the inner loops run over neighbouring numbers. There are
+//! only sums, products and ReLU, and the compiler neither fuses nor reorders them, so the same file gives the same values on every machine;
+//! tanh, which does not, is left to who shows the outputs. What goes in and what comes out is not known here.
+
+/// Numbers that are summed beside each other in a dot product, so that they fit one vector register or two.
+const LANES: usize = 8;
+
+/// A hidden layer with ReLU.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Hidden {
+    /// By input: the weights that lead from it to every unit. So inputs that are zero, of which there are many, cost nothing.
+    by_input: Vec<f32>,
+    bias: Vec<f32>,
+}
+
+impl Hidden {
+    /// A layer of `bias.len()` units (at least 1); `weights` by unit, as files have them.
+    pub(super) fn new(weights: &[f32], bias: Vec<f32>) -> Hidden {
+        let (units, inputs) = (bias.len(), weights.len() / bias.len());
+        let by_input = (0..inputs)
+            .flat_map(|input| (0..units).map(move |unit| weights[unit * inputs + input]))
+            .collect();
+        Hidden { by_input, bias }
+    }
+
+    /// Computes the units' values into `out`, whatever was in it.
+    pub(super) fn forward(&self, input: &[f32], out: &mut Vec<f32>) {
+        assert_eq!(
+            input.len() * self.bias.len(),
+            self.by_input.len(),
+            "there are as many values as the layer has inputs"
+        );
+        out.clear();
+        out.extend_from_slice(&self.bias);
+        for (&value, weights) in input.iter().zip(self.by_input.chunks_exact(out.len())) {
+            if value != 0.0 {
+                for (unit, weight) in out.iter_mut().zip(weights) {
+                    *unit += value * weight;
+                }
+            }
+        }
+        for unit in out {
+            *unit = unit.max(0.0);
+        }
+    }
+}
+
+/// The last layer, without an activation. Its outputs are computed one at a time, because few actions are legal.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Output {
+    /// By output.
+    weights: Vec<f32>,
+    bias: Vec<f32>,
+}
+
+impl Output {
+    /// A layer of `bias.len()` outputs (at least 1); `weights` by output, as files have them.
+    pub(super) fn new(weights: Vec<f32>, bias: Vec<f32>) -> Output {
+        Output { weights, bias }
+    }
+
+    /// Number of outputs.
+    pub(super) fn len(&self) -> usize {
+        self.bias.len()
+    }
+
+    /// Number of inputs.
+    pub(super) fn inputs(&self) -> usize {
+        self.weights.len() / self.bias.len()
+    }
+
+    /// One output, for as many inputs as the layer has.
+    pub(super) fn value(&self, index: usize, input: &[f32]) -> f32 {
+        let row = &self.weights[index * input.len()..][..input.len()];
+        self.bias[index] + dot(row, input)
+    }
+}
+
+/// The dot product of two slices of the same length.
+fn dot(left: &[f32], right: &[f32]) -> f32 {
+    let (lefts, left_rest) = left.as_chunks::<LANES>();
+    let (rights, right_rest) = right.as_chunks::<LANES>();
+    let mut sums = [0.0; LANES];
+    for (a, b) in lefts.iter().zip(rights) {
+        for lane in 0..LANES {
+            sums[lane] += a[lane] * b[lane];
+        }
+    }
+    let rest: f32 = left_rest.iter().zip(right_rest).map(|(a, b)| a * b).sum();
+    sums.iter().sum::<f32>() + rest
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::network::layers::*;
+
+    #[test]
+    fn layers_agree_with_sums_written_down() {
+        // Two units of three inputs; the second is cut off by ReLU.
+        let hidden = Hidden::new(&[1.0, 2.0, -3.0, 0.5, -4.0, 1.0], vec![0.25, 1.0]);
+        let mut out = vec![9.0; 7];
+        hidden.forward(&[2.0, 1.0, 0.0], &mut out);
+        assert_eq!(out, [4.25, 0.0]);
+        hidden.forward(&[0.0, 0.0, 1.0], &mut out);
+        assert_eq!(out, [0.0, 2.0]);
+
+        let output = Output::new(vec![1.0, -1.0, 0.5, 2.0], vec![0.0, 10.0]);
+        assert_eq!((output.len(), output.inputs()), (2, 2));
+        assert_eq!(output.value(0, &[4.25, 1.0]), 3.25);
+        assert_eq!(output.value(1, &[4.0, 1.0]), 14.0);
+    }
+
+    #[test]
+    fn a_dot_product_is_one_whatever_its_length() {
+        for length in 0..40u8 {
+            let left: Vec<f32> = (0..length).map(f32::from).collect();
+            let right: Vec<f32> = left.iter().map(|number| 2.0 * number - 3.0).collect();
+            let expected: f32 = left.iter().zip(&right).map(|(a, b)| a * b).sum();
+            assert_eq!(dot(&left, &right), expected, "{length} whole numbers");
+        }
+    }
+}

@@ -1,0 +1,282 @@
+//! Playing as somebody played before: the decisions one seat took in a recorded game, and what follows from them at a decision of this
+//! game or another. How decisions are read out of a record is not known here.
+
+use std::collections::HashMap;
+
+use chefshat_engine::{
+    ActionId, ActionSpace, Cards, Face, Mask, Observation, RecordedDecision, Seat,
+};
+
+/// A player of a recorded game, as an agent that decides as it did.
+///
+/// - At a decision where it sees exactly what it saw at a recorded one (the same observation, the same legal actions) it does what
+///   it did then. No two decisions of a game look the same to a seat: Shift, pizza, cards played, cards given and hand tell them apart. So in its
+///   own game it repeats itself from beginning to end, from any point on, and again wherever another course of the game leads back to
+///   what it knew.
+/// - At any other decision it does what it did at the most similar of its own decisions of the same kind whose action is legal now; of
+///   equally similar ones at the earliest. The first [`MAX_MODELS`] decisions of its own are compared. Actions are carried over by their meaning, since their numbers depend on the deck.
+/// - If there is none, it takes the default decision.
+///
+/// How different two decisions are, from 0 (alike) to 14, is the sum of these differences, each from 0 to 1 in millionths rounded down,
+/// times their weights. F and H are the faces and the cards dealt to a hand in each one's own game; seats are counted from the own one to
+/// the left.
+///
+/// | weight | difference |
+/// |---|---|
+/// | 4 | of the hands: Σ over kinds of cards of \|a − b\| / Σ of (a + b), with a and b the number of cards of that kind |
+/// | 3 | of the faces on the board, each divided by F + 2, a joker alone counting as F + 1 and an empty board as F + 2 |
+/// | 2 | of the numbers of cards on the board, each divided by F |
+/// | 2 | of the cards left to each other seat, each divided by H: the mean over these seats |
+/// | 1 | of who may not play any more: the share of the other seats that have passed or finished in one of the two alone |
+/// | 1 | of the own role: 0 if it is the same, else 1 |
+/// | 1 | of the cards played so far in the Shift, as for the hands |
+///
+/// Where one game has more seats than the other, those that the other lacks count as seats that hold no cards and have passed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RecordedPlayer {
+    decisions: Vec<RecordedDecision>,
+    /// Where in `decisions` those are that look alike at first glance.
+    by_glance: HashMap<Glance, Vec<usize>>,
+}
+
+/// What tells nearly all decisions of a game apart: Shift, pizza, hand, cards played.
+type Glance = (u32, u32, Cards, Cards);
+
+fn glance(seen: &Observation) -> Glance {
+    (seen.shift, seen.pizza, seen.hand, seen.played)
+}
+
+/// Most decisions that are compared with another to find the most similar one: the first of the recorded game.
+pub const MAX_MODELS: usize = 2_048;
+
+const HAND: u64 = 4;
+const BOARD_FACE: u64 = 3;
+const BOARD_SIZE: u64 = 2;
+const CARDS_LEFT: u64 = 2;
+const PASSED: u64 = 1;
+const ROLE: u64 = 1;
+const PLAYED: u64 = 1;
+/// A whole difference. In whole numbers, so that what is equally similar is so on every machine.
+const WHOLE: u64 = 1_000_000;
+
+impl RecordedPlayer {
+    /// The player of these decisions, in the order in which they were taken. Those whose observation has no decision open, or whose action
+    /// was not legal, are left out: nothing can be learnt from them.
+    pub fn new(decisions: impl IntoIterator<Item = RecordedDecision>) -> Self {
+        let sound = |decision: &RecordedDecision| {
+            decision.observation.kind.is_some()
+                && decision.observation.seat.is_some()
+                && decision.legal.contains(decision.action)
+        };
+        let decisions: Vec<RecordedDecision> = decisions.into_iter().filter(sound).collect();
+        let mut by_glance: HashMap<Glance, Vec<usize>> = HashMap::new();
+        for (position, decision) in decisions.iter().enumerate() {
+            let alike = by_glance.entry(glance(&decision.observation));
+            alike.or_default().push(position);
+        }
+        Self {
+            decisions,
+            by_glance,
+        }
+    }
+
+    /// Its decisions, in the order in which they were taken.
+    pub fn decisions(&self) -> &[RecordedDecision] {
+        &self.decisions
+    }
+
+    /// Decides. The action is one of `legal`.
+    ///
+    /// # Panics
+    /// When `legal` is empty or no decision is open for the seat of the observation.
+    pub fn decide(&self, observation: &Observation, legal: &Mask) -> ActionId {
+        self.repeated(observation, legal)
+            .or_else(|| self.most_similar(observation, legal))
+            .or_else(|| observation.default_action(legal))
+            .expect("a decision has a legal action")
+    }
+
+    /// What it did where it saw exactly this.
+    fn repeated(&self, observation: &Observation, legal: &Mask) -> Option<ActionId> {
+        self.by_glance
+            .get(&glance(observation))?
+            .iter()
+            .map(|position| &self.decisions[*position])
+            .find(|then| then.observation == *observation && then.legal == *legal)
+            .map(|then| then.action)
+    }
+
+    /// What it did where it saw what is most like this.
+    fn most_similar(&self, observation: &Observation, legal: &Mask) -> Option<ActionId> {
+        let now = space(observation);
+        let mut best: Option<(u64, ActionId)> = None;
+        let own = self.decisions.iter().filter(|then| then.own);
+        for then in own.take(MAX_MODELS) {
+            if then.observation.kind != observation.kind {
+                continue;
+            }
+            let meaning = space(&then.observation).decode(then.action);
+            let Some(action) = meaning
+                .and_then(|meaning| now.encode(meaning))
+                .filter(|action| legal.contains(*action))
+            else {
+                continue;
+            };
+            let difference = difference(&then.observation, observation);
+            if best.is_none_or(|(least, _)| difference < least) {
+                best = Some((difference, action));
+            }
+        }
+        best.map(|(_, action)| action)
+    }
+}
+
+/// How different two decisions look to their seats, in millionths: the sum of [`RecordedPlayer`]'s table.
+fn difference(a: &Observation, b: &Observation) -> u64 {
+    HAND * cards_apart(a.hand, b.hand)
+        + BOARD_FACE * apart(board_face(a), board_face(b))
+        + BOARD_SIZE * apart((a.board.size, a.faces), (b.board.size, b.faces))
+        + others_apart(a, b)
+        + ROLE * WHOLE * u64::from(own_role(a) != own_role(b))
+        + PLAYED * cards_apart(a.played, b.played)
+}
+
+/// How far apart two fractions are that are at most 1, in millionths.
+fn apart(a: (u8, u8), b: (u8, u8)) -> u64 {
+    let [(a, of_a), (b, of_b)] = [a, b].map(|(part, of)| (u64::from(part), u64::from(of)));
+    (a * of_b).abs_diff(b * of_a) * WHOLE / (of_a * of_b)
+}
+
+/// The share of cards by which two hands differ, in millionths.
+fn cards_apart(a: Cards, b: Cards) -> u64 {
+    let all = a.len() + b.len();
+    if all == 0 {
+        return 0;
+    }
+    let faces = (1..=chefshat_engine::MAX_FACES).filter_map(Face::new);
+    let differ: u8 = faces
+        .map(|face| a.count(face).abs_diff(b.count(face)))
+        .sum();
+    let jokers = a.jokers().abs_diff(b.jokers());
+    u64::from(differ + jokers) * WHOLE / u64::from(all)
+}
+
+fn board_face(observation: &Observation) -> (u8, u8) {
+    let empty = observation.faces + 2;
+    match observation.board.face {
+        0 => (empty, empty),
+        face => (face, empty),
+    }
+}
+
+fn own_role(observation: &Observation) -> Option<chefshat_engine::Role> {
+    observation.seat.and_then(|seat| observation.roles[seat])
+}
+
+/// What sets the other seats apart: the cards left to them, and who of them may not play any more. With its weights, in millionths.
+fn others_apart(a: &Observation, b: &Observation) -> u64 {
+    let seats = a.cards_left.len().max(b.cards_left.len());
+    let (mut left, mut passed) = (0, 0);
+    for distance in 1..seats {
+        let ((left_a, passed_a), (left_b, passed_b)) = (other(a, distance), other(b, distance));
+        left += apart((left_a, a.hand_size), (left_b, b.hand_size));
+        passed += WHOLE * u64::from(passed_a != passed_b);
+    }
+    let others = seats as u64 - 1;
+    CARDS_LEFT * (left / others) + PASSED * (passed / others)
+}
+
+/// The cards left to the seat at this distance to the left, and whether it may not play any more.
+fn other(observation: &Observation, distance: usize) -> (u8, bool) {
+    let seats = observation.cards_left.len();
+    let Some(own) = observation.seat.filter(|_| distance < seats) else {
+        return (0, true);
+    };
+    let seat = Seat::new((own.index() + distance) % seats);
+    let left = observation.cards_left[seat];
+    (left, observation.passed[seat] || left == 0)
+}
+
+fn space(observation: &Observation) -> ActionSpace {
+    ActionSpace::new(observation.faces).expect("an observation has 4 to 15 faces")
+}
+
+#[cfg(test)]
+mod tests {
+    use chefshat_engine::{Game, RuleSetSpec, Seed, Viewer};
+
+    use crate::recorded::*;
+
+    fn observation() -> Observation {
+        let rules = RuleSetSpec::default().validate().expect("the standard");
+        let game = Game::new(rules, Seed([3; 32]), |_| {});
+        let seat = game.decision().expect("a decision is open").seat;
+        game.observe(Viewer::Seat(seat))
+    }
+
+    #[test]
+    fn each_difference_counts_with_its_weight() {
+        let base = observation();
+        let own = base.seat.expect("a seat's observation");
+        let left = |distance: usize| Seat::new((own.index() + distance) % 4);
+        let face = |n| Face::new(n).expect("a face");
+        let changed = |change: &dyn Fn(&mut Observation)| {
+            let mut other = base;
+            change(&mut other);
+            assert_eq!(difference(&base, &other), difference(&other, &base));
+            difference(&base, &other)
+        };
+        let held = (1..=11)
+            .map(face)
+            .find(|face| base.hand.count(*face) > 0)
+            .expect("a card");
+        let fewer = base.hand.without_face(held, 1).expect("it is held");
+        let table = [
+            (changed(&|_| {}), 0),
+            // Nothing in common.
+            (changed(&|seen| seen.hand = Cards::EMPTY), HAND * WHOLE),
+            // One card of 17 and 16.
+            (changed(&|seen| seen.hand = fewer), HAND * (WHOLE / 33)),
+            (
+                changed(&|seen| seen.board.face = 11),
+                BOARD_FACE * (2 * WHOLE / 13),
+            ),
+            (
+                changed(&|seen| seen.board.size = 3),
+                BOARD_SIZE * (3 * WHOLE / 11),
+            ),
+            (
+                changed(&|seen| seen.cards_left[left(2)] = 0),
+                (CARDS_LEFT + PASSED) * (WHOLE / 3),
+            ),
+            (
+                changed(&|seen| seen.passed[left(3)] = true),
+                PASSED * (WHOLE / 3),
+            ),
+            (
+                changed(&|seen| seen.roles[own] = Some(chefshat_engine::Role::Chef)),
+                ROLE * WHOLE,
+            ),
+            (changed(&|seen| seen.played = fewer), PLAYED * WHOLE),
+        ];
+        for (line, (found, expected)) in table.into_iter().enumerate() {
+            assert_eq!(found, expected, "line {line}");
+        }
+        // Points, Shift and pizza say nothing of what is wise now.
+        assert_eq!(changed(&|seen| (seen.shift, seen.pizza) = (7, 7)), 0);
+    }
+
+    #[test]
+    fn seats_are_counted_from_the_own_one() {
+        let base = observation();
+        let own = base.seat.expect("a seat's observation");
+        let turned = Observation {
+            seat: Some(Seat::new((own.index() + 1) % 4)),
+            cards_left: chefshat_engine::BySeat::from_fn(4, |seat| {
+                base.cards_left[Seat::new((seat.index() + 3) % 4)]
+            }),
+            ..base
+        };
+        assert_eq!(difference(&base, &turned), 0);
+    }
+}

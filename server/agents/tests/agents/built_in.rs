@@ -1,0 +1,226 @@
+//! The built-in agents: what greedy chooses in a table of positions, how evenly the random ones choose, and that all are functions of what
+//! they see and of their generator.
+
+use chefshat_agents::{AgentKind, BuiltInAgent};
+use chefshat_engine::{
+    ActionId, ActionSpace, BySeat, Decision, DecisionKind, Game, Mask, Observation, Role,
+    RuleSetSpec, Seat, Seed, Viewer,
+};
+use chefshat_simulation::Batch;
+
+const FACES: u8 = 11;
+
+fn space() -> ActionSpace {
+    ActionSpace::new(FACES).unwrap()
+}
+
+fn actions(texts: &str) -> Mask {
+    texts
+        .split(", ")
+        .map(|text| space().parse(text).unwrap_or_else(|| panic!("{text}")))
+        .collect()
+}
+
+/// What seat 0 sees, as far as agents look at it.
+fn observation(kind: DecisionKind, role: Option<Role>) -> Observation {
+    let rules = RuleSetSpec::default().validate().unwrap();
+    let mut observation =
+        Game::new(rules, Seed([1; 32]), |_| {}).observe(Viewer::Seat(Seat::new(0)));
+    observation.kind = Some(kind);
+    observation.roles = BySeat::from_fn(4, |seat| role.filter(|_| seat == Seat::new(0)));
+    observation
+}
+
+#[test]
+fn greedy_chooses_as_it_says() {
+    use DecisionKind::{Exchange, SpecialAction, Turn};
+    let table = [
+        // The least rare face, as many cards of it as it can.
+        (Turn, None, "C9;Q1;J0, C9;Q2;J0, C8;Q4;J0, pass", "C9;Q2;J0"),
+        (Turn, None, "C1;Q1;J0, C2;Q1;J0, pass", "C2;Q1;J0"),
+        // Jokers are kept while anything else can be played …
+        (
+            Turn,
+            None,
+            "C11;Q3;J0, C11;Q3;J1, C11;Q3;J2, C0;Q0;J1, pass",
+            "C11;Q3;J0",
+        ),
+        (Turn, None, "C3;Q1;J0, C9;Q2;J1, pass", "C3;Q1;J0"),
+        // … and as few of them as possible are played otherwise, alone last of all.
+        (Turn, None, "C4;Q2;J1, C9;Q1;J2, C5;Q2;J1, pass", "C5;Q2;J1"),
+        (Turn, None, "C2;Q1;J1, C0;Q0;J1, pass", "C2;Q1;J1"),
+        (Turn, None, "C0;Q0;J1, pass", "C0;Q0;J1"),
+        (Turn, None, "pass", "pass"),
+        // Gives away its least rare card, a joker only when there is nothing else.
+        (
+            Exchange,
+            Some(Role::Chef),
+            "give C2, give C10, give C11, give J",
+            "give C11",
+        ),
+        (Exchange, Some(Role::SousChef), "give C1, give J", "give C1"),
+        (Exchange, Some(Role::Chef), "give J", "give J"),
+        // Declares exactly where the exchange would cost it cards.
+        (
+            SpecialAction,
+            Some(Role::Dishwasher),
+            "decline, declare",
+            "declare",
+        ),
+        (
+            SpecialAction,
+            Some(Role::Waiter),
+            "decline, declare",
+            "declare",
+        ),
+        (
+            SpecialAction,
+            Some(Role::Cook),
+            "decline, declare",
+            "decline",
+        ),
+        (
+            SpecialAction,
+            Some(Role::SousChef),
+            "decline, declare",
+            "decline",
+        ),
+        (
+            SpecialAction,
+            Some(Role::Chef),
+            "decline, declare",
+            "decline",
+        ),
+    ];
+    for (kind, role, legal, expected) in table {
+        let mut agent = BuiltInAgent::new(AgentKind::Greedy, [0; 32]);
+        let chosen = agent.decide(&observation(kind, role), &actions(legal));
+        assert_eq!(
+            space().text(chosen).as_deref(),
+            Some(expected),
+            "{role:?}: {legal}"
+        );
+    }
+}
+
+/// How often an agent with a fixed seed takes each action.
+fn counts(kind: AgentKind, decision: DecisionKind, legal: &Mask, draws: usize) -> Vec<usize> {
+    let mut agent = BuiltInAgent::new(kind, [3; 32]);
+    let observation = observation(decision, None);
+    let mut counts = vec![0; usize::from(space().size())];
+    for _ in 0..draws {
+        counts[usize::from(agent.decide(&observation, legal).index())] += 1;
+    }
+    counts
+}
+
+#[test]
+fn random_is_even_over_the_legal_actions() {
+    let legal =
+        actions("C1;Q1;J0, C2;Q1;J0, C3;Q1;J0, C9;Q4;J1, C11;Q11;J2, C0;Q0;J1, pass, give C1");
+    for kind in [AgentKind::Random, AgentKind::RandomUnmasked] {
+        // An exchange, where both choose among the legal actions.
+        let counts = counts(kind, DecisionKind::Exchange, &legal, 8_000);
+        for action in space().iter() {
+            let count = counts[usize::from(action.index())];
+            let expected = if legal.contains(action) {
+                850..1150
+            } else {
+                0..1
+            };
+            assert!(
+                expected.contains(&count),
+                "{kind:?} took {action} {count} times"
+            );
+        }
+    }
+}
+
+#[test]
+fn random_unmasked_is_even_over_all_actions_of_a_turn() {
+    let legal = actions("C1;Q1;J0, pass");
+    let counts = counts(
+        AgentKind::RandomUnmasked,
+        DecisionKind::Turn,
+        &legal,
+        200_000,
+    );
+    let turn_actions = usize::from(space().turn_actions());
+    assert!(
+        counts[..turn_actions]
+            .iter()
+            .all(|count| (800..1200).contains(count)),
+        "{counts:?}"
+    );
+    assert!(
+        counts[turn_actions..].iter().all(|&count| count == 0),
+        "{counts:?}"
+    );
+    let masked = self::counts(AgentKind::Random, DecisionKind::Turn, &legal, 1_000);
+    assert_eq!(masked.iter().filter(|&&count| count > 0).count(), 2);
+}
+
+#[test]
+fn an_agent_is_a_function_of_observation_and_generator() {
+    let rules = RuleSetSpec::default().validate().unwrap();
+    for kind in AgentKind::ALL {
+        let mut game = Game::new(rules, Seed([5; 32]), |_| {});
+        let mut agent = BuiltInAgent::new(kind, [6; 32]);
+        let mut decisions = 0;
+        while let Some(Decision { seat, .. }) = game.decision() {
+            let (observation, legal) = (game.observe(Viewer::Seat(seat)), game.legal_actions());
+            let mut twin = agent.clone();
+            let action = agent.decide(&observation, &legal);
+            assert_eq!(twin.decide(&observation, &legal), action, "{kind:?}");
+            if legal.contains(action) {
+                game.apply(action, |_| {}).unwrap();
+                decisions += 1;
+            }
+        }
+        assert!(decisions > 100, "{kind:?} took {decisions} decisions");
+    }
+}
+
+#[test]
+fn names_lead_back_to_agents() {
+    for kind in AgentKind::ALL {
+        assert_eq!(AgentKind::from_name(kind.name()), Some(kind));
+    }
+    assert_eq!(AgentKind::from_name("Greedy"), None);
+}
+
+#[test]
+fn greedy_beats_random_and_random_is_fair() {
+    let rules = RuleSetSpec::default().validate().unwrap();
+    let random = [AgentKind::Random; 4];
+    let fair = Batch::new(rules, &random, 1_000, 1).unwrap().run(|_| {});
+    for seat in fair.seats.seats() {
+        let (won, place) = (fair.seats[seat].games_won, fair.mean_place(seat));
+        assert!(
+            (180..320).contains(&won),
+            "seat {seat} won {won} of 1000 games"
+        );
+        assert!(
+            (2.4..2.6).contains(&place),
+            "seat {seat}: mean place {place}"
+        );
+    }
+    for favourite in fair.seats.seats() {
+        let mut agents = random;
+        agents[favourite.index()] = AgentKind::Greedy;
+        let table = Batch::new(rules, &agents, 200, 1).unwrap().run(|_| {});
+        let won = table.seats[favourite].games_won;
+        assert!(
+            won > 180,
+            "greedy on seat {favourite} won {won} of 200 games"
+        );
+    }
+}
+
+#[test]
+#[should_panic(expected = "a decision has a legal action")]
+fn no_legal_action_is_no_decision() {
+    let observation = observation(DecisionKind::Turn, None);
+    let _: ActionId =
+        BuiltInAgent::new(AgentKind::Random, [0; 32]).decide(&observation, &Mask::EMPTY);
+}

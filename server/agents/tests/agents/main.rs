@@ -1,0 +1,12 @@
+//! The tests of agents, one binary. Each module below is a subject.
+
+#![allow(
+    clippy::unwrap_used,
+    reason = "a test fails by it, in its helpers as well"
+)]
+
+mod built_in;
+mod network;
+mod network_file;
+mod play;
+mod recorded;

@@ -1,0 +1,230 @@
+//! `chefshat agent`: a built-in agent, or one that plays as a recorded player, as a remote client, over the Rust SDK like anybody's agent.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::time::Duration;
+
+use chefshat_agents::{AgentKind, BuiltInAgent, RecordedPlayer};
+use chefshat_client::{Client, Outcome, PlayError, v1};
+use chefshat_record::jsonl;
+use clap::Args;
+
+use super::connect::{KindArg, Pass, ServerArg, WayIn, free_seats};
+use super::remote::{MAX_PACE_MS, RemoteAgent, agent_kind, seed_for};
+use super::{CommandError, say};
+use chefshat_server::convert::recorded_player;
+
+/// Play as a built-in agent on a server.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  chefshat agent greedy --server http://127.0.0.1:50051 --code BCDF2345\n  \
+                  chefshat agent random --code-file ./join-code --name Rolf --seed 7\n  \
+                  chefshat agent replay --record 5f0c6a4de2b14b7f8a3d9c1e7b60425d.jsonl --seat 2 --code BCDF2345\n\n\
+                  replay does what the player of that seat did where it sees exactly what that player saw, and elsewhere what it did \
+                  where it saw what is most like it (docs/branching.md).\n\n\
+                  Exit code: 0 when the game finished, 1 when it was aborted or the seat was lost."
+)]
+pub(super) struct AgentCommand {
+    /// Which agent: random, random_unmasked, greedy or trained; or replay, which plays as a recorded player.
+    #[arg(value_parser = agent_arg, value_name = "KIND")]
+    agent: AgentArg,
+    #[command(flatten)]
+    server: ServerArg,
+    #[command(flatten)]
+    way_in: WayIn,
+    /// For replay: the record of the game in which the player played.
+    #[arg(
+        long,
+        value_name = "FILE",
+        required_if_eq("agent", BuiltInAgent::REPLAY)
+    )]
+    record: Option<PathBuf>,
+    /// For replay: the seat that the player had there, from 0.
+    #[arg(
+        long,
+        value_name = "SEAT",
+        required_if_eq("agent", BuiltInAgent::REPLAY)
+    )]
+    seat: Option<u32>,
+    /// Name to show; standard: the agent's.
+    #[arg(long)]
+    name: Option<String>,
+    /// What to take part as.
+    #[arg(long, value_enum, default_value_t = KindArg::Agent)]
+    kind_of: KindArg,
+    /// Makes the agent's choices repeatable.
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Games to play one after the other; each needs a new join code in the file.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    games: u32,
+    /// Milliseconds to wait before each decision, so that people can follow.
+    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u64).range(0..=MAX_PACE_MS))]
+    pace_ms: u64,
+    /// Print one JSON line a game.
+    #[arg(long)]
+    json: bool,
+}
+
+/// The agent that is named.
+#[derive(Debug, Clone, Copy)]
+enum AgentArg {
+    Kind(AgentKind),
+    Replay,
+}
+
+impl AgentArg {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Kind(kind) => kind.name(),
+            Self::Replay => BuiltInAgent::REPLAY,
+        }
+    }
+}
+
+impl AgentCommand {
+    pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
+        if self.games > 1 && !self.way_in.goes_on() {
+            return Err("a code or ticket is for one game; for more --games give a --code-file into which new codes are written".into());
+        }
+        let agent = self.built_in_agent()?;
+        let client = self.server.connect_patiently().await?;
+        let mut agent = RemoteAgent::new(agent, Duration::from_millis(self.pace_ms));
+        let mut last_code = None;
+        let mut all_finished = true;
+        for _ in 0..self.games {
+            let ticket = self.ticket(&client, &mut last_code).await?;
+            let played = client.play(ticket, &mut agent).await;
+            all_finished &= matches!(&played, Ok(outcome) if outcome.standing().is_some());
+            if self.json {
+                say(as_json(&played))?;
+            } else {
+                say(in_words(&played))?;
+            }
+        }
+        Ok(if all_finished {
+            ExitCode::SUCCESS
+        } else {
+            ExitCode::FAILURE
+        })
+    }
+
+    fn built_in_agent(&self) -> Result<BuiltInAgent, CommandError> {
+        match (self.agent, &self.record, self.seat) {
+            (AgentArg::Kind(kind), None, None) => Ok(BuiltInAgent::new(
+                kind,
+                seed_for("chefshat agent", self.seed),
+            )),
+            (AgentArg::Kind(_), ..) => Err(
+                "--record and --seat say whom the agent replay plays as; name that agent".into(),
+            ),
+            (AgentArg::Replay, Some(record), Some(seat)) => {
+                Ok(BuiltInAgent::replay(player_of(record, seat)?))
+            }
+            (AgentArg::Replay, ..) => Err("replay needs --record and --seat".into()),
+        }
+    }
+
+    /// The ticket for the next game.
+    async fn ticket(
+        &self,
+        client: &Client,
+        last_code: &mut Option<String>,
+    ) -> Result<String, CommandError> {
+        let code = match self.way_in.pass(last_code.as_deref()).await? {
+            Pass::Ticket(ticket) => return Ok(ticket),
+            Pass::Code(code) => code,
+        };
+        let name = self.name.as_deref().unwrap_or(self.agent.name());
+        let joined = client
+            .join(v1::JoinRoomRequest {
+                join_code: code.clone(),
+                name: name.to_owned(),
+                kind: self.kind_of.kind().into(),
+                ..v1::JoinRoomRequest::default()
+            })
+            .await?;
+        *last_code = Some(code);
+        let waits = match joined.room.as_ref().map_or(0, free_seats) {
+            0 => String::new(),
+            1 => "waits for 1 other seat to be taken, then ".to_owned(),
+            free => format!("waits for {free} other seats to be taken, then "),
+        };
+        anstream::eprintln!("{name} has seat {}; {waits}plays to the end", joined.seat);
+        // Whoever has it has the seat: it is told to the one who started the agent alone.
+        anstream::eprintln!(
+            "should this agent end before its game, another goes on in its seat with --ticket {}",
+            joined.ticket
+        );
+        Ok(joined.ticket)
+    }
+}
+
+fn agent_arg(name: &str) -> Result<AgentArg, String> {
+    if name == BuiltInAgent::REPLAY {
+        return Ok(AgentArg::Replay);
+    }
+    let kind = agent_kind(name).map_err(|known| format!("{known}, {}", BuiltInAgent::REPLAY))?;
+    Ok(AgentArg::Kind(kind))
+}
+
+/// The player of a seat in a recorded game.
+fn player_of(record: &Path, seat: u32) -> Result<Arc<RecordedPlayer>, CommandError> {
+    let lines = jsonl::read(record)?;
+    let name = record.display();
+    recorded_player(&lines, seat).map_err(|error| format!("{name}: {error}").into())
+}
+
+fn in_words(played: &Result<Outcome, PlayError>) -> String {
+    match played {
+        Ok(outcome) => outcome_in_words(outcome),
+        Err(error) => format!("the seat was lost: {error}"),
+    }
+}
+
+fn as_json(played: &Result<Outcome, PlayError>) -> serde_json::Value {
+    match played {
+        Ok(outcome) => outcome_json(outcome),
+        Err(error) => serde_json::json!({
+            "event": "lost", "reason": error.reason(), "message": error.to_string(),
+        }),
+    }
+}
+
+/// How a game ended for a seat, in a line for people.
+pub(super) fn outcome_in_words(outcome: &Outcome) -> String {
+    let (answers, game) = (outcome.answers, &outcome.game_id);
+    match (outcome.standing(), outcome.aborted()) {
+        (Some(line), _) => format!(
+            "place {} of {}, {} points, {answers} answers, game {game}",
+            line.place,
+            outcome.standings().len(),
+            line.points
+        ),
+        (None, Some(reason)) => format!("the game was aborted ({}), game {game}", short(reason)),
+        (None, None) => format!("the game ended without a place for this seat, game {game}"),
+    }
+}
+
+/// How a game ended for a seat, for programs.
+pub(super) fn outcome_json(outcome: &Outcome) -> serde_json::Value {
+    let (room_id, game_id, seat) = (&outcome.room_id, &outcome.game_id, outcome.seat);
+    match (outcome.standing(), outcome.aborted()) {
+        (Some(line), _) => serde_json::json!({
+            "event": "result", "room_id": room_id, "game_id": game_id, "seat": seat,
+            "place": line.place, "players": outcome.standings().len(), "points": line.points,
+            "answers": outcome.answers,
+        }),
+        (None, reason) => serde_json::json!({
+            "event": "aborted", "room_id": room_id, "game_id": game_id, "seat": seat,
+            "reason": reason.map(short),
+        }),
+    }
+}
+
+/// The reason of an abort without the prefix of its enum.
+fn short(reason: v1::AbortReason) -> &'static str {
+    let name = reason.as_str_name();
+    name.strip_prefix("ABORT_REASON_").unwrap_or(name)
+}

@@ -1,0 +1,149 @@
+//! A leaderboard as a table for people, as JSON, as CSV: one form for the one a server tells and the one recomputed from records.
+
+use chefshat_engine::MAX_SEATS;
+use chefshat_proto::v1;
+use serde_json::{Value, json};
+
+use super::CommandError;
+use super::narrator::clean;
+use super::sheet::{line, table};
+
+/// Widest name in a table, columns.
+const NAME_COLUMNS: usize = 24;
+/// 95 % of a normal distribution lie within so many deviations.
+const Z95: f64 = 1.96;
+/// Places by name.
+const PLACES: [&str; MAX_SEATS] = ["1st", "2nd", "3rd", "4th", "5th", "6th"];
+
+/// A rating's mean, and what lies on each side of it with a confidence of 95 %.
+pub(super) fn rating_in_words(rating: &v1::Rating) -> [String; 2] {
+    let half = Z95 * rating.deviation;
+    [format!("{:.2}", rating.mean), format!("± {half:.2}")]
+}
+
+/// Adds the table of a leaderboard.
+pub(super) fn add_table(text: &mut String, board: &v1::GetLeaderboardResponse) {
+    if board.rated.is_empty() {
+        line(text, "nobody to show");
+        return;
+    }
+    let deepest = board.rated.iter().map(|line| line.places.len()).max();
+    let places = &PLACES[..deepest.unwrap_or(0).min(MAX_SEATS)];
+    let header = ["", "Name", "Kind", "Rating", "95 %", "Games"];
+    let header: Vec<&str> = header.iter().chain(places).copied().collect();
+    let rows = board.rated.iter().map(|line| {
+        let rating = line.rating.unwrap_or_default();
+        let [mean, uncertainty] = rating_in_words(&rating);
+        let mut row = vec![
+            line.place.to_string(),
+            clean(&line.name, NAME_COLUMNS),
+            kind_name(line).to_owned(),
+            mean,
+            uncertainty,
+            rating.games.to_string(),
+        ];
+        row.extend(times(line, places.len()));
+        row
+    });
+    table(text, &header, &[1, 2], rows);
+}
+
+/// Its lines as a JSON array.
+pub(super) fn as_json(board: &v1::GetLeaderboardResponse) -> Vec<Value> {
+    let lines = board.rated.iter().map(|line| {
+        let rating = line.rating.unwrap_or_default();
+        json!({
+            "place": line.place,
+            "name": line.name,
+            "kind": kind_name(line),
+            "mean": rating.mean,
+            "deviation": rating.deviation,
+            "games": rating.games,
+            "places": line.places,
+        })
+    });
+    lines.collect()
+}
+
+/// Its lines as CSV, with a header.
+///
+/// # Errors
+/// None that is known; what is written to memory can be written.
+pub(super) fn as_csv(board: &v1::GetLeaderboardResponse) -> Result<Vec<u8>, CommandError> {
+    let mut sheet = csv::Writer::from_writer(Vec::new());
+    let mut header: Vec<String> = ["place", "name", "kind", "mean", "deviation", "games"]
+        .map(str::to_owned)
+        .into();
+    header.extend((1..=MAX_SEATS).map(|place| format!("place_{place}")));
+    sheet.write_record(&header)?;
+    for line in &board.rated {
+        let rating = line.rating.unwrap_or_default();
+        let mut row = vec![
+            line.place.to_string(),
+            line.name.clone(),
+            kind_name(line).to_owned(),
+            rating.mean.to_string(),
+            rating.deviation.to_string(),
+            rating.games.to_string(),
+        ];
+        row.extend(times(line, MAX_SEATS));
+        sheet.write_record(&row)?;
+    }
+    Ok(sheet.into_inner()?)
+}
+
+/// How often it had each of the first places.
+fn times(line: &v1::Rated, places: usize) -> impl Iterator<Item = String> {
+    (0..places).map(|index| line.places.get(index).copied().unwrap_or(0).to_string())
+}
+
+fn kind_name(line: &v1::Rated) -> &'static str {
+    match (line.built_in, line.kind()) {
+        (true, _) => "built-in",
+        (_, v1::ParticipantKind::Human) => "human",
+        (_, v1::ParticipantKind::Robot) => "robot",
+        _ => "agent",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::board::*;
+
+    #[test]
+    fn a_leaderboard_has_the_same_lines_in_every_form() {
+        let rated = |place, name: &str, built_in| v1::Rated {
+            name: name.into(),
+            kind: v1::ParticipantKind::Human.into(),
+            built_in,
+            rating: Some(v1::Rating {
+                mean: 25.5,
+                deviation: 2.0,
+                games: 7,
+            }),
+            place,
+            places: vec![4, 3],
+        };
+        let mut board = v1::GetLeaderboardResponse {
+            rated: vec![rated(1, "greedy", true), rated(2, "A\u{1b}da", false)],
+            games: 7,
+        };
+        let mut text = String::new();
+        add_table(&mut text, &board);
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(lines.len(), 4, "{text}");
+        let words: Vec<&str> = lines[3].split_whitespace().collect();
+        assert_eq!(
+            words,
+            ["2", "Ada", "human", "25.50", "±", "3.92", "7", "4", "3"]
+        );
+        let csv = String::from_utf8(as_csv(&board).expect("written")).expect("text");
+        let csv: Vec<&str> = csv.lines().collect();
+        assert_eq!(csv[1], "1,greedy,built-in,25.5,2,7,4,3,0,0,0,0");
+        assert_eq!(as_json(&board)[1]["kind"], "human");
+        board.rated.clear();
+        text.clear();
+        add_table(&mut text, &board);
+        assert_eq!(text, "  nobody to show\n");
+    }
+}

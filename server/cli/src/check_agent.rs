@@ -1,0 +1,273 @@
+//! `chefshat check-agent`: the examination of an agent from the command line, and what is printed of it. What is examined, and how it is
+//! judged, is in `examiner`.
+
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Duration;
+
+use anstyle::{AnsiColor, Style};
+use clap::Args;
+use tokio::signal::unix::{SignalKind, signal};
+
+use super::{CommandError, say};
+use chefshat_examiner::case::{CASES, Case, Patience};
+use chefshat_examiner::{AgentCommand, Examination, Outcome, Waiting};
+
+/// How long an agent that is started by hand is waited for.
+const BY_HAND: Duration = Duration::from_secs(600);
+/// Exit code when Ctrl-C ended the examination, as shells have it.
+const INTERRUPTED: u8 = 130;
+
+/// Examine an agent: play cases with it over the real protocol and say what it got wrong.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  chefshat check-agent -- python agent.py --server {address} --code {code}\n  \
+                  chefshat check-agent --only refusal --only disconnect -- node agent.js --address {address} --code {code} --name {name}\n  \
+                  chefshat check-agent --many 'python agent.py --server {address} --tournament {tournament}' -- python agent.py --server {address} --code {code}\n  \
+                  chefshat check-agent --list\n  chefshat check-agent --only game        (waits for an agent started by hand)\n\n\
+                  In the command {address} stands for the examiner's host:port, {url} for http://host:port, {code} for the join code of \
+                  the case's room, {tournament} for that of a tournament, {name} for a name to show. The agent is started anew for each case. What each fault means is in \
+                  docs/check-agent.md.\n\n\
+                  Exit code: 0 when the agent passed every case."
+)]
+pub(super) struct CheckAgent {
+    /// Play this case alone; may be given more than once.
+    #[arg(long, value_name = "CASE", value_parser = case_named)]
+    only: Vec<&'static Case>,
+    /// List the cases and play none.
+    #[arg(long)]
+    list: bool,
+    /// Seconds that the agent has for an answer, to come back, to leave, to end.
+    #[arg(long, value_name = "SECONDS", default_value_t = 5.0, value_parser = seconds)]
+    patience: f64,
+    /// Seconds that the agent has to start and take its seat; standard: 30, or 600 where it is started by hand.
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    start: Option<f64>,
+    /// Where to listen, for an agent that knows its server; standard: another port of 127.0.0.1 for each case.
+    #[arg(long, value_name = "ADDRESS")]
+    listen: Option<SocketAddr>,
+    /// Folder for what the agent prints, one file for each case.
+    #[arg(long, value_name = "FOLDER")]
+    logs: Option<PathBuf>,
+    /// Command, for the shell, that starts the agent for a tournament: for the case many-seats, which is left out otherwise.
+    #[arg(long, value_name = "COMMAND LINE")]
+    many: Option<String>,
+    /// Print one JSON line for each case, and one at the end.
+    #[arg(long)]
+    json: bool,
+    /// The command that starts the agent. Without one the address and join code of each case are printed.
+    #[arg(last = true, value_name = "COMMAND")]
+    command: Vec<String>,
+}
+
+impl CheckAgent {
+    pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
+        if self.list {
+            return self.print_list();
+        }
+        let mut terminate = signal(SignalKind::terminate())?;
+        tokio::select! {
+            code = self.examine() => code,
+            // The agent's processes, which have a group of their own, are ended on the way out.
+            pressed = tokio::signal::ctrl_c() => {
+                pressed?;
+                Ok(ExitCode::from(INTERRUPTED))
+            }
+            _ = terminate.recv() => Ok(ExitCode::FAILURE),
+        }
+    }
+
+    async fn examine(&self) -> Result<ExitCode, CommandError> {
+        let in_rooms = match self.command.is_empty() {
+            true => None,
+            false => Some(AgentCommand::new(self.command.clone())?),
+        };
+        let in_tournaments = (self.many.as_deref())
+            .map(AgentCommand::for_tournament)
+            .transpose()?;
+        if let Some(logs) = &self.logs {
+            std::fs::create_dir_all(logs).map_err(|error| {
+                let folder = logs.display();
+                format!("the folder {folder} cannot be used: {error}; choose another with --logs")
+            })?;
+        }
+        let start = match (self.start, in_rooms.as_ref().or(in_tournaments.as_ref())) {
+            (Some(start), _) => Duration::from_secs_f64(start),
+            (None, Some(_)) => Duration::from_secs(30),
+            (None, None) => BY_HAND,
+        };
+        let patience = Patience {
+            start,
+            each: Duration::from_secs_f64(self.patience),
+        };
+        let cases = self.cases()?;
+        let examination = Examination::new(self.listen, patience, self.logs.clone()).await?;
+        let mut passed = 0;
+        let mut played = 0;
+        for case in &cases {
+            let waiting = |waiting: &Waiting| self.print_waiting(case, waiting);
+            let command = match case.is_tournament() {
+                true => in_tournaments.as_ref(),
+                false => in_rooms.as_ref(),
+            };
+            let outcome = examination.examine(case, command, waiting).await?;
+            self.print(case, &outcome)?;
+            played += 1;
+            passed += usize::from(outcome.is_passed());
+            if outcome.is_hopeless() {
+                break;
+            }
+        }
+        examination.stop().await?;
+        self.print_summary(passed, played, cases.len())?;
+        Ok(if passed == cases.len() {
+            ExitCode::SUCCESS
+        } else {
+            ExitCode::FAILURE
+        })
+    }
+
+    /// The cases to play: those asked for, or all for which there is a command.
+    fn cases(&self) -> Result<Vec<&'static Case>, CommandError> {
+        let (rooms, many) = (!self.command.is_empty(), self.many.is_some());
+        if self.only.is_empty() {
+            // Nothing but --many asks for that case alone; nothing at all, for agents started by hand in rooms.
+            let wanted = |case: &&Case| match case.is_tournament() {
+                true => many,
+                false => rooms || !many,
+            };
+            return Ok(CASES.iter().filter(wanted).collect());
+        }
+        let without = |case: &&&Case| case.is_tournament() && rooms && !many;
+        match self.only.iter().find(without) {
+            Some(case) => Err(format!(
+                "the case {} is played in a tournament; give its command with --many",
+                case.name
+            )
+            .into()),
+            None => Ok(self.only.clone()),
+        }
+    }
+
+    fn print_list(&self) -> Result<ExitCode, CommandError> {
+        for case in &CASES {
+            let (name, about) = (case.name, case.about);
+            if self.json {
+                say(serde_json::json!({"case": name, "about": about}))?;
+            } else {
+                say(format!("{name:WIDTH$} {about}"))?;
+            }
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+
+    fn print_waiting(&self, case: &Case, waiting: &Waiting) {
+        let Waiting { address, code } = waiting;
+        if self.json {
+            let line = serde_json::json!({
+                "event": "waiting", "case": case.name, "address": address.to_string(), "code": code,
+            });
+            // Whoever does not read it will not start an agent: the case says so when its time is up.
+            let _unread = say(line);
+        } else {
+            anstream::eprintln!(
+                "{}: start an agent on {address} with join code {code}",
+                case.name
+            );
+        }
+    }
+
+    fn print(&self, case: &Case, outcome: &Outcome) -> Result<(), CommandError> {
+        if self.json {
+            return say(as_json(case, outcome));
+        }
+        let mut text = String::new();
+        let (word, colour) = match outcome.is_passed() {
+            true => ("PASS ", AnsiColor::Green),
+            false => ("FAULT", AnsiColor::Red),
+        };
+        let style = Style::new().fg_color(Some(colour.into())).bold();
+        let (name, took) = (case.name, outcome.took.as_secs_f64());
+        write!(
+            text,
+            "{style}{word}{style:#} {name:WIDTH$} {} ({took:.1} s)",
+            case.about
+        )?;
+        for finding in &outcome.findings {
+            let fault = finding.fault;
+            let times = match finding.times {
+                1 => String::new(),
+                times => format!(", {times} times"),
+            };
+            write!(text, "\n      {style}{fault}{style:#}{times}")?;
+            write!(text, "\n        expected: {}", finding.expected)?;
+            write!(text, "\n        came:     {}", finding.got)?;
+            write!(text, "\n        to do:    {}", fault.advice())?;
+        }
+        if !outcome.last_lines.is_empty() {
+            write!(text, "\n      the agent's last lines:")?;
+            for line in &outcome.last_lines {
+                write!(text, "\n        | {line}")?;
+            }
+        }
+        Ok(writeln!(anstream::stdout(), "{text}")?)
+    }
+
+    fn print_summary(&self, passed: usize, played: usize, all: usize) -> Result<(), CommandError> {
+        if self.json {
+            return say(serde_json::json!({
+                "event": "summary", "cases": all, "played": played, "passed": passed, "ok": passed == all,
+            }));
+        }
+        let rest = match all - played {
+            0 => String::new(),
+            rest => format!("; {rest} not played, for there is no agent to examine"),
+        };
+        say(format!("{passed} of {all} cases passed{rest}"))
+    }
+}
+
+/// Width of the column of names.
+const WIDTH: usize = 15;
+
+fn as_json(case: &Case, outcome: &Outcome) -> serde_json::Value {
+    let faults: Vec<serde_json::Value> = outcome
+        .findings
+        .iter()
+        .map(|finding| {
+            serde_json::json!({
+                "code": finding.fault.code(),
+                "times": finding.times,
+                "expected": finding.expected,
+                "got": finding.got,
+                "advice": finding.fault.advice(),
+            })
+        })
+        .collect();
+    serde_json::json!({
+        "event": "case",
+        "case": case.name,
+        "about": case.about,
+        "passed": outcome.is_passed(),
+        "faults": faults,
+        "seconds": outcome.took.as_secs_f64(),
+        "last_lines": outcome.last_lines,
+    })
+}
+
+fn case_named(name: &str) -> Result<&'static Case, String> {
+    Case::named(name).ok_or_else(|| {
+        let names: Vec<&str> = CASES.iter().map(|case| case.name).collect();
+        format!("no such case; there are {}", names.join(", "))
+    })
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if (0.1..=3600.0).contains(&seconds) => Ok(seconds),
+        _ => Err("0.1 to 3600 seconds".into()),
+    }
+}

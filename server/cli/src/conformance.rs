@@ -1,0 +1,127 @@
+//! `chefshat conformance FILE`: replays test vectors and says whether the engine agrees with them. How a line is replayed is decided in
+//! `chefshat-arena`.
+
+use std::fs::File;
+use std::io::{BufReader, Write};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use chefshat_simulation::conformance::{Agreed, Failure, Report, check};
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::{Value, json};
+
+use super::CommandError;
+
+const HELP: &str = "\
+A file of vectors has one JSON object a line, either a deal (rules, seed, shift, hands, leader) or a whole game (rules, seed, steps, \
+shifts, scores, winner).
+
+Exit code 0: all agree. 1: one does not agree (the first is named), or the file is none of vectors.
+
+Example:
+  chefshat conformance tests/fixtures/vectors/games.jsonl";
+
+/// Check the rule engine against deals and games that another engine made.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub(super) struct Conformance {
+    /// The file of vectors.
+    file: PathBuf,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Conformance {
+    pub(super) fn run(self) -> Result<ExitCode, CommandError> {
+        let name = self.file.display();
+        let file = File::open(&self.file).map_err(|error| format!("{name}: {error}"))?;
+        let bytes = file
+            .metadata()
+            .map_err(|error| format!("{name}: {error}"))?;
+        if bytes.is_dir() {
+            return Err(format!("{name} is a folder: name a file of vectors in it").into());
+        }
+        let bar = ProgressBar::new(bytes.len()).with_style(ProgressStyle::with_template(
+            "{bar:40} {bytes} of {total_bytes}",
+        )?);
+        let report = check(BufReader::new(file), |bytes| bar.inc(bytes));
+        bar.finish_and_clear();
+        let mut out = anstream::stdout().lock();
+        if self.json {
+            writeln!(out, "{}", json_report(&self.file, &report))?;
+        } else {
+            write_report(&mut out, &self.file, &report)?;
+        }
+        match report.failure {
+            None => Ok(ExitCode::SUCCESS),
+            Some(Failure::Disagrees { .. }) => Ok(ExitCode::FAILURE),
+            Some(problem) => Err(format!("{name}: {problem}").into()),
+        }
+    }
+}
+
+/// For people. A file that is none of vectors is left to the error message.
+fn write_report(out: &mut impl Write, file: &Path, report: &Report) -> std::io::Result<()> {
+    let name = file.display();
+    match &report.failure {
+        None => writeln!(out, "{name}: all agree: {}", counted(&report.agreed)),
+        Some(Failure::Disagrees { line, disagreement }) => {
+            let step = disagreement.step.map_or_else(String::new, |step| {
+                format!(", step {step} (the first is 0)")
+            });
+            writeln!(out, "{name}: line {line}{step} does not agree")?;
+            writeln!(out, "  where     {}", disagreement.place)?;
+            writeln!(out, "  expected  {}", disagreement.expected)?;
+            writeln!(out, "  got       {}", disagreement.got)?;
+            writeln!(out, "before it: {}", counted(&report.agreed))
+        }
+        Some(_) => Ok(()),
+    }
+}
+
+/// What agreed, in words.
+fn counted(agreed: &Agreed) -> String {
+    let Agreed {
+        deals,
+        games,
+        steps,
+    } = agreed;
+    let games_and_steps = format!("{games} games ({steps} decisions)");
+    match (deals, games) {
+        (0, 0) => "none".to_owned(),
+        (_, 0) => format!("{deals} deals"),
+        (0, _) => games_and_steps,
+        _ => format!("{deals} deals, {games_and_steps}"),
+    }
+}
+
+fn json_report(file: &Path, report: &Report) -> Value {
+    let (mut disagreement, mut problem) = (Value::Null, Value::Null);
+    match &report.failure {
+        None => {}
+        Some(Failure::Disagrees {
+            line,
+            disagreement: found,
+        }) => {
+            disagreement = json!({
+                "line": line,
+                "step": found.step,
+                "place": found.place,
+                "expected": found.expected,
+                "got": found.got,
+            });
+        }
+        Some(other) => problem = other.to_string().into(),
+    }
+    json!({
+        "file": file.display().to_string(),
+        "agree": report.failure.is_none(),
+        "deals": report.agreed.deals,
+        "games": report.agreed.games,
+        "decisions": report.agreed.steps,
+        "disagreement": disagreement,
+        "problem": problem,
+    })
+}

@@ -1,0 +1,213 @@
+//! `chefshat demo`: a server, agents that reach it over real connections, a spectator that tells the game, and at the end the
+//! standings, whether the deals check out, and where the record is. The game is played as any other: the demo has no way around the
+//! protocol.
+
+mod table;
+mod verify;
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Duration;
+
+use chefshat_agents::AgentKind;
+use chefshat_client::Spectator;
+use chefshat_client::v1::{self, game_event::Kind};
+use chefshat_record::jsonl;
+use clap::Args;
+
+use super::narrator::{Narrator, abort_reason, clean, heading, legend, row};
+use super::remote::{MAX_PACE_MS, agent_kind};
+use super::rules_args::{RulesArgs, rules_of};
+use super::{CommandError, data_dir};
+use chefshat_server::host::Host;
+use table::Table;
+
+/// Most agents that can be named: the engine's limit of seats.
+const MAX_PLAYERS: usize = 6;
+/// The agents that take turns in taking seats when none are named.
+const STANDARD_AGENTS: [AgentKind; 2] = [AgentKind::Greedy, AgentKind::Random];
+
+/// Play a game between agents over real connections and watch it.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  chefshat demo\n  chefshat demo --seed 7 --agents greedy,random,random_unmasked\n  \
+                  chefshat demo --pace-ms 300 --preset rulebook\n  chefshat demo --json --data-dir ./chefshat-data\n\n\
+                  Exit code: 0 when the game finished and its deals check out."
+)]
+pub(super) struct Demo {
+    /// Makes the game repeatable: fixes its deals and the agents' choices.
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Who plays, seat by seat: random, random_unmasked, greedy, trained. Standard: greedy and random in turn.
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = agent_kind)]
+    agents: Vec<AgentKind>,
+    /// Milliseconds that each agent waits before it decides.
+    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u64).range(0..=MAX_PACE_MS))]
+    pace_ms: u64,
+    /// Folder for the record (records/GAME-ID.jsonl). Standard: chefshat in the user's data folder.
+    #[arg(long, env = "CHEFSHAT_DATA_DIR")]
+    data_dir: Option<PathBuf>,
+    /// Print JSON lines: where the server listens, every event, the result.
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    rules: RulesArgs,
+}
+
+impl Demo {
+    pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
+        let (agents, rules) = self.agents_and_rules()?;
+        let data_dir = data_dir::prepare(self.data_dir.clone())?;
+        let host = Host::in_memory(Some(data_dir.clone())).await?;
+        let mut out = anstream::stdout();
+        if self.json {
+            let address = host.address().to_string();
+            let line = serde_json::json!({"event": "listening", "address": address});
+            writeln!(out, "{line}")?;
+        }
+        let pace = Duration::from_millis(self.pace_ms);
+        let table = Table::set(host.address(), agents, rules, self.seed, pace).await?;
+        if !self.json {
+            self.introduce(&mut out, &host, &table)?;
+        }
+        let end = self.watch(&mut out, &table).await?;
+        let Table { agents, room, .. } = table;
+        let outcomes = table::outcomes(agents.players).await;
+        // The record is written when the server has ended: it waits for that.
+        host.stop().await?;
+        let end = match end {
+            Ending::Finished(end) => end,
+            Ending::Aborted(reason) => return Err(format!("the game was aborted: {reason}").into()),
+        };
+        let path = jsonl::path_of(&data_dir, &room.game_id);
+        let record = jsonl::read(&path)?;
+        let asked = self.seed.map(table::game_seed);
+        let checked = verify::check(&record, &room.seed_commitment, asked, &outcomes?)?;
+        if self.json {
+            let line = result(&end, &room, &agents.names, &agents.kinds, &checked, &path);
+            writeln!(out, "{line}")?;
+        } else {
+            writeln!(out)?;
+            write!(out, "{}", row("the deals", &checked.in_words()))?;
+            write!(out, "{}", row("the record", &path.display().to_string()))?;
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+
+    /// Who plays by which rules: as many seats as agents are named, unless the flags say how many.
+    fn agents_and_rules(&self) -> Result<(Vec<AgentKind>, v1::RuleSet), CommandError> {
+        let mut message = self.rules.message();
+        if !self.agents.is_empty() && message.players.is_none() {
+            let named = self.agents.len();
+            if !(2..=MAX_PLAYERS).contains(&named) {
+                let plural = if named == 1 { "" } else { "s" };
+                return Err(format!(
+                    "--agents names {named} agent{plural}; name 2 to {MAX_PLAYERS}, for instance greedy,random"
+                )
+                .into());
+            }
+            message.players = u32::try_from(named).ok();
+        }
+        let rules = rules_of(&message)?;
+        let players = rules.players();
+        if self.agents.is_empty() {
+            let agents = STANDARD_AGENTS.iter().copied().cycle().take(players);
+            return Ok((agents.collect(), message));
+        }
+        if self.agents.len() != players {
+            let named = self.agents.len();
+            return Err(format!("--agents names {named} agents, but {players} play").into());
+        }
+        Ok((self.agents.clone(), message))
+    }
+
+    fn introduce(
+        &self,
+        out: &mut impl Write,
+        host: &Host,
+        table: &Table,
+    ) -> Result<(), CommandError> {
+        write!(out, "{}", heading("Chef's Hat"))?;
+        write!(out, "{}", row("the server", &host.url()))?;
+        write!(out, "{}", row("the room", &table.room.room_id))?;
+        let deals = match self.seed {
+            Some(seed) => format!("from the seed {seed}"),
+            None => {
+                let commitment = hex::encode(&table.room.seed_commitment);
+                format!("committed to as {commitment}")
+            }
+        };
+        write!(out, "{}", row("the deals", &deals))?;
+        write!(out, "{}", legend())?;
+        Ok(())
+    }
+
+    /// Shows every event as it comes, to the end of the game.
+    async fn watch(&self, out: &mut impl Write, table: &Table) -> Result<Ending, CommandError> {
+        let labels = table.agents.kinds.iter().map(|kind| kind.name().to_owned());
+        let mut narrator = Narrator::new().with_labels(labels);
+        let mut spectator: Spectator = table.client.spectate(table.room.room_id.as_str(), 1);
+        let mut end = Ending::Aborted("the spectator was not told why");
+        while let Some(event) = spectator.next().await? {
+            if self.json {
+                // What came over the wire may be more than JSON can say; that is an error, not a panic.
+                let game_event = serde_json::to_value(&event)?;
+                let line = serde_json::json!({"event": "game", "game_event": game_event});
+                writeln!(out, "{line}")?;
+            } else if !matches!(event.kind, Some(Kind::Seated(_))) {
+                // Who sits where is said when the game begins.
+                write!(out, "{}", narrator.tell(&event))?;
+                out.flush()?;
+            }
+            match event.kind {
+                Some(Kind::GameEnded(ended)) => end = Ending::Finished(*ended),
+                Some(Kind::GameAborted(aborted)) => {
+                    end = Ending::Aborted(abort_reason(aborted.reason()));
+                }
+                _ => {}
+            }
+        }
+        Ok(end)
+    }
+}
+
+/// How the game ended for the spectator.
+enum Ending {
+    Finished(v1::GameEnded),
+    Aborted(&'static str),
+}
+
+/// The last line for programs.
+fn result(
+    end: &v1::GameEnded,
+    room: &v1::Room,
+    names: &[String],
+    kinds: &[AgentKind],
+    checked: &verify::Checked,
+    record: &Path,
+) -> serde_json::Value {
+    let standings: Vec<serde_json::Value> = end
+        .standings
+        .iter()
+        .map(|line| {
+            let seat = usize::try_from(line.seat).unwrap_or(usize::MAX);
+            serde_json::json!({
+                "place": line.place,
+                "seat": line.seat,
+                "name": names.get(seat).map(|name| clean(name, 64)),
+                "agent": kinds.get(seat).map(|kind| kind.name()),
+                "points": line.points,
+            })
+        })
+        .collect();
+    serde_json::json!({
+        "event": "result",
+        "room_id": room.room_id,
+        "game_id": room.game_id,
+        "standings": standings,
+        "deals_checked": checked.deals,
+        "seed_committed": checked.committed,
+        "record": record,
+    })
+}

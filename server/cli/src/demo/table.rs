@@ -1,0 +1,118 @@
+//! The table of a demo: a room made over one connection, and agents that sit down at it over a connection each.
+
+use std::net::SocketAddr;
+use std::time::Duration;
+
+use chefshat_agents::{AgentKind, BuiltInAgent};
+use chefshat_client::{Client, Outcome, PlayError, v1};
+use tokio::task::JoinHandle;
+
+use super::super::CommandError;
+use super::super::remote::{RemoteAgent, seed_for};
+
+/// An agent at play.
+pub(super) type Player = JoinHandle<Result<Outcome, PlayError>>;
+
+/// A room whose agents are at play.
+pub(super) struct Table {
+    /// The connection of the host, which is the spectator's too.
+    pub(super) client: Client,
+    /// The room as it was made.
+    pub(super) room: v1::Room,
+    /// Who plays.
+    pub(super) agents: Agents,
+}
+
+/// The agents of a table; each list's index is the seat.
+pub(super) struct Agents {
+    pub(super) kinds: Vec<AgentKind>,
+    pub(super) names: Vec<String>,
+    pub(super) players: Vec<Player>,
+}
+
+impl Table {
+    /// Makes the room, seats the agents in the order of the seats and lets them play.
+    pub(super) async fn set(
+        address: SocketAddr,
+        kinds: Vec<AgentKind>,
+        rules: v1::RuleSet,
+        seed: Option<u64>,
+        pace: Duration,
+    ) -> Result<Self, CommandError> {
+        let server = format!("http://{address}");
+        let client = Client::connect(&server).await?;
+        let made = client
+            .create_room(v1::CreateRoomRequest {
+                name: "demo".into(),
+                rules: Some(rules),
+                game_seed: seed.map_or_else(Vec::new, |seed| game_seed(seed).to_vec()),
+                ..v1::CreateRoomRequest::default()
+            })
+            .await?;
+        let room = made
+            .room
+            .ok_or("the server did not say which room it made")?;
+        let names = names(&kinds);
+        // Everybody sits before anybody plays, so that the seats do not depend on who is faster.
+        let mut seated = Vec::with_capacity(kinds.len());
+        for name in &names {
+            let own = Client::connect(&server).await?;
+            let joined = own
+                .join_with_code(made.join_code.as_str(), name.as_str())
+                .await?;
+            seated.push((own, joined.ticket));
+        }
+        let players = seated
+            .into_iter()
+            .zip(&kinds)
+            .enumerate()
+            .map(|(seat, ((own, ticket), kind))| {
+                let seed = seed_for(&format!("chefshat demo agent {seat}"), seed);
+                let agent = RemoteAgent::new(BuiltInAgent::new(*kind, seed), pace);
+                tokio::spawn(async move { own.play(ticket, agent).await })
+            })
+            .collect();
+        Ok(Self {
+            client,
+            room,
+            agents: Agents {
+                kinds,
+                names,
+                players,
+            },
+        })
+    }
+}
+
+/// What the agents have at the end of the game, index = seat.
+pub(super) async fn outcomes(players: Vec<Player>) -> Result<Vec<Outcome>, CommandError> {
+    let mut outcomes = Vec::with_capacity(players.len());
+    for player in players {
+        outcomes.push(player.await??);
+    }
+    Ok(outcomes)
+}
+
+/// The game seed of a number that a person chose.
+pub(super) fn game_seed(seed: u64) -> [u8; 32] {
+    seed_for("chefshat demo game", Some(seed))
+}
+
+/// A name for each agent, no two alike, whose first letter says what it is.
+fn names(kinds: &[AgentKind]) -> Vec<String> {
+    let mut used = [0; AgentKind::ALL.len()];
+    kinds
+        .iter()
+        .map(|kind| {
+            let (number, names) = match kind {
+                AgentKind::Greedy => (0, ["Greta", "Gustav", "Gina", "Georg", "Gloria", "Gil"]),
+                AgentKind::Random => (1, ["Rosa", "Rolf", "Rita", "Remi", "Ruth", "Ravi"]),
+                AgentKind::RandomUnmasked => (2, ["Uma", "Udo", "Ulla", "Ugo", "Ursa", "Ulf"]),
+                AgentKind::Trained => (3, ["Tara", "Timo", "Thea", "Theo", "Tilda", "Tom"]),
+            };
+            let name = names[used[number] % names.len()];
+            used[number] += 1;
+            name.to_owned()
+        })
+        .collect()
+}

@@ -1,0 +1,255 @@
+//! `chefshat experiment mechanics`: the paper's Experiment 1, its table next to ours. How the Shifts of a condition are played is decided in
+//! `chefshat-arena`.
+
+use std::io::Write as _;
+use std::process::ExitCode;
+
+use chefshat_engine::{RuleSet, RuleSetSpec};
+use chefshat_simulation::RulesForm;
+use chefshat_simulation::mechanics::{Condition, MechanicsTable, SHIFTS_PER_GAME};
+use chefshat_tournament::statistics::Interval;
+use clap::Args;
+use clap::builder::PossibleValuesParser;
+use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::{Value, json};
+
+use super::super::numbers::{counted, grouped};
+use super::super::sheet::{heading, line, table};
+use super::super::{CommandError, threads};
+
+const HELP: &str = "\
+What the paper calls a game is a Shift here, its rounds are laps. The Shifts of a condition are played as the paper's 250 are: one after \
+another, each with the roles that the one before brought about, 250 to a game. Conditions with the same deck play the same deals.
+
+Examples:
+  chefshat experiment mechanics
+  chefshat experiment mechanics --large --seed 7
+  chefshat experiment mechanics --shifts 5000 --preset paper --json
+
+The same seed gives the same output, on any number of threads.";
+
+/// Shifts of each condition that `--large` adds.
+const LARGE: u64 = 100_000;
+
+/// Experiment 1 of the paper: four random agents play with all mechanics, without jokers, without the exchange, without special actions.
+/// How often does the starter win the Shift, and how many laps does a Shift have?
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub(in super::super) struct Mechanics {
+    /// Shifts of each condition; the paper's are 250.
+    #[arg(long, default_value_t = u64::from(SHIFTS_PER_GAME), value_parser = clap::value_parser!(u64).range(1..))]
+    shifts: u64,
+    /// Play each condition again over 100,000 Shifts, to see what is signal.
+    #[arg(long)]
+    large: bool,
+    /// The rules the mechanics are taken from, separated by commas.
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        default_value = "paper,original2020",
+        value_parser = PossibleValuesParser::new(RuleSetSpec::PRESETS)
+    )]
+    preset: Vec<String>,
+    /// The number that all chance is drawn from.
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Threads to play on, at most 256; 0 is one for each core.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    threads: usize,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+/// A condition under a preset.
+struct Row {
+    preset: String,
+    condition: Condition,
+    rules: RuleSet,
+    /// What came out, for each number of Shifts.
+    tables: Vec<MechanicsTable>,
+}
+
+impl Mechanics {
+    pub(super) fn run(self) -> Result<ExitCode, CommandError> {
+        let numbers: Vec<u64> = std::iter::once(self.shifts)
+            .chain(self.large.then_some(LARGE))
+            .collect();
+        let mut rows = self.rows();
+        let shifts = numbers
+            .iter()
+            .sum::<u64>()
+            .saturating_mul(rows.len() as u64);
+        let bar = ProgressBar::new(shifts).with_style(ProgressStyle::with_template(
+            "{bar:40} {human_pos} of {human_len} Shifts, {eta} left",
+        )?);
+        let pool = threads::pool(self.threads, u64::MAX)?;
+        pool.install(|| {
+            for row in &mut rows {
+                let play =
+                    |&shifts| MechanicsTable::play(row.rules, shifts, self.seed, |n| bar.inc(n));
+                row.tables = numbers.iter().map(play).collect();
+            }
+        });
+        bar.finish_and_clear();
+        let mut out = anstream::stdout().lock();
+        if self.json {
+            writeln!(out, "{}", self.as_json(&rows))?;
+        } else {
+            write!(out, "{}", self.as_text(&rows, &numbers))?;
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+
+    fn rows(&self) -> Vec<Row> {
+        let conditions = |preset: &String| {
+            Condition::ALL.map(|condition| Row {
+                preset: preset.clone(),
+                condition,
+                rules: condition
+                    .rules(preset)
+                    .expect("the possible values are the presets"),
+                tables: Vec::new(),
+            })
+        };
+        self.preset.iter().flat_map(conditions).collect()
+    }
+
+    fn as_json(&self, rows: &[Row]) -> Value {
+        let results = rows.iter().flat_map(|row| {
+            let paper = row.condition.paper();
+            row.tables.iter().map(move |table| {
+                json!({
+                    "preset": row.preset,
+                    "condition": row.condition.name(),
+                    "rules": RulesForm::from(&row.rules),
+                    "shifts": table.shifts(),
+                    "starter_won": table.starter_won,
+                    "starter_wins": table.starter_wins(),
+                    "starter_wins_95": ends(table.starter_wins_interval()),
+                    "laps_per_shift": table.laps.mean(),
+                    "laps_per_shift_95": ends(table.laps.interval95()),
+                    "laps_standard_deviation": table.laps.variance().sqrt(),
+                    "pizzas_per_shift": table.pizzas.mean(),
+                    "turns_per_shift": table.turns.mean(),
+                    "special_actions": table.special_actions,
+                    "paper": {
+                        "shifts": SHIFTS_PER_GAME,
+                        "starter_wins": paper.starter_wins,
+                        "starter_wins_95": ends(paper.starter_wins_interval()),
+                        "laps_per_shift": paper.laps,
+                    },
+                })
+            })
+        });
+        json!({
+            "experiment": "mechanics",
+            "agents": "random",
+            "seed": self.seed,
+            "shifts_per_game": SHIFTS_PER_GAME,
+            "results": results.collect::<Vec<Value>>(),
+        })
+    }
+
+    /// The result as lines of at most 100 columns.
+    fn as_text(&self, rows: &[Row], numbers: &[u64]) -> String {
+        let mut text = String::new();
+        heading(
+            &mut text,
+            &format!(
+                "The paper's Experiment 1: four random agents, seed {}",
+                self.seed
+            ),
+        );
+        line(
+            &mut text,
+            &format!(
+                "{} of each condition, {SHIFTS_PER_GAME} to a game; the paper's figures are of {SHIFTS_PER_GAME}.",
+                counted_all(numbers)
+            ),
+        );
+        text.push('\n');
+        heading(
+            &mut text,
+            "The starter wins the Shift, % (95 % interval: Wilson's)",
+        );
+        let paper = |condition: Condition| {
+            let interval = condition.paper().starter_wins_interval();
+            with_interval(
+                100.0 * condition.paper().starter_wins,
+                percents(interval),
+                0,
+            )
+        };
+        let ours = |table: &MechanicsTable| {
+            let interval = percents(table.starter_wins_interval());
+            with_interval(100.0 * table.starter_wins(), interval, 1)
+        };
+        figures(&mut text, rows, numbers, paper, ours);
+        text.push('\n');
+        heading(
+            &mut text,
+            "Laps a Shift (95 % interval: mean ± 1.96 standard errors; the paper gives no spread)",
+        );
+        let paper = |condition: Condition| format!("{}", condition.paper().laps);
+        let ours =
+            |table: &MechanicsTable| with_interval(table.laps.mean(), table.laps.interval95(), 2);
+        figures(&mut text, rows, numbers, paper, ours);
+        text
+    }
+}
+
+/// One figure of all conditions.
+fn figures(
+    text: &mut String,
+    rows: &[Row],
+    numbers: &[u64],
+    paper: impl Fn(Condition) -> String,
+    ours: impl Fn(&MechanicsTable) -> String,
+) {
+    let ours_header: Vec<String> = numbers
+        .iter()
+        .map(|&number| counted(number, "Shift"))
+        .collect();
+    let mut header = vec!["Preset", "Condition", "Paper"];
+    header.extend(ours_header.iter().map(String::as_str));
+    let rows = rows.iter().map(|row| {
+        let mut cells = vec![
+            row.preset.clone(),
+            row.condition.name().replace('_', " "),
+            paper(row.condition),
+        ];
+        cells.extend(row.tables.iter().map(&ours));
+        cells
+    });
+    table(text, &header, &[0, 1], rows);
+}
+
+/// `28.0 (22.8–33.9)`; the interval has one decimal more than a whole figure.
+fn with_interval(figure: f64, Interval { low, high }: Interval, decimals: usize) -> String {
+    let finer = decimals.max(1);
+    format!("{figure:.decimals$} ({low:.finer$}–{high:.finer$})")
+}
+
+fn percents(interval: Interval) -> Interval {
+    Interval {
+        low: 100.0 * interval.low,
+        high: 100.0 * interval.high,
+    }
+}
+
+fn ends(interval: Interval) -> [f64; 2] {
+    [interval.low, interval.high]
+}
+
+/// `250 Shifts`, `250 and 100,000 Shifts`.
+fn counted_all(numbers: &[u64]) -> String {
+    let (last, before) = numbers.split_last().expect("there is a number of Shifts");
+    let mut words: String = before
+        .iter()
+        .map(|&number| format!("{} and ", grouped(number)))
+        .collect();
+    words.push_str(&counted(*last, "Shift"));
+    words
+}

@@ -1,0 +1,135 @@
+//! `chefshat import`: puts the record of another server, or a game written down at a real table, among the records of a data folder. What a
+//! transcript may say, and whether it can have happened, is decided in `chefshat-records`.
+
+use std::fs::File;
+use std::io::{Read as _, Write as _};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use chefshat_proto::v1::{self, record_line::Line};
+use chefshat_record::jsonl;
+use chefshat_record::replay::{Replayed, replay};
+use chefshat_record::table;
+use chefshat_record::table::MAX_TRANSCRIPT_BYTES;
+use clap::Args;
+use serde_json::json;
+
+use super::{CommandError, data_dir, verify};
+
+const HELP: &str = "\
+A FILE that ends in .jsonl is a record, perhaps of another server: it is verified and copied. Any other is a transcript: a CSV file in \
+which somebody wrote down a game played with real cards. It becomes a record; hands that nobody wrote down stay unknown where they do not \
+follow from what was played. docs/records.md describes both forms.
+
+Exit code 0: the record is there. 1: a line does not fit (it is named), or the record was there before.
+
+Examples:
+  chefshat import table-3.csv
+  chefshat import table-3.csv --out ./records
+  chefshat import 5f0c6a4de2b14b7f8a3d9c1e7b60425d.jsonl --data-dir ./chefshat-data";
+
+/// Add the record of a game played elsewhere, at a real table too.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub(super) struct Import {
+    /// A record (.jsonl) or a transcript (.csv).
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    /// Where to write the record: a file that ends in .jsonl, or a folder. Standard: the records of the data folder.
+    #[arg(long, value_name = "PATH")]
+    out: Option<PathBuf>,
+    /// Data folder to write to (records/GAME-ID.jsonl), where --out is not given. Standard: chefshat in the user's data folder.
+    #[arg(long, env = "CHEFSHAT_DATA_DIR")]
+    data_dir: Option<PathBuf>,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Import {
+    pub(super) fn run(self) -> Result<ExitCode, CommandError> {
+        let (lines, replayed) = self.read()?;
+        let header = match lines.first().and_then(|line| line.line.as_ref()) {
+            Some(Line::Header(header)) => header,
+            _ => unreachable!("a record that replays begins with its header"),
+        };
+        let path = self.path_for(&header.game_id)?;
+        if path.exists() {
+            return Err(format!(
+                "{}: game {} is there already; nothing was changed",
+                path.display(),
+                header.game_id
+            )
+            .into());
+        }
+        jsonl::write(&path, &lines)?;
+        self.tell(&path, header, &replayed)?;
+        Ok(ExitCode::SUCCESS)
+    }
+
+    /// The record that the file is or tells of, verified.
+    fn read(&self) -> Result<(Vec<v1::RecordLine>, Replayed), CommandError> {
+        let name = self.file.display();
+        let lines = if self
+            .file
+            .extension()
+            .is_some_and(|extension| extension == "jsonl")
+        {
+            jsonl::read(&self.file)?
+        } else {
+            let most = u64::try_from(MAX_TRANSCRIPT_BYTES).unwrap_or(u64::MAX);
+            let mut text = Vec::new();
+            File::open(&self.file)
+                .and_then(|file| file.take(most.saturating_add(1)).read_to_end(&mut text))
+                .map_err(|error| format!("{name}: {error}"))?;
+            table::import(&text).map_err(|error| format!("{name}: {error}"))?
+        };
+        let replayed = replay(&lines).map_err(|error| format!("{name}: {error}"))?;
+        Ok((lines, replayed))
+    }
+
+    fn path_for(&self, game_id: &str) -> Result<PathBuf, CommandError> {
+        Ok(match &self.out {
+            None => jsonl::path_of(&data_dir::prepare(self.data_dir.clone())?, game_id),
+            Some(file)
+                if file
+                    .extension()
+                    .is_some_and(|extension| extension == "jsonl") =>
+            {
+                file.clone()
+            }
+            Some(folder) => folder.join(format!("{game_id}.jsonl")),
+        })
+    }
+
+    fn tell(
+        &self,
+        path: &Path,
+        header: &v1::RecordHeader,
+        replayed: &Replayed,
+    ) -> Result<(), CommandError> {
+        let mut out = anstream::stdout().lock();
+        if self.json {
+            let report = json!({
+                "file": path,
+                "game_id": header.game_id,
+                "origin": header.origin().as_str_name(),
+                "state": verify::ending(replayed),
+                "decisions": replayed.decisions,
+                "events": replayed.events,
+            });
+            writeln!(out, "{report}")?;
+        } else {
+            writeln!(
+                out,
+                "{}: {}, {} decisions, {} events, {}",
+                path.display(),
+                verify::ending(replayed),
+                replayed.decisions,
+                replayed.events,
+                verify::deals(header)
+            )?;
+        }
+        Ok(())
+    }
+}

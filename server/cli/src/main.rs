@@ -1,0 +1,181 @@
+//! The command line of `chefshat`: what it understands, and one module for each command. What the commands do is elsewhere.
+
+mod agent;
+mod board;
+mod check_agent;
+mod compare;
+mod conformance;
+mod connect;
+mod data_dir;
+mod demo;
+mod experiment;
+mod export;
+mod import;
+mod leaderboard;
+mod narrator;
+mod numbers;
+mod participant;
+mod policy_args;
+mod ratings;
+mod records;
+mod remote;
+mod render;
+mod room;
+mod rules_args;
+mod secret_file;
+mod serve;
+mod sheet;
+mod simulate;
+mod threads;
+mod tournament;
+mod tui;
+mod verify;
+
+use std::fmt::Display;
+use std::io::{self, IsTerminal as _, Write as _};
+use std::process::ExitCode;
+
+use clap::builder::FalseyValueParser;
+use clap::{Parser, Subcommand};
+use tracing_subscriber::EnvFilter;
+
+/// Why a command failed, in words for the person who ran it.
+type CommandError = Box<dyn std::error::Error + Send + Sync>;
+
+/// Chef's Hat: a game server for agents, robots and people.
+#[derive(Debug, Parser)]
+#[command(name = "chefshat", version, propagate_version = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+    /// What is logged to standard error, for instance `debug` or `chefshat_server=debug`.
+    #[arg(long, env = "CHEFSHAT_LOG", default_value = "warn", global = true)]
+    log: String,
+    /// Log lines as JSON.
+    #[arg(long, env = "CHEFSHAT_LOG_JSON", global = true, value_parser = FalseyValueParser::new())]
+    log_json: bool,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Host rooms.
+    Serve(serve::Serve),
+    /// Play a game between agents over real connections and watch it.
+    Demo(demo::Demo),
+    /// Play as a built-in agent on a server.
+    Agent(agent::AgentCommand),
+    /// Examine an agent: play cases with it and say what it got wrong.
+    CheckAgent(check_agent::CheckAgent),
+    /// Play as a person at this terminal.
+    Play(tui::play::Play),
+    /// Watch a room or a recorded game at this terminal.
+    Watch(tui::watch::Watch),
+    /// Make, list, watch and close rooms of a server.
+    Room(room::RoomCommand),
+    /// Hold tournaments: make, join, follow them, and see their results.
+    Tournament(tournament::TournamentCommand),
+    /// Show the ratings of all who have played rated games on a server.
+    Leaderboard(leaderboard::Leaderboard),
+    /// List, fetch and add records of games that have ended.
+    Records(records::RecordsCommand),
+    /// Make a dataset of records: Parquet, CSV or JSON Lines, with a dataset card.
+    Export(export::Export),
+    /// Draw a record: a picture of a moment, a film of a game, the look-up table of a decision.
+    Render(render::Render),
+    /// Play many games offline and print what they add up to.
+    Simulate(simulate::Simulate),
+    /// Compare two agents on duplicate deals: the same deals for both, in all seats.
+    Compare(compare::Compare),
+    /// Recompute a leaderboard from records.
+    Ratings(ratings::RatingsCommand),
+    /// Repeat an experiment of the paper, or one that says how far results can be trusted.
+    Experiment(experiment::ExperimentCommand),
+    /// Check the rule engine against test vectors.
+    Conformance(conformance::Conformance),
+    /// Replay records and name the first line that does not fit.
+    Verify(verify::Verify),
+    /// Add the record of a game played elsewhere, at a real table too.
+    Import(import::Import),
+    /// Give out or delete what is known of a participant.
+    Participant(participant::ParticipantCommand),
+}
+
+/// Runs what the command line asks for.
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let result = start_logging(&cli).and_then(|()| match cli.command {
+        Command::Serve(command) => in_runtime(command.run()),
+        Command::Demo(command) => in_runtime(command.run()),
+        Command::Agent(command) => in_runtime(command.run()),
+        Command::Play(command) => in_runtime(command.run()),
+        Command::Watch(command) => in_runtime(command.run()),
+        Command::CheckAgent(command) => in_runtime(command.run()),
+        Command::Room(command) => in_runtime(command.run()),
+        Command::Tournament(command) => in_runtime(command.run()),
+        Command::Leaderboard(command) => in_runtime(command.run()),
+        Command::Records(command) => in_runtime(command.run()),
+        Command::Export(command) => command.run(),
+        Command::Render(command) => command.run(),
+        Command::Simulate(command) => command.run(),
+        Command::Compare(command) => command.run(),
+        Command::Ratings(command) => command.run(),
+        Command::Experiment(command) => command.run(),
+        Command::Conformance(command) => command.run(),
+        Command::Verify(command) => command.run(),
+        Command::Import(command) => command.run(),
+        Command::Participant(command) => in_runtime(command.run()),
+    });
+    match result {
+        Ok(code) => code,
+        // Whoever reads the output has had enough of it, as `head` does.
+        Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
+        Err(error) => {
+            anstream::eprintln!("chefshat: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn is_broken_pipe(error: &CommandError) -> bool {
+    error
+        .downcast_ref::<io::Error>()
+        .is_some_and(|error| error.kind() == io::ErrorKind::BrokenPipe)
+}
+
+/// Writes a line to standard output.
+fn say(line: impl Display) -> Result<(), CommandError> {
+    Ok(writeln!(io::stdout().lock(), "{line}")?)
+}
+
+fn in_runtime(
+    command: impl Future<Output = Result<ExitCode, CommandError>>,
+) -> Result<ExitCode, CommandError> {
+    tokio::runtime::Builder::new_multi_thread()
+        .enable_all()
+        .build()?
+        .block_on(command)
+}
+
+fn start_logging(cli: &Cli) -> Result<(), CommandError> {
+    let filter = EnvFilter::try_new(&cli.log)
+        .map_err(|error| format!("--log {:?}: {error}; write for instance info", cli.log))?;
+    let terminal = io::stderr().is_terminal();
+    // What is logged there would stand in the middle of the picture; a file takes it.
+    let draws = matches!(cli.command, Command::Play(_) | Command::Watch(_));
+    let filter = if terminal && draws {
+        EnvFilter::new("off")
+    } else {
+        filter
+    };
+    let colours = terminal && std::env::var_os("NO_COLOR").is_none_or(|set| set.is_empty());
+    let logs = tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_ansi(colours)
+        .with_writer(io::stderr);
+    if cli.log_json {
+        logs.json().init();
+    } else {
+        logs.init();
+    }
+    Ok(())
+}

@@ -1,0 +1,205 @@
+//! Text that knows how wide it is: styled pieces, wrapped items, names that are safe to show. What is said is not decided here.
+
+use anstyle::{AnsiColor, Color, Style};
+use unicode_width::{UnicodeWidthChar as _, UnicodeWidthStr as _};
+
+/// Columns that no line goes beyond.
+pub(super) const WIDTH: usize = 98;
+/// Most columns of a name.
+pub(crate) const MAX_NAME: usize = 15;
+
+/// Columns of the label of a line outside of Shifts.
+const LABEL: usize = 17;
+
+/// The colours of the seats, by number.
+const SEAT_COLOURS: [AnsiColor; 6] = [
+    AnsiColor::Cyan,
+    AnsiColor::Yellow,
+    AnsiColor::Magenta,
+    AnsiColor::Green,
+    AnsiColor::Blue,
+    AnsiColor::Red,
+];
+
+/// For what matters less.
+pub(super) const DIM: Style = Style::new().dimmed();
+/// For what matters more.
+pub(super) const BOLD: Style = Style::new().bold();
+/// For the Golden card and for special moments.
+pub(super) const GOLD: Style = Style::new()
+    .fg_color(Some(Color::Ansi(AnsiColor::BrightYellow)))
+    .bold();
+/// For nothing in particular.
+pub(super) const PLAIN: Style = Style::new();
+
+/// The colour of a seat.
+pub(super) fn seat_style(seat: u32) -> Style {
+    let index = usize::try_from(seat).unwrap_or(0) % SEAT_COLOURS.len();
+    Style::new().fg_color(Some(Color::Ansi(SEAT_COLOURS[index])))
+}
+
+/// Columns that text takes on a terminal.
+pub(crate) fn columns(text: &str) -> usize {
+    text.width()
+}
+
+/// Styled text and the columns it takes; one line at most.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Piece {
+    text: String,
+    width: usize,
+}
+
+impl Piece {
+    /// Text in one style.
+    pub(super) fn new(style: Style, text: &str) -> Self {
+        Self::default().and(style, text)
+    }
+
+    /// With text in a style after it.
+    #[must_use]
+    pub(super) fn and(mut self, style: Style, text: &str) -> Self {
+        self.width += columns(text);
+        if style == PLAIN {
+            self.text.push_str(text);
+        } else {
+            self.text.push_str(&format!("{style}{text}{style:#}"));
+        }
+        self
+    }
+
+    /// With another piece after it.
+    #[must_use]
+    pub(super) fn join(mut self, other: &Self) -> Self {
+        self.width += other.width;
+        self.text.push_str(&other.text);
+        self
+    }
+
+    /// With spaces after it, until it is this wide.
+    #[must_use]
+    pub(super) fn padded(self, width: usize) -> Self {
+        let missing = width.saturating_sub(self.width);
+        self.and(PLAIN, &" ".repeat(missing))
+    }
+
+    /// With spaces before it, until it is this wide.
+    #[must_use]
+    pub(super) fn right(self, width: usize) -> Self {
+        let missing = width.saturating_sub(self.width);
+        Self::new(PLAIN, &" ".repeat(missing)).join(&self)
+    }
+
+    /// Columns it takes.
+    pub(super) fn width(&self) -> usize {
+        self.width
+    }
+
+    /// The text with its styles.
+    pub(super) fn as_str(&self) -> &str {
+        &self.text
+    }
+}
+
+/// Items behind each other with a dot between them, in as many lines as it takes, all but the first behind an indent as wide as
+/// `start`.
+pub(super) fn wrapped(start: &Piece, items: &[Piece]) -> String {
+    let mut out = start.as_str().to_owned();
+    let mut column = start.width();
+    for (index, item) in items.iter().enumerate() {
+        if index > 0 {
+            if column + 3 + item.width() > WIDTH {
+                out.push('\n');
+                out.push_str(&" ".repeat(start.width()));
+                column = start.width();
+            } else {
+                out.push_str(Piece::new(DIM, " · ").as_str());
+                column += 3;
+            }
+        }
+        out.push_str(item.as_str());
+        column += item.width();
+    }
+    out.push('\n');
+    out
+}
+
+/// A heading: words in a rule across the page.
+pub(crate) fn heading(words: &str) -> String {
+    let words = clean(words, WIDTH - 10);
+    let rest = WIDTH.saturating_sub(columns(&words) + 4);
+    let line = Piece::new(BOLD, "━━ ")
+        .and(BOLD, &words)
+        .and(BOLD, " ")
+        .and(BOLD, &"━".repeat(rest));
+    format!("\n{}\n", line.as_str())
+}
+
+/// What begins a line outside of Shifts.
+pub(super) fn label(words: &str) -> Piece {
+    Piece::new(PLAIN, "   ").and(DIM, words).padded(LABEL)
+}
+
+/// A line outside of Shifts: a label and what belongs to it. Not wrapped, for addresses and paths.
+pub(crate) fn row(words: &str, text: &str) -> String {
+    let line = label(words).and(PLAIN, text);
+    format!("{}\n", line.as_str())
+}
+
+/// A name or label from outside as it may be shown: nothing that steers a terminal, at most `width` columns.
+pub(crate) fn clean(text: &str, width: usize) -> String {
+    let shown = |letter: &char| !steers(*letter);
+    let safe: String = text.chars().filter(shown).collect();
+    if columns(&safe) <= width {
+        return safe;
+    }
+    let mut cut = String::new();
+    let mut used = 1;
+    for letter in safe.chars() {
+        used += letter.width().unwrap_or(0);
+        if used > width {
+            break;
+        }
+        cut.push(letter);
+    }
+    cut.push('…');
+    cut
+}
+
+/// Control characters, and those that turn the direction of writing or join what stands around them.
+fn steers(letter: char) -> bool {
+    letter.is_control()
+        || matches!(letter, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}')
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::narrator::text::*;
+
+    #[test]
+    fn names_are_safe_and_short() {
+        let table = [
+            ("Greta", "Greta"),
+            ("Wilhelmina the Great", "Wilhelmina the…"),
+            ("a\u{1b}[31mb\u{7}", "a[31mb"),
+            ("\u{202e}drow", "drow"),
+            ("料理長のとても長い名前", "料理長のとても…"),
+            ("random_unmasked", "random_unmasked"),
+        ];
+        for (name, expected) in table {
+            assert_eq!(clean(name, MAX_NAME), expected);
+        }
+    }
+
+    #[test]
+    fn items_wrap_behind_their_start() {
+        let item = Piece::new(PLAIN, &"x".repeat(40));
+        let text = wrapped(
+            &Piece::new(PLAIN, "   a "),
+            &[item.clone(), item.clone(), item],
+        );
+        let text = anstream::adapter::strip_str(&text).to_string();
+        let x = "x".repeat(40);
+        assert_eq!(text, format!("   a {x} · {x}\n     {x}\n"));
+    }
+}

@@ -1,0 +1,262 @@
+//! `chefshat participant delete`: the database first, then the files of records. A run that was interrupted is made good by another.
+
+use std::io::{self, BufRead as _, IsTerminal as _, Write as _};
+use std::path::Path;
+use std::process::ExitCode;
+
+use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
+use chefshat_record::jsonl;
+use chefshat_record::pseudonym::{Pseudonym, TakenOut};
+use clap::Args;
+use serde_json::json;
+
+use super::super::numbers::counted;
+use super::super::{CommandError, say};
+use super::{Left, Who, records_with};
+use chefshat_room::ids::Id;
+use chefshat_server::store::Forgetting;
+
+const HELP: &str = "\
+The name gives way to a pseudonym, \"deleted participant\" and six letters and digits, in the database and in records/*.jsonl; expressions of the \
+participant and annotations of its decisions (times measured at its side among them) are dropped. What was played stays, so that the \
+games of the others can still be replayed and checked. Copies elsewhere (datasets, backups, other servers) are not touched, nor is what \
+others wrote in theirs. The server must be stopped; while a game or tournament with the name is not over, nothing is changed.
+
+This cannot be undone. `chefshat participant export` first, if the data are still wanted.
+
+Examples:
+  chefshat participant delete P07 --data-dir ./chefshat-data
+  chefshat participant delete \"Rosa L.\" --yes --json";
+
+/// What a pseudonym begins with.
+const PSEUDONYM: &str = "deleted participant ";
+/// Random bytes of a pseudonym.
+const PSEUDONYM_BYTES: usize = 3;
+
+/// Take a participant out of everything that is kept: the name gives way to a pseudonym.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub(super) struct Delete {
+    #[command(flatten)]
+    who: Who,
+    /// Do not ask.
+    #[arg(long)]
+    yes: bool,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What came of the files.
+#[derive(Default)]
+struct Files {
+    changed: u64,
+    taken_out: TakenOut,
+    /// The pseudonym that a run before this one, which did not come to its end, had put into the database.
+    earlier: Option<String>,
+    left: Left,
+}
+
+impl Delete {
+    pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
+        let data_dir = self.who.data_dir()?;
+        let mut database = Forgetting::open(&data_dir).await?;
+        self.ask()?;
+        let who = Pseudonym {
+            name: self.who.name.clone(),
+            pseudonym: format!(
+                "{PSEUDONYM}{}",
+                hex::encode(rand::random::<[u8; PSEUDONYM_BYTES]>())
+            ),
+        };
+        let forgotten = database.forget(&who).await?;
+        let files = rewrite(&mut database, &data_dir, &who)
+            .await
+            .map_err(|error| {
+                format!("{error}; not all records were rewritten: run the command again")
+            })?;
+        database.finish(&forgotten).await?;
+        let taken_out = TakenOut {
+            names: forgotten.taken_out.names.max(files.taken_out.names),
+            expressions: (forgotten.taken_out.expressions).max(files.taken_out.expressions),
+            annotations: (forgotten.taken_out.annotations).max(files.taken_out.annotations),
+        };
+        let games = forgotten.games.max(files.changed);
+        let found = games + forgotten.tournaments > 0;
+        let pseudonym = match files.earlier {
+            Some(earlier) if forgotten.games + forgotten.tournaments == 0 => earlier,
+            _ => who.pseudonym,
+        };
+        if self.json {
+            say(json!({
+                "pseudonym": pseudonym,
+                "games": games,
+                "tournaments": forgotten.tournaments,
+                "files": files.changed,
+                "expressions": taken_out.expressions,
+                "annotations": taken_out.annotations,
+            }))?;
+        } else if found {
+            say(format_args!(
+                "{:?} is now {:?} in {}, {} and {}; dropped: {}, {}",
+                who.name,
+                pseudonym,
+                counted(games, "game"),
+                counted(forgotten.tournaments, "tournament"),
+                counted(files.changed, "record file"),
+                counted(taken_out.expressions, "expression"),
+                counted(taken_out.annotations, "annotation"),
+            ))?;
+        }
+        files.left.check(&who.name)?;
+        if !found && !self.json {
+            anstream::eprintln!("nothing is kept of {:?}", who.name);
+        }
+        Ok(if found {
+            ExitCode::SUCCESS
+        } else {
+            ExitCode::FAILURE
+        })
+    }
+
+    /// Asks whether this is meant.
+    fn ask(&self) -> Result<(), CommandError> {
+        if self.yes {
+            return Ok(());
+        }
+        if !io::stdin().is_terminal() {
+            return Err("nothing was changed: say --yes if this is meant".into());
+        }
+        let name = &self.who.name;
+        let mut out = anstream::stderr();
+        write!(
+            out,
+            "This takes {name:?} out of everything kept here and cannot be undone. Type the name to go on: "
+        )?;
+        out.flush()?;
+        let mut answer = String::new();
+        io::stdin().lock().read_line(&mut answer)?;
+        if answer.trim_end_matches(['\r', '\n']) == name {
+            Ok(())
+        } else {
+            Err("nothing was changed".into())
+        }
+    }
+}
+
+/// Rewrites the files of the records in which the name stands, each whole or not at all.
+async fn rewrite(
+    database: &mut Forgetting,
+    data_dir: &Path,
+    who: &Pseudonym,
+) -> Result<Files, CommandError> {
+    let mut files = Files::default();
+    for candidate in records_with(data_dir, &who.name)? {
+        let Some(mut lines) = files.left.read(&candidate) else {
+            continue;
+        };
+        let mut who = who.clone();
+        if let Some(held) = held(database, &lines, &who.name).await?
+            && held != who.pseudonym
+        {
+            who.pseudonym.clone_from(&held);
+            files.earlier = Some(held);
+        }
+        let taken_out = who.take_out(&mut lines);
+        if taken_out == TakenOut::default() {
+            continue;
+        }
+        if let Err(error) = jsonl::write(&candidate.path, &lines) {
+            files.left.0.push(error.to_string());
+            continue;
+        }
+        files.changed += 1;
+        files.taken_out += taken_out;
+    }
+    Ok(files)
+}
+
+/// The pseudonym that the database has in the place of a name in a record, so that the file says what the database says.
+async fn held(
+    database: &mut Forgetting,
+    lines: &[v1::RecordLine],
+    name: &str,
+) -> Result<Option<String>, CommandError> {
+    let header = lines.iter().find_map(|line| match &line.line {
+        Some(Line::Header(header)) => Some(header),
+        _ => None,
+    });
+    let Some((game, header)) = header.and_then(|it| Some((Id::parse(&it.game_id)?, it))) else {
+        return Ok(None);
+    };
+    for seat in &header.seats {
+        if seat.name == name
+            && seat.built_in_agent.is_empty()
+            && let Some(held) = database.name_at(game, seat.seat).await?
+            && held.starts_with(PSEUDONYM)
+        {
+            return Ok(Some(held));
+        }
+    }
+    // Who left before the game has no seat in it, but sat down.
+    let names = sat_down(lines);
+    if !names.contains(&name) {
+        return Ok(None);
+    }
+    let kept = database.sat_down(game).await?;
+    Ok(pseudonym_of(name, &names, &kept).cloned())
+}
+
+/// The names of those who sat down in the game of a record, in order.
+fn sat_down(lines: &[v1::RecordLine]) -> Vec<&str> {
+    let events = lines.iter().filter_map(|line| match &line.line {
+        Some(Line::Event(event)) => event.kind.as_ref(),
+        _ => None,
+    });
+    let names = events.filter_map(|kind| match kind {
+        Kind::Seated(seated) => Some(seated.name.as_str()),
+        _ => None,
+    });
+    names.collect()
+}
+
+/// The pseudonym that is kept where a record has a name, of those who sat down in the same game.
+fn pseudonym_of<'k>(name: &str, recorded: &[&str], kept: &'k [String]) -> Option<&'k String> {
+    let mut both = recorded.iter().zip(kept);
+    let found = both.find(|(recorded, kept)| **recorded == name && kept.starts_with(PSEUDONYM));
+    found.map(|(_, kept)| kept)
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::participant::delete::*;
+
+    #[test]
+    fn who_left_before_the_game_is_found_among_those_who_sat_down() {
+        let seated = |name: &str| v1::RecordLine {
+            line: Some(Line::Event(v1::GameEvent {
+                kind: Some(Kind::Seated(Box::new(v1::Seated {
+                    name: name.into(),
+                    ..v1::Seated::default()
+                }))),
+                ..v1::GameEvent::default()
+            })),
+        };
+        let lines = ["Ana", "Bo", "Ana"].map(seated);
+        let recorded = sat_down(&lines);
+        assert_eq!(recorded, ["Ana", "Bo", "Ana"]);
+        let kept = |names: [&str; 3]| names.map(str::to_owned);
+        let held = |names| pseudonym_of("Ana", &recorded, &kept(names)).cloned();
+        let pseudonym = format!("{PSEUDONYM}a1b2c3");
+        assert_eq!(
+            held([&pseudonym, "Bo", &pseudonym]),
+            Some(pseudonym.clone())
+        );
+        assert_eq!(held(["Ana", "Bo", "Ana"]), None);
+        assert_eq!(
+            held(["Ana", &pseudonym, "Ana"]),
+            None,
+            "another was deleted"
+        );
+    }
+}

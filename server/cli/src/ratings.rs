@@ -1,0 +1,221 @@
+//! `chefshat ratings`: a leaderboard recomputed from record files. Which games count is decided in `chefshat-records`, how ratings come about
+//! in `chefshat-arena`.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use chefshat_proto::v1;
+use chefshat_record::files::{RecordFile, find_records};
+use chefshat_record::jsonl;
+use chefshat_record::outcome::{Identity, Outcome, OutcomeError, outcome};
+use chefshat_record::replay::replay;
+use chefshat_tournament::ratings::Ratings;
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use rayon::prelude::*;
+use serde_json::{Value, json};
+
+use super::connect::KindArg;
+use super::numbers::counted;
+use super::sheet::{heading, line};
+use super::{CommandError, board, data_dir};
+use chefshat_server::convert::leaderboard;
+
+const HELP: &str = "\
+Rated are finished games that a server dealt by its own seed, all of whose seats were played by different participants without \
+substitutes. Every record is replayed first. Games count in the order in which they ended; one that is found twice counts once. A rating is \
+a mean with its deviation: the skill lies within 1.96 deviations with a confidence of 95 %. The order is by the mean less two deviations. \
+docs/ratings.md says how far these numbers can be trusted.
+
+Examples:
+  chefshat ratings
+  chefshat ratings ./chefshat-data/records --min-games 20
+  chefshat ratings records/ --kind human --csv > people.csv";
+
+/// Recompute a leaderboard from records.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub(super) struct RatingsCommand {
+    /// Records, or folders of records (*.jsonl). Standard: the records of the data folder.
+    #[arg(value_name = "PATH")]
+    paths: Vec<PathBuf>,
+    /// Data folder whose records are taken when no PATH is named. Standard: chefshat in the user's data folder.
+    #[arg(long, env = "CHEFSHAT_DATA_DIR")]
+    data_dir: Option<PathBuf>,
+    /// Show participants of this kind alone, rated by all their games.
+    #[arg(long, value_enum)]
+    kind: Option<KindArg>,
+    /// Leave out those who have played fewer rated games.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    min_games: u32,
+    /// Leave out damaged records, and say which.
+    #[arg(long)]
+    skip_damaged: bool,
+    /// Print one JSON object.
+    #[arg(long, conflicts_with = "csv")]
+    json: bool,
+    /// Print CSV, a line for each participant.
+    #[arg(long)]
+    csv: bool,
+}
+
+/// What the records came to.
+#[derive(Default)]
+struct Gathered {
+    records: u64,
+    damaged: u64,
+    /// Games that are not rated, by reason: in a word, and in words.
+    not_rated: BTreeMap<(&'static str, String), u64>,
+    ratings: Ratings<Identity>,
+}
+
+impl RatingsCommand {
+    pub(super) fn run(self) -> Result<ExitCode, CommandError> {
+        let paths = if self.paths.is_empty() {
+            vec![data_dir::records(self.data_dir.clone())?]
+        } else {
+            self.paths.clone()
+        };
+        let files = find_records(&paths)?;
+        let gathered = self.gather(&files)?;
+        let kind = self
+            .kind
+            .map_or(v1::ParticipantKind::Unspecified, KindArg::kind);
+        let board = leaderboard(&gathered.ratings, kind, self.min_games, usize::MAX);
+        let mut out = anstream::stdout().lock();
+        if self.json {
+            writeln!(out, "{}", as_json(&gathered, &board))?;
+        } else if self.csv {
+            out.write_all(&board::as_csv(&board)?)?;
+        } else {
+            write!(out, "{}", as_text(&gathered, &board))?;
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+
+    /// Reads all records on all cores, then rates the games in their order.
+    fn gather(&self, files: &[RecordFile]) -> Result<Gathered, CommandError> {
+        let bytes = files.iter().map(|file| file.bytes).sum();
+        let bar = ProgressBar::new(bytes).with_style(ProgressStyle::with_template(
+            "{bar:40} {bytes} of {total_bytes} of records, {eta} left",
+        )?);
+        let read: Vec<(&Path, Result<Told, String>)> = files
+            .par_iter()
+            .map(|file| {
+                let told = tell(&file.path);
+                bar.inc(file.bytes);
+                (file.path.as_path(), told)
+            })
+            .collect();
+        bar.finish_and_clear();
+        let mut gathered = Gathered::default();
+        let (mut games, mut known) = (Vec::new(), BTreeSet::new());
+        for (path, told) in read {
+            let told = match told {
+                Ok(told) => told,
+                Err(problem) if self.skip_damaged => {
+                    anstream::eprintln!("chefshat: left out {}: {problem}", path.display());
+                    gathered.damaged += 1;
+                    continue;
+                }
+                Err(problem) => {
+                    return Err(format!(
+                        "{}: {problem}; leave out what is damaged with --skip-damaged",
+                        path.display()
+                    )
+                    .into());
+                }
+            };
+            if !known.insert(told.game_id) {
+                continue;
+            }
+            gathered.records += 1;
+            match told.outcome {
+                Ok(outcome) => games.push(outcome),
+                Err(reason) => *gathered.not_rated.entry(reason).or_default() += 1,
+            }
+        }
+        games.sort_by(|left, right| {
+            let key = |game: &Outcome| (game.ended_at_ms, game.game_id.clone());
+            key(left).cmp(&key(right))
+        });
+        for game in games {
+            // A game of one seat or of seven would be no game of these rules, and the record did not replay.
+            gathered.ratings.fold(&game.places())?;
+        }
+        Ok(gathered)
+    }
+}
+
+/// What a record says of ratings.
+struct Told {
+    game_id: String,
+    /// Or why the game counts for none.
+    outcome: Result<Outcome, (&'static str, String)>,
+}
+
+/// Reads and checks a record.
+fn tell(path: &Path) -> Result<Told, String> {
+    let lines = jsonl::read(path).map_err(|error| match error {
+        jsonl::RecordFileError::Io { source, .. } => source.to_string(),
+        jsonl::RecordFileError::Line { line, problem, .. } => format!("line {line} {problem}"),
+    })?;
+    replay(&lines).map_err(|error| error.to_string())?;
+    let game_id = match lines.first().and_then(|line| line.line.as_ref()) {
+        Some(v1::record_line::Line::Header(header)) => header.game_id.clone(),
+        _ => String::new(),
+    };
+    let outcome = match outcome(&lines) {
+        Ok(outcome) => match outcome.unrated {
+            None => Ok(outcome),
+            Some(reason) => Err((reason.name(), reason.to_string())),
+        },
+        Err(error @ OutcomeError::NotFinished) => Err(("not_finished", error.to_string())),
+        Err(damage) => return Err(damage.to_string()),
+    };
+    Ok(Told { game_id, outcome })
+}
+
+fn as_text(gathered: &Gathered, board: &v1::GetLeaderboardResponse) -> String {
+    let mut text = String::new();
+    heading(
+        &mut text,
+        &format!(
+            "{} of {}",
+            counted(board.games, "rated game"),
+            counted(gathered.records, "record")
+        ),
+    );
+    for ((_, reason), games) in &gathered.not_rated {
+        line(
+            &mut text,
+            &format!("{} not rated: {reason}", counted(*games, "game")),
+        );
+    }
+    if gathered.damaged > 0 {
+        line(
+            &mut text,
+            &format!("{} damaged, left out", counted(gathered.damaged, "record")),
+        );
+    }
+    if !board.rated.is_empty() {
+        text.push('\n');
+    }
+    board::add_table(&mut text, board);
+    text
+}
+
+fn as_json(gathered: &Gathered, board: &v1::GetLeaderboardResponse) -> Value {
+    let not_rated: BTreeMap<&str, u64> = (gathered.not_rated.iter())
+        .map(|((reason, _), games)| (*reason, *games))
+        .collect();
+    json!({
+        "records": gathered.records,
+        "damaged": gathered.damaged,
+        "rated_games": board.games,
+        "not_rated": not_rated,
+        "leaderboard": board::as_json(board),
+    })
+}

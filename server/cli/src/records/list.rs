@@ -1,0 +1,155 @@
+//! `chefshat records list`: a line for each record.
+
+use std::process::ExitCode;
+
+use chefshat_client::{Error, v1};
+use clap::Args;
+
+use super::super::connect::ServerArg;
+use super::super::narrator::{abort_reason, clean};
+use super::super::{CommandError, say};
+use super::filter::FilterArgs;
+use super::service;
+
+/// Records asked for at a time.
+const PAGE: u32 = 100;
+
+/// List the records of a server, oldest first unless asked otherwise.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  chefshat records list --state finished\n  \
+                  chefshat records list --newest-first --participant Greta\n  \
+                  chefshat records list --origin branched --json")]
+pub(super) struct List {
+    #[command(flatten)]
+    server: ServerArg,
+    #[command(flatten)]
+    filter: FilterArgs,
+    /// Begin with the newest, not with the oldest.
+    #[arg(long)]
+    newest_first: bool,
+    /// Print each record's summary as a JSON line.
+    #[arg(long)]
+    json: bool,
+}
+
+impl List {
+    pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
+        let client = self.server.connect().await?;
+        let mut service = service(&client);
+        let mut request = v1::ListRecordsRequest {
+            filter: Some(self.filter.message()),
+            page_size: PAGE,
+            page_token: String::new(),
+            newest_first: self.newest_first,
+        };
+        let mut count = 0;
+        loop {
+            let page = (service.list_records(request.clone()).await)
+                .map_err(Error::from)?
+                .into_inner();
+            for summary in &page.records {
+                say(self.line(summary)?)?;
+                count += 1;
+            }
+            if page.next_page_token.is_empty() {
+                break;
+            }
+            request.page_token = page.next_page_token;
+        }
+        if count == 0 && !self.json {
+            say("no records")?;
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+
+    fn line(&self, summary: &v1::RecordSummary) -> Result<String, CommandError> {
+        Ok(if self.json {
+            serde_json::to_string(summary)?
+        } else {
+            in_a_line(summary)
+        })
+    }
+}
+
+/// A record in a line: which game, how it ended, how long it was, who played.
+pub(super) fn in_a_line(summary: &v1::RecordSummary) -> String {
+    let state = match summary.state() {
+        v1::RoomState::Finished => "finished",
+        v1::RoomState::Aborted => "aborted",
+        _ => "unknown",
+    };
+    let name = |seat: u32| {
+        let participant = summary.seats.iter().find(|other| other.seat == seat);
+        let name = participant.map_or("", |participant| participant.name.as_str());
+        match name {
+            "" => format!("seat {seat}"),
+            name => clean(name, 20),
+        }
+    };
+    let players: Vec<String> = if summary.standings.is_empty() {
+        summary.seats.iter().map(|seat| name(seat.seat)).collect()
+    } else {
+        let lines = summary.standings.iter();
+        lines
+            .map(|line| format!("{} {}", name(line.seat), line.points))
+            .collect()
+    };
+    let room = match summary.room_name.as_str() {
+        "" => String::new(),
+        room => format!("  ({})", clean(room, 30)),
+    };
+    let why = match summary.abort_reason() {
+        v1::AbortReason::Unspecified => String::new(),
+        reason => format!("  aborted: {}", abort_reason(reason)),
+    };
+    format!(
+        "{}  {state:<8}  {:>3} Shifts  {:>6} decisions  {}{room}{why}",
+        clean(&summary.game_id, 32),
+        summary.shifts,
+        summary.decisions,
+        players.join(", "),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::records::list::*;
+
+    #[test]
+    fn a_record_fits_in_a_line() {
+        let seat = |seat, name: &str| v1::Participant {
+            seat,
+            name: name.into(),
+            ..v1::Participant::default()
+        };
+        let standing = |seat, points| v1::Standing {
+            seat,
+            points,
+            place: 0,
+        };
+        let finished = v1::RecordSummary {
+            game_id: "5f0c6a4de2b14b7f8a3d9c1e7b60425d".into(),
+            room_name: "friday".into(),
+            state: v1::RoomState::Finished.into(),
+            seats: vec![seat(0, "Greta"), seat(1, "\u{1b}[2JRolf")],
+            standings: vec![standing(1, 15), standing(0, 4)],
+            shifts: 5,
+            decisions: 203,
+            ..v1::RecordSummary::default()
+        };
+        assert_eq!(
+            in_a_line(&finished),
+            "5f0c6a4de2b14b7f8a3d9c1e7b60425d  finished    5 Shifts     203 decisions  [2JRolf 15, Greta 4  (friday)"
+        );
+        let aborted = v1::RecordSummary {
+            game_id: "5f0c6a4de2b14b7f8a3d9c1e7b60425d".into(),
+            state: v1::RoomState::Aborted.into(),
+            seats: vec![seat(0, "Greta"), seat(1, "")],
+            ..v1::RecordSummary::default()
+        };
+        assert_eq!(
+            in_a_line(&aborted),
+            "5f0c6a4de2b14b7f8a3d9c1e7b60425d  aborted     0 Shifts       0 decisions  Greta, seat 1"
+        );
+    }
+}

@@ -1,0 +1,220 @@
+//! `chefshat records get`, `stream` and `import`: whole records between a server and files. A file appears whole or not at all.
+
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use chefshat_client::v1::{self, record_line::Line};
+use chefshat_client::{Error, v1::RecordLine};
+use chefshat_record::jsonl;
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use prost::Message as _;
+
+use super::super::connect::ServerArg;
+use super::super::{CommandError, say};
+use super::filter::FilterArgs;
+use super::list::in_a_line;
+use super::service;
+
+/// Bytes of lines that are sent in one message: half of what a server takes.
+const PART_BYTES: usize = 32 * 1024;
+
+/// Fetch the record of one game.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  chefshat records get 5f0c6a4de2b14b7f8a3d9c1e7b60425d --out game.jsonl"
+)]
+pub(super) struct Get {
+    /// Which game.
+    #[arg(value_name = "GAME-ID")]
+    game_id: String,
+    #[command(flatten)]
+    server: ServerArg,
+    /// File to write; standard output if none is named.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+/// Fetch many records, oldest first.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  chefshat records stream --state finished --out-dir ./games\n  \
+                  chefshat records stream --room-name friday > friday.jsonl"
+)]
+pub(super) struct Stream {
+    #[command(flatten)]
+    server: ServerArg,
+    #[command(flatten)]
+    filter: FilterArgs,
+    /// Folder to write into, a file GAME-ID.jsonl for each; standard output, one after the other, if none is named.
+    #[arg(long, value_name = "FOLDER")]
+    out_dir: Option<PathBuf>,
+}
+
+/// Add records of games played elsewhere: on another server, or at a real table. The server verifies them first, and its host must have
+/// allowed it.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  chefshat records import ./game.jsonl ./games/*.jsonl")]
+pub(super) struct Import {
+    /// The records.
+    #[arg(value_name = "FILE", required = true)]
+    files: Vec<PathBuf>,
+    #[command(flatten)]
+    server: ServerArg,
+    /// Print each record's summary as a JSON line.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Get {
+    pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
+        let client = self.server.connect().await?;
+        let lines = client.record(self.game_id).await?;
+        match &self.out {
+            Some(file) => jsonl::write(file, &lines)?,
+            None => print(&lines)?,
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+impl Stream {
+    pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
+        let client = self.server.connect().await?;
+        let request = v1::StreamRecordsRequest {
+            filter: Some(self.filter.message()),
+        };
+        let mut parts = (service(&client).stream_records(request).await)
+            .map_err(Error::from)?
+            .into_inner();
+        let bar = ProgressBar::no_length().with_style(ProgressStyle::with_template(
+            "{spinner} {human_pos} records, {per_sec}",
+        )?);
+        let mut record: Vec<RecordLine> = Vec::new();
+        let mut count = 0_u64;
+        while let Some(part) = parts.message().await.map_err(Error::from)? {
+            for line in part.lines {
+                let last = matches!(line.line, Some(Line::Footer(_)));
+                record.push(line);
+                if last {
+                    self.keep(&std::mem::take(&mut record))?;
+                    count += 1;
+                    bar.inc(1);
+                }
+            }
+        }
+        bar.finish_and_clear();
+        if !record.is_empty() {
+            return Err("the server ended in the middle of a record".into());
+        }
+        if let Some(folder) = &self.out_dir {
+            say(format_args!("{count} records in {}", folder.display()))?;
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+
+    fn keep(&self, record: &[RecordLine]) -> Result<(), CommandError> {
+        let Some(folder) = &self.out_dir else {
+            return print(record);
+        };
+        let Some(Line::Header(header)) = record.first().and_then(|line| line.line.as_ref()) else {
+            return Err("the server sent a record without a header".into());
+        };
+        // It becomes a file's name, and the server may be anybody's.
+        if header.game_id.len() != 32
+            || !header.game_id.bytes().all(|byte| byte.is_ascii_hexdigit())
+        {
+            return Err(format!("the server sent a record of a game {:?}", header.game_id).into());
+        }
+        let file = folder.join(format!("{}.jsonl", header.game_id));
+        Ok(jsonl::write(&file, record)?)
+    }
+}
+
+impl Import {
+    pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
+        let client = self.server.connect().await?;
+        let mut service = service(&client);
+        let bar = ProgressBar::new(self.files.len() as u64).with_style(
+            ProgressStyle::with_template("{bar:40} {pos} of {len} records, {eta} left")?,
+        );
+        for file in &self.files {
+            let requests = in_parts(jsonl::read(file)?);
+            let added = (service.import_record(tokio_stream::iter(requests)).await)
+                .map_err(|status| refused(file, &Error::from(status)))?;
+            let summary = (added.into_inner().record)
+                .ok_or("the server did not say which record it added")?;
+            let line = if self.json {
+                serde_json::to_string(&summary)?
+            } else {
+                in_a_line(&summary)
+            };
+            bar.suspend(|| say(line))?;
+            bar.inc(1);
+        }
+        bar.finish_and_clear();
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+fn refused(file: &Path, error: &Error) -> CommandError {
+    let (name, message) = (file.display(), error.message());
+    match error.reason() {
+        Some("IMPORT_OFF") => {
+            format!("{name}: {message}; its host can allow it with `chefshat serve --allow-import`")
+                .into()
+        }
+        _ => format!("{name}: {message}").into(),
+    }
+}
+
+/// The lines of a record in messages of a size that a server takes.
+fn in_parts(lines: Vec<RecordLine>) -> Vec<v1::ImportRecordRequest> {
+    let mut parts: Vec<v1::ImportRecordRequest> = Vec::new();
+    let mut room = 0;
+    for line in lines {
+        let size = line.encoded_len();
+        match parts.last_mut() {
+            Some(part) if size <= room => part.lines.push(line),
+            _ => {
+                room = PART_BYTES;
+                parts.push(v1::ImportRecordRequest { lines: vec![line] });
+            }
+        }
+        room = room.saturating_sub(size);
+    }
+    parts
+}
+
+/// Writes a record to standard output.
+fn print(lines: &[RecordLine]) -> Result<(), CommandError> {
+    let mut out = io::BufWriter::new(io::stdout().lock());
+    for line in lines {
+        serde_json::to_writer(&mut out, line).map_err(io::Error::from)?;
+        out.write_all(b"\n")?;
+    }
+    Ok(out.flush()?)
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::records::transfer::*;
+
+    #[test]
+    fn a_record_is_sent_whole_and_in_parts_that_fit() {
+        let line = |bytes: usize| RecordLine {
+            line: Some(Line::Header(v1::RecordHeader {
+                room_name: "x".repeat(bytes),
+                ..v1::RecordHeader::default()
+            })),
+        };
+        let lines: Vec<RecordLine> = [10, 31_000, 900, 20_000, 40_000, 5, 5].map(line).into();
+        let parts = in_parts(lines.clone());
+        let counts: Vec<usize> = parts.iter().map(|part| part.lines.len()).collect();
+        assert_eq!(counts, [3, 1, 1, 2]);
+        let sent: Vec<RecordLine> = parts.into_iter().flat_map(|part| part.lines).collect();
+        assert_eq!(sent, lines);
+        assert!(in_parts(Vec::new()).is_empty());
+    }
+}

@@ -1,0 +1,241 @@
+//! A built-in agent at the other end of a connection: what a decision request says is read back into the engine's observation, and the
+//! agent decides as it would inside the server.
+
+use std::time::Duration;
+
+use chefshat_agents::{AgentKind, BuiltInAgent};
+use chefshat_client::{ActionId, Agent, nth_legal, v1};
+use chefshat_engine::{Mask, RuleSet, Seat};
+use chefshat_record::convert::rules_from_proto;
+use sha2::{Digest as _, Sha256};
+use tracing::warn;
+
+use chefshat_record::convert::observation_from_proto;
+use chefshat_room::ids::random_bytes;
+
+/// Longest time a remote agent may be told to wait before it decides, milliseconds: well within the standard time for a decision.
+pub(super) const MAX_PACE_MS: u64 = 5_000;
+
+/// A built-in agent that plays a seat of a server. Goes on with the same generator from one game to the next.
+#[derive(Debug)]
+pub(super) struct RemoteAgent {
+    agent: BuiltInAgent,
+    pace: Duration,
+    seat: Option<u32>,
+    rules: Option<RuleSet>,
+}
+
+impl RemoteAgent {
+    /// Plays as this agent; waits for `pace` before each decision.
+    pub(super) fn new(agent: BuiltInAgent, pace: Duration) -> Self {
+        Self {
+            agent,
+            pace,
+            seat: None,
+            rules: None,
+        }
+    }
+
+    /// What the agent would do; an error when the request does not fit the rules that the server told.
+    fn consider(&mut self, request: &v1::DecisionRequest) -> Result<ActionId, String> {
+        let (Some(rules), Some(seat)) = (self.rules, self.seat) else {
+            return Err("the server asked before it said what is played".into());
+        };
+        let seat = usize::try_from(seat)
+            .ok()
+            .filter(|seat| *seat < rules.players())
+            .map(Seat::new)
+            .ok_or("the server told a seat that the game does not have")?;
+        let observation = observation_from_proto(request, seat, &rules)
+            .map_err(|problem| format!("the observation cannot be read: {problem}"))?;
+        let legal = Mask::from_bytes(&request.action_mask)
+            .filter(|mask| !mask.is_empty())
+            .ok_or("the mask of legal actions cannot be read")?;
+        let action = self.agent.decide(&observation, &legal);
+        Ok(ActionId(action.index().into()))
+    }
+}
+
+impl Agent for RemoteAgent {
+    fn decide(&mut self, request: &v1::DecisionRequest) -> ActionId {
+        if !self.pace.is_zero() {
+            tokio::task::block_in_place(|| std::thread::sleep(self.pace));
+        }
+        self.consider(request).unwrap_or_else(|problem| {
+            warn!(problem, "playing the first legal action instead");
+            nth_legal(request, 0).unwrap_or(ActionId(0))
+        })
+    }
+
+    fn on_attached(&mut self, attached: &v1::Attached) {
+        self.seat = Some(attached.seat);
+    }
+
+    fn on_event(&mut self, event: &v1::GameEvent) {
+        let Some(v1::game_event::Kind::GameStarted(start)) = &event.kind else {
+            return;
+        };
+        self.rules = match start.rules.as_ref().map(rules_from_proto) {
+            Some(Ok(rules)) => Some(rules),
+            Some(Err(problem)) => {
+                warn!(%problem, "the rules of the game cannot be read");
+                None
+            }
+            None => None,
+        };
+    }
+}
+
+/// The seed for one use of a number that a person chose: SHA-256(use ‖ number, 8 bytes, low byte first); random without a number.
+pub(super) fn seed_for(purpose: &str, number: Option<u64>) -> [u8; 32] {
+    match number {
+        Some(number) => Sha256::new()
+            .chain_update(purpose)
+            .chain_update(number.to_le_bytes())
+            .finalize()
+            .into(),
+        None => random_bytes(),
+    }
+}
+
+/// Reads the name of a built-in agent on the command line.
+pub(super) fn agent_kind(name: &str) -> Result<AgentKind, String> {
+    AgentKind::from_name(name).ok_or_else(|| {
+        let known = AgentKind::ALL.map(AgentKind::name).join(", ");
+        format!("use one of {known}")
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use chefshat_agents::RecordedPlayer;
+    use chefshat_engine::RecordedDecision;
+    use chefshat_engine::{DecisionKind, Game, RuleSetSpec, Seed, Viewer};
+    use chefshat_record::convert::rules_to_proto;
+
+    use crate::remote::*;
+    use chefshat_record::convert::observation_to_proto;
+
+    /// A request as a server would put the open decision of a game.
+    fn request(game: &Game) -> v1::DecisionRequest {
+        let decision = game.decision().expect("a decision is open");
+        let observation = game.observe(Viewer::Seat(decision.seat));
+        v1::DecisionRequest {
+            kind: match decision.kind {
+                DecisionKind::Turn => v1::DecisionKind::Turn,
+                DecisionKind::Exchange => v1::DecisionKind::Exchange,
+                DecisionKind::SpecialAction => v1::DecisionKind::SpecialAction,
+            }
+            .into(),
+            observation: Some(observation_to_proto(&observation)),
+            action_mask: game.legal_actions().to_bytes(game.rules().actions().size()),
+            ..v1::DecisionRequest::default()
+        }
+    }
+
+    fn started(game: &Game) -> v1::GameEvent {
+        v1::GameEvent {
+            kind: Some(v1::game_event::Kind::GameStarted(Box::new(
+                v1::GameStarted {
+                    rules: Some(rules_to_proto(game.rules())),
+                    ..v1::GameStarted::default()
+                },
+            ))),
+            ..v1::GameEvent::default()
+        }
+    }
+
+    #[test]
+    fn decides_remotely_as_it_does_inside_the_server() {
+        let rules = RuleSetSpec::default().validate().expect("the standard");
+        for kind in AgentKind::ALL {
+            let mut game = Game::new(rules, Seed([5; 32]), |_| {});
+            let mut inside = BuiltInAgent::new(kind, [9; 32]);
+            let mut remote = RemoteAgent::new(inside.clone(), Duration::ZERO);
+            remote.on_event(&started(&game));
+            let mut turns = 0;
+            while game.shift() == 1 {
+                let decision = game.decision().expect("the first Shift is not the last");
+                remote.on_attached(&v1::Attached {
+                    seat: u32::try_from(decision.seat.index()).expect("a seat is below six"),
+                    ..v1::Attached::default()
+                });
+                let observation = game.observe(Viewer::Seat(decision.seat));
+                let expected = inside.decide(&observation, &game.legal_actions());
+                assert_eq!(
+                    remote.decide(&request(&game)).0,
+                    u32::from(expected.index())
+                );
+                let action = if game.legal_actions().contains(expected) {
+                    expected
+                } else {
+                    game.default_action().expect("a decision has a default")
+                };
+                game.apply(action, |_| {}).expect("the action is legal");
+                turns += 1;
+            }
+            assert!(turns > 20, "{kind:?} played {turns} turns only");
+        }
+    }
+
+    #[test]
+    fn a_recorded_player_sees_remotely_what_it_saw() {
+        let rules = RuleSetSpec::default().validate().expect("the standard");
+        let mut chance = BuiltInAgent::new(AgentKind::Random, [4; 32]);
+        let mut game = Game::new(rules, Seed([5; 32]), |_| {});
+        let (mut requests, mut decisions) = (Vec::new(), Vec::new());
+        while let Some(decision) = game.decision() {
+            let observation = game.observe(Viewer::Seat(decision.seat));
+            let legal = game.legal_actions();
+            let action = chance.decide(&observation, &legal);
+            requests.push((decision, request(&game), action));
+            decisions.push(RecordedDecision {
+                observation,
+                legal,
+                action,
+                // No model elsewhere: only what looks exactly the same finds its action again.
+                own: false,
+            });
+            game.apply(action, |_| {}).expect("the action is legal");
+        }
+        let player = Arc::new(RecordedPlayer::new(decisions));
+        let mut remote = RemoteAgent::new(BuiltInAgent::replay(player), Duration::ZERO);
+        remote.on_event(&started(&game));
+        for (decision, request, action) in requests {
+            remote.on_attached(&v1::Attached {
+                seat: u32::try_from(decision.seat.index()).expect("a seat is below six"),
+                ..v1::Attached::default()
+            });
+            assert_eq!(remote.decide(&request).0, u32::from(action.index()));
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_read_is_answered_all_the_same() {
+        let rules = RuleSetSpec::default().validate().expect("the standard");
+        let game = Game::new(rules, Seed([5; 32]), |_| {});
+        let mut remote = RemoteAgent::new(
+            BuiltInAgent::new(AgentKind::Greedy, [9; 32]),
+            Duration::ZERO,
+        );
+        let first = game.legal_actions().nth(0).expect("an action is legal");
+        assert_eq!(remote.decide(&request(&game)).0, u32::from(first.index()));
+        remote.on_event(&started(&game));
+        remote.on_attached(&v1::Attached {
+            seat: 77,
+            ..v1::Attached::default()
+        });
+        assert_eq!(remote.decide(&request(&game)).0, u32::from(first.index()));
+        assert_eq!(remote.decide(&v1::DecisionRequest::default()), ActionId(0));
+    }
+
+    #[test]
+    fn seeds_differ_by_use_and_number() {
+        assert_eq!(seed_for("a", Some(1)), seed_for("a", Some(1)));
+        assert_ne!(seed_for("a", Some(1)), seed_for("a", Some(2)));
+        assert_ne!(seed_for("a", Some(1)), seed_for("b", Some(1)));
+        assert_ne!(seed_for("a", None), seed_for("a", None));
+    }
+}

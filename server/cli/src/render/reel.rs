@@ -1,0 +1,201 @@
+//! Frames as a film: painted on all cores, in order into an animated GIF or into ffmpeg for an MP4.
+
+use std::io::{self, Read as _, Write};
+use std::path::Path;
+use std::process::{Child, ChildStdin, Command, Stdio};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use chefshat_record::whole::WholeFile;
+use chefshat_render::{Frame, GifWriter, Painter, Palette, Pixels};
+use indicatif::{ProgressBar, ProgressStyle};
+use rayon::prelude::*;
+
+use super::CommandError;
+
+/// Frames painted before they are written: as many at a time keep all cores busy without filling the memory.
+const AT_A_TIME: usize = 32;
+/// Frames that a GIF's palette is made from.
+const PALETTE_FRAMES: usize = 12;
+/// Pictures a second of an MP4; a decision is shown for a whole number of them.
+const PICTURES_A_SECOND: u32 = 10;
+/// Most of what ffmpeg says that is told on.
+const MAX_COMPLAINT: u64 = 2000;
+
+/// The frames of a film with the time each is shown.
+pub(super) struct Reel<'a> {
+    frames: Vec<(&'a Frame, Duration)>,
+    width: u32,
+    painter: Painter,
+}
+
+impl<'a> Reel<'a> {
+    /// A film, so many pixels wide.
+    pub(super) fn new(frames: Vec<(&'a Frame, Duration)>, width: u32) -> Self {
+        Self {
+            frames,
+            width,
+            painter: Painter::new(),
+        }
+    }
+
+    /// Number of frames.
+    pub(super) fn len(&self) -> usize {
+        self.frames.len()
+    }
+
+    /// How long the film is.
+    pub(super) fn time(&self) -> Duration {
+        self.frames.iter().map(|(_, shown_for)| *shown_for).sum()
+    }
+
+    /// Writes the film as a GIF; says its size.
+    pub(super) fn gif(&self, path: &Path) -> Result<(u32, u32), CommandError> {
+        let mut file = WholeFile::create(path)?;
+        let sample = self.sample()?;
+        let size = sample
+            .first()
+            .map(|picture| (picture.width(), picture.height()))
+            .ok_or("there is nothing to show")?;
+        let palette = Palette::of(&sample);
+        drop(sample);
+        let mut gif = GifWriter::new(&mut file, size.0, size.1, palette)?;
+        self.show(|picture, shown_for| {
+            let hundredths = (shown_for.as_secs_f64() * 100.0).round();
+            Ok(gif.add(picture, (hundredths as u16).max(1))?)
+        })?;
+        gif.finish()?;
+        file.finish()?;
+        Ok(size)
+    }
+
+    /// Writes the film as an MP4 by the program ffmpeg; says its size.
+    pub(super) fn mp4(&self, path: &Path, program: &Path) -> Result<(u32, u32), CommandError> {
+        let (first, _) = self.frames.first().ok_or("there is nothing to show")?;
+        let first = self.paint(first)?;
+        let size = (first.width(), first.height());
+        let file = WholeFile::create(path)?;
+        let mut ffmpeg = Ffmpeg::start(program, size, file.part())?;
+        let shown = self.show(|picture, shown_for| {
+            let times = shown_for.as_secs_f64() * f64::from(PICTURES_A_SECOND);
+            for _ in 0..(times.round() as u64).max(1) {
+                ffmpeg.input.write_all(picture.data())?;
+            }
+            Ok(())
+        });
+        // When ffmpeg stops early, what it says about it is worth more than that nobody reads any more.
+        ffmpeg.finish()?;
+        shown?;
+        file.finish()?;
+        Ok((size.0.next_multiple_of(2), size.1.next_multiple_of(2)))
+    }
+
+    fn paint(&self, frame: &Frame) -> Result<Pixels, CommandError> {
+        let svg = self.painter.table(&frame.scene);
+        Ok(self.painter.pixels(&svg, self.width)?)
+    }
+
+    /// Some pictures, spread over the film.
+    fn sample(&self) -> Result<Vec<Pixels>, CommandError> {
+        let step = self.frames.len().div_ceil(PALETTE_FRAMES).max(1);
+        let frames: Vec<_> = self.frames.iter().step_by(step).collect();
+        frames
+            .par_iter()
+            .map(|(frame, _)| self.paint(frame))
+            .collect()
+    }
+
+    /// Paints all frames and hands them over in order.
+    fn show(
+        &self,
+        mut take: impl FnMut(&Pixels, Duration) -> Result<(), CommandError>,
+    ) -> Result<(), CommandError> {
+        let total = self.frames.len().try_into().unwrap_or(u64::MAX);
+        let bar = ProgressBar::new(total).with_style(ProgressStyle::with_template(
+            "{bar:40} {human_pos} of {human_len} frames, {eta} left",
+        )?);
+        for frames in self.frames.chunks(AT_A_TIME) {
+            let painted: Result<Vec<_>, _> = frames
+                .par_iter()
+                .map(|&(frame, shown_for)| Ok::<_, CommandError>((self.paint(frame)?, shown_for)))
+                .collect();
+            for (picture, shown_for) in painted? {
+                take(&picture, shown_for)?;
+                bar.inc(1);
+            }
+        }
+        bar.finish_and_clear();
+        Ok(())
+    }
+}
+
+/// ffmpeg, being given pictures.
+struct Ffmpeg {
+    child: Child,
+    input: ChildStdin,
+    complaints: JoinHandle<io::Result<String>>,
+}
+
+impl Ffmpeg {
+    fn start(
+        program: &Path,
+        (width, height): (u32, u32),
+        out: &Path,
+    ) -> Result<Self, CommandError> {
+        let rate = PICTURES_A_SECOND.to_string();
+        let mut child = Command::new(program)
+            .args(["-hide_banner", "-loglevel", "error", "-y"])
+            .args(["-f", "rawvideo", "-pixel_format", "rgba"])
+            .args(["-video_size", &format!("{width}x{height}")])
+            .args(["-framerate", &rate, "-i", "-"])
+            // The usual players know no other form, and it has no odd sides.
+            .args(["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2"])
+            .args(["-c:v", "libx264", "-pix_fmt", "yuv420p"])
+            .args(["-movflags", "+faststart", "-f", "mp4"])
+            .arg(out)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .map_err(|error| match error.kind() {
+                io::ErrorKind::NotFound => format!(
+                    "{} was not found: install ffmpeg, or choose a name that ends in .gif",
+                    program.display()
+                ),
+                _ => format!("{}: {error}", program.display()),
+            })?;
+        let input = child.stdin.take().ok_or("ffmpeg has no input")?;
+        let errors = child.stderr.take().ok_or("ffmpeg has no errors")?;
+        let complaints = std::thread::spawn(move || {
+            let (mut text, mut rest) = (Vec::new(), errors);
+            rest.by_ref().take(MAX_COMPLAINT).read_to_end(&mut text)?;
+            // The rest is read so that ffmpeg does not wait for a reader.
+            io::copy(&mut rest, &mut io::sink())?;
+            Ok(String::from_utf8_lossy(&text).trim().to_owned())
+        });
+        Ok(Self {
+            child,
+            input,
+            complaints,
+        })
+    }
+
+    fn finish(self) -> Result<(), CommandError> {
+        let Self {
+            mut child,
+            input,
+            complaints,
+        } = self;
+        drop(input);
+        let status = child.wait()?;
+        let said = match complaints.join() {
+            Ok(said) => said.unwrap_or_default(),
+            Err(_) => String::new(),
+        };
+        if status.success() {
+            Ok(())
+        } else {
+            Err(format!("ffmpeg failed ({status}): {said}").into())
+        }
+    }
+}

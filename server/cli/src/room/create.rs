@@ -1,0 +1,353 @@
+//! `chefshat room create`: a room as the flags describe it, and the secrets it comes with. How its game begins is in `start`.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use chefshat_agents::AgentKind;
+use chefshat_client::v1::{self, create_room_request::Start, seat_config::FilledBy};
+use chefshat_engine::RuleSet;
+use clap::Args;
+
+use super::super::connect::{ServerArg, free_seats};
+use super::super::policy_args::PolicyArgs;
+use super::super::rules_args::{RulesArgs, by_flag};
+use super::super::secret_file::SecretFile;
+use super::super::{CommandError, say};
+use super::start::{StartArgs, players_of};
+
+/// Make a room and say how to join it.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  chefshat room create --name friday --seat greedy --seat random=Rolf\n  \
+                  chefshat room create --preset rulebook --target-shifts 10 --decision-time-ms 60000\n  \
+                  chefshat room create --code-file ./join-code\n  \
+                  chefshat room create --branch GAME-ID@40 --seat replay:GAME-ID:0 --seat greedy\n  \
+                  chefshat room create --hands ./hands.json --durability ephemeral"
+)]
+pub(super) struct Create {
+    /// Name to show.
+    #[arg(long, default_value = "")]
+    name: String,
+    #[command(flatten)]
+    server: ServerArg,
+    /// How the next seat is filled: random, random_unmasked, greedy or trained (played by the server), replay:GAME-ID:SEAT (played by the server
+    /// as the player of that seat of a recorded game played), each with =NAME to go by another name, or open, agent, human or robot (for whom it
+    /// is free). Repeatable; seats not named are open.
+    #[arg(long = "seat", value_name = "SEAT", value_parser = seat)]
+    seats: Vec<v1::SeatConfig>,
+    /// The game seed, 64 hexadecimal digits, for experiments; such a game has no seed commitment.
+    #[arg(long, value_name = "HEX", value_parser = game_seed)]
+    game_seed: Option<[u8; 32]>,
+    /// Leave the join code in this file, readable to its owner alone; waits for the server if it is not there yet.
+    #[arg(long, value_name = "FILE")]
+    code_file: Option<PathBuf>,
+    /// Print the room with its secrets as a JSON line.
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    start: StartArgs,
+    #[command(flatten)]
+    rules: RulesArgs,
+    #[command(flatten)]
+    policy: PolicyArgs,
+    /// Milliseconds to wait for the seats to be filled; standard 3600000.
+    #[arg(long, value_name = "MS", help_heading = "Times and limits")]
+    waiting_time_ms: Option<u32>,
+}
+
+impl Create {
+    pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
+        let start = self.start.message()?;
+        let rules = self.rules()?;
+        let client = match &self.code_file {
+            Some(_) => self.server.connect_patiently().await?,
+            None => self.server.connect().await?,
+        };
+        let players = match (rules, self.start.branch()) {
+            (Some(rules), _) => rules.players(),
+            // Who plays is asked for seat by seat; if no seat is named, all are open and it need not be known how many there are.
+            (None, Some(point)) if !self.seats.is_empty() => {
+                players_of(&client, &point.game_id).await?
+            }
+            (None, _) => 0,
+        };
+        let request = self.request(start, players)?;
+        // Before there is a room: whoever cannot be told its code has no use for it.
+        let code_file = (self.code_file.as_deref())
+            .map(|file| SecretFile::prepare(file, "--code-file", "a join code"))
+            .transpose()?;
+        let made = client.create_room(request).await.map_err(refused)?;
+        let room = made
+            .room
+            .ok_or("the server did not say which room it made")?;
+        let left = code_file.map_or(Ok(()), |file| file.leave(&made.join_code));
+        let (code, owner) = (made.join_code, made.owner_token);
+        if self.json {
+            let line = serde_json::json!({
+                "event": "created", "room": room, "join_code": code, "owner_token": owner,
+            });
+            say(format_args!("{line}"))?;
+        } else {
+            say(format_args!("room         {}", room.room_id))?;
+            say(format_args!("game         {}", room.game_id))?;
+            say(format_args!("join code    {code}"))?;
+            say(format_args!("owner token  {owner}"))?;
+            if let Some(words) = next_step(&room, self.server.url(), &code) {
+                say(words)?;
+            }
+        }
+        // Only now, so that the secrets are told all the same.
+        left?;
+        Ok(ExitCode::SUCCESS)
+    }
+
+    /// The rule set, unless it is that of a recorded game.
+    fn rules(&self) -> Result<Option<RuleSet>, CommandError> {
+        if self.start.branch().is_none() {
+            return Ok(Some(self.rules.rules()?));
+        }
+        if !self.rules.are_standard() {
+            return Err(
+                "--branch: the recorded game's rules are played; leave out the flags for rules"
+                    .into(),
+            );
+        }
+        Ok(None)
+    }
+
+    fn request(
+        &self,
+        start: Option<Start>,
+        players: usize,
+    ) -> Result<v1::CreateRoomRequest, CommandError> {
+        if self.seats.len() > players {
+            let described = self.seats.len();
+            return Err(
+                format!("--seat: {described} seats are described, but {players} play").into(),
+            );
+        }
+        let open = v1::SeatConfig {
+            filled_by: Some(FilledBy::ReservedFor(0)),
+            ..v1::SeatConfig::default()
+        };
+        let all = self.seats.iter().cloned().chain(std::iter::repeat(open));
+        Ok(v1::CreateRoomRequest {
+            name: self.name.clone(),
+            rules: (self.start.branch().is_none()).then(|| self.rules.message()),
+            seats: all.take(players).collect(),
+            policy: Some(v1::RoomPolicy {
+                waiting_time_ms: self.waiting_time_ms,
+                ..self.policy.message()
+            }),
+            game_seed: self.game_seed.map_or_else(Vec::new, |seed| seed.to_vec()),
+            start,
+        })
+    }
+}
+
+fn seat(word: &str) -> Result<v1::SeatConfig, String> {
+    let (filled_by, name) = match word.split_once('=') {
+        Some((_, "")) => return Err("there is no name after the =".into()),
+        Some((agent, name)) => (filled_by(agent)?, name),
+        None => (filled_by(word)?, ""),
+    };
+    if !name.is_empty() && matches!(filled_by, FilledBy::ReservedFor(_)) {
+        return Err("a name is for a built-in agent; whoever joins brings their own".into());
+    }
+    Ok(v1::SeatConfig {
+        filled_by: Some(filled_by),
+        name: name.to_owned(),
+    })
+}
+
+fn filled_by(word: &str) -> Result<FilledBy, String> {
+    if let Some(player) = word.strip_prefix("replay:") {
+        return recorded_player(player).map(FilledBy::Replay);
+    }
+    let reserved = match word {
+        "open" => v1::ParticipantKind::Unspecified,
+        "agent" => v1::ParticipantKind::Agent,
+        "human" => v1::ParticipantKind::Human,
+        "robot" => v1::ParticipantKind::Robot,
+        _ => {
+            return AgentKind::from_name(word)
+                .map(|kind| FilledBy::BuiltInAgent(kind.name().to_owned()))
+                .ok_or_else(|| {
+                    let known = AgentKind::ALL.map(AgentKind::name).join(", ");
+                    format!("use one of {known}, replay:GAME-ID:SEAT, open, agent, human, robot")
+                });
+        }
+    };
+    Ok(FilledBy::ReservedFor(reserved.into()))
+}
+
+fn recorded_player(words: &str) -> Result<v1::RecordedPlayer, String> {
+    let player = words.split_once(':').and_then(|(game_id, seat)| {
+        Some(v1::RecordedPlayer {
+            game_id: game_id.to_owned(),
+            seat: seat.parse().ok()?,
+        })
+    });
+    player.ok_or_else(|| "give replay:, the id of a recorded game, :, and a seat of it".to_owned())
+}
+
+fn game_seed(digits: &str) -> Result<[u8; 32], String> {
+    let mut seed = [0; 32];
+    hex::decode_to_slice(digits, &mut seed)
+        .map(|()| seed)
+        .map_err(|_| "a game seed is 64 hexadecimal digits".to_owned())
+}
+
+/// A refusal of the server in the words of the command line.
+fn refused(error: chefshat_client::Error) -> CommandError {
+    match (error.reason(), error.metadata().get("field")) {
+        (Some("RULE_SET_REFUSED" | "POLICY_REFUSED" | "NAME_REFUSED"), Some(field)) => {
+            let message = error.message();
+            let said = format!("{field}: ");
+            by_flag(field, message.strip_prefix(&said).unwrap_or(message)).into()
+        }
+        (Some("SCRIPT_REFUSED"), _) => format!("--hands: {}", error.message()).into(),
+        (Some("BRANCH_REFUSED"), _) => format!("--branch: {}", error.message()).into(),
+        _ => error.into(),
+    }
+}
+
+/// How the seats that are free can be filled.
+fn next_step(room: &v1::Room, server: &str, code: &str) -> Option<String> {
+    let free = free_seats(room);
+    let first = room.seats.iter().find(|seat| seat.name.is_empty())?;
+    let free = match free {
+        1 => "1 seat is free; fill it with:".to_owned(),
+        _ => format!("{free} seats are free; fill each with:"),
+    };
+    let there = format!("--server {server} --code {code}");
+    Some(match first.reserved_for() {
+        v1::ParticipantKind::Unspecified | v1::ParticipantKind::Agent => {
+            format!("{free} chefshat agent greedy {there}")
+        }
+        v1::ParticipantKind::Human => {
+            format!("{free} chefshat play {there}, or in a browser at {server}/join/{code}")
+        }
+        v1::ParticipantKind::Robot => {
+            format!("{free} chefshat agent greedy {there} --kind-of robot")
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use crate::room::create::*;
+
+    #[derive(Parser)]
+    struct Only {
+        #[command(flatten)]
+        create: Create,
+    }
+
+    fn request(flags: &str) -> Result<v1::CreateRoomRequest, CommandError> {
+        let words = std::iter::once("test").chain(flags.split_whitespace());
+        let create = Only::try_parse_from(words)
+            .expect("the flags are known")
+            .create;
+        let players = create.rules()?.map_or(4, |rules| rules.players());
+        create.request(create.start.message()?, players)
+    }
+
+    #[test]
+    fn seats_not_named_are_open() {
+        let request = request("--seat greedy --seat human").expect("a room");
+        let seats: Vec<FilledBy> = request
+            .seats
+            .into_iter()
+            .filter_map(|seat| seat.filled_by)
+            .collect();
+        let open = FilledBy::ReservedFor(0);
+        let human = FilledBy::ReservedFor(v1::ParticipantKind::Human.into());
+        assert_eq!(
+            seats,
+            [
+                FilledBy::BuiltInAgent("greedy".into()),
+                human,
+                open.clone(),
+                open
+            ]
+        );
+    }
+
+    #[test]
+    fn a_seat_can_be_a_recorded_players() {
+        let request = request("--seat replay:5f0c6a4d:3").expect("a room");
+        let replay = FilledBy::Replay(v1::RecordedPlayer {
+            game_id: "5f0c6a4d".into(),
+            seat: 3,
+        });
+        assert_eq!(request.seats[0].filled_by, Some(replay));
+        for word in [
+            "replay",
+            "replay:5f0c6a4d",
+            "replay:5f0c6a4d:x",
+            "ada",
+            "human=Ada",
+            "greedy=",
+        ] {
+            assert!(seat(word).is_err(), "{word}");
+        }
+    }
+
+    #[test]
+    fn a_built_in_agent_may_go_by_another_name() {
+        let request = request("--seat greedy=Greta --seat random").expect("a room");
+        let names: Vec<&str> = request.seats.iter().map(|seat| &*seat.name).collect();
+        assert_eq!(names, ["Greta", "", "", ""]);
+        let greedy = FilledBy::BuiltInAgent("greedy".into());
+        assert_eq!(request.seats[0].filled_by, Some(greedy));
+    }
+
+    #[test]
+    fn a_branch_leaves_the_rules_to_the_record() {
+        let branch = request("--branch 5f0c6a4d@7 --seat greedy").expect("a room");
+        assert_eq!(branch.rules, None);
+        assert_eq!(branch.seats.len(), 4);
+        let Some(Start::Branch(point)) = branch.start else {
+            panic!("a branch begins with a point");
+        };
+        assert_eq!((&*point.game_id, point.decisions), ("5f0c6a4d", 7));
+        assert!(request("--branch 5f0c6a4d@7 --faces 9").is_err());
+    }
+
+    #[test]
+    fn too_many_seats_are_refused() {
+        let error = request("--players 2 --seat open --seat open --seat open")
+            .expect_err("three seats for two");
+        assert!(error.to_string().contains("3 seats"), "{error}");
+    }
+
+    #[test]
+    fn free_seats_come_with_the_line_that_fills_them() {
+        let seat = |name: &str, kind: v1::ParticipantKind| v1::Participant {
+            name: name.into(),
+            reserved_for: kind.into(),
+            ..v1::Participant::default()
+        };
+        let words = |seats: Vec<v1::Participant>| {
+            let room = v1::Room {
+                seats,
+                ..v1::Room::default()
+            };
+            next_step(&room, "http://[::1]:7", "BCDF2345")
+        };
+        let (any, human) = (v1::ParticipantKind::Unspecified, v1::ParticipantKind::Human);
+        assert_eq!(words(vec![seat("Ada", any)]), None);
+        assert_eq!(
+            words(vec![seat("Ada", any), seat("", human)]).as_deref(),
+            Some(
+                "1 seat is free; fill it with: \
+                 chefshat play --server http://[::1]:7 --code BCDF2345, or in a browser at http://[::1]:7/join/BCDF2345"
+            )
+        );
+        let two = words(vec![seat("", any), seat("", any)]).expect("two are free");
+        assert!(two.starts_with("2 seats are free;"), "{two}");
+    }
+}

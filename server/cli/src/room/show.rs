@@ -1,0 +1,270 @@
+//! `chefshat room list` and `chefshat room show`.
+
+use std::process::ExitCode;
+
+use chefshat_client::v1;
+use clap::{Args, ValueEnum};
+
+use super::super::connect::ServerArg;
+use super::super::narrator::{abort_reason, clean};
+use super::super::{CommandError, say};
+
+/// Rooms asked for at a time.
+const PAGE: u32 = 100;
+
+/// List the rooms of a server, newest first.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  chefshat room list --state playing")]
+pub(super) struct List {
+    #[command(flatten)]
+    server: ServerArg,
+    /// Rooms in this state alone.
+    #[arg(long)]
+    state: Option<StateArg>,
+    /// Print each room as a JSON line.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Show one room.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  chefshat room show 5f0c6a4de2b14b7f8a3d9c1e7b60425d")]
+pub(super) struct Show {
+    /// Which room.
+    #[arg(value_name = "ROOM-ID")]
+    room_id: String,
+    #[command(flatten)]
+    server: ServerArg,
+    /// Print the room as a JSON line.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum StateArg {
+    Waiting,
+    Playing,
+    Finished,
+    Aborted,
+}
+
+impl List {
+    pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
+        let client = self.server.connect().await?;
+        let state = match self.state {
+            None => v1::RoomState::Unspecified,
+            Some(StateArg::Waiting) => v1::RoomState::Waiting,
+            Some(StateArg::Playing) => v1::RoomState::Playing,
+            Some(StateArg::Finished) => v1::RoomState::Finished,
+            Some(StateArg::Aborted) => v1::RoomState::Aborted,
+        };
+        let mut request = v1::ListRoomsRequest {
+            state: state.into(),
+            page_size: PAGE,
+            page_token: String::new(),
+        };
+        let mut count = 0;
+        loop {
+            let page = client.list_rooms(request.clone()).await?;
+            for room in &page.rooms {
+                if self.json {
+                    say(serde_json::to_string(room)?)?;
+                } else {
+                    say(in_a_line(room))?;
+                }
+                count += 1;
+            }
+            if page.next_page_token.is_empty() {
+                break;
+            }
+            request.page_token = page.next_page_token;
+        }
+        if count == 0 && !self.json {
+            say("no rooms")?;
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+impl Show {
+    pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
+        let client = self.server.connect().await?;
+        let room = client.get_room(self.room_id).await?;
+        if self.json {
+            say(serde_json::to_string(&room)?)?;
+        } else {
+            print!("{}", in_full(&room));
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+/// Where a room stands, in a word.
+pub(super) fn state(state: v1::RoomState) -> &'static str {
+    match state {
+        v1::RoomState::Unspecified => "in a state this program does not know",
+        v1::RoomState::Waiting => "waiting",
+        v1::RoomState::Playing => "playing",
+        v1::RoomState::Finished => "finished",
+        v1::RoomState::Aborted => "aborted",
+    }
+}
+
+fn in_a_line(room: &v1::Room) -> String {
+    let taken = room
+        .seats
+        .iter()
+        .filter(|seat| !seat.name.is_empty())
+        .count();
+    let seats = room.seats.len();
+    let state = state(room.state());
+    let name = clean(&room.name, 30);
+    let beginning = match room.origin() {
+        v1::GameOrigin::Branched => "  (branched)",
+        v1::GameOrigin::Scripted => "  (given hands)",
+        _ => "",
+    };
+    let line = format!(
+        "{}  {state:<8}  {taken}/{seats} seats  {name}{beginning}",
+        room.room_id
+    );
+    line.trim_end().to_owned()
+}
+
+fn in_full(room: &v1::Room) -> String {
+    let mut out = format!("room  {}\ngame  {}\n", room.room_id, room.game_id);
+    if !room.name.is_empty() {
+        out.push_str(&format!("name  {}\n", clean(&room.name, 64)));
+    }
+    let why = match room.abort_reason() {
+        v1::AbortReason::Unspecified => String::new(),
+        reason => format!(": {}", abort_reason(reason)),
+    };
+    out.push_str(&format!("state {}{why}\n", state(room.state())));
+    if let Some(words) = beginning(room) {
+        out.push_str(&format!("start {words}\n"));
+    }
+    if room.seed_fixed {
+        out.push_str("deal  from a seed its creator fixed\n");
+    } else {
+        out.push_str(&format!(
+            "deal  committed to as {}\n",
+            hex::encode(&room.seed_commitment)
+        ));
+    }
+    let policy = room.policy.clone().unwrap_or_default();
+    if policy.durability() == v1::Durability::Ephemeral {
+        out.push_str("kept  in memory until it ends; lost when the server stops\n");
+    }
+    for seat in &room.seats {
+        out.push_str(&format!("seat {} {}\n", seat.seat, seat_in_words(seat)));
+    }
+    out
+}
+
+/// How the game of a room begins, where it is not simply dealt.
+pub(super) fn beginning(room: &v1::Room) -> Option<String> {
+    if let Some(point) = &room.branched_from {
+        let (game, decisions) = (clean(&point.game_id, 40), point.decisions);
+        let deals = if point.same_deals {
+            "later deals as there"
+        } else {
+            "later deals of its own"
+        };
+        return Some(format!(
+            "as game {game} until after decision {decisions}, {deals}"
+        ));
+    }
+    let scripted = room.origin() == v1::GameOrigin::Scripted;
+    scripted.then(|| "with hands its creator gave".to_owned())
+}
+
+fn seat_in_words(seat: &v1::Participant) -> String {
+    let kind = |kind| match kind {
+        v1::ParticipantKind::Unspecified => "anybody",
+        v1::ParticipantKind::Agent => "agent",
+        v1::ParticipantKind::Human => "human",
+        v1::ParticipantKind::Robot => "robot",
+    };
+    if seat.name.is_empty() {
+        return format!("free for {}", kind(seat.reserved_for()));
+    }
+    let name = clean(&seat.name, 30);
+    if let Some(player) = &seat.replay {
+        let game = clean(&player.game_id, 40);
+        return format!(
+            "{name}, played by the server as seat {} of game {game} played",
+            player.seat
+        );
+    }
+    if !seat.built_in_agent.is_empty() {
+        return match name == seat.built_in_agent {
+            true => format!("{name}, played by the server"),
+            false => format!("{name}, played by the server as {}", seat.built_in_agent),
+        };
+    }
+    let there = match (seat.substituted, seat.connected) {
+        (true, _) => "substituted",
+        (false, true) => "connected",
+        (false, false) => "not connected",
+    };
+    format!("{name}, {}, {there}", kind(seat.kind()))
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::room::show::*;
+
+    #[test]
+    fn a_branched_room_says_where_it_comes_from() {
+        let room = v1::Room {
+            room_id: "a".into(),
+            game_id: "b".into(),
+            state: v1::RoomState::Playing.into(),
+            policy: Some(v1::RoomPolicy {
+                durability: v1::Durability::Ephemeral.into(),
+                ..v1::RoomPolicy::default()
+            }),
+            seats: vec![
+                v1::Participant {
+                    name: "replay".into(),
+                    built_in_agent: "replay".into(),
+                    replay: Some(v1::RecordedPlayer {
+                        game_id: "c".into(),
+                        seat: 2,
+                    }),
+                    ..v1::Participant::default()
+                },
+                v1::Participant {
+                    seat: 1,
+                    ..v1::Participant::default()
+                },
+            ],
+            seed_fixed: true,
+            origin: v1::GameOrigin::Branched.into(),
+            branched_from: Some(v1::BranchPoint {
+                game_id: "c".into(),
+                decisions: 40,
+                same_deals: true,
+            }),
+            ..v1::Room::default()
+        };
+        assert_eq!(
+            in_full(&room),
+            "room  a\ngame  b\nstate playing\n\
+             start as game c until after decision 40, later deals as there\n\
+             deal  from a seed its creator fixed\n\
+             kept  in memory until it ends; lost when the server stops\n\
+             seat 0 replay, played by the server as seat 2 of game c played\n\
+             seat 1 free for anybody\n"
+        );
+        assert_eq!(in_a_line(&room), "a  playing   1/2 seats    (branched)");
+        let scripted = v1::Room {
+            origin: v1::GameOrigin::Scripted.into(),
+            ..v1::Room::default()
+        };
+        let words = beginning(&scripted);
+        assert_eq!(words.as_deref(), Some("with hands its creator gave"));
+        assert_eq!(beginning(&v1::Room::default()), None);
+    }
+}

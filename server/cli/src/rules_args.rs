@@ -1,0 +1,237 @@
+//! The flags that describe a rule set, shared by the commands that play games: a preset, and one flag for each field that may be set
+//! in its place. What makes sense is not decided here but by the engine.
+
+use chefshat_engine::{RuleSet, RuleSetSpec};
+use chefshat_proto::v1;
+use chefshat_record::convert::rules_from_proto;
+use clap::builder::PossibleValuesParser;
+use clap::{Args, ValueEnum};
+
+use super::CommandError;
+
+/// A rule set as the command line describes it.
+#[derive(Debug, Clone, Default, Args)]
+#[command(next_help_heading = "Rules")]
+pub(super) struct RulesArgs {
+    /// Where the rules start from; every other flag overrides one field. paper: to 15 points, 5,3,1,0 by place, the Golden 11 opens.
+    /// rulebook: the same with 3,2,1,0. original2020: as paper, but any 11 opens, the opener may pass and a pass binds for one turn.
+    #[arg(long, default_value = "paper", value_parser = PossibleValuesParser::new(RuleSetSpec::PRESETS))]
+    preset: String,
+    /// Seats, 2 to 6; standard 4.
+    #[arg(long, value_name = "N")]
+    players: Option<u32>,
+    /// Faces, 4 to 15; face f is in the deck f times; standard 11.
+    #[arg(long, value_name = "F")]
+    faces: Option<u32>,
+    /// Jokers, 0 to 2; standard 2.
+    #[arg(long, value_name = "J")]
+    jokers: Option<u32>,
+    /// End after the Shift in which somebody reaches this many points; standard 15.
+    #[arg(long, value_name = "POINTS", conflicts_with = "target_shifts")]
+    target_points: Option<u32>,
+    /// End after this many Shifts.
+    #[arg(long, value_name = "SHIFTS")]
+    target_shifts: Option<u32>,
+    /// Points by place, from the first on, for instance 5,3,1,0.
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    points: Vec<u32>,
+    /// Whether cards are exchanged from the second Shift on.
+    #[arg(long, value_name = "ON|OFF")]
+    exchange: Option<Switch>,
+    /// Short for --exchange off.
+    #[arg(long, conflicts_with = "exchange")]
+    no_exchange: bool,
+    /// Whether special actions are offered from the second Shift on.
+    #[arg(long, value_name = "ON|OFF")]
+    special_actions: Option<Switch>,
+    /// Short for --special-actions off.
+    #[arg(long, conflicts_with = "special_actions")]
+    no_special_actions: bool,
+    /// Who opens a Shift.
+    #[arg(long)]
+    opening: Option<OpeningFlag>,
+    /// Whether the seat that opens a Shift may pass on that turn.
+    #[arg(long)]
+    opening_pass: Option<OpeningPass>,
+    /// How long a pass binds.
+    #[arg(long)]
+    pass_scope: Option<PassScopeFlag>,
+    /// Consecutive pizzas without a play after which somebody must play.
+    #[arg(long, value_name = "PIZZAS")]
+    max_idle_pizzas: Option<u32>,
+    /// Turns after which a Shift is adjudicated.
+    #[arg(long, value_name = "TURNS")]
+    max_turns: Option<u32>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Switch {
+    On,
+    Off,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+#[value(rename_all = "snake_case")]
+enum OpeningFlag {
+    /// The holder of the Golden card, who must play it.
+    Golden,
+    /// The first seat from a drawn one that holds the top face, which must play that face.
+    AnyTopFace,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum OpeningPass {
+    Forbidden,
+    Allowed,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum PassScopeFlag {
+    /// Until the next pizza.
+    Pizza,
+    /// For that turn only.
+    Turn,
+}
+
+impl RulesArgs {
+    /// Whether no flag was given that changes the standard.
+    pub(super) fn are_standard(&self) -> bool {
+        let standard = v1::RuleSet {
+            preset: RuleSetSpec::PRESETS[0].to_owned(),
+            ..v1::RuleSet::default()
+        };
+        self.message() == standard
+    }
+
+    /// The rule set as a server is asked for it: what was not said is left to the preset.
+    pub(super) fn message(&self) -> v1::RuleSet {
+        use v1::rule_set::Stop;
+        let on = |switch: Switch| switch == Switch::On;
+        v1::RuleSet {
+            preset: self.preset.clone(),
+            players: self.players,
+            faces: self.faces,
+            jokers: self.jokers,
+            stop: (self.target_points.map(Stop::TargetPoints))
+                .or(self.target_shifts.map(Stop::TargetShifts)),
+            points: self.points.clone(),
+            exchange: (self.exchange.map(on)).or(self.no_exchange.then_some(false)),
+            special_actions: (self.special_actions.map(on))
+                .or(self.no_special_actions.then_some(false)),
+            opening: match self.opening {
+                None => v1::Opening::Unspecified,
+                Some(OpeningFlag::Golden) => v1::Opening::Golden,
+                Some(OpeningFlag::AnyTopFace) => v1::Opening::AnyTopFace,
+            }
+            .into(),
+            opening_pass: self.opening_pass.map(|pass| pass == OpeningPass::Allowed),
+            pass_scope: match self.pass_scope {
+                None => v1::PassScope::Unspecified,
+                Some(PassScopeFlag::Pizza) => v1::PassScope::Pizza,
+                Some(PassScopeFlag::Turn) => v1::PassScope::Turn,
+            }
+            .into(),
+            max_idle_pizzas: self.max_idle_pizzas,
+            max_turns: self.max_turns,
+        }
+    }
+
+    /// The rule set.
+    ///
+    /// # Errors
+    /// The first flag that makes no sense.
+    pub(super) fn rules(&self) -> Result<RuleSet, CommandError> {
+        rules_of(&self.message())
+    }
+}
+
+/// The rule set of a message that was made from flags.
+///
+/// # Errors
+/// The first flag that makes no sense.
+pub(super) fn rules_of(message: &v1::RuleSet) -> Result<RuleSet, CommandError> {
+    rules_from_proto(message).map_err(|problem| by_flag(problem.field, &problem.message).into())
+}
+
+/// What is wrong with a field of the protocol, for somebody who typed a flag.
+pub(super) fn by_flag(field: &str, message: &str) -> String {
+    let flag = match field {
+        "reward_scheme" => "reward".to_owned(),
+        "clocks" => "clock".to_owned(),
+        "spectator_delay_decisions" => "spectator-delay".to_owned(),
+        _ => field.replace('_', "-"),
+    };
+    // Some messages begin with the field.
+    match message.strip_prefix(field) {
+        Some(rest) if rest.starts_with(' ') => format!("--{flag}{rest}"),
+        _ => format!("--{flag}: {message}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use chefshat_engine::{Opening, PassScope, Stop};
+    use clap::Parser;
+
+    use crate::rules_args::*;
+
+    #[derive(Parser)]
+    struct Only {
+        #[command(flatten)]
+        rules: RulesArgs,
+    }
+
+    fn spec(flags: &str) -> RuleSetSpec {
+        let words = std::iter::once("test").chain(flags.split_whitespace());
+        let only = Only::try_parse_from(words).expect("the flags are known");
+        only.rules.rules().expect("the rules make sense").spec()
+    }
+
+    #[test]
+    fn every_flag_sets_its_field() {
+        let paper = spec("");
+        let standard = RuleSetSpec::default()
+            .validate()
+            .expect("the standard")
+            .spec();
+        assert_eq!(paper, standard);
+        assert_eq!(spec("--preset rulebook").points, [3, 2, 1, 0]);
+        let changed = spec(
+            "--players 3 --faces 9 --jokers 1 --target-shifts 7 --points 4,2,0 --exchange off --special-actions off \
+             --opening any_top_face --opening-pass allowed --pass-scope turn --max-idle-pizzas 5 --max-turns 99",
+        );
+        let expected = RuleSetSpec {
+            players: 3,
+            faces: 9,
+            jokers: 1,
+            stop: Stop::Shifts(7),
+            points: vec![4, 2, 0],
+            exchange: false,
+            special_actions: false,
+            opening: Opening::AnyTopFace,
+            opening_pass: true,
+            pass_scope: PassScope::Turn,
+            max_idle_pizzas: 5,
+            max_turns: 99,
+        };
+        assert_eq!(changed, expected);
+        let back = spec(
+            "--preset original2020 --opening golden --opening-pass forbidden --pass-scope pizza",
+        );
+        assert_eq!(back, standard);
+    }
+
+    #[test]
+    fn nonsense_names_its_field() {
+        let only = Only::try_parse_from(["test", "--faces", "3"]).expect("a number");
+        let problem = only.rules.rules().expect_err("three faces are too few");
+        assert!(problem.to_string().starts_with("--faces: "), "{problem}");
+        let only = Only::try_parse_from(["test", "--max-turns", "0"]).expect("a number");
+        let problem = only.rules.rules().expect_err("no turns are too few");
+        assert!(
+            problem.to_string().starts_with("--max-turns is 0"),
+            "{problem}"
+        );
+        assert_eq!(by_flag("reward_scheme", "odd"), "--reward: odd");
+    }
+}

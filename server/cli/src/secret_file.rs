@@ -1,0 +1,127 @@
+//! Leaving a secret in a file, for programs that are started beside the one that was told it: the join code of a room or a tournament, or
+//! what its owner needs.
+
+use std::fs::File;
+use std::io::{self, Write as _};
+use std::os::unix::fs::OpenOptionsExt as _;
+use std::path::{Path, PathBuf};
+
+use super::CommandError;
+
+/// A file that a secret is going to be left in: whole or not at all, and for its owner alone.
+pub(super) struct SecretFile<'a> {
+    what: &'static str,
+    file: &'a Path,
+    part: PathBuf,
+    whole: File,
+}
+
+impl<'a> SecretFile<'a> {
+    /// Begins it under another name, beside where it is to be. `flag` named the file, `what` is to be left in it: "a join code".
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub(super) fn prepare(
+        file: &'a Path,
+        flag: &str,
+        what: &'static str,
+    ) -> Result<Self, CommandError> {
+        let mut part = file.as_os_str().to_owned();
+        part.push(".part");
+        let part = PathBuf::from(part);
+        let open = || {
+            if file.is_dir() {
+                return Err(io::ErrorKind::IsADirectory.into());
+            }
+            // One left behind by a process that was stopped may have been made otherwise.
+            match std::fs::remove_file(&part) {
+                Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+                _ => {}
+            }
+            let mut options = File::options();
+            options.write(true).create_new(true).mode(0o600).open(&part)
+        };
+        match open() {
+            Ok(whole) => Ok(Self {
+                what,
+                file,
+                part,
+                whole,
+            }),
+            Err(error) => {
+                let file = file.display();
+                Err(
+                    format!("{flag}: {what} cannot be left in {file}: {error}; nothing was made")
+                        .into(),
+                )
+            }
+        }
+    }
+
+    /// Leaves the secret.
+    ///
+    /// # Errors
+    /// It cannot be written after all.
+    pub(super) fn leave(mut self, secret: &str) -> Result<(), CommandError> {
+        writeln!(self.whole, "{secret}")
+            .and_then(|()| std::fs::rename(&self.part, self.file))
+            .map_err(|error| {
+                format!(
+                    "what was asked for was made, but {} cannot be left in {}: {error}",
+                    self.what,
+                    self.file.display()
+                )
+                .into()
+            })
+    }
+}
+
+impl Drop for SecretFile<'_> {
+    fn drop(&mut self) {
+        // Nothing is there any more once the secret was left.
+        let _ = std::fs::remove_file(&self.part);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::secret_file::*;
+
+    fn prepare(file: &Path) -> Result<SecretFile<'_>, CommandError> {
+        SecretFile::prepare(file, "--code-file", "a join code")
+    }
+
+    #[test]
+    fn a_secret_is_left_for_its_owner_alone() {
+        use std::os::unix::fs::PermissionsExt as _;
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("code");
+        for code in ["BCDF2345", "BCDF2346"] {
+            let prepared = prepare(&file).expect("it can be written");
+            prepared.leave(code).expect("written");
+        }
+        assert_eq!(std::fs::read_to_string(&file).expect("read"), "BCDF2346\n");
+        let mode = std::fs::metadata(&file)
+            .expect("it is there")
+            .permissions()
+            .mode();
+        assert_eq!(mode & 0o777, 0o600);
+    }
+
+    #[test]
+    fn a_file_that_gets_no_secret_leaves_nothing_behind() {
+        let folder = tempfile::tempdir().expect("a folder");
+        drop(prepare(&folder.path().join("code")).expect("it can be written"));
+        let left = std::fs::read_dir(folder.path())
+            .expect("the folder")
+            .count();
+        assert_eq!(left, 0);
+        let refused = prepare(folder.path()).err().expect("a folder is no file");
+        assert!(
+            refused
+                .to_string()
+                .starts_with("--code-file: a join code cannot"),
+            "{refused}"
+        );
+    }
+}

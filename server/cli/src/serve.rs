@@ -1,0 +1,223 @@
+//! `chefshat serve`: host rooms until told to stop.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::time::Duration;
+
+use clap::Args;
+use clap::builder::{FalseyValueParser, RangedU64ValueParser};
+use futures::future::OptionFuture;
+use tokio::net::TcpListener;
+use tokio::signal::unix::{SignalKind, signal};
+use tokio::sync::oneshot;
+
+use super::{CommandError, data_dir, say};
+use chefshat_server::config::ServerConfig;
+use chefshat_server::serve::Server;
+use chefshat_server::store::{MemoryStore, SqliteStore, Store};
+use chefshat_server::web;
+
+/// Host rooms: one port for gRPC, gRPC-web, health checks, reflection, and the page on which people play.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  chefshat serve --listen 127.0.0.1:50051 --data-dir ./chefshat-data"
+)]
+pub(super) struct Serve {
+    /// Address and port to listen on, such as 0.0.0.0:50051 or localhost:50051; port 0 takes a free one.
+    #[arg(long, env = "CHEFSHAT_LISTEN", value_name = "HOST:PORT", default_value = "127.0.0.1:50051", value_parser = host_and_port)]
+    listen: String,
+    /// Folder in which games are kept: a database (games.sqlite3) and the records of finished games (records/GAME-ID.jsonl). Standard:
+    /// chefshat in the user's data folder.
+    #[arg(long, env = "CHEFSHAT_DATA_DIR")]
+    data_dir: Option<PathBuf>,
+    /// Keep games in memory alone: no database, no records.
+    #[arg(long, env = "CHEFSHAT_NO_RECORDS", value_parser = FalseyValueParser::new())]
+    no_records: bool,
+    /// Let anybody add records of games played elsewhere.
+    #[arg(long, env = "CHEFSHAT_ALLOW_IMPORT", value_parser = FalseyValueParser::new())]
+    allow_import: bool,
+    /// Most rooms at a time.
+    #[arg(long, env = "CHEFSHAT_MAX_ROOMS", default_value_t = 10_000, value_parser = RangedU64ValueParser::<usize>::new().range(1..))]
+    max_rooms: usize,
+    /// Threads that step the games of learning agents; 0: one for each core. Rooms have threads of their own.
+    #[arg(long, env = "CHEFSHAT_VECTOR_THREADS", default_value_t = 0, value_parser = RangedU64ValueParser::<usize>::new().range(..=256))]
+    vector_threads: usize,
+    /// Seconds that running games may go on after the server was told to stop.
+    #[arg(long, env = "CHEFSHAT_GRACE", default_value_t = 30)]
+    grace: u64,
+    /// Web origin whose pages may call the server, such as https://example.org (repeatable); * is all.
+    #[arg(
+        long = "allow-origin",
+        env = "CHEFSHAT_ALLOW_ORIGIN",
+        value_name = "ORIGIN",
+        value_delimiter = ',',
+        value_parser = origin
+    )]
+    allowed_origins: Vec<String>,
+    /// Stop when standard input ends: for a program that starts a server of its own and may itself end in any way.
+    #[arg(long)]
+    until_stdin_closes: bool,
+    /// Say where the server listens as a JSON line on standard output.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Serve {
+    pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
+        // Not left to clap, for which a variable that says no is there as much as one that says yes.
+        let data_dir = match (self.no_records, self.data_dir) {
+            (true, None) => None,
+            (true, Some(_)) => {
+                return Err("--no-records and --data-dir cannot be used together".into());
+            }
+            (false, data_dir) => Some(data_dir::prepare(data_dir)?),
+        };
+        let listener = TcpListener::bind(&self.listen).await.map_err(|error| {
+            format!(
+                "cannot listen on {}: {error}; choose another address with --listen",
+                self.listen
+            )
+        })?;
+        let store: Arc<dyn Store> = match &data_dir {
+            Some(folder) => Arc::new(SqliteStore::open(folder).await?),
+            None => Arc::new(MemoryStore::default()),
+        };
+        let address = listener.local_addr()?;
+        // Before anybody is told where to connect, so that a stop that comes at once is heard.
+        let mut terminate = signal(SignalKind::terminate())?;
+        let mut interrupt = signal(SignalKind::interrupt())?;
+        let kept_in = data_dir.clone();
+        let grace = self.grace;
+        let config = ServerConfig {
+            data_dir,
+            max_rooms: self.max_rooms,
+            vector_threads: self.vector_threads,
+            allow_import: self.allow_import,
+            grace: Duration::from_secs(self.grace),
+            allowed_origins: (self.allowed_origins.into_iter())
+                .filter(|origin| !origin.is_empty())
+                .collect(),
+            ..ServerConfig::default()
+        };
+        let server = Server::restored(config, store).await?;
+        if let Some(folder) = kept_in {
+            eprintln!("games are kept in {}", folder.display());
+        }
+        if server.games() > 0 {
+            eprintln!("unfinished games that go on: {}", server.games());
+        }
+        if self.json {
+            say(serde_json::json!({
+                "event": "listening",
+                "address": address.to_string(),
+                "games": server.games(),
+            }))?;
+        }
+        eprintln!("listening on http://{address}");
+        if !web::is_built_in() {
+            eprintln!("the page for people is not built in; `cargo xtask web` builds it");
+        }
+        let input_ends = self.until_stdin_closes.then(end_of_input);
+        let stop = async move {
+            tokio::select! {
+                _ = terminate.recv() => {}
+                _ = interrupt.recv() => {}
+                Some(_) = OptionFuture::from(input_ends) => {}
+            }
+            eprintln!(
+                "stopping: no new rooms; running games may end within {grace} s, after that durable ones are put down and go on at the next \
+                 start; stop again to end at once"
+            );
+            tokio::spawn(async move {
+                tokio::select! {
+                    _ = terminate.recv() => {}
+                    _ = interrupt.recv() => {}
+                }
+                eprintln!(
+                    "stopped at once: durable games go on when the server is started again, all others are lost"
+                );
+                std::process::exit(1);
+            });
+        };
+        server.serve(listener, stop).await?;
+        eprintln!("stopped");
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+/// Resolves when standard input has ended. Read in a thread of its own, which nobody waits for: tokio would wait for one of its threads.
+fn end_of_input() -> oneshot::Receiver<()> {
+    let (tell, told) = oneshot::channel();
+    std::thread::spawn(move || {
+        // An input that cannot be read has ended, too.
+        let _ = std::io::copy(&mut std::io::stdin().lock(), &mut std::io::sink());
+        let _ = tell.send(());
+    });
+    told
+}
+
+/// Checks the form of an address; whether there is such a host is found out when it is used.
+fn host_and_port(text: &str) -> Result<String, String> {
+    let whole = |(host, port): (&str, &str)| !host.is_empty() && port.parse::<u16>().is_ok();
+    match text.rsplit_once(':').is_some_and(whole) {
+        true => Ok(text.to_owned()),
+        false => Err("give IP:PORT or HOST:PORT, for instance 127.0.0.1:50051".to_owned()),
+    }
+}
+
+/// Checks a web origin as browsers send it: a scheme and a host, without a path. A variable that is empty names none.
+fn origin(text: &str) -> Result<String, String> {
+    if text.is_empty() || text == "*" {
+        return Ok(text.to_owned());
+    }
+    let host = (text.strip_prefix("https://")).or(text.strip_prefix("http://"));
+    let plain =
+        |letter: char| letter.is_ascii_graphic() && !matches!(letter, '/' | '?' | '#' | '@');
+    match host.is_some_and(|host| !host.is_empty() && host.chars().all(plain)) {
+        true => Ok(text.to_owned()),
+        false => Err(
+            "give http://HOST or https://HOST with a port if it has one and no path, for instance https://example.org, or *"
+                .to_owned(),
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::serve::{host_and_port, origin};
+
+    #[test]
+    fn addresses_have_a_host_and_a_port() {
+        for good in ["127.0.0.1:0", "localhost:50051", "[::1]:50051"] {
+            assert_eq!(host_and_port(good).as_deref(), Ok(good));
+        }
+        for bad in [
+            "",
+            "50051",
+            ":50051",
+            "localhost",
+            "localhost:http",
+            "localhost:70000",
+        ] {
+            assert!(host_and_port(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn origins_are_as_browsers_send_them() {
+        for good in ["", "*", "http://localhost:8080", "https://example.org"] {
+            assert_eq!(origin(good).as_deref(), Ok(good));
+        }
+        for bad in [
+            "example.org",
+            "https://",
+            "https://example.org/",
+            "https://a b",
+            " *",
+            "ftp://a",
+        ] {
+            assert!(origin(bad).is_err(), "{bad}");
+        }
+    }
+}

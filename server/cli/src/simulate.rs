@@ -1,0 +1,154 @@
+//! `chefshat simulate`: a batch of offline games on all cores, and what it adds up to. How the result is written is in `report`, how its games are
+//! written down in `records`; the games are played by `chefshat-arena`.
+
+mod records;
+mod report;
+
+use std::io::Write as _;
+use std::num::NonZeroU32;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Instant;
+
+use chefshat_agents::AgentKind;
+use chefshat_engine::RewardScheme;
+use chefshat_simulation::{Batch, BatchTable};
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use indicatif::{ProgressBar, ProgressStyle};
+use rayon::prelude::*;
+
+use super::numbers::grouped;
+use super::rules_args::RulesArgs;
+use super::{CommandError, threads};
+use chefshat_record::convert::MAX_RECORDED_ATTEMPTS;
+
+const EXAMPLES: &str = "\
+Examples:
+  chefshat simulate --games 2000 --seed 7
+  chefshat simulate --games 500 --agents greedy,random_unmasked,random --players 3 --reward validity
+  chefshat simulate --games 50 --records simulated/
+  chefshat simulate --games 10000 --preset original2020 --no-exchange --no-special-actions --json
+
+The same seed gives the same output, on any number of threads.";
+
+/// Play many games offline, on all cores, and print what they add up to.
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct Simulate {
+    /// Games to play.
+    #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..))]
+    games: u64,
+    /// The number that all chance is drawn from.
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// The agent on each seat, from seat 0, separated by commas. Standard: greedy on seat 0, random on the others.
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = agents())]
+    agents: Vec<AgentKind>,
+    /// Reward the turns by this scheme and print each seat's mean reward.
+    #[arg(long, value_name = "SCHEME", value_parser = schemes())]
+    reward: Option<RewardScheme>,
+    /// Take the default decision after so many invalid answers to one decision. Standard: ask again without end.
+    #[arg(long, value_name = "N")]
+    max_invalid_attempts: Option<NonZeroU32>,
+    /// Threads to play on, at most 256 and one for each game; 0 is one for each core.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    threads: usize,
+    /// Write the record of every game into this folder, as the server writes those of hosted games.
+    #[arg(long, value_name = "DIR")]
+    records: Option<PathBuf>,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    rules: RulesArgs,
+}
+
+fn agents() -> impl TypedValueParser<Value = AgentKind> {
+    PossibleValuesParser::new(AgentKind::ALL.map(AgentKind::name))
+        .map(|name| AgentKind::from_name(&name).expect("the possible values are the names"))
+}
+
+fn schemes() -> impl TypedValueParser<Value = RewardScheme> {
+    PossibleValuesParser::new(RewardScheme::ALL.map(RewardScheme::name))
+        .map(|name| RewardScheme::from_name(&name).expect("the possible values are the names"))
+}
+
+impl Simulate {
+    pub(super) fn run(self) -> Result<ExitCode, CommandError> {
+        let batch = self.batch()?;
+        let pool = threads::pool(self.threads, batch.games())?;
+        let bar = ProgressBar::new(batch.games()).with_style(ProgressStyle::with_template(
+            "{bar:40} {human_pos} of {human_len} games, {eta} left",
+        )?);
+        let start = Instant::now();
+        let table = pool.install(|| batch.run(|games| bar.inc(games)));
+        bar.finish_and_clear();
+        if !bar.is_hidden() {
+            say_speed(&table, start.elapsed().as_secs_f64());
+        }
+        if let Some(folder) = &self.records {
+            pool.install(|| write_records(&batch, folder))?;
+        }
+        let mut out = anstream::stdout().lock();
+        if self.json {
+            writeln!(out, "{}", report::json(&batch, &table))?;
+        } else {
+            write!(out, "{}", report::text(&batch, &table))?;
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+
+    /// What is to be played.
+    fn batch(&self) -> Result<Batch, CommandError> {
+        let rules = self.rules.rules()?;
+        let players = rules.players();
+        let agents = if self.agents.is_empty() {
+            let mut agents = vec![AgentKind::Random; players];
+            agents[0] = AgentKind::Greedy;
+            agents
+        } else {
+            self.agents.clone()
+        };
+        let mut batch = Batch::new(rules, &agents, self.games, self.seed).map_err(|error| {
+            let example = vec!["random"; players].join(",");
+            format!("--agents: {error}, for instance --agents {example}, or change --players")
+        })?;
+        if let Some(scheme) = self.reward {
+            batch = batch.with_rewards(scheme);
+        }
+        if let Some(attempts) = self.max_invalid_attempts {
+            if self.records.is_some() && attempts.get() > MAX_RECORDED_ATTEMPTS {
+                return Err(format!(
+                    "--max-invalid-attempts: with --records at most {}",
+                    MAX_RECORDED_ATTEMPTS
+                )
+                .into());
+            }
+            batch = batch.with_max_invalid_attempts(attempts);
+        }
+        Ok(batch)
+    }
+}
+
+/// Writes the records of all games, on the threads of the pool it is called in.
+fn write_records(batch: &Batch, folder: &Path) -> Result<(), CommandError> {
+    let bar = ProgressBar::new(batch.games()).with_style(ProgressStyle::with_template(
+        "{bar:40} {human_pos} of {human_len} records, {eta} left",
+    )?);
+    (0..batch.games())
+        .into_par_iter()
+        .try_for_each(|index| records::write(batch, index, folder).inspect(|()| bar.inc(1)))?;
+    bar.finish_and_clear();
+    Ok(())
+}
+
+/// For people who watch: to standard error, because it is never the same twice.
+fn say_speed(table: &BatchTable, seconds: f64) {
+    let answers = table.decisions + table.seats.values().map(|seat| seat.wrong).sum::<u64>();
+    eprintln!(
+        "{} answers of agents in {seconds:.1} s, {:.1} million a second",
+        grouped(answers),
+        answers as f64 / seconds / 1e6
+    );
+}

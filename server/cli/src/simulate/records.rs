@@ -1,0 +1,66 @@
+//! Records of simulated games: the games of a batch are played again, their decisions noted and written down. The form of such a record is
+//! decided in `convert::played`.
+
+use std::path::Path;
+
+use chefshat_agents::{AgentKind, Listener};
+use chefshat_engine::PlayedDecision;
+use chefshat_engine::{ActionId, Decision};
+use chefshat_record::jsonl;
+use chefshat_record::jsonl::RecordFileError;
+use chefshat_simulation::Batch;
+
+use chefshat_record::convert::Played;
+use chefshat_server::convert::simulation_policy;
+
+/// Plays a game of a batch, by its index from 0, and writes its record into a folder.
+///
+/// # Errors
+/// Whatever the file system has against it.
+pub(super) fn write(batch: &Batch, index: u64, folder: &Path) -> Result<(), RecordFileError> {
+    let limit = batch
+        .max_invalid_attempts()
+        .map(|attempts| attempts.get() as usize);
+    let mut notes = Notes {
+        limit,
+        ..Notes::default()
+    };
+    batch.play_game(index, &mut notes);
+    let played = Played {
+        by: "simulate",
+        rules: batch.rules(),
+        agents: &batch.agents().map(|agent| Some(AgentKind::name(agent))),
+        seed: batch.game_seed(index),
+        scheme: batch.scheme(),
+        policy: &simulation_policy(
+            batch.max_invalid_attempts().map(|attempts| attempts.get()),
+            batch.scheme(),
+        ),
+        decisions: &notes.decisions,
+    };
+    let path = folder.join(format!("{}.jsonl", played.game_id()));
+    jsonl::write(&path, &played.record())
+}
+
+/// The decisions of a game, each after the attempts that were refused.
+#[derive(Default)]
+struct Notes {
+    limit: Option<usize>,
+    decisions: Vec<PlayedDecision>,
+    attempts: Vec<ActionId>,
+}
+
+impl Listener for Notes {
+    fn on_invalid(&mut self, _: Decision, action: ActionId) {
+        self.attempts.push(action);
+    }
+
+    fn on_decision(&mut self, _: Decision, action: ActionId) {
+        let attempts = std::mem::take(&mut self.attempts);
+        self.decisions.push(PlayedDecision {
+            action,
+            by_default: self.limit.is_some_and(|limit| attempts.len() >= limit),
+            attempts,
+        });
+    }
+}

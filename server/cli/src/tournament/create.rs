@@ -1,0 +1,363 @@
+//! `chefshat tournament create`: a tournament as the flags describe it, and the secrets it comes with.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use chefshat_client::{Error, v1};
+use clap::Args;
+
+use super::super::connect::{KindArg, ServerArg};
+use super::super::policy_args::PolicyArgs;
+use super::super::remote::agent_kind;
+use super::super::rules_args::{RulesArgs, by_flag};
+use super::super::secret_file::SecretFile;
+use super::super::{CommandError, say};
+use super::words::{DealsArg, FormatArg};
+
+/// Most participants of a tournament.
+const MAX_BUILT_IN: usize = 1024;
+
+/// Make a tournament and say how to take part.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  chefshat tournament create --name cup --format knockout --built-in greedy*4 --start-when 16\n  \
+                  chefshat tournament create --name league --format round_robin --deals same --games-per-pairing 4 --code-file ./join-code\n  \
+                  chefshat tournament create --name mixed --format swiss --rounds 5 --target-shifts 3 \\\n    \
+                  --clock human:60000:300000 --clock robot:30000 --no-show-time-ms 300000 --owner-file ./owner\n\n\
+                  docs/tournaments.md says what the formats and deals are, and what happens to those who do not come."
+)]
+pub(super) struct Create {
+    /// Name to show, 1 to 64 characters.
+    #[arg(long)]
+    name: String,
+    /// Who plays whom.
+    #[arg(long, value_enum)]
+    format: FormatArg,
+    #[command(flatten)]
+    server: ServerArg,
+    /// Built-in agents that take part: random, random_unmasked, greedy or trained, or so many of one, separated by commas, for instance
+    /// greedy*4,trained. Repeatable.
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = built_in)]
+    built_in: Vec<BuiltIn>,
+    /// Begin by itself when so many have joined, built-in agents included. Standard: `chefshat tournament start` begins it.
+    #[arg(long, value_name = "N")]
+    start_when: Option<u32>,
+    /// Rounds of round_robin and swiss. Standard: one less than there are participants; for swiss, enough to find a winner.
+    #[arg(long, value_name = "N")]
+    rounds: Option<u32>,
+    /// Games of each table of a round, its seats rotated from game to game; with rotated deals: deals. Standard 1.
+    #[arg(long, value_name = "N")]
+    games_per_pairing: Option<u32>,
+    /// How games are dealt.
+    #[arg(long, value_enum, default_value_t = DealsArg::Independent)]
+    deals: DealsArg,
+    /// What may take part. Repeatable; standard: all.
+    #[arg(long = "kind", value_enum, value_name = "KIND")]
+    kinds: Vec<KindArg>,
+    /// Most participants, built-in agents included, 2 to 1024; standard 64.
+    #[arg(long, value_name = "N")]
+    max_participants: Option<u32>,
+    /// Milliseconds that a game waits for participants who are not connected; standard 60000.
+    #[arg(long, value_name = "MS")]
+    no_show_time_ms: Option<u32>,
+    /// How often a game is called before those who do not come forfeit it, 1 to 10; standard 2.
+    #[arg(long, value_name = "N")]
+    max_calls: Option<u32>,
+    /// Most games at a time, 1 to 256; standard 64.
+    #[arg(long, value_name = "N")]
+    max_parallel_games: Option<u32>,
+    /// What every draw of seats and tables is made from, 64 hexadecimal digits, so that it can be drawn again alike. The deals do not depend
+    /// on it.
+    #[arg(long, value_name = "HEX", value_parser = seed)]
+    draw_seed: Option<[u8; 32]>,
+    /// 64 hexadecimal digits from which all deals follow, for an experiment: whoever knows them knows the cards, and games are not rated.
+    #[arg(long, value_name = "HEX", value_parser = seed)]
+    deal_seed: Option<[u8; 32]>,
+    /// Built-in agent that fills up a knockout and plays for those who forfeit; standard random.
+    #[arg(long, value_name = "AGENT", value_parser = agent_name)]
+    filler: Option<String>,
+    /// Leave the join code in this file, readable to its owner alone; waits for the server if it is not there yet.
+    #[arg(long, value_name = "FILE")]
+    code_file: Option<PathBuf>,
+    /// Leave the owner token in this file, readable to its owner alone; `start` and `close` take it from there.
+    #[arg(long, value_name = "FILE")]
+    owner_file: Option<PathBuf>,
+    /// Print the tournament with its secrets as a JSON line.
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    rules: RulesArgs,
+    #[command(flatten)]
+    policy: PolicyArgs,
+}
+
+/// Some built-in agents alike.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct BuiltIn {
+    pub(super) name: String,
+    pub(super) count: usize,
+}
+
+impl Create {
+    pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
+        let settings = self.settings()?;
+        let client = match &self.code_file {
+            Some(_) => self.server.connect_patiently().await?,
+            None => self.server.connect().await?,
+        };
+        // Before there is a tournament: whoever cannot be told its secrets has no use for it.
+        let code_file = (self.code_file.as_deref())
+            .map(|file| SecretFile::prepare(file, "--code-file", "a join code"))
+            .transpose()?;
+        let owner_file = (self.owner_file.as_deref())
+            .map(|file| SecretFile::prepare(file, "--owner-file", "an owner token"))
+            .transpose()?;
+        let made = client.create_tournament(settings).await.map_err(refused)?;
+        let tournament = made
+            .tournament
+            .ok_or("the server did not say which tournament it made")?;
+        let (code, owner) = (made.join_code, made.owner_token);
+        let left = [(code_file, &code), (owner_file, &owner)].map(|(file, secret)| match file {
+            Some(file) => file.leave(secret),
+            None => Ok(()),
+        });
+        if self.json {
+            let line = serde_json::json!({
+                "event": "created", "tournament": tournament, "join_code": code, "owner_token": owner,
+            });
+            say(line)?;
+        } else {
+            say(format_args!("tournament   {}", tournament.tournament_id))?;
+            say(format_args!("join code    {code}"))?;
+            say(format_args!("owner token  {owner}"))?;
+            say(self.next_steps(&tournament, &code))?;
+        }
+        // Only now, so that the secrets are told all the same.
+        left.into_iter().collect::<Result<Vec<()>, _>>()?;
+        Ok(ExitCode::SUCCESS)
+    }
+
+    /// What the server is asked for: what was not said is left to its standard.
+    fn settings(&self) -> Result<v1::TournamentSettings, CommandError> {
+        // Nonsense is said by flag, before anybody is asked.
+        self.rules.rules()?;
+        let built_in: usize = self.built_in.iter().map(|some| some.count).sum();
+        if built_in > MAX_BUILT_IN {
+            return Err(format!("--built-in: {built_in} of at most {MAX_BUILT_IN} agents").into());
+        }
+        let named = |some: &BuiltIn| std::iter::repeat_n(some.name.clone(), some.count);
+        Ok(v1::TournamentSettings {
+            name: self.name.clone(),
+            format: self.format.format().into(),
+            rules: Some(self.rules.message()),
+            policy: Some(self.policy.message()),
+            rounds: asked("--rounds", self.rounds)?,
+            games_per_pairing: asked("--games-per-pairing", self.games_per_pairing)?,
+            deals: self.deals.deals().into(),
+            kinds: self.kinds.iter().map(|kind| kind.kind().into()).collect(),
+            max_participants: asked("--max-participants", self.max_participants)?,
+            built_in_agents: self.built_in.iter().flat_map(named).collect(),
+            start_when_joined: asked("--start-when", self.start_when)?,
+            no_show_time_ms: asked("--no-show-time-ms", self.no_show_time_ms)?,
+            max_calls: asked("--max-calls", self.max_calls)?,
+            max_parallel_games: asked("--max-parallel-games", self.max_parallel_games)?,
+            draw_seed: self.draw_seed.map_or_else(Vec::new, |seed| seed.to_vec()),
+            deal_seed: self.deal_seed.map_or_else(Vec::new, |seed| seed.to_vec()),
+            filler: self.filler.clone().unwrap_or_default(),
+        })
+    }
+
+    /// How others take part, and how it begins.
+    fn next_steps(&self, tournament: &v1::Tournament, code: &str) -> String {
+        let (id, server) = (&tournament.tournament_id, self.server.url());
+        if tournament.state() != v1::TournamentState::Open {
+            return format!(
+                "it has begun; follow it with: chefshat tournament follow {id} --server {server}"
+            );
+        }
+        let join =
+            format!("chefshat tournament join --agent greedy --server {server} --code {code}");
+        let owner = match &self.owner_file {
+            Some(file) => format!("--owner-file {}", file.display()),
+            None => "--owner-token TOKEN".to_owned(),
+        };
+        let begins = match self.start_when {
+            Some(count) => format!("it begins when {count} have joined"),
+            None => {
+                format!("begin it with: chefshat tournament start {id} --server {server} {owner}")
+            }
+        };
+        format!("take part with: {join}\n{begins}")
+    }
+}
+
+/// A number as the protocol has it, where 0 stands for what was not said.
+fn asked(flag: &str, number: Option<u32>) -> Result<u32, CommandError> {
+    match number {
+        Some(0) => Err(format!("{flag}: 0 is too few; leave the flag out for the standard").into()),
+        number => Ok(number.unwrap_or(0)),
+    }
+}
+
+/// Reads `greedy` or `greedy*4`.
+pub(super) fn built_in(words: &str) -> Result<BuiltIn, String> {
+    let (name, count) = match words.split_once('*') {
+        None => (words, Some(1)),
+        Some((name, count)) => (name, count.parse().ok()),
+    };
+    match count {
+        Some(count @ 1..=MAX_BUILT_IN) => Ok(BuiltIn {
+            name: agent_name(name)?,
+            count,
+        }),
+        _ => Err(format!("after * give a number from 1 to {MAX_BUILT_IN}")),
+    }
+}
+
+fn agent_name(name: &str) -> Result<String, String> {
+    agent_kind(name).map(|kind| kind.name().to_owned())
+}
+
+fn seed(digits: &str) -> Result<[u8; 32], String> {
+    let mut seed = [0; 32];
+    hex::decode_to_slice(digits, &mut seed)
+        .map(|()| seed)
+        .map_err(|_| "a seed is 64 hexadecimal digits".to_owned())
+}
+
+/// A refusal of the server in the words of the command line.
+fn refused(error: Error) -> CommandError {
+    let known = [
+        "RULE_SET_REFUSED",
+        "POLICY_REFUSED",
+        "SETTINGS_REFUSED",
+        "NAME_REFUSED",
+    ];
+    let field = error.metadata().get("field");
+    match (error.reason(), field.map(String::as_str)) {
+        (Some(reason), Some(field)) if known.contains(&reason) => flagged(field, error.message()),
+        _ => error.into(),
+    }
+}
+
+/// What is wrong with a field of the settings, for somebody who typed a flag.
+fn flagged(field: &str, message: &str) -> CommandError {
+    let said = format!("{field}: ");
+    let message = message.strip_prefix(&said).unwrap_or(message);
+    match field {
+        // The field within is what was typed.
+        "rules" | "policy" => match message.split_once(": ") {
+            Some((inner, rest)) => by_flag(inner, rest),
+            None => message.to_owned(),
+        },
+        "start_when_joined" => by_flag("start_when", message),
+        "built_in_agents" => by_flag("built_in", message),
+        "kinds" => by_flag("kind", message),
+        _ => by_flag(field, message),
+    }
+    .into()
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use crate::tournament::create::*;
+
+    #[derive(Parser)]
+    struct Only {
+        #[command(flatten)]
+        create: Create,
+    }
+
+    fn settings(flags: &str) -> Result<v1::TournamentSettings, CommandError> {
+        let words = "test --name cup --format swiss".split(' ');
+        let create = Only::try_parse_from(words.chain(flags.split_whitespace()))?.create;
+        create.settings()
+    }
+
+    #[test]
+    fn every_flag_sets_its_field() {
+        let seed = "07".repeat(32);
+        let flags = format!(
+            "--built-in greedy*2,trained --built-in random --start-when 9 --rounds 5 --games-per-pairing 3 --deals same --kind human \
+             --kind robot --max-participants 20 --no-show-time-ms 5000 --max-calls 3 --max-parallel-games 7 --draw-seed {seed} --deal-seed {seed} \
+             --filler greedy --target-shifts 3 --decision-time-ms 700 --clock human:60000"
+        );
+        let rules = v1::RuleSet {
+            preset: "paper".into(),
+            stop: Some(v1::rule_set::Stop::TargetShifts(3)),
+            ..v1::RuleSet::default()
+        };
+        let clock = v1::KindClock {
+            kind: v1::ParticipantKind::Human.into(),
+            decision_time_ms: Some(60_000),
+            bank_ms: None,
+        };
+        let policy = v1::RoomPolicy {
+            decision_time_ms: Some(700),
+            clocks: vec![clock],
+            ..v1::RoomPolicy::default()
+        };
+        let expected = v1::TournamentSettings {
+            name: "cup".into(),
+            format: v1::TournamentFormat::Swiss.into(),
+            rules: Some(rules),
+            policy: Some(policy),
+            rounds: 5,
+            games_per_pairing: 3,
+            deals: v1::TournamentDeals::SameAtAllTables.into(),
+            kinds: vec![
+                v1::ParticipantKind::Human.into(),
+                v1::ParticipantKind::Robot.into(),
+            ],
+            max_participants: 20,
+            built_in_agents: ["greedy", "greedy", "trained", "random"]
+                .map(String::from)
+                .into(),
+            start_when_joined: 9,
+            no_show_time_ms: 5000,
+            max_calls: 3,
+            max_parallel_games: 7,
+            draw_seed: vec![7; 32],
+            deal_seed: vec![7; 32],
+            filler: "greedy".into(),
+        };
+        assert_eq!(settings(&flags).expect("they make sense"), expected);
+    }
+
+    #[test]
+    fn nonsense_is_said_by_flag() {
+        for (flags, words) in [
+            ("--faces 3", "--faces: "),
+            ("--rounds 0", "--rounds: 0 is too few"),
+            ("--built-in greedy*", "after * give a number"),
+            ("--built-in greedy*0", "after * give a number"),
+            ("--built-in gready", "use one of random"),
+            (
+                "--built-in greedy*600,random*600",
+                "--built-in: 1200 of at most 1024",
+            ),
+            ("--draw-seed 07", "64 hexadecimal digits"),
+        ] {
+            let error = settings(flags).expect_err(flags).to_string();
+            assert!(error.contains(words), "{error}");
+        }
+        for (field, message, words) in [
+            ("rounds", "rounds: too many", "--rounds: too many"),
+            (
+                "start_when_joined",
+                "start_when_joined: 3",
+                "--start-when: 3",
+            ),
+            (
+                "policy",
+                "policy: decision_time_ms: 1",
+                "--decision-time-ms: 1",
+            ),
+            ("policy", "policy: no", "no"),
+        ] {
+            assert_eq!(flagged(field, message).to_string(), words);
+        }
+    }
+}

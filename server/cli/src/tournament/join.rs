@@ -1,0 +1,177 @@
+//! `chefshat tournament join`: a built-in agent takes part as a remote client, over the Rust SDK like anybody's agent, until the tournament
+//! is over.
+
+use std::process::ExitCode;
+use std::time::Duration;
+
+use chefshat_agents::{AgentKind, BuiltInAgent};
+use chefshat_client::{ActionId, Agent, Client, Outcome, v1};
+use clap::Args;
+
+use super::super::agent::{outcome_in_words, outcome_json};
+use super::super::connect::{KindArg, Pass, ServerArg, WayIn};
+use super::super::numbers::counted;
+use super::super::remote::{MAX_PACE_MS, RemoteAgent, agent_kind, seed_for};
+use super::super::{CommandError, say};
+use super::tables::{NO_GAME_COUNTED, place_in_words};
+use super::words::state;
+
+/// Take part with a built-in agent, until the tournament is over.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  chefshat tournament join --agent greedy --name Gustav --code BCDF2345\n  \
+                  chefshat tournament join --agent trained --games 8 --code-file ./join-code --json\n\n\
+                  Exit code: 0 when the tournament finished, 1 when it was closed or the place in it was lost."
+)]
+pub(super) struct Join {
+    /// Which agent: random, random_unmasked, greedy or trained.
+    #[arg(long, value_parser = agent_kind, value_name = "KIND")]
+    agent: AgentKind,
+    #[command(flatten)]
+    server: ServerArg,
+    #[command(flatten)]
+    way_in: WayIn,
+    /// Name to show, which no other participant has; standard: the agent's.
+    #[arg(long)]
+    name: Option<String>,
+    /// What to take part as.
+    #[arg(long, value_enum, default_value_t = KindArg::Agent)]
+    kind_of: KindArg,
+    /// Games to play at a time.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=64))]
+    games: u32,
+    /// Makes the agent's choices repeatable.
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Milliseconds to wait before each decision, so that people can follow.
+    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u64).range(0..=MAX_PACE_MS))]
+    pace_ms: u64,
+    /// Print one JSON line a game, and one at the end.
+    #[arg(long)]
+    json: bool,
+}
+
+/// A place in a tournament that was taken just now.
+struct Place {
+    tournament_id: String,
+    participant: u32,
+}
+
+impl Join {
+    pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
+        let client = self.server.connect_patiently().await?;
+        let (ticket, place) = match self.way_in.pass(None).await? {
+            Pass::Ticket(ticket) => (ticket, None),
+            Pass::Code(code) => {
+                let (ticket, place) = self.take_place(&client, code).await?;
+                (ticket, Some(place))
+            }
+        };
+        let mut games = 0_u64;
+        let make = |_: &v1::Attached| {
+            let seed = seed_for(&format!("chefshat tournament join {games}"), self.seed);
+            games += 1;
+            let agent = BuiltInAgent::new(self.agent, seed);
+            Teller {
+                agent: RemoteAgent::new(agent, Duration::from_millis(self.pace_ms)),
+                json: self.json,
+            }
+        };
+        let played = client.play_tournament(ticket, make).await;
+        let outcomes = played.map_err(|error| format!("the place was lost: {error}"))?;
+        match place {
+            Some(place) => self.tell_end(&client, &place).await,
+            None => {
+                let games = counted(outcomes.len() as u64, "game");
+                anstream::eprintln!("the tournament is over; played here: {games}");
+                Ok(ExitCode::SUCCESS)
+            }
+        }
+    }
+
+    async fn take_place(
+        &self,
+        client: &Client,
+        code: String,
+    ) -> Result<(String, Place), CommandError> {
+        let name = self.name.as_deref().unwrap_or(self.agent.name());
+        let joined = client
+            .join_tournament(v1::JoinTournamentRequest {
+                join_code: code,
+                name: name.to_owned(),
+                kind: self.kind_of.kind().into(),
+                max_games: self.games,
+                // Each game has an agent of its own.
+                stateless: true,
+                ..v1::JoinTournamentRequest::default()
+            })
+            .await?;
+        let tournament = joined.tournament.unwrap_or_default();
+        let (participant, id) = (joined.participant, tournament.tournament_id);
+        anstream::eprintln!("{name} takes part in tournament {id} as participant {participant}");
+        // Whoever has it has the place: it is told to the one who started the agent alone.
+        anstream::eprintln!(
+            "should this agent end before the tournament, another goes on in its place with --ticket {}",
+            joined.ticket
+        );
+        let place = Place {
+            tournament_id: id,
+            participant,
+        };
+        Ok((joined.ticket, place))
+    }
+
+    async fn tell_end(&self, client: &Client, place: &Place) -> Result<ExitCode, CommandError> {
+        let results = client
+            .tournament_results(place.tournament_id.as_str())
+            .await?;
+        let end = results.tournament.unwrap_or_default().state();
+        let participants = results.standings.len();
+        let standing = (results.standings.into_iter())
+            .find(|standing| standing.participant == place.participant)
+            .ok_or("the server's standings lack this participant")?;
+        if self.json {
+            let state = state(end);
+            say(serde_json::json!({"event": "over", "state": state, "standing": standing}))?;
+        } else {
+            let place = place_in_words(&standing, participants);
+            let place = place.as_deref().unwrap_or(NO_GAME_COUNTED);
+            say(format_args!("the tournament is {}: {place}", state(end)))?;
+        }
+        Ok(match end {
+            v1::TournamentState::Finished => ExitCode::SUCCESS,
+            _ => ExitCode::FAILURE,
+        })
+    }
+}
+
+/// An agent whose games are told as they end.
+struct Teller {
+    agent: RemoteAgent,
+    json: bool,
+}
+
+impl Agent for Teller {
+    fn decide(&mut self, request: &v1::DecisionRequest) -> ActionId {
+        self.agent.decide(request)
+    }
+
+    fn on_attached(&mut self, attached: &v1::Attached) {
+        self.agent.on_attached(attached);
+    }
+
+    fn on_event(&mut self, event: &v1::GameEvent) {
+        self.agent.on_event(event);
+    }
+
+    fn on_game_over(&mut self, outcome: &Outcome) {
+        let told = match self.json {
+            true => say(outcome_json(outcome)),
+            false => say(outcome_in_words(outcome)),
+        };
+        if let Err(error) = told {
+            // The tournament is played to its end all the same.
+            tracing::debug!(%error, "a game was told to nobody");
+        }
+    }
+}

@@ -1,0 +1,227 @@
+//! `chefshat tournament list` and `chefshat tournament games`: a line for each tournament of a server, and for each game of a tournament.
+
+use std::process::ExitCode;
+
+use chefshat_client::v1;
+use clap::Args;
+
+use super::super::connect::ServerArg;
+use super::super::narrator::clean;
+use super::super::numbers::{counted, ordinal};
+use super::super::{CommandError, say};
+use super::all_games;
+use super::words::{StateArg, format_name, state};
+
+/// Tournaments asked for at a time.
+const PAGE: u32 = 100;
+
+/// List the tournaments of a server, newest first.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  chefshat tournament list --state open")]
+pub(super) struct List {
+    #[command(flatten)]
+    server: ServerArg,
+    /// Tournaments in this state alone.
+    #[arg(long)]
+    state: Option<StateArg>,
+    /// Print each tournament as a JSON line.
+    #[arg(long)]
+    json: bool,
+}
+
+/// List the games of a tournament, in order, with what came of them and where their records are.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  chefshat tournament games 5f0c6a4de2b14b7f8a3d9c1e7b60425d --round 2\n  \
+                  chefshat tournament games 5f0c6a4de2b14b7f8a3d9c1e7b60425d --json\n\n\
+                  A record lies in the server's data directory as records/GAME-ID.jsonl; `chefshat records get GAME-ID` fetches it."
+)]
+pub(super) struct Games {
+    /// Which tournament.
+    #[arg(value_name = "TOURNAMENT-ID")]
+    tournament_id: String,
+    #[command(flatten)]
+    server: ServerArg,
+    /// Games of this round alone, from 1.
+    #[arg(long, value_name = "ROUND")]
+    round: Option<u32>,
+    /// Print each game as a JSON line.
+    #[arg(long)]
+    json: bool,
+}
+
+impl List {
+    pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
+        let client = self.server.connect().await?;
+        let mut request = v1::ListTournamentsRequest {
+            page_size: PAGE,
+            page_token: String::new(),
+            state: (self.state)
+                .map_or(v1::TournamentState::Unspecified, StateArg::state)
+                .into(),
+        };
+        let mut count = 0;
+        loop {
+            let page = client.list_tournaments(request.clone()).await?;
+            for tournament in &page.tournaments {
+                if self.json {
+                    say(serde_json::to_string(tournament)?)?;
+                } else {
+                    say(in_a_line(tournament))?;
+                }
+                count += 1;
+            }
+            if page.next_page_token.is_empty() {
+                break;
+            }
+            request.page_token = page.next_page_token;
+        }
+        if count == 0 && !self.json {
+            say("no tournaments")?;
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+impl Games {
+    pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
+        let client = self.server.connect().await?;
+        let participants = client
+            .tournament(self.tournament_id.as_str())
+            .await?
+            .participants;
+        let wanted = |game: &v1::TournamentGame| self.round.is_none_or(|round| game.round == round);
+        let mut count = 0;
+        for game in all_games(&client, &self.tournament_id).await? {
+            if !wanted(&game) {
+                continue;
+            }
+            count += 1;
+            if self.json {
+                let record = record_of(&game);
+                say(serde_json::json!({"event": "game", "game": game, "record": record}))?;
+            } else {
+                say(game_in_a_line(&game, &participants))?;
+            }
+        }
+        if count == 0 && !self.json {
+            say("no games have been drawn")?;
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+/// Where the record of a game lies under the server's data directory, once it has one.
+fn record_of(game: &v1::TournamentGame) -> Option<String> {
+    let counted = game.state() == v1::TournamentGameState::Counted;
+    counted.then(|| format!("records/{}.jsonl", clean(&game.game_id, 40)))
+}
+
+fn in_a_line(tournament: &v1::Tournament) -> String {
+    let settings = tournament.settings.clone().unwrap_or_default();
+    let games = counted(tournament.games.into(), "game");
+    format!(
+        "{}  {:<8}  {:<11}  {} of {games}  {}",
+        clean(&tournament.tournament_id, 40),
+        state(tournament.state()),
+        format_name(settings.format()),
+        tournament.games_over,
+        clean(&settings.name, 40),
+    )
+}
+
+/// Which game, where it stands, who played as what, and its record.
+fn game_in_a_line(game: &v1::TournamentGame, participants: &[v1::TournamentParticipant]) -> String {
+    let name = |seat: &v1::TournamentGameSeat| {
+        let who = usize::try_from(seat.participant)
+            .ok()
+            .and_then(|number| participants.get(number));
+        who.map_or_else(
+            || format!("participant {}", seat.participant),
+            |who| clean(&who.name, 20),
+        )
+    };
+    let over = game.state() == v1::TournamentGameState::Counted;
+    let mut seats: Vec<&v1::TournamentGameSeat> = game.seats.iter().collect();
+    if over {
+        seats.sort_by_key(|seat| seat.place);
+    }
+    let seats: Vec<String> = seats
+        .into_iter()
+        .map(|seat| {
+            let note = match (seat.forfeited, seat.substituted) {
+                (true, _) => " (forfeited)",
+                (false, true) => " (substituted)",
+                (false, false) => "",
+            };
+            match over {
+                true => format!(
+                    "{} {} {}{note}",
+                    ordinal(seat.place),
+                    name(seat),
+                    seat.points
+                ),
+                false => format!("{}{note}", name(seat)),
+            }
+        })
+        .collect();
+    let state = match game.state() {
+        v1::TournamentGameState::Unspecified => "unknown",
+        v1::TournamentGameState::Due => "due",
+        v1::TournamentGameState::Playing => "playing",
+        v1::TournamentGameState::Counted => "counted",
+        v1::TournamentGameState::Void => "void",
+    };
+    let record = record_of(game).map_or_else(String::new, |record| format!("  {record}"));
+    format!(
+        "{:>4}  round {} table {} game {}  {state:<7}  {}{record}",
+        game.game,
+        game.round,
+        game.table,
+        game.number,
+        seats.join(", ")
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::tournament::list::*;
+
+    #[test]
+    fn a_game_fits_in_a_line() {
+        let participant = |number, name: &str| v1::TournamentParticipant {
+            participant: number,
+            name: name.into(),
+            ..v1::TournamentParticipant::default()
+        };
+        let participants = [participant(0, "Ada"), participant(1, "Bo\u{1b}[2J")];
+        let seat = |participant, place, points| v1::TournamentGameSeat {
+            participant,
+            place,
+            points,
+            ..v1::TournamentGameSeat::default()
+        };
+        let mut game = v1::TournamentGame {
+            game: 7,
+            round: 2,
+            table: 1,
+            number: 1,
+            state: v1::TournamentGameState::Counted.into(),
+            seats: vec![seat(0, 2, 9), seat(1, 1, 15), seat(9, 3, 0)],
+            game_id: "5f0c6a4de2b14b7f8a3d9c1e7b60425d".into(),
+            ..v1::TournamentGame::default()
+        };
+        game.seats[0].substituted = true;
+        game.seats[2].forfeited = true;
+        assert_eq!(
+            game_in_a_line(&game, &participants),
+            "   7  round 2 table 1 game 1  counted  1st Bo[2J 15, 2nd Ada 9 (substituted), \
+             3rd participant 9 0 (forfeited)  records/5f0c6a4de2b14b7f8a3d9c1e7b60425d.jsonl"
+        );
+        game.state = v1::TournamentGameState::Playing.into();
+        assert_eq!(
+            game_in_a_line(&game, &participants),
+            "   7  round 2 table 1 game 1  playing  Ada (substituted), Bo[2J, participant 9 (forfeited)"
+        );
+    }
+}

@@ -1,0 +1,97 @@
+//! `chefshat tournament`: tournaments of a server, made, joined, begun, followed and closed from the command line, and their results. Who
+//! plays whom and what counts is decided in `chefshat_tournament`, by the server.
+
+mod create;
+mod files;
+mod follow;
+mod join;
+mod list;
+mod owner;
+mod results;
+mod simulate;
+pub(super) mod tables;
+pub(super) mod words;
+
+use std::process::ExitCode;
+
+use chefshat_client::{Client, v1};
+use clap::{Args, Subcommand};
+
+use super::CommandError;
+
+/// Games asked for at a time.
+const GAMES_PAGE: u32 = 500;
+
+/// Hold tournaments: make, join, follow them, and see their results.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  chefshat tournament create --name cup --format swiss --built-in greedy*4 --start-when 12\n  \
+                  chefshat tournament join --agent greedy --name Gustav --code BCDF2345\n  \
+                  chefshat tournament follow TOURNAMENT-ID\n  chefshat tournament results TOURNAMENT-ID --csv standings.csv"
+)]
+pub(super) struct TournamentCommand {
+    #[command(subcommand)]
+    action: TournamentAction,
+}
+
+#[derive(Debug, Subcommand)]
+enum TournamentAction {
+    /// Make a tournament and say how to take part.
+    Create(Box<create::Create>),
+    /// Take part with a built-in agent, until the tournament is over.
+    Join(join::Join),
+    /// Begin a tournament with those who have joined.
+    Start(owner::Start),
+    /// Close a tournament before its end.
+    Close(owner::Close),
+    /// Follow a tournament to its end.
+    Follow(follow::Follow),
+    /// Show the standings of a tournament, and how sure they are.
+    Results(results::Results),
+    /// Play a tournament of built-in agents offline.
+    Simulate(simulate::Simulate),
+    /// List the tournaments of a server.
+    List(list::List),
+    /// List the games of a tournament.
+    Games(list::Games),
+}
+
+impl TournamentCommand {
+    pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
+        match self.action {
+            TournamentAction::Create(command) => command.run().await,
+            TournamentAction::Join(command) => command.run().await,
+            TournamentAction::Start(command) => command.run().await,
+            TournamentAction::Close(command) => command.run().await,
+            TournamentAction::Follow(command) => command.run().await,
+            TournamentAction::Results(command) => command.run().await,
+            TournamentAction::Simulate(command) => command.run(),
+            TournamentAction::List(command) => command.run().await,
+            TournamentAction::Games(command) => command.run().await,
+        }
+    }
+}
+
+/// All games of a tournament that have been drawn, in order.
+///
+/// # Errors
+/// `TOURNAMENT_UNKNOWN`.
+async fn all_games(
+    client: &Client,
+    tournament_id: &str,
+) -> Result<Vec<v1::TournamentGame>, CommandError> {
+    let mut request = v1::ListTournamentGamesRequest {
+        tournament_id: tournament_id.to_owned(),
+        page_size: GAMES_PAGE,
+        page_token: String::new(),
+    };
+    let mut games = Vec::new();
+    loop {
+        let page = client.tournament_games(request.clone()).await?;
+        games.extend(page.games);
+        if page.next_page_token.is_empty() {
+            return Ok(games);
+        }
+        request.page_token = page.next_page_token;
+    }
+}

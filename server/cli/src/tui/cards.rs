@@ -1,0 +1,145 @@
+//! Cards drawn with lines and letters: the stacks of a hand side by side, a play as a fan. Which of them may be played is told to this file.
+
+use ratatui::style::Style;
+use ratatui::text::{Line, Span};
+
+use super::hand::Stack;
+use super::look::Look;
+use super::table::OnBoard;
+
+/// Columns of a stack with the space behind it, at most.
+const STACK_COLUMNS: usize = 6;
+/// Columns of the narrowest stack that can be read.
+const MIN_STACK_COLUMNS: usize = 4;
+
+/// Most cards of a kind that are drawn in a fan: more than any deck has.
+const MAX_FAN: usize = 64;
+
+/// How a stack of a hand is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Shown {
+    pub(crate) stack: Stack,
+    /// Something legal can be done with it.
+    pub(crate) active: bool,
+    /// How many of it are picked, if the cursor is on it.
+    pub(crate) picked: Option<u8>,
+    /// How many of it go with the stack that is picked (jokers).
+    pub(crate) along: u8,
+    /// The key that picks it, where that is not what is written on the card.
+    pub(crate) key: Option<char>,
+}
+
+/// A hand in five lines: cards of four, and what is picked below them.
+pub(crate) fn hand(look: Look, faces: u32, stacks: &[Shown], columns: usize) -> Vec<Line<'static>> {
+    let width = (columns / stacks.len().max(1)).clamp(MIN_STACK_COLUMNS, STACK_COLUMNS);
+    // One column of the six is the space between two cards; narrower ones have none.
+    let gap = usize::from(width == STACK_COLUMNS);
+    let inner = width - gap - 2;
+    let mut rows: Vec<Vec<Span<'static>>> = vec![Vec::new(); 5];
+    for shown in stacks {
+        let stack = shown.stack;
+        let frame = frame_of(shown);
+        let style = style_of(look, faces, shown);
+        let face = if stack.joker {
+            "J".to_owned()
+        } else if stack.golden {
+            format!("{}★", stack.face)
+        } else {
+            stack.face.to_string()
+        };
+        let count = format!("×{}", stack.count);
+        let [left, line, right, side, low_left, low_right] = frame;
+        let space = " ".repeat(gap);
+        rows[0].push(Span::styled(
+            format!("{left}{}{right}{space}", top(line, inner, shown.key)),
+            style,
+        ));
+        // Faces and counts are to be read in any case: the frame alone is coloured or dimmed.
+        let ink = if shown.active || shown.picked.is_some() {
+            look.bold()
+        } else {
+            Style::new()
+        };
+        let words = [format!("{face:>inner$}"), format!("{count:<inner$}")];
+        for (row, words) in rows[1..3].iter_mut().zip(words) {
+            row.push(Span::styled(side, style));
+            row.push(Span::styled(words, ink));
+            row.push(Span::styled(format!("{side}{space}"), style));
+        }
+        rows[3].push(Span::styled(
+            format!("{low_left}{}{low_right}{space}", line.repeat(inner)),
+            style,
+        ));
+        let mark = match (shown.picked, shown.along) {
+            (Some(picked), _) => format!("▲{picked}"),
+            (None, 0) => String::new(),
+            (None, along) => format!("+{along}"),
+        };
+        rows[4].push(Span::styled(format!("{mark:^width$}"), look.bold()));
+    }
+    rows.into_iter().map(Line::from).collect()
+}
+
+/// The upper edge of a card between its corners, with a key in the middle.
+fn top(line: &str, inner: usize, key: Option<char>) -> String {
+    let Some(key) = key else {
+        return line.repeat(inner);
+    };
+    let left = inner / 2;
+    let right = inner.saturating_sub(left + 1);
+    format!("{}{key}{}", line.repeat(left), line.repeat(right))
+}
+
+/// Corners, line and side of a card: heavy where the cursor is, broken where nothing legal can be done.
+fn frame_of(shown: &Shown) -> [&'static str; 6] {
+    match (shown.picked.is_some(), shown.active) {
+        (true, _) => ["┏", "━", "┓", "┃", "┗", "┛"],
+        (false, true) => ["╭", "─", "╮", "│", "╰", "╯"],
+        (false, false) => ["╭", "┄", "╮", "┆", "╰", "╯"],
+    }
+}
+
+fn style_of(look: Look, faces: u32, shown: &Shown) -> Style {
+    let style = look.card(shown.stack.face, faces);
+    match (shown.picked.is_some(), shown.active) {
+        (true, _) => style.patch(look.bold()),
+        (false, true) => style,
+        (false, false) => style.patch(look.dim()),
+    }
+}
+
+/// A play as a fan of cards, three lines high; one behind the other, so that twelve fit into 37 columns.
+pub(crate) fn fan(look: Look, faces: u32, play: OnBoard) -> [Line<'static>; 3] {
+    let plain = usize::try_from(play.quantity)
+        .unwrap_or(MAX_FAN)
+        .min(MAX_FAN);
+    let jokers = usize::try_from(play.jokers).unwrap_or(MAX_FAN).min(MAX_FAN);
+    let cards = std::iter::repeat_n(false, plain).chain(std::iter::repeat_n(true, jokers));
+    let mut rows: [Vec<Span<'static>>; 3] = Default::default();
+    let mut last = Style::new();
+    for (index, joker) in cards.enumerate() {
+        let face = if joker { faces + 1 } else { play.face };
+        let style = look.card(face, faces);
+        let words = match (joker, play.golden && index == 0) {
+            (true, _) => " J".to_owned(),
+            (false, true) => format!("{face:<2}"),
+            (false, false) => format!("{face:>2}"),
+        };
+        let golden = play.golden && index == 0;
+        let (edge, style) = if golden {
+            ("★", look.gold())
+        } else {
+            ("│", style)
+        };
+        rows[0].push(Span::styled("╭──", style));
+        rows[1].push(Span::styled(format!("{edge}{words}"), style));
+        rows[2].push(Span::styled("╰──", style));
+        last = style;
+    }
+    if !rows[0].is_empty() {
+        for (row, end) in rows.iter_mut().zip(["╮", "│", "╯"]) {
+            row.push(Span::styled(end, last));
+        }
+    }
+    rows.map(Line::from)
+}

@@ -1,0 +1,73 @@
+//! Cards of a hand as a person sorts them: stacks of one face, rarest first, jokers last.
+
+/// Cards of one hand.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(crate) struct Hand {
+    /// How many of each: index f-1 counts face f, the last one jokers.
+    pub(crate) counts: Vec<u8>,
+    /// One of the top face is the Golden card.
+    pub(crate) golden: bool,
+}
+
+/// Cards of one face in a hand, or its jokers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Stack {
+    /// The face; F+1 for jokers.
+    pub(crate) face: u32,
+    pub(crate) count: u8,
+    pub(crate) joker: bool,
+    /// One of them is the Golden card.
+    pub(crate) golden: bool,
+}
+
+impl Hand {
+    /// Cards of a number of faces, ascending, F+1 for a joker; a card that the deck does not have is left out.
+    pub(super) fn of(faces: usize, cards: &[u32], golden: bool) -> Self {
+        let mut hand = Self {
+            counts: vec![0; faces + 1],
+            golden,
+        };
+        hand.put(cards);
+        hand
+    }
+
+    pub(super) fn put(&mut self, cards: &[u32]) {
+        for card in cards {
+            if let Some(count) = self.slot(*card) {
+                *count = count.saturating_add(1);
+            }
+        }
+    }
+
+    pub(super) fn take(&mut self, face: u32, quantity: u32) {
+        let quantity = u8::try_from(quantity).unwrap_or(u8::MAX);
+        if let Some(count) = self.slot(face) {
+            *count = count.saturating_sub(quantity);
+        }
+    }
+
+    fn slot(&mut self, face: u32) -> Option<&mut u8> {
+        let index = usize::try_from(face).ok()?.checked_sub(1)?;
+        self.counts.get_mut(index)
+    }
+
+    /// Its stacks, rarest first, jokers last.
+    pub(crate) fn stacks(&self) -> Vec<Stack> {
+        let faces = self.counts.len().saturating_sub(1);
+        (0..)
+            .zip(&self.counts)
+            .filter(|(_, count)| **count > 0)
+            .map(|(index, &count)| Stack {
+                face: u32::try_from(index + 1).unwrap_or(u32::MAX),
+                count,
+                joker: index == faces,
+                golden: self.golden && index + 1 == faces,
+            })
+            .collect()
+    }
+
+    /// Number of jokers.
+    pub(crate) fn jokers(&self) -> u8 {
+        self.counts.last().copied().unwrap_or(0)
+    }
+}

@@ -1,0 +1,128 @@
+//! What happened, drawn: the newest lines beside the seats, or, when a person scrolls back, earlier ones in the place of seats and pizza. What
+//! the lines say is in `story`.
+
+use ratatui::Frame;
+use ratatui::crossterm::event::KeyCode;
+use ratatui::layout::Rect;
+use ratatui::text::{Line, Span};
+use ratatui::widgets::Paragraph;
+
+use super::super::narrator::columns;
+use super::look::Look;
+use super::story;
+use super::table::Table;
+use super::view::boxed;
+
+/// Lines that a key goes back or on, at first and then: less than there is room for in the smallest window.
+const FIRST: usize = 5;
+const PAGE: usize = 10;
+/// What continues a line is moved in by so much.
+const INDENT: usize = 2;
+
+/// How far back a person looks.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct Scroll {
+    /// Number of the line behind the last one that is shown, of all that were ever told; none while the newest are shown beside the seats.
+    end: Option<usize>,
+}
+
+impl Scroll {
+    /// Whether earlier lines are shown in the place of the table.
+    pub(crate) fn is_open(self) -> bool {
+        self.end.is_some()
+    }
+
+    /// Takes a key; says whether it was meant for this: `PgUp` always is, every other one while earlier lines are shown.
+    pub(crate) fn key(&mut self, code: KeyCode, table: &Table) -> bool {
+        // So much is to be seen at least, where so much was told.
+        let first = (table.told - table.story.len() + PAGE).min(table.told);
+        self.end = match (code, self.end) {
+            (KeyCode::PageUp, None) => Some(table.told.saturating_sub(FIRST).max(first)),
+            (KeyCode::PageUp, Some(end)) => Some(end.saturating_sub(PAGE).max(first)),
+            (KeyCode::Home, Some(_)) => Some(first),
+            (KeyCode::PageDown, Some(end)) => Some(end + PAGE).filter(|end| *end < table.told),
+            (_, Some(_)) => None,
+            (_, None) => return false,
+        };
+        true
+    }
+}
+
+/// Draws the newest lines.
+pub(super) fn draw(frame: &mut Frame<'_>, look: Look, table: &Table, area: Rect) {
+    let lines = last_lines(look, table, table.told, area);
+    let block = boxed(look, " what happened ");
+    frame.render_widget(Paragraph::new(lines).block(block), area);
+}
+
+/// Draws earlier lines.
+pub(super) fn draw_back(
+    frame: &mut Frame<'_>,
+    look: Look,
+    table: &Table,
+    scroll: Scroll,
+    area: Rect,
+) {
+    let end = scroll.end.unwrap_or(table.told).min(table.told);
+    let lines = last_lines(look, table, end, area);
+    let after = match table.told - end {
+        0 => "the newest".to_owned(),
+        after => format!("{after} more after these"),
+    };
+    let block = boxed(look, format!(" what happened · {after} "))
+        .title_bottom(" PgUp earlier · PgDn later · any other key: the table ");
+    frame.render_widget(Paragraph::new(lines).block(block), area);
+}
+
+/// As many lines before line number `end` as a box has room for, long ones wrapped.
+fn last_lines(look: Look, table: &Table, end: usize, area: Rect) -> Vec<Line<'static>> {
+    let rows = usize::from(area.height.saturating_sub(2));
+    let width = usize::from(area.width.saturating_sub(2));
+    let told_before = table.told - table.story.len();
+    let shown = end.saturating_sub(told_before).min(table.story.len());
+    let mut lines: Vec<Line<'static>> = Vec::new();
+    for line in table.story.range(..shown).rev() {
+        let wrapped = wrap(look, table, line, width);
+        lines.extend(wrapped.into_iter().rev());
+        if lines.len() >= rows {
+            break;
+        }
+    }
+    lines.truncate(rows);
+    lines.reverse();
+    lines
+}
+
+/// A line of the story in as many rows as it needs, broken between words.
+fn wrap(look: Look, table: &Table, line: &story::Line, width: usize) -> Vec<Line<'static>> {
+    let (lead, words) = match (line.heading, line.seat) {
+        (true, _) => (None, format!("─ {}", line.words)),
+        (false, Some(seat)) => (Some((table.name(seat), seat)), format!(" {}", line.words)),
+        (false, None) => (None, line.words.clone()),
+    };
+    let style = if line.heading {
+        look.bold()
+    } else {
+        ratatui::style::Style::new()
+    };
+    let mut rows = Vec::new();
+    let mut used = lead.as_ref().map_or(0, |(name, _)| columns(name));
+    let mut spans: Vec<Span<'static>> = lead
+        .map(|(name, seat)| Span::styled(name, look.seat(seat)))
+        .into_iter()
+        .collect();
+    let mut text = String::new();
+    for word in words.split_inclusive(' ') {
+        if used + columns(word.trim_end()) > width && used > INDENT {
+            spans.push(Span::styled(std::mem::take(&mut text), style));
+            rows.push(Line::from(std::mem::take(&mut spans)));
+            text.push_str(&" ".repeat(INDENT));
+            used = INDENT;
+        }
+        text.push_str(word);
+        used += columns(word);
+    }
+    spans.push(Span::styled(text, style));
+    rows.push(Line::from(spans));
+    rows
+}

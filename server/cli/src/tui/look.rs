@@ -1,0 +1,137 @@
+//! Colours and symbols. Nothing is said by colour alone: every colour stands beside a number, a symbol or a word, and `NO_COLOR` takes the
+//! colours away.
+
+use chefshat_client::v1;
+use ratatui::style::{Color, Modifier, Style};
+
+use super::table::Place;
+
+/// The ingredients of the eleven faces of the standard deck, rarest first.
+const INGREDIENTS: [&str; 11] = [
+    "truffle",
+    "shrimp",
+    "anchovy",
+    "artichoke",
+    "chilli",
+    "basil",
+    "olive",
+    "pepper",
+    "mushroom",
+    "tomato",
+    "mozzarella",
+];
+
+/// Colours of the ingredients, of the 256 that terminals have: bright enough on black, dark enough on white.
+const FACE_COLOURS: [u8; 11] = [130, 209, 67, 107, 160, 34, 100, 172, 137, 167, 179];
+
+/// The colours of the seats, as `chefshat demo` has them.
+const SEAT_COLOURS: [Color; 6] = [
+    Color::Cyan,
+    Color::Yellow,
+    Color::Magenta,
+    Color::Green,
+    Color::Blue,
+    Color::Red,
+];
+
+/// How things look.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Look {
+    colours: bool,
+}
+
+impl Look {
+    /// With colours or without.
+    pub(crate) fn new(colours: bool) -> Self {
+        Self { colours }
+    }
+
+    /// As the environment wants it.
+    pub(crate) fn of_environment() -> Self {
+        Self::new(std::env::var_os("NO_COLOR").is_none_or(|set| set.is_empty()))
+    }
+
+    fn fg(self, colour: Color) -> Style {
+        if self.colours {
+            Style::new().fg(colour)
+        } else {
+            Style::new()
+        }
+    }
+
+    /// A seat's name.
+    pub(crate) fn seat(self, seat: u32) -> Style {
+        let index = usize::try_from(seat).unwrap_or(0) % SEAT_COLOURS.len();
+        self.fg(SEAT_COLOURS[index])
+    }
+
+    /// The frame of a card: of a face of the deck, else of a joker.
+    pub(crate) fn card(self, face: u32, faces: u32) -> Style {
+        let index = usize::try_from(face).ok().and_then(|it| it.checked_sub(1));
+        match index.and_then(|index| FACE_COLOURS.get(index)) {
+            Some(colour) if face <= faces => self.fg(Color::Indexed(*colour)),
+            _ if face > faces => self.fg(Color::Magenta),
+            _ => Style::new(),
+        }
+    }
+
+    /// What matters more.
+    pub(crate) fn bold(self) -> Style {
+        Style::new().add_modifier(Modifier::BOLD)
+    }
+
+    /// What matters less.
+    pub(crate) fn dim(self) -> Style {
+        Style::new().add_modifier(Modifier::DIM)
+    }
+
+    /// The Golden card, winners.
+    pub(crate) fn gold(self) -> Style {
+        self.fg(Color::Yellow).add_modifier(Modifier::BOLD)
+    }
+
+    /// What a person should read.
+    pub(crate) fn warning(self) -> Style {
+        self.fg(Color::Red).add_modifier(Modifier::BOLD)
+    }
+
+    /// The line at the top.
+    pub(crate) fn header(self) -> Style {
+        if self.colours {
+            Style::new()
+                .bg(Color::Indexed(94))
+                .fg(Color::Indexed(230))
+                .add_modifier(Modifier::BOLD)
+        } else {
+            Style::new().add_modifier(Modifier::REVERSED | Modifier::BOLD)
+        }
+    }
+
+    /// Frames around parts of the table.
+    pub(crate) fn frame(self) -> Style {
+        self.fg(Color::Indexed(137))
+    }
+}
+
+/// The ingredient of a face; decks larger than the standard one have faces without.
+pub(crate) fn ingredient(face: u32, faces: u32) -> Option<&'static str> {
+    let index = usize::try_from(face).ok()?.checked_sub(1)?;
+    INGREDIENTS.get(index).filter(|_| face <= faces).copied()
+}
+
+/// What sits there, as a symbol and a word.
+pub(crate) fn kind(place: &Place) -> (&'static str, &'static str) {
+    match place.name.is_empty() {
+        true => ("·", "free"),
+        false => symbol(place.kind),
+    }
+}
+
+/// A kind of participants, as a symbol and a word.
+pub(crate) fn symbol(kind: v1::ParticipantKind) -> (&'static str, &'static str) {
+    match kind {
+        v1::ParticipantKind::Human => ("☺", "person"),
+        v1::ParticipantKind::Robot => ("▣", "robot"),
+        v1::ParticipantKind::Agent | v1::ParticipantKind::Unspecified => ("◆", "agent"),
+    }
+}

@@ -1,0 +1,390 @@
+//! What `chefshat play` knows and does: keys and messages of the server go in, what is to be done comes out. No terminal, no connection, no
+//! clock of its own, so that a whole game can be played by data.
+
+use chefshat_client::v1::{self, game_event::Kind, seat_update::Update};
+use ratatui::crossterm::event::KeyCode;
+
+use super::keys::{key_of, names_cards, not_held};
+use super::pick::Decision;
+use crate::tui::log::Scroll;
+use crate::tui::screen::Key;
+use crate::tui::table::Table;
+
+/// What a person can show with one key: a label, valence and arousal, as the page for browsers has them.
+pub(super) const EXPRESSIONS: [(&str, f32, f32); 6] = [
+    ("joy", 0.8, 0.5),
+    ("amusement", 0.6, 0.7),
+    ("surprise", 0.1, 0.8),
+    ("concentration", 0.0, 0.2),
+    ("annoyance", -0.6, 0.6),
+    ("sadness", -0.7, -0.4),
+];
+
+/// What a person is told whose decision was taken otherwise.
+const TOO_LATE: &str = "too late: this decision was taken without you";
+
+/// What happens to a game at the terminal.
+#[derive(Debug)]
+pub(super) enum Input {
+    Key(Key),
+    /// The server said something to the seat.
+    Update(Box<Update>),
+    /// The connection is lost, and why; it is being made again.
+    Lost(String),
+    /// Nothing more will come from the server; why, if that is not the end of the game.
+    Over(Option<String>),
+}
+
+/// What is to be done.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Do {
+    /// Answer a decision; how long it was before the person's eyes.
+    Answer {
+        decision_id: u64,
+        action: u32,
+        took_ms: u64,
+    },
+    Express(usize),
+    /// Play itself again after a substitute has.
+    Resume,
+    /// Leave the table and end.
+    Leave,
+}
+
+/// What stands over the table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Dialog {
+    Help,
+    Leave,
+    Express,
+}
+
+/// The connection, as it is shown.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Link {
+    Connecting,
+    Live,
+    Lost(String),
+    /// Nothing more comes; why, if the game has not ended.
+    Over(Option<String>),
+}
+
+/// A decision and when it came, by the caller's clock.
+#[derive(Debug, Clone)]
+pub(super) struct Open {
+    pub(super) decision: Decision,
+    pub(super) since_ms: u64,
+    /// An answer is on its way.
+    pub(super) sent: bool,
+}
+
+/// A game at the terminal.
+#[derive(Debug)]
+pub(super) struct App {
+    pub(super) table: Table,
+    pub(super) me: Option<u32>,
+    pub(super) open: Option<Open>,
+    pub(super) dialog: Option<Dialog>,
+    pub(super) link: Link,
+    /// What the person should know: an objection, the server's word.
+    pub(super) notice: String,
+    /// How far back the person looks at what happened.
+    pub(super) scroll: Scroll,
+    /// What Enter does when the game is over.
+    pub(super) then: &'static str,
+    /// How the person stands in the tournament, to be shown with the result.
+    pub(super) standing: Option<String>,
+    /// What the person should know of other games that go on beside this one.
+    pub(super) others: Option<String>,
+    /// The answer not yet acknowledged.
+    unacknowledged: Option<(u64, u32)>,
+    pub(super) left: bool,
+}
+
+impl Link {
+    /// The state of the connection in a symbol and words.
+    pub(super) fn words(&self) -> &'static str {
+        match self {
+            Self::Connecting => "○ connecting",
+            Self::Live => "● connected",
+            Self::Lost(_) => "✕ connection lost",
+            Self::Over(_) => "○ over",
+        }
+    }
+}
+
+impl App {
+    /// At this table, before anything has come.
+    pub(super) fn new(table: Table, me: Option<u32>) -> Self {
+        Self {
+            table,
+            me,
+            open: None,
+            dialog: None,
+            link: Link::Connecting,
+            notice: String::new(),
+            scroll: Scroll::default(),
+            then: "Enter ends",
+            standing: None,
+            others: None,
+            unacknowledged: None,
+            left: false,
+        }
+    }
+
+    /// Takes what happened at `now_ms` of any clock that goes on.
+    pub(super) fn take(&mut self, input: Input, now_ms: u64) -> Option<Do> {
+        match input {
+            Input::Key(key) => self.key(key, now_ms),
+            Input::Update(update) => self.update(*update, now_ms),
+            Input::Lost(why) => {
+                self.link = Link::Lost(why);
+                self.open = None;
+                None
+            }
+            Input::Over(why) => {
+                self.link = Link::Over(why);
+                self.open = None;
+                None
+            }
+        }
+    }
+
+    /// Milliseconds left for the open decision, and then in the bank.
+    pub(super) fn clock(&self, now_ms: u64) -> Option<(u64, u64)> {
+        let open = self.open.as_ref()?;
+        let gone = now_ms.saturating_sub(open.since_ms);
+        let request = &open.decision.request;
+        let (time, bank) = (
+            u64::from(request.time_left_ms),
+            u64::from(request.bank_left_ms),
+        );
+        let beyond = gone.saturating_sub(time);
+        Some((time.saturating_sub(gone), bank.saturating_sub(beyond)))
+    }
+
+    /// Whether a key means what it means at the table: nothing stands over that.
+    pub(super) fn takes_keys(&self) -> bool {
+        self.dialog.is_none() && !self.scroll.is_open()
+    }
+
+    /// Since when the person is asked; `None` while others decide, or the server has the answer.
+    pub(super) fn asks_since(&self) -> Option<u64> {
+        let open = self.open.as_ref().filter(|open| !open.sent)?;
+        Some(open.since_ms)
+    }
+
+    /// Whether a substitute plays for this seat.
+    pub(super) fn substituted(&self) -> bool {
+        let me = self.me.and_then(|me| self.table.seat(me));
+        me.is_some_and(|place| place.substituted)
+    }
+
+    fn update(&mut self, update: Update, now_ms: u64) -> Option<Do> {
+        match update {
+            Update::Attached(attached) => {
+                self.me = Some(attached.seat);
+                self.link = Link::Live;
+                self.notice.clear();
+                self.open = None;
+            }
+            Update::Events(batch) => {
+                for event in &batch.events {
+                    self.table.apply(event);
+                    self.close_by(event);
+                }
+            }
+            Update::Decision(request) => return self.asked(request, now_ms),
+            Update::Result(result) => self.result(&result),
+            Update::Refused(refused) => {
+                self.notice = crate::narrator::clean(&refused.message, 76);
+            }
+            Update::Snapshot(_) | Update::Detached(_) | Update::Entered(_) => {}
+        }
+        None
+    }
+
+    /// Closes the open decision when the game has gone on: time ran out, or a substitute decided.
+    fn close_by(&mut self, event: &v1::GameEvent) {
+        let moved = matches!(
+            event.kind,
+            Some(
+                Kind::Play(_)
+                    | Kind::Pass(_)
+                    | Kind::CardsExchanged(_)
+                    | Kind::SpecialActionDeclared(_)
+                    | Kind::GameEnded(_)
+                    | Kind::GameAborted(_)
+            )
+        );
+        if moved
+            && let Some(open) = self.open.take()
+            && !open.sent
+        {
+            TOO_LATE.clone_into(&mut self.notice);
+        }
+    }
+
+    fn asked(&mut self, request: v1::DecisionRequest, now_ms: u64) -> Option<Do> {
+        // The answer may have been lost with the connection: it is given again.
+        if let Some((decision_id, action)) = self.unacknowledged
+            && decision_id == request.decision_id
+        {
+            return Some(Do::Answer {
+                decision_id,
+                action,
+                took_ms: 0,
+            });
+        }
+        self.unacknowledged = None;
+        self.notice.clear();
+        let decision = self
+            .table
+            .rules
+            .and_then(|rules| Decision::open(request, rules));
+        if decision.is_none() {
+            "the server's question cannot be read; its default decision will be taken"
+                .clone_into(&mut self.notice);
+        }
+        self.open = decision.map(|decision| Open {
+            decision,
+            since_ms: now_ms,
+            sent: false,
+        });
+        self.table.turn = self.me;
+        None
+    }
+
+    fn result(&mut self, result: &v1::AnswerResult) {
+        let about = (result.decision_id, result.action);
+        if self.unacknowledged == Some(about) {
+            self.unacknowledged = None;
+        }
+        let ours =
+            |open: &mut Open| open.decision.request.decision_id == result.decision_id && open.sent;
+        match result.status() {
+            v1::AnswerStatus::Invalid if result.invalid_attempts_left != Some(0) => {
+                if let Some(open) = self
+                    .open
+                    .as_mut()
+                    .filter(|open| open.decision.request.decision_id == result.decision_id)
+                {
+                    open.sent = false;
+                }
+                self.notice = crate::narrator::clean(&result.detail, 76);
+            }
+            v1::AnswerStatus::Closed => {
+                self.open.take_if(ours);
+                TOO_LATE.clone_into(&mut self.notice);
+            }
+            _ => {
+                self.open.take_if(ours);
+            }
+        }
+    }
+
+    fn key(&mut self, key: Key, now_ms: u64) -> Option<Do> {
+        let code = match key {
+            Key::Resized => return None,
+            Key::Interrupt => return self.leave(),
+            Key::Code(code) => code,
+        };
+        if self.dialog.is_none() && self.scroll.key(code, &self.table) {
+            return None;
+        }
+        if self.table.end.is_some() || matches!(self.link, Link::Over(_)) {
+            let done = matches!(code, KeyCode::Enter | KeyCode::Esc | KeyCode::Char('q'));
+            return done.then(|| self.leave()).flatten();
+        }
+        if let Some(dialog) = self.dialog {
+            return self.dialog_key(dialog, code);
+        }
+        match code {
+            KeyCode::Char('?') => self.dialog = Some(Dialog::Help),
+            KeyCode::Char('q') | KeyCode::Esc => self.dialog = Some(Dialog::Leave),
+            KeyCode::Char('e') => self.dialog = Some(Dialog::Express),
+            KeyCode::Char('r') if self.substituted() => return Some(Do::Resume),
+            code => return self.decide(code, now_ms),
+        }
+        None
+    }
+
+    fn dialog_key(&mut self, dialog: Dialog, code: KeyCode) -> Option<Do> {
+        self.dialog = None;
+        match (dialog, code) {
+            (Dialog::Leave, KeyCode::Char('y' | 'Y')) => self.leave(),
+            (Dialog::Express, KeyCode::Char(digit @ '1'..='6')) => {
+                let index = usize::try_from(u32::from(digit) - u32::from('1')).ok()?;
+                Some(Do::Express(index))
+            }
+            _ => None,
+        }
+    }
+
+    fn leave(&mut self) -> Option<Do> {
+        self.left = true;
+        Some(Do::Leave)
+    }
+
+    /// A key about the open decision.
+    fn decide(&mut self, code: KeyCode, now_ms: u64) -> Option<Do> {
+        let open = self.open.as_mut().filter(|open| !open.sent)?;
+        let decision = &mut open.decision;
+        let special = decision.kind() == v1::DecisionKind::SpecialAction;
+        self.notice.clear();
+        let action = match code {
+            KeyCode::Left => return done(|| decision.step(false)),
+            KeyCode::Right => return done(|| decision.step(true)),
+            KeyCode::Tab => return done(|| decision.step_active(true)),
+            KeyCode::BackTab => return done(|| decision.step_active(false)),
+            KeyCode::Up | KeyCode::Char('+') => return done(|| decision.more(true)),
+            KeyCode::Down | KeyCode::Char('-') => return done(|| decision.more(false)),
+            KeyCode::Char('j') => {
+                if !decision.next_joker() {
+                    "no joker can go with it".clone_into(&mut self.notice);
+                }
+                return None;
+            }
+            KeyCode::Char(key) if !special && names_cards(key) => {
+                let mut stacks = decision.stacks.iter();
+                match stacks.position(|stack| key_of(*stack) == Some(key)) {
+                    Some(at) => decision.press(at),
+                    None => self.notice = not_held(key),
+                }
+                return None;
+            }
+            KeyCode::Char('p') => match decision.pass_objection() {
+                None => decision.pass(),
+                Some(why) => {
+                    why.clone_into(&mut self.notice);
+                    return None;
+                }
+            },
+            KeyCode::Char('d') if special => decision.declare()[0],
+            KeyCode::Char('n') if special => decision.declare()[1],
+            KeyCode::Enter | KeyCode::Char(' ') => match decision.objection() {
+                None => decision.picked()?,
+                Some(why) => {
+                    self.notice = why;
+                    return None;
+                }
+            },
+            _ => return None,
+        };
+        open.sent = true;
+        let decision_id = decision.request.decision_id;
+        let action = u32::from(action.index());
+        self.unacknowledged = Some((decision_id, action));
+        Some(Do::Answer {
+            decision_id,
+            action,
+            took_ms: now_ms.saturating_sub(open.since_ms),
+        })
+    }
+}
+
+/// Does something that asks for nothing further.
+fn done(act: impl FnOnce()) -> Option<Do> {
+    act();
+    None
+}

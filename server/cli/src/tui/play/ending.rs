@@ -1,0 +1,176 @@
+//! What is said of a part when the screen is gone: how it ended, where more is to be found, and how one comes back.
+
+use std::process::ExitCode;
+
+use chefshat_client::v1;
+
+use super::app::{App, Link};
+use super::lobby::Lobby;
+use super::part::Part;
+use crate::narrator::{MAX_NAME, abort_reason};
+use crate::numbers::{counted, ordinal};
+use crate::tournament::tables::{NO_GAME_COUNTED, place_in_words};
+use crate::tui::table::End;
+use crate::tui::view::padded;
+use crate::{CommandError, say};
+
+/// Where more is to be found.
+pub(super) struct Hints {
+    /// The command that gets the record of the game with an id.
+    pub(super) record: Box<dyn Fn(&str) -> String + Send>,
+    /// The command that shows a tournament's results, but for its id.
+    pub(super) results: String,
+    /// The command that goes on where the person stood, if one can.
+    pub(super) back: Option<String>,
+}
+
+/// The end in a few lines; the exit code of the command.
+///
+/// # Errors
+/// The seat, or the place in the tournament, is lost.
+pub(super) fn told(part: &Part, hints: &Hints) -> Result<ExitCode, CommandError> {
+    if let Some(lobby) = &part.lobby {
+        return of_tournament(part, lobby, hints);
+    }
+    let lost = match &part.link {
+        Link::Over(why) => why.clone(),
+        _ => None,
+    };
+    let end = part.game.as_ref().and_then(|game| game.table.end.as_ref());
+    match (&part.game, end) {
+        (Some(game), Some(End::Finished(standings))) => {
+            finished(game, standings, hints)?;
+            Ok(ExitCode::SUCCESS)
+        }
+        (_, Some(End::Aborted(reason))) => {
+            let why = abort_reason(*reason);
+            say(format_args!(
+                "the game was aborted and has no result: {why}"
+            ))?;
+            Ok(ExitCode::FAILURE)
+        }
+        (_, _) => {
+            if let Some(why) = lost {
+                return Err(format!("the seat is lost: {why}").into());
+            }
+            say("you left the table before the game ended")?;
+            back(hints)?;
+            Ok(ExitCode::FAILURE)
+        }
+    }
+}
+
+fn finished(game: &App, standings: &[v1::Standing], hints: &Hints) -> Result<(), CommandError> {
+    for line in standings {
+        let name = padded(&game.table.name(line.seat), MAX_NAME);
+        let points = counted(line.points, "point");
+        say(format_args!(
+            "{}  {name}  {points:>10}",
+            ordinal(line.place)
+        ))?;
+    }
+    let mut mine = standings.iter().filter(|line| Some(line.seat) == game.me);
+    if let Some(line) = mine.next() {
+        say(format_args!(
+            "you have place {} of {}",
+            line.place,
+            standings.len()
+        ))?;
+    }
+    let record = (hints.record)(&game.table.game_id);
+    say(format_args!("the record: {record}"))
+}
+
+fn of_tournament(part: &Part, lobby: &Lobby, hints: &Hints) -> Result<ExitCode, CommandError> {
+    let results = format!("the results: {} {}", hints.results, lobby.tournament_id);
+    let state = lobby.report.as_ref().map(|it| it.tournament.state());
+    let code = match (state, &part.link) {
+        (Some(v1::TournamentState::Finished), _) => {
+            say(standing(lobby, "the tournament is over"))?;
+            ExitCode::SUCCESS
+        }
+        (Some(v1::TournamentState::Closed), _) => {
+            say(standing(lobby, "the tournament was closed before its end"))?;
+            ExitCode::FAILURE
+        }
+        (_, Link::Over(Some(why))) => {
+            return Err(format!("the place in the tournament is lost: {why}").into());
+        }
+        (_, Link::Over(None)) => {
+            say(standing(lobby, "the tournament is over"))?;
+            ExitCode::SUCCESS
+        }
+        _ if !lobby.has_games_to_come() => {
+            say(standing(lobby, "your games are over"))?;
+            ExitCode::SUCCESS
+        }
+        _ => {
+            say("you left the tournament before its end")?;
+            back(hints)?;
+            return Ok(ExitCode::FAILURE);
+        }
+    };
+    say(results)?;
+    Ok(code)
+}
+
+/// How the person stands, after other words.
+fn standing(lobby: &Lobby, what: &str) -> String {
+    let told = lobby.report.as_ref().and_then(|report| {
+        let line = report.standing(lobby.me)?;
+        let place = place_in_words(line, report.standings.len());
+        Some(place.map_or_else(|| NO_GAME_COUNTED.to_owned(), |it| format!("you are {it}")))
+    });
+    match told {
+        Some(told) => format!("{what}: {told}"),
+        None => what.to_owned(),
+    }
+}
+
+fn back(hints: &Hints) -> Result<(), CommandError> {
+    match &hints.back {
+        Some(back) => say(format_args!("to go on where you stood: {back}")),
+        None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::tui::play::ending::*;
+    use crate::tui::play::lobby::Report;
+
+    /// A tournament that was closed tells no place that nobody has.
+    #[test]
+    fn a_tournament_that_is_over_says_how_one_stands() {
+        let standing = |participant, place, games| v1::TournamentStanding {
+            participant,
+            place,
+            games,
+            score: 6,
+            ..v1::TournamentStanding::default()
+        };
+        let closed = "the tournament was closed before its end";
+        let table = [
+            (
+                vec![standing(0, 0, 0), standing(1, 0, 0)],
+                ": no game was counted",
+            ),
+            (
+                vec![standing(0, 1, 3), standing(1, 2, 4)],
+                ": you are 2nd of 2, score 1.50 a game in 4 games",
+            ),
+            (Vec::new(), ""),
+        ];
+        for (standings, words) in table {
+            let mut lobby = Lobby::new("7ea82e54d878816e4e9bde8b21aa7dce".into(), 1);
+            lobby.report = Some(Report {
+                standings,
+                ..Report::default()
+            });
+            assert_eq!(
+                crate::tui::play::ending::standing(&lobby, closed),
+                format!("{closed}{words}")
+            );
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! How a person gets a ticket: of a seat in a room, of a place in a tournament, or of a table made for this game. What is refused is said
+//! together with what can be done about it.
+
+use chefshat_client::{Client, Error, v1};
+
+use super::app::App;
+use super::run::Taken;
+use crate::CommandError;
+use crate::tui::table::Table;
+
+/// Time for a decision at a table of one's own: nobody waits but built-in agents.
+const OWN_DECISION_MS: u32 = 3_600_000;
+
+/// Takes a seat of the room, or a place in the tournament, with this join code: only the server knows which of the two it opens.
+///
+/// # Errors
+/// What the server refuses.
+pub(super) async fn by_code(client: Client, code: &str, name: &str) -> Result<Taken, CommandError> {
+    match join_room(client.clone(), code, name).await {
+        Ok(taken) => Ok(taken),
+        Err(error) if error.reason() == Some("JOIN_CODE_WRONG") => {
+            let joined = client
+                .join_tournament(v1::JoinTournamentRequest {
+                    join_code: code.to_owned(),
+                    name: name.to_owned(),
+                    kind: v1::ParticipantKind::Human.into(),
+                    max_games: 1,
+                    ..v1::JoinTournamentRequest::default()
+                })
+                .await
+                .map_err(|error| refused(&error))?;
+            Ok(Taken {
+                client,
+                ticket: joined.ticket,
+                game: None,
+            })
+        }
+        Err(error) => Err(refused(&error)),
+    }
+}
+
+/// Makes a room of this person and built-in agents, and takes its seat.
+///
+/// # Errors
+/// What the server refuses.
+pub(super) async fn own_table(
+    client: Client,
+    rules: v1::RuleSet,
+    seats: Vec<v1::SeatConfig>,
+    pace_ms: u32,
+    name: &str,
+) -> Result<Taken, CommandError> {
+    let made = client
+        .create_room(v1::CreateRoomRequest {
+            name: "your table".into(),
+            rules: Some(rules),
+            seats,
+            policy: Some(v1::RoomPolicy {
+                decision_time_ms: Some(OWN_DECISION_MS),
+                pace_ms: Some(pace_ms),
+                ..v1::RoomPolicy::default()
+            }),
+            ..v1::CreateRoomRequest::default()
+        })
+        .await?;
+    let taken = join_room(client, &made.join_code, name).await;
+    taken.map_err(|error| refused(&error))
+}
+
+async fn join_room(client: Client, code: &str, name: &str) -> Result<Taken, Error> {
+    let joined = client
+        .join(v1::JoinRoomRequest {
+            join_code: code.to_owned(),
+            name: name.to_owned(),
+            kind: v1::ParticipantKind::Human.into(),
+            ..v1::JoinRoomRequest::default()
+        })
+        .await?;
+    let table = Table::of_room(&joined.room.unwrap_or_default());
+    Ok(Taken {
+        client,
+        ticket: joined.ticket,
+        game: Some(App::new(table, Some(joined.seat))),
+    })
+}
+
+/// What was refused, and what to do.
+fn refused(error: &Error) -> CommandError {
+    let what = error.message();
+    let Some(todo) = error.reason().and_then(remedy) else {
+        return error.to_string().into();
+    };
+    if error.reason() == Some("JOIN_CODE_WRONG") {
+        return format!("no room and no tournament of this server has this join code; {todo}")
+            .into();
+    }
+    format!("{what}; {todo}").into()
+}
+
+/// What a person can do about a refusal.
+fn remedy(reason: &str) -> Option<&'static str> {
+    Some(match reason {
+        "JOIN_CODE_WRONG" => {
+            "see that it is typed as it was given, and that --server names the right server"
+        }
+        "ROOM_FULL" | "SEAT_TAKEN" => {
+            "ask for the code of another room, or watch with `chefshat watch`"
+        }
+        "GAME_STARTED" => {
+            "who has a seat in it goes on with --ticket; all others watch with `chefshat watch`"
+        }
+        "KIND_NOT_ADMITTED" => "people cannot join here: ask its host for a seat for a person",
+        "TOURNAMENT_FULL" => "ask its host for another one",
+        "TOURNAMENT_STARTED" => {
+            "who takes part in it goes on with --ticket; all others follow it with `chefshat tournament follow`"
+        }
+        "NAME_TAKEN" => "choose another --name, or go on in your own place with --ticket",
+        "NOT_STATELESS" => "people cannot take part in it: ask its host for other --deals",
+        "NAME_REFUSED" => "choose another --name",
+        _ => return None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::tui::play::join::remedy;
+
+    /// Every refusal that the protocol knows of joining, but for those that no command line can cause.
+    #[test]
+    fn every_refusal_says_what_to_do() {
+        let reasons = [
+            "JOIN_CODE_WRONG",
+            "ROOM_FULL",
+            "SEAT_TAKEN",
+            "GAME_STARTED",
+            "KIND_NOT_ADMITTED",
+            "TOURNAMENT_FULL",
+            "TOURNAMENT_STARTED",
+            "NAME_TAKEN",
+            "NOT_STATELESS",
+            "NAME_REFUSED",
+        ];
+        for reason in reasons {
+            assert!(remedy(reason).is_some(), "{reason}");
+        }
+    }
+}

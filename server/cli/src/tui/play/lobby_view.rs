@@ -1,0 +1,239 @@
+//! The screen between the games of a tournament: what comes for the person, and the standings.
+
+use chefshat_client::v1;
+use ratatui::Frame;
+use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::text::{Line, Span};
+use ratatui::widgets::{Paragraph, Wrap};
+
+use super::app::Link;
+use super::lobby::{Lobby, Report};
+use super::part::{Over, Part};
+use crate::narrator::{clean, columns};
+use crate::tournament::tables::{Field, mean_score};
+use crate::tournament::words::format_name;
+use crate::tui::look::{Look, symbol};
+use crate::tui::view::{boxed, is_too_small, padded, popup};
+
+/// Rows of the box of the person, its frame included.
+const OWN_ROWS: u16 = 7;
+/// Columns of a name.
+const NAME: usize = 24;
+
+const HELP: [&str; 9] = [
+    "Each of your games begins here by itself; when it is over,",
+    "its result and then the standings are shown.",
+    "",
+    "PgUp PgDn  ↑ ↓   through the standings",
+    "s                while you play: the standings, any key goes back",
+    "q                leave; your games wait for you for a while, then",
+    "                 they are played without you",
+    "",
+    "any key goes back",
+];
+
+/// Draws the lobby.
+pub(super) fn draw(frame: &mut Frame<'_>, look: Look, part: &Part, lobby: &Lobby) {
+    let area = frame.area();
+    if is_too_small(frame) {
+        return;
+    }
+    let [header, own, standings, said, keys] = Layout::vertical([
+        Constraint::Length(1),
+        Constraint::Length(OWN_ROWS),
+        Constraint::Min(1),
+        Constraint::Length(1),
+        Constraint::Length(1),
+    ])
+    .areas(area);
+    draw_header(frame, look, part, lobby, header);
+    draw_own(frame, look, part, lobby, own);
+    draw_standings(frame, look, lobby, standings);
+    let (words, style) = match &part.link {
+        Link::Over(Some(why)) if !lobby.is_over() => (
+            format!(" ! Your place is lost: {why}. Enter ends."),
+            look.warning(),
+        ),
+        _ if part.is_over() && !part.peek => (" Enter ends.".to_owned(), look.bold()),
+        Link::Lost(why) => (
+            format!(" The connection is lost and being made again: {why}"),
+            look.warning(),
+        ),
+        _ if !lobby.notice.is_empty() => (format!(" ! {}", lobby.notice), look.warning()),
+        _ if part.peek => (
+            " Your game goes on. Any key goes back to it.".to_owned(),
+            look.bold(),
+        ),
+        _ if lobby.has_games_to_come() => (
+            " Your next game begins here by itself.".to_owned(),
+            look.bold(),
+        ),
+        _ => (
+            " No game of yours is to come. Stay to see the end, or leave with q.".to_owned(),
+            look.bold(),
+        ),
+    };
+    frame.render_widget(Paragraph::new(words).style(style), said);
+    let words = " ↑↓ PgUp PgDn standings  ? help  q leave";
+    frame.render_widget(Paragraph::new(words).style(look.dim()), keys);
+}
+
+/// Draws what stands over lobby and games alike.
+pub(super) fn draw_over(frame: &mut Frame<'_>, look: Look, part: &Part) {
+    match part.over {
+        Some(Over::Help) => {
+            let lines = HELP.iter().map(|line| Line::from(*line)).collect();
+            popup(frame, look, "help", lines);
+        }
+        Some(Over::Leave) => popup(frame, look, "leave", leaving(part)),
+        None => {}
+    }
+}
+
+/// What leaving means.
+fn leaving(part: &Part) -> Vec<Line<'static>> {
+    let report = part.lobby.as_ref().and_then(|it| it.report.as_ref());
+    let settings = report.and_then(|it| it.tournament.settings.as_ref());
+    let mut lines = vec!["Leave the tournament? Games of yours are still to come.".to_owned()];
+    if let Some(settings) = settings {
+        let seconds = settings.no_show_time_ms.div_ceil(1000);
+        lines.push(format!(
+            "Each waits {seconds} s for you, {} times at most, then you forfeit it.",
+            settings.max_calls
+        ));
+    }
+    lines.push("You can come back with the ticket that is told when you have left.".to_owned());
+    lines.push(String::new());
+    lines.push("y leaves, any other key stays".to_owned());
+    lines.into_iter().map(Line::from).collect()
+}
+
+fn draw_header(frame: &mut Frame<'_>, look: Look, part: &Part, lobby: &Lobby, area: Rect) {
+    let mut words = " Chef's Hat".to_owned();
+    if let Some(report) = &lobby.report {
+        let tournament = &report.tournament;
+        let settings = tournament.settings.clone().unwrap_or_default();
+        words.push_str(&format!(
+            " · {} · {}",
+            clean(&settings.name, 30),
+            format_name(report.format())
+        ));
+        if tournament.round > 0 {
+            words.push_str(&format!(
+                " · round {} of {}",
+                tournament.round, tournament.rounds
+            ));
+        }
+    }
+    let status = part.link.words();
+    let width = usize::from(area.width).saturating_sub(columns(status) + 1);
+    let line = Line::from(format!("{}{status} ", padded(&words, width)));
+    frame.render_widget(Paragraph::new(line).style(look.header()), area);
+}
+
+fn draw_own(frame: &mut Frame<'_>, look: Look, part: &Part, lobby: &Lobby, area: Rect) {
+    let ended = matches!(part.link, Link::Over(None));
+    let words = lobby.words(ended).into_iter();
+    let mut lines: Vec<Line<'_>> = words.map(|words| Line::from(format!(" {words}"))).collect();
+    if let Some(first) = lines.first_mut() {
+        *first = first.clone().patch_style(look.bold());
+    }
+    let block = boxed(look, " your tournament ");
+    let own = Paragraph::new(lines).wrap(Wrap { trim: false });
+    frame.render_widget(own.block(block), area);
+}
+
+fn draw_standings(frame: &mut Frame<'_>, look: Look, lobby: &Lobby, area: Rect) {
+    let Some(report) = &lobby.report else {
+        frame.render_widget(boxed(look, " standings "), area);
+        return;
+    };
+    let tournament = &report.tournament;
+    let title = match (report.is_over(), tournament.games) {
+        (true, _) => " final standings ".to_owned(),
+        _ if tournament.state() == v1::TournamentState::Open => " who takes part ".to_owned(),
+        (false, 0) => " standings ".to_owned(),
+        (false, games) => format!(
+            " standings · {} of {games} games over ",
+            tournament.games_over
+        ),
+    };
+    let rows = usize::from(area.height.saturating_sub(3));
+    let count = report.standings.len();
+    let most = count.saturating_sub(rows);
+    let mine = report
+        .standings
+        .iter()
+        .position(|it| it.participant == lobby.me);
+    // The own line is in the middle until the person goes elsewhere.
+    let first = lobby
+        .first
+        .unwrap_or_else(|| mine.unwrap_or(0).saturating_sub(rows / 2));
+    let first = first.min(most);
+    let knockout = report.format() == v1::TournamentFormat::Knockout;
+    let last = if knockout { "last round" } else { "byes" };
+    let heading = format!(
+        "       {} what      games  a game  won  {last}",
+        padded("name", NAME)
+    );
+    let mut lines = vec![Line::from(Span::styled(heading, look.dim()))];
+    let shown = report.standings.iter().skip(first).take(rows);
+    lines.extend(shown.map(|standing| line(look, lobby, report, standing)));
+    let mut block = boxed(look, title);
+    if most > 0 {
+        let to = (first + rows).min(count);
+        block = block.title_bottom(format!(" {}–{to} of {count} ", first + 1));
+    }
+    frame.render_widget(Paragraph::new(lines).block(block), area);
+}
+
+fn line(
+    look: Look,
+    lobby: &Lobby,
+    report: &Report,
+    standing: &v1::TournamentStanding,
+) -> Line<'static> {
+    let field = Field::new(&report.tournament);
+    let who = field.get(standing.participant);
+    let (mark, word) = symbol(who.map_or(v1::ParticipantKind::Agent, |it| it.kind()));
+    let word = if who.is_some_and(|it| it.filler) {
+        "filler"
+    } else {
+        word
+    };
+    let mine = standing.participant == lobby.me;
+    let name = match mine {
+        true => format!("{} (you)", field.name(standing.participant)),
+        false => field.name(standing.participant),
+    };
+    let here = who.is_none_or(|it| it.connected || !it.built_in_agent.is_empty());
+    let knockout = report.format() == v1::TournamentFormat::Knockout;
+    let last = if knockout {
+        standing.last_round
+    } else {
+        standing.byes
+    };
+    let first = standing.places.first().copied().unwrap_or(0);
+    let words = format!(
+        "{} {:>4}  {} {mark} {word:<7} {:>5}  {:>6}  {first:>3}  {last:>4}{}",
+        if mine { "▶" } else { " " },
+        match standing.place {
+            0 => "–".to_owned(),
+            place => place.to_string(),
+        },
+        padded(&name, NAME),
+        standing.games,
+        format!("{:.2}", mean_score(standing)),
+        if here || report.is_over() {
+            ""
+        } else {
+            "  not here"
+        },
+    );
+    let style = if mine {
+        look.bold()
+    } else {
+        ratatui::style::Style::new()
+    };
+    Line::from(Span::styled(words, style))
+}

@@ -1,0 +1,178 @@
+//! `chefshat play`: a person at a terminal takes a seat of a server, or of one started for this game, or a place in a tournament. This file
+//! understands the command line; `join` gets the ticket, `run` plays, `ending` says what came of it.
+
+mod app;
+mod ending;
+mod follow;
+#[cfg(test)]
+mod friday;
+mod join;
+#[cfg(test)]
+mod key_tests;
+mod keys;
+mod link;
+mod lobby;
+mod lobby_view;
+mod part;
+mod pick;
+mod run;
+#[cfg(test)]
+mod several_tests;
+#[cfg(test)]
+mod tests;
+#[cfg(test)]
+mod tournament_tests;
+mod view;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use chefshat_agents::AgentKind;
+use chefshat_client::Client;
+use chefshat_client::v1::{self, seat_config::FilledBy};
+use chefshat_record::jsonl;
+use clap::Args;
+
+use crate::CommandError;
+use crate::connect::ServerArg;
+use crate::data_dir;
+use crate::remote::agent_kind;
+use crate::rules_args::{RulesArgs, rules_of};
+use crate::tui::screen::missing;
+use chefshat_server::host::Host;
+use ending::{Hints, told};
+use run::{Taken, play};
+
+/// Longest wait of built-in agents before they decide, milliseconds.
+const MAX_PACE_MS: i64 = 60_000;
+
+/// Play as a person at this terminal.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  chefshat play --local\n  \
+                  chefshat play --server http://127.0.0.1:50051 --code BCDF2345 --name Ada\n  \
+                  chefshat play --local --agents trained,trained,trained --target-shifts 3\n\n\
+                  A code that is no room's is tried as a tournament's: then every game of yours begins by itself, with the standings \
+                  between them, until the tournament is over.\n\n\
+                  Press ? for the keys. Who leaves is told a ticket; with it, --ticket goes on.\n\n\
+                  Exit code: 0 when the game or tournament finished, 1 when it was aborted, closed, left or lost, 2 without a terminal.")]
+pub(crate) struct Play {
+    #[command(flatten)]
+    server: ServerArg,
+    #[command(flatten)]
+    seat: SeatArgs,
+    /// Name to show.
+    #[arg(
+        long,
+        env = "CHEFSHAT_NAME",
+        default_value = "Guest",
+        conflicts_with = "ticket"
+    )]
+    name: String,
+    /// With --local: the built-in agents at the table, in turn: random, random_unmasked, greedy, trained.
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = agent_kind,
+          default_values = ["trained", "greedy", "random"])]
+    agents: Vec<AgentKind>,
+    /// With --local: milliseconds that each of them waits before it decides.
+    #[arg(long, default_value_t = 900, value_parser = clap::value_parser!(u32).range(0..=MAX_PACE_MS))]
+    pace_ms: u32,
+    /// With --local: folder for the record (records/GAME-ID.jsonl). Standard: chefshat in the user's data folder.
+    #[arg(long, env = "CHEFSHAT_DATA_DIR")]
+    data_dir: Option<PathBuf>,
+    /// Record with each decision how long it was before your eyes, as the annotation person_decision_time_ms.
+    #[arg(long)]
+    times: bool,
+    #[command(flatten)]
+    rules: RulesArgs,
+}
+
+/// How a seat is come by.
+#[derive(Debug, Args)]
+#[group(required = true, multiple = false)]
+struct SeatArgs {
+    /// The join code of a room or of a tournament.
+    #[arg(long)]
+    code: Option<String>,
+    /// Ticket of a seat, or of a place in a tournament, that was taken before.
+    #[arg(long, env = "CHEFSHAT_TICKET", hide_env_values = true)]
+    ticket: Option<String>,
+    /// Start a server in this process and play against built-in agents.
+    #[arg(long)]
+    local: bool,
+}
+
+impl Play {
+    pub(crate) async fn run(self) -> Result<ExitCode, CommandError> {
+        if let Some(code) =
+            missing("`chefshat agent` plays without one, `chefshat demo` shows a game")
+        {
+            return Ok(code);
+        }
+        if !self.seat.local && !self.rules.are_standard() {
+            return Err(
+                "a room or tournament has its rules from who made it; flags for rules go with --local".into(),
+            );
+        }
+        let Some(data_dir) = (self.seat.local)
+            .then(|| data_dir::prepare(self.data_dir.clone()))
+            .transpose()?
+        else {
+            let taken = self.take().await?;
+            let server = self.server.url().to_owned();
+            let hints = Hints {
+                back: Some(format!(
+                    "chefshat play --server {server} --ticket {}",
+                    taken.ticket
+                )),
+                results: format!("chefshat tournament results --server {server}"),
+                record: Box::new(move |game| {
+                    format!("chefshat records get {game} --server {server}")
+                }),
+            };
+            return told(&play(taken, self.times).await?, &hints);
+        };
+        let host = Host::in_memory(Some(data_dir.clone())).await?;
+        let played = async { play(self.take_local(&host).await?, self.times).await }.await;
+        // The record is written when the server has ended.
+        host.stop().await?;
+        let hints = Hints {
+            // The server has gone with the game.
+            back: None,
+            results: String::new(),
+            record: Box::new(move |game| {
+                format!(
+                    "chefshat watch {}",
+                    jsonl::path_of(&data_dir, game).display()
+                )
+            }),
+        };
+        told(&played?, &hints)
+    }
+
+    async fn take(&self) -> Result<Taken, CommandError> {
+        let client = self.server.connect().await?;
+        match (&self.seat.ticket, &self.seat.code) {
+            (Some(ticket), _) => Ok(Taken {
+                client,
+                ticket: ticket.clone(),
+                game: None,
+            }),
+            (None, code) => join::by_code(client, code.as_deref().unwrap_or(""), &self.name).await,
+        }
+    }
+
+    /// A room of this person and built-in agents.
+    async fn take_local(&self, host: &Host) -> Result<Taken, CommandError> {
+        let rules = self.rules.message();
+        let players = rules_of(&rules)?.players();
+        let client = Client::connect(host.url()).await?;
+        let person = FilledBy::ReservedFor(v1::ParticipantKind::Human.into());
+        let agents = self.agents.iter().cycle();
+        let agents = agents.map(|kind| FilledBy::BuiltInAgent(kind.name().to_owned()));
+        let seats = std::iter::once(person).chain(agents).take(players);
+        let seats = seats.map(|filled_by| v1::SeatConfig {
+            filled_by: Some(filled_by),
+            ..v1::SeatConfig::default()
+        });
+        join::own_table(client, rules, seats.collect(), self.pace_ms, &self.name).await
+    }
+}

@@ -1,0 +1,368 @@
+//! Games played by keys alone, and what the screen shows of them.
+
+use chefshat_client::v1::{self, seat_command::Command, seat_update::Update};
+use chefshat_engine::{ActionId, DecisionKind, RuleSetSpec, Seat, Stop, Viewer};
+use ratatui::crossterm::event::KeyCode;
+
+use super::app::{App, Do, Input, Link};
+use super::run::command;
+use super::view;
+use crate::tui::look::Look;
+use crate::tui::screen::Key;
+use crate::tui::table::Table;
+use crate::tui::testing::{Dealt, as_kept, text};
+
+const ME: Viewer = Viewer::Seat(Seat::new(0));
+
+/// A game and the person who plays seat 0 of it.
+pub(super) struct Evening {
+    pub(super) dealt: Dealt,
+    pub(super) app: App,
+    pub(super) now_ms: u64,
+}
+
+impl Evening {
+    pub(super) fn new(rules: &RuleSetSpec, seed: u8) -> Self {
+        let (dealt, events) = Dealt::new(rules, seed, ME);
+        let mut evening = Self {
+            dealt,
+            app: App::new(Table::default(), Some(0)),
+            now_ms: 0,
+        };
+        evening.tell(Update::Attached(v1::Attached::default()));
+        evening.tell(Update::Events(v1::EventBatch { events }));
+        evening
+    }
+
+    pub(super) fn tell(&mut self, update: Update) -> Option<Do> {
+        let input = Input::Update(Box::new(update));
+        self.app.take(input, self.now_ms)
+    }
+
+    pub(super) fn press(&mut self, code: KeyCode) -> Option<Do> {
+        self.app.take(Input::Key(Key::Code(code)), self.now_ms)
+    }
+
+    pub(super) fn apply(&mut self, action: ActionId) {
+        let events = self.dealt.apply(action);
+        self.tell(Update::Events(v1::EventBatch { events }));
+    }
+
+    /// Has the others play, by default decisions or the first legal one, until the person is asked.
+    pub(super) fn until_asked(&mut self) -> bool {
+        while let Some(decision) = self.dealt.game.decision() {
+            if decision.seat.index() == 0 {
+                let request = self.dealt.request();
+                self.tell(Update::Decision(request));
+                return true;
+            }
+            let first = self.dealt.game.legal_actions().nth(0).unwrap();
+            self.apply(first);
+        }
+        false
+    }
+
+    /// Does what is picked, or passes where that cannot be done.
+    pub(super) fn act(&mut self) -> Do {
+        let picked = self.press(KeyCode::Enter);
+        let what = picked.or_else(|| self.press(KeyCode::Char('p')));
+        what.expect("one of the two is legal")
+    }
+
+    /// The server takes an answer.
+    pub(super) fn answered(&mut self, what: Do) {
+        let Do::Answer {
+            decision_id,
+            action,
+            ..
+        } = what
+        else {
+            panic!("{what:?} is no answer");
+        };
+        self.tell(Update::Result(v1::AnswerResult {
+            decision_id,
+            action,
+            status: v1::AnswerStatus::Accepted.into(),
+            ..v1::AnswerResult::default()
+        }));
+        self.apply(ActionId::new(u16::try_from(action).unwrap()));
+    }
+
+    pub(super) fn screen(&self) -> String {
+        text(80, 24, |frame| {
+            view::draw_game(frame, Look::new(false), &self.app, self.now_ms);
+        })
+    }
+}
+
+pub(super) fn shifts(shifts: u32) -> RuleSetSpec {
+    RuleSetSpec {
+        stop: Stop::Shifts(shifts),
+        ..RuleSetSpec::default()
+    }
+}
+
+/// Every legal action can be picked by keys, and what is picked has an objection just when it is not legal.
+#[test]
+fn whole_games_are_played_by_keys() {
+    let (mut kinds, mut objections) = ([0; 3], 0);
+    for seed in 0..6 {
+        let mut evening = Evening::new(&shifts(4), seed);
+        while evening.until_asked() {
+            let decision = evening.dealt.game.decision().unwrap();
+            kinds[decision.kind as usize] += 1;
+            let legal = evening.dealt.game.legal_actions();
+            let (reached, refused) = everything_picked(&mut evening);
+            objections += refused;
+            let mut missing = legal.iter().filter(|action| !reached.contains(action));
+            let pass = evening.app.open.as_ref().unwrap().decision.pass();
+            assert_eq!(missing.find(|action| *action != pass), None);
+
+            let passes = evening.press(KeyCode::Char('p'));
+            assert_eq!(passes.is_some(), legal.contains(pass));
+            evening.app.open.as_mut().unwrap().sent = false;
+            // What is picked to begin with is legal, unless there is nothing to play.
+            let request = evening.dealt.request();
+            evening.tell(Update::Decision(request));
+            let what = evening.act();
+            evening.answered(what);
+            assert!(evening.app.open.is_none());
+        }
+        assert!(evening.app.table.end.is_some());
+        let end = evening.screen();
+        assert!(end.contains("wins the game"), "{end}");
+        assert!(end.contains(&evening.app.table.game_id), "{end}");
+        assert_eq!(evening.press(KeyCode::Enter), Some(Do::Leave));
+    }
+    let [turns, exchanges, _specials] = kinds;
+    assert!(
+        turns > 100 && exchanges > 3 && objections > 100,
+        "{kinds:?} {objections}"
+    );
+}
+
+/// All that can be picked: the legal actions, and how many others, each with its reason.
+fn everything_picked(evening: &mut Evening) -> (Vec<ActionId>, usize) {
+    let legal = evening.dealt.game.legal_actions();
+    let (mut reached, mut refused) = (Vec::new(), 0);
+    let stacks = evening.app.open.as_ref().unwrap().decision.stacks.len();
+    for _ in 0..stacks.max(2) {
+        evening.press(KeyCode::Right);
+        for _ in 0..20 {
+            evening.press(KeyCode::Down);
+        }
+        for _ in 0..12 {
+            for _ in 0..3 {
+                let decision = &evening.app.open.as_ref().unwrap().decision;
+                let picked = decision.picked().unwrap();
+                let objection = decision.objection();
+                assert_eq!(objection.is_none(), legal.contains(picked), "{objection:?}");
+                match objection {
+                    None => reached.push(picked),
+                    Some(why) => {
+                        refused += 1;
+                        // A refused key does nothing but say why.
+                        assert_eq!(evening.press(KeyCode::Enter), None);
+                        assert_eq!(evening.app.notice, why);
+                    }
+                }
+                // In an exchange it is the key of the jokers, which would begin anew.
+                if evening.app.open.as_ref().unwrap().decision.kind() == v1::DecisionKind::Turn {
+                    evening.press(KeyCode::Char('j'));
+                }
+            }
+            evening.press(KeyCode::Up);
+        }
+    }
+    (reached, refused)
+}
+
+#[test]
+fn a_special_action_is_declared_or_declined_by_a_key() {
+    let mut offered = 0;
+    for seed in 0..60 {
+        let mut evening = Evening::new(&shifts(3), seed);
+        while evening.until_asked() {
+            let decision = evening.dealt.game.decision().unwrap();
+            let what = match decision.kind {
+                DecisionKind::SpecialAction => {
+                    offered += 1;
+                    assert!(
+                        evening.screen().contains("Two jokers!"),
+                        "{}",
+                        evening.screen()
+                    );
+                    let key = ['d', 'n'][offered % 2];
+                    evening.press(KeyCode::Char(key)).unwrap()
+                }
+                _ => evening.act(),
+            };
+            evening.answered(what);
+        }
+    }
+    assert!(offered > 1, "{offered} were offered");
+}
+
+#[test]
+fn the_screen_says_what_is_asked() {
+    let mut evening = Evening::new(&shifts(2), 3);
+    assert!(evening.until_asked());
+    evening.now_ms += 12_500;
+    let first = evening.screen();
+    for _ in 0..5 {
+        let what = evening.act();
+        evening.answered(what);
+        assert!(evening.until_asked());
+    }
+    evening.press(KeyCode::Left);
+    let later = evening.screen();
+    evening.press(KeyCode::Char('?'));
+    as_kept(&[
+        ("first.txt", first, include_str!("screens/first.txt")),
+        ("later.txt", later, include_str!("screens/later.txt")),
+        (
+            "help.txt",
+            evening.screen(),
+            include_str!("screens/help.txt"),
+        ),
+    ]);
+}
+
+#[test]
+fn windows_of_any_size_are_drawn() {
+    let spec = RuleSetSpec {
+        players: 6,
+        faces: 15,
+        ..shifts(1)
+    };
+    let mut evening = Evening::new(&spec, 1);
+    assert!(evening.until_asked());
+    for (columns, rows) in [
+        (1, 1),
+        (20, 5),
+        (79, 24),
+        (80, 23),
+        (80, 24),
+        (100, 30),
+        (250, 90),
+    ] {
+        let screen = text(columns, rows, |frame| {
+            view::draw_game(frame, Look::new(true), &evening.app, 0);
+        });
+        let drawn = screen.contains("your hand");
+        assert_eq!(drawn, columns >= 80 && rows >= 24, "{screen}");
+    }
+}
+
+#[test]
+fn an_answer_that_was_lost_is_given_again() {
+    let mut evening = Evening::new(&shifts(1), 3);
+    assert!(evening.until_asked());
+    evening.now_ms = 4_000;
+    let first = evening.press(KeyCode::Enter).unwrap();
+    let Do::Answer {
+        decision_id,
+        action,
+        took_ms,
+    } = first
+    else {
+        panic!("{first:?}");
+    };
+    assert_eq!(took_ms, 4_000);
+    // Nothing is sent twice by a person who is impatient.
+    assert_eq!(evening.press(KeyCode::Enter), None);
+    evening.app.take(Input::Lost("gone".into()), 5_000);
+    assert!(evening.screen().contains("connection is lost"));
+    assert_eq!(evening.press(KeyCode::Enter), None);
+    evening.tell(Update::Attached(v1::Attached::default()));
+    assert_eq!(evening.app.link, Link::Live);
+    let again = evening.dealt.request();
+    let again = v1::DecisionRequest {
+        decision_id,
+        ..again
+    };
+    let answer = evening.tell(Update::Decision(again));
+    assert!(
+        matches!(answer, Some(Do::Answer { decision_id: id, action: same, .. }) if (id, same) == (decision_id, action))
+    );
+}
+
+/// How long a person takes is recorded only where that was asked for.
+#[test]
+fn times_go_with_answers_only_when_asked_for() {
+    let annotations = |took_ms, times| {
+        let what = Do::Answer {
+            decision_id: 1,
+            action: 2,
+            took_ms,
+        };
+        match command(what, times) {
+            Some(Command::Answer(answer)) => answer.annotations,
+            other => panic!("{other:?}"),
+        }
+    };
+    assert_eq!(annotations(4_000, false), None);
+    assert_eq!(annotations(0, true), None);
+    let noted = annotations(4_000, true).unwrap().extra;
+    assert_eq!(noted["person_decision_time_ms"], "4000");
+}
+
+#[test]
+fn the_servers_word_on_an_answer_is_shown() {
+    let table = [
+        (v1::AnswerStatus::Invalid, "not so", true),
+        (v1::AnswerStatus::Closed, "too late", false),
+        (v1::AnswerStatus::Accepted, "", false),
+    ];
+    for (status, words, stays) in table {
+        let mut evening = Evening::new(&shifts(1), 3);
+        assert!(evening.until_asked());
+        let Some(Do::Answer {
+            decision_id,
+            action,
+            ..
+        }) = evening.press(KeyCode::Enter)
+        else {
+            panic!("an answer");
+        };
+        evening.tell(Update::Result(v1::AnswerResult {
+            decision_id,
+            action,
+            status: status.into(),
+            detail: words.into(),
+            ..v1::AnswerResult::default()
+        }));
+        assert!(evening.app.notice.contains(words), "{status:?}");
+        let open = evening.app.open.as_ref().filter(|open| !open.sent);
+        assert_eq!(open.is_some(), stays, "{status:?}");
+    }
+}
+
+#[test]
+fn a_decision_taken_without_the_person_is_closed() {
+    let mut evening = Evening::new(&shifts(1), 3);
+    assert!(evening.until_asked());
+    let default = evening.dealt.game.default_action().unwrap();
+    evening.apply(default);
+    assert!(evening.app.open.is_none());
+    assert!(evening.screen().contains("too late"));
+    assert_eq!(evening.press(KeyCode::Enter), None);
+    // The next question takes the words away.
+    assert!(evening.until_asked());
+    assert!(!evening.screen().contains("too late"));
+}
+
+#[test]
+fn the_clock_runs_into_the_bank() {
+    let mut evening = Evening::new(&shifts(1), 3);
+    assert!(evening.until_asked());
+    let table = [
+        (0, 30_000, 60_000),
+        (29_999, 1, 60_000),
+        (31_000, 0, 59_000),
+        (600_000, 0, 0),
+    ];
+    for (now, time, bank) in table {
+        assert_eq!(evening.app.clock(now), Some((time, bank)));
+    }
+}

@@ -1,0 +1,360 @@
+//! The screen of `chefshat play` at a table: the table, below it the person's hand, what is asked of it, and the keys. Between the games of a
+//! tournament the screen is that of `lobby_view`.
+
+use chefshat_client::v1;
+use ratatui::Frame;
+use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::text::{Line, Span};
+use ratatui::widgets::Paragraph;
+
+use super::app::{App, Dialog, EXPRESSIONS, Link, Open};
+use super::keys::key_of;
+use super::lobby_view;
+use super::part::Part;
+use crate::tui::cards;
+use crate::tui::cards::Shown;
+use crate::tui::look::{Look, ingredient};
+use crate::tui::table::End;
+use crate::tui::view::{boxed, draw as draw_table, end_lines, popup};
+
+/// Rows below the table: the hand (7), what is asked (2), the keys (1).
+const ROWS: u16 = 10;
+/// Columns of the bar of the clock.
+const BAR: u64 = 10;
+/// Below this the clock warns.
+const SHORT_MS: u64 = 5_000;
+
+/// The keys that matter in a turn, in an exchange, when a special action is offered, and while others decide.
+const TURN_KEYS: &str =
+    " 1-9 ←→ card  ↑↓ number  j joker  Enter play  p pass  e feeling  ? keys  q leave";
+const EXCHANGE_KEYS: &str = " 1-9 ←→ card  J joker  Enter give  e feeling  ? keys  q leave";
+const SPECIAL_KEYS: &str = " d declare  n decline  e feeling  ? keys  q leave";
+const WAITING_KEYS: &str = " PgUp what happened  e feeling  ? keys  q leave";
+
+const HELP: [&str; 18] = [
+    "You want to be the first without cards. A play is cards of one",
+    "face, jokers with them or not. It must be of a lower face than",
+    "the one on the board, and of no fewer cards. Who passes is out",
+    "until the next pizza.",
+    "",
+    "1 … 9, 0  the cards of face 1 … 9, 10; those of higher faces have",
+    "          a letter on their edge; again: one more of them",
+    "J         the jokers          j     a joker with the cards picked",
+    "← →       to another card     Tab   to the next that can be used",
+    "↑ ↓       one card more, one fewer",
+    "Enter     play (or give) what is picked",
+    "p         pass",
+    "d, n      declare a special action, or do not",
+    "e         show a feeling to the table",
+    "PgUp      what happened before, PgDn goes on",
+    "s         in a tournament: the standings",
+    "r         play on yourself after a substitute has played for you",
+    "q         leave; the room's rules say who plays on",
+];
+
+/// Draws everything.
+pub(super) fn draw(frame: &mut Frame<'_>, look: Look, part: &Part, now_ms: u64) {
+    match (&part.game, &part.lobby) {
+        (Some(game), _) if !part.peek => draw_game(frame, look, game, now_ms),
+        (_, Some(lobby)) => lobby_view::draw(frame, look, part, lobby),
+        (_, None) => {
+            let words = match &part.link {
+                Link::Lost(why) => format!(" Connecting, again and again: {why}"),
+                _ => " Connecting.".to_owned(),
+            };
+            frame.render_widget(Paragraph::new(words), frame.area());
+        }
+    }
+    lobby_view::draw_over(frame, look, part);
+}
+
+/// Draws a game.
+pub(super) fn draw_game(frame: &mut Frame<'_>, look: Look, app: &App, now_ms: u64) {
+    let mut status = app.link.words().to_owned();
+    if let Some(others) = &app.others {
+        status = format!("{others} · {status}");
+    }
+    let Some(area) = draw_table(frame, look, &app.table, app.me, &status, app.scroll, ROWS) else {
+        return;
+    };
+    let [hand, asked, keys] = Layout::vertical([
+        Constraint::Length(ROWS - 3),
+        Constraint::Length(2),
+        Constraint::Length(1),
+    ])
+    .areas(area);
+    draw_hand(frame, look, app, hand);
+    draw_asked(frame, look, app, now_ms, asked);
+    let words = match app.open.as_ref().map(|open| open.decision.kind()) {
+        Some(v1::DecisionKind::SpecialAction) => SPECIAL_KEYS,
+        Some(v1::DecisionKind::Exchange) => EXCHANGE_KEYS,
+        Some(_) => TURN_KEYS,
+        None => WAITING_KEYS,
+    };
+    frame.render_widget(Paragraph::new(words).style(look.dim()), keys);
+    draw_over(frame, look, app);
+}
+
+fn draw_hand(frame: &mut Frame<'_>, look: Look, app: &App, area: Rect) {
+    let faces = app.table.faces();
+    let place = app.me.and_then(|me| app.table.seat(me));
+    let open = app
+        .open
+        .as_ref()
+        .filter(|open| open.decision.kind() != v1::DecisionKind::SpecialAction);
+    let shown: Vec<Shown> = match (open, place.and_then(|place| place.hand.as_ref())) {
+        (Some(open), _) => shown(open),
+        (None, Some(hand)) => hand
+            .stacks()
+            .into_iter()
+            .map(|stack| Shown {
+                stack,
+                active: app.open.is_some(),
+                picked: None,
+                along: 0,
+                key: None,
+            })
+            .collect(),
+        (None, None) => Vec::new(),
+    };
+    let count: u32 = shown.iter().map(|it| u32::from(it.stack.count)).sum();
+    let title = match count {
+        0 => " your hand ".to_owned(),
+        count => format!(
+            " your hand · {} ",
+            crate::numbers::counted(count.into(), "card")
+        ),
+    };
+    let block = boxed(look, title);
+    let inner = block.inner(area);
+    frame.render_widget(block, area);
+    if shown.is_empty() {
+        let words = match place.and_then(|place| place.finished) {
+            Some(_) => "You are out of cards.",
+            None => "No cards yet.",
+        };
+        let lines = vec![Line::default(), Line::from(format!("  {words}"))];
+        frame.render_widget(Paragraph::new(lines), inner);
+        return;
+    }
+    let columns = usize::from(inner.width).saturating_sub(1);
+    let mut lines = cards::hand(look, faces, &shown, columns);
+    for line in &mut lines {
+        line.spans.insert(0, Span::raw(" "));
+    }
+    frame.render_widget(Paragraph::new(lines), inner);
+}
+
+/// The stacks of an open decision, with what is picked.
+fn shown(open: &Open) -> Vec<Shown> {
+    let decision = &open.decision;
+    let stacks = decision.stacks.iter().enumerate();
+    stacks
+        .map(|(at, stack)| Shown {
+            stack: *stack,
+            active: decision.is_active(at),
+            picked: (at == decision.at).then_some(decision.quantity),
+            along: if stack.joker && at != decision.at {
+                decision.jokers
+            } else {
+                0
+            },
+            // A face's own number, and J, are read off the card.
+            key: key_of(*stack)
+                .filter(|key| !stack.joker && stack.face.to_string() != key.to_string()),
+        })
+        .collect()
+}
+
+fn draw_asked(frame: &mut Frame<'_>, look: Look, app: &App, now_ms: u64, area: Rect) {
+    let mut first = vec![Span::styled(format!(" {}", asked(app)), look.bold())];
+    if let (Some((time, bank)), Some(open)) = (app.clock(now_ms), &app.open) {
+        let line: usize = first.iter().map(Span::width).sum();
+        let clock = clock(open, time, bank);
+        let space = usize::from(area.width).saturating_sub(line + Span::raw(&*clock).width() + 1);
+        first.push(Span::raw(" ".repeat(space)));
+        let style = if time < SHORT_MS {
+            look.warning()
+        } else {
+            look.bold()
+        };
+        first.push(Span::styled(clock, style));
+    }
+    let second = match &app.open {
+        _ if !app.notice.is_empty() => Span::styled(format!(" ! {}", app.notice), look.warning()),
+        Some(open) if !open.sent => match open.decision.objection() {
+            Some(why) => Span::styled(format!(" ✕ {why}"), look.dim()),
+            None => Span::raw(hint(open, app.table.faces())),
+        },
+        _ => Span::raw(""),
+    };
+    frame.render_widget(
+        Paragraph::new(vec![Line::from(first), Line::from(second)]),
+        area,
+    );
+}
+
+/// What the person is asked, or who is.
+fn asked(app: &App) -> String {
+    if let Link::Lost(why) = &app.link {
+        return format!("The connection is lost and being made again: {why}");
+    }
+    if app.substituted() {
+        return "A substitute plays for you. Press r to play on yourself.".to_owned();
+    }
+    let Some(open) = &app.open else {
+        return waiting(app);
+    };
+    let decision = &open.decision;
+    if open.sent {
+        return "Sent.".to_owned();
+    }
+    match decision.kind() {
+        v1::DecisionKind::SpecialAction => {
+            let dishwasher = app.me.and_then(|me| app.table.seat(me));
+            let dishwasher = dishwasher.is_some_and(|it| it.role == v1::Role::Dishwasher);
+            if dishwasher {
+                "Two jokers! Food Fight: all roles turn around?".to_owned()
+            } else {
+                "Two jokers! Dinner is Served: no exchange?".to_owned()
+            }
+        }
+        v1::DecisionKind::Exchange => {
+            format!("Give a card to {}: {}?", partner(app), decision.words())
+        }
+        _ if !decision.can_play() => "Your turn: nothing can be played, pass with p.".to_owned(),
+        _ => format!("Your turn: {}?", decision.words()),
+    }
+}
+
+/// Who gets what the person gives in the exchange.
+fn partner(app: &App) -> String {
+    let role = |seat| app.table.seat(seat).map(|place| place.role);
+    let theirs = match app.me.and_then(role) {
+        Some(v1::Role::Chef) => v1::Role::Dishwasher,
+        _ => v1::Role::Waiter,
+    };
+    let seats = (0u32..).zip(&app.table.seats);
+    let mut seats = seats.filter(|(_, place)| place.role == theirs);
+    match seats.next() {
+        Some((seat, _)) => app.table.name(seat),
+        None => "your partner".to_owned(),
+    }
+}
+
+/// What is waited for.
+fn waiting(app: &App) -> String {
+    let table = &app.table;
+    let first = table.turns == 0 && table.shift > 0;
+    match table.turn {
+        _ if table.end.is_some() => String::new(),
+        _ if !table.started => "The game has not begun.".to_owned(),
+        Some(seat) if app.me != Some(seat) => format!("It is {}'s turn.", table.name(seat)),
+        None if first && table.last_order.is_empty() => {
+            "Another player opens the Shift.".to_owned()
+        }
+        None if first => "The others decide: special action, exchange, the first turn.".to_owned(),
+        _ => "The others decide.".to_owned(),
+    }
+}
+
+/// What Enter would do.
+fn hint(open: &Open, faces: u32) -> String {
+    let decision = &open.decision;
+    if decision.kind() == v1::DecisionKind::SpecialAction {
+        let [declare, decline] = match decision.at {
+            0 => ["[d declare]", " n decline "],
+            _ => [" d declare ", "[n decline]"],
+        };
+        return format!(" {declare} {decline}   ← → chooses, Enter decides.");
+    }
+    let name = decision.stacks.get(decision.at);
+    let name = name.and_then(|stack| ingredient(stack.face, faces));
+    let name = name.map_or_else(String::new, |name| format!(" ({name})"));
+    let words = decision.words();
+    match (decision.opening(), decision.pass_objection()) {
+        (Some(rule), _) => format!(" Enter: {words}{name}. {rule}"),
+        (None, None) => format!(" Enter: {words}{name}. p: pass."),
+        (None, Some(_)) => format!(" Enter: {words}{name}."),
+    }
+}
+
+/// The clock: a bar, the time for this decision, the bank.
+fn clock(open: &Open, time_ms: u64, bank_ms: u64) -> String {
+    let full = u64::from(open.decision.request.time_left_ms).max(1);
+    let filled = (time_ms * BAR).div_ceil(full).min(BAR);
+    let bar: String = (0..BAR)
+        .map(|cell| if cell < filled { '█' } else { '░' })
+        .collect();
+    format!("{bar} {} · bank {}", time(time_ms), time(bank_ms))
+}
+
+/// `1:05` or `9 s`.
+fn time(ms: u64) -> String {
+    let seconds = ms.div_ceil(1000);
+    if seconds < 60 {
+        format!("{seconds} s")
+    } else {
+        format!("{}:{:02}", seconds / 60, seconds % 60)
+    }
+}
+
+/// What stands over the table: the end, or a dialog.
+fn draw_over(frame: &mut Frame<'_>, look: Look, app: &App) {
+    let plain = |words: &str| Line::from(words.to_owned());
+    if app.scroll.is_open() {
+        return;
+    }
+    match (&app.table.end, &app.link, app.dialog) {
+        (Some(end), ..) => {
+            let mut lines = vec![plain("")];
+            lines.extend(end_lines(look, &app.table, end));
+            lines.push(plain(""));
+            if let Some(standing) = &app.standing {
+                lines.push(plain(standing));
+            } else {
+                lines.push(plain(&format!("game {}", app.table.game_id)));
+            }
+            lines.push(plain(""));
+            lines.push(Line::from(Span::styled(app.then, look.dim())));
+            let title = match end {
+                End::Finished(_) => "the game is over",
+                End::Aborted(_) => "no result",
+            };
+            popup(frame, look, title, lines);
+        }
+        (None, Link::Over(why), _) => {
+            let why = why
+                .clone()
+                .unwrap_or_else(|| "the seat has left the table".to_owned());
+            popup(
+                frame,
+                look,
+                "the seat is lost",
+                vec![plain(&why), plain(""), plain(app.then)],
+            );
+        }
+        (None, _, Some(Dialog::Help)) => {
+            let mut lines: Vec<Line<'_>> = HELP.iter().map(|line| plain(line)).collect();
+            lines.push(Line::from(Span::styled("any key goes back", look.dim())));
+            popup(frame, look, "help", lines);
+        }
+        (None, _, Some(Dialog::Leave)) => popup(
+            frame,
+            look,
+            "leave",
+            vec![
+                plain("Leave the table? The room's rules say who plays on."),
+                plain(""),
+                plain("y leaves, any other key stays"),
+            ],
+        ),
+        (None, _, Some(Dialog::Express)) => {
+            let lines = (1..)
+                .zip(EXPRESSIONS)
+                .map(|(key, (label, ..))| plain(&format!("{key}  {label}")));
+            popup(frame, look, "show the table", lines.collect());
+        }
+        (None, _, None) => {}
+    }
+}

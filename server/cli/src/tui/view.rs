@@ -1,0 +1,334 @@
+//! The table drawn into a part of the screen: header, seats, story, pizza, and boxes over them. What lies below (a hand, a reel) is drawn by
+//! `play` and `watch`.
+
+use chefshat_client::v1;
+use ratatui::Frame;
+use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::text::{Line, Span};
+use ratatui::widgets::{Block, BorderType, Clear, Paragraph, Wrap};
+
+use super::super::narrator::{MAX_NAME, abort_reason, clean, columns, title};
+use super::super::numbers::{counted, ordinal};
+use super::cards::fan;
+use super::log::{self, Scroll};
+use super::look::{Look, ingredient, kind};
+use super::table::{End, Table};
+
+/// The least that a table needs.
+pub(crate) const MIN_COLUMNS: u16 = 80;
+pub(crate) const MIN_ROWS: u16 = 24;
+
+/// Columns of the box of seats.
+const SEATS_COLUMNS: u16 = 54;
+/// Its title, with a word over each column of numbers.
+const SEATS_TITLE: &str = " at the table ───────────── cards points ";
+/// Rows of the box of the pizza.
+const PIZZA_ROWS: u16 = 5;
+/// Least rows of seats and story.
+const UPPER_ROWS: u16 = 8;
+
+/// Draws the table; gives the part of the screen below it, `rows` high.
+pub(crate) fn draw(
+    frame: &mut Frame<'_>,
+    look: Look,
+    table: &Table,
+    me: Option<u32>,
+    status: &str,
+    scroll: Scroll,
+    rows: u16,
+) -> Option<Rect> {
+    let area = frame.area();
+    if is_too_small(frame) {
+        return None;
+    }
+    let [header, upper, pizza, lower] = Layout::vertical([
+        Constraint::Length(1),
+        Constraint::Min(UPPER_ROWS),
+        Constraint::Length(PIZZA_ROWS),
+        Constraint::Length(rows),
+    ])
+    .areas(area);
+    draw_header(frame, look, table, status, header);
+    if scroll.is_open() {
+        log::draw_back(frame, look, table, scroll, upper.union(pizza));
+        return Some(lower);
+    }
+    let [seats, story] =
+        Layout::horizontal([Constraint::Length(SEATS_COLUMNS), Constraint::Min(1)]).areas(upper);
+    draw_seats(frame, look, table, me, seats);
+    log::draw(frame, look, table, story);
+    draw_pizza(frame, look, table, me, pizza);
+    Some(lower)
+}
+
+/// Says that a window is too small for a table, where it is.
+pub(crate) fn is_too_small(frame: &mut Frame<'_>) -> bool {
+    let area = frame.area();
+    let small = area.width < MIN_COLUMNS || area.height < MIN_ROWS;
+    if small {
+        let words = format!(
+            "The table needs {MIN_COLUMNS}×{MIN_ROWS}; this window has {}×{}. Make it larger, or the letters smaller.",
+            area.width, area.height
+        );
+        frame.render_widget(Paragraph::new(words).wrap(Wrap { trim: true }), area);
+    }
+    small
+}
+
+/// A box with a title.
+pub(crate) fn boxed<'a>(look: Look, title: impl Into<Line<'a>>) -> Block<'a> {
+    Block::bordered()
+        .border_type(BorderType::Rounded)
+        .border_style(look.frame())
+        .title(title)
+}
+
+/// A box over everything else, in the middle.
+pub(crate) fn popup(frame: &mut Frame<'_>, look: Look, title: &str, lines: Vec<Line<'_>>) {
+    let area = frame.area();
+    let longest = lines.iter().map(Line::width).max().unwrap_or(0);
+    let width = u16::try_from(longest + 6).unwrap_or(u16::MAX);
+    let height = u16::try_from(lines.len() + 2).unwrap_or(u16::MAX);
+    let (width, height) = (width.min(area.width), height.min(area.height));
+    let place = Rect {
+        x: area.x + (area.width - width) / 2,
+        y: area.y + (area.height - height) / 2,
+        width,
+        height,
+    };
+    frame.render_widget(Clear, place);
+    let block = Block::bordered()
+        .border_type(BorderType::Double)
+        .border_style(look.gold())
+        .title(format!(" {title} "))
+        .padding(ratatui::widgets::Padding::horizontal(2));
+    frame.render_widget(Paragraph::new(lines).block(block), place);
+}
+
+/// The end of a game as lines: its standings, or why it has none.
+pub(crate) fn end_lines(look: Look, table: &Table, end: &End) -> Vec<Line<'static>> {
+    match end {
+        End::Aborted(reason) => vec![Line::from(format!(
+            "The game was aborted and has no result: {}.",
+            abort_reason(*reason)
+        ))],
+        End::Finished(standings) => standings
+            .iter()
+            .map(|line| {
+                let name = padded(&table.name(line.seat), MAX_NAME + 1);
+                let words = format!("{:>3}  ", ordinal(line.place));
+                let points = counted(line.points, "point");
+                let mut spans = vec![
+                    Span::raw(words),
+                    Span::styled(name, look.seat(line.seat)),
+                    Span::raw(format!("{points:>10}")),
+                ];
+                if line.place == 1 {
+                    spans.push(Span::styled("  ★ wins the game", look.gold()));
+                }
+                Line::from(spans)
+            })
+            .collect(),
+    }
+}
+
+/// Text with spaces behind it until it is so many columns wide.
+pub(crate) fn padded(text: &str, width: usize) -> String {
+    let missing = width.saturating_sub(columns(text));
+    format!("{text}{}", " ".repeat(missing))
+}
+
+fn draw_header(frame: &mut Frame<'_>, look: Look, table: &Table, status: &str, area: Rect) {
+    let mut progress = String::new();
+    if table.shift > 0 {
+        progress.push_str(&format!(" · Shift {} · pizza {}", table.shift, table.pizza));
+    }
+    if let Some(rules) = &table.rules {
+        progress.push_str(&match rules.stop() {
+            chefshat_engine::Stop::Points(points) => format!(" · to {points} points"),
+            chefshat_engine::Stop::Shifts(shifts) => {
+                format!(" · {}", counted(u64::from(shifts), "Shift"))
+            }
+        });
+    }
+    let width = usize::from(area.width).saturating_sub(columns(status) + 1);
+    let space = width.saturating_sub(columns(&progress) + 2);
+    let room = &table.room_name;
+    // A long name takes the place of the game's own, and is cut where that is not enough.
+    let named = match room.is_empty() {
+        true => "Chef's Hat".to_owned(),
+        false => format!("Chef's Hat · {room}"),
+    };
+    let named = match columns(&named) <= space {
+        true => named,
+        false => clean(room, space),
+    };
+    let words = format!(" {named}{progress}");
+    let line = Line::from(format!("{}{status} ", padded(&words, width)));
+    frame.render_widget(Paragraph::new(line).style(look.header()), area);
+}
+
+fn draw_seats(frame: &mut Frame<'_>, look: Look, table: &Table, me: Option<u32>, area: Rect) {
+    let lines = (0u32..).zip(&table.seats).map(|(seat, place)| {
+        let marker = if table.turn == Some(seat) {
+            "▶ "
+        } else {
+            "  "
+        };
+        let (symbol, word) = kind(place);
+        let name = if place.name.is_empty() {
+            "(free)".to_owned()
+        } else if me == Some(seat) {
+            format!("{} (you)", place.name)
+        } else {
+            place.name.clone()
+        };
+        let name_style = if table.turn == Some(seat) {
+            look.seat(seat).patch(look.bold())
+        } else {
+            look.seat(seat)
+        };
+        let role = match place.role {
+            v1::Role::Unspecified => "",
+            role => title(role),
+        };
+        let name = padded(&clean(&name, 16), 17);
+        let mut spans = vec![
+            Span::styled(marker, look.bold()),
+            Span::styled(name, name_style),
+            Span::raw(format!("{symbol} {word:<6} ")),
+        ];
+        if table.started {
+            let cards = match place.finished {
+                Some(place) => ordinal(place),
+                None => place.cards.to_string(),
+            };
+            spans.push(Span::styled(format!("{cards:>5}"), look.bold()));
+            spans.push(Span::raw(format!("{:>7} ", place.points)));
+            spans.push(match note_of(place) {
+                Some(note) => Span::styled(note, look.dim()),
+                None => Span::raw(role),
+            });
+        }
+        Line::from(spans)
+    });
+    let lines: Vec<Line<'_>> = lines.collect();
+    frame.render_widget(Paragraph::new(lines).block(boxed(look, SEATS_TITLE)), area);
+}
+
+/// What matters more about a seat than its role.
+fn note_of(place: &super::table::Place) -> Option<String> {
+    if place.substituted {
+        return Some("substitute".to_owned());
+    }
+    if !place.connected {
+        return Some("not here".to_owned());
+    }
+    (place.passed && place.finished.is_none()).then(|| "passed".to_owned())
+}
+
+fn draw_pizza(frame: &mut Frame<'_>, look: Look, table: &Table, me: Option<u32>, area: Rect) {
+    let block = boxed(look, " the pizza ");
+    let inner = block.inner(area);
+    frame.render_widget(block, area);
+    let Some(play) = table.board else {
+        if table.turns == 0 && !table.last_order.is_empty() && table.end.is_none() {
+            let lines = between(look, table, me);
+            frame.render_widget(Paragraph::new(lines).wrap(Wrap { trim: false }), inner);
+            return;
+        }
+        let words = match (table.started, table.turn) {
+            (false, _) => waiting(table),
+            (true, Some(seat)) if me == Some(seat) => "The board is empty: you lead.".to_owned(),
+            (true, Some(seat)) => format!("The board is empty: {} leads.", table.name(seat)),
+            (true, None) => "The board is empty.".to_owned(),
+        };
+        let lines = vec![Line::default(), Line::from(format!("  {words}"))];
+        frame.render_widget(Paragraph::new(lines), inner);
+        return;
+    };
+    let faces = table.faces();
+    let [first, second, third] = fan(look, faces, play);
+    let width = u16::try_from(first.width())
+        .unwrap_or(u16::MAX)
+        .saturating_add(1);
+    let [left, right] = Layout::horizontal([
+        Constraint::Length(width.min(inner.width)),
+        Constraint::Min(0),
+    ])
+    .areas(inner);
+    frame.render_widget(Paragraph::new(vec![first, second, third]), left);
+    let size = play.quantity.saturating_add(play.jokers);
+    let name = if me == Some(play.seat) {
+        "you".to_owned()
+    } else {
+        table.name(play.seat)
+    };
+    let what = ingredient(play.face, faces).map_or_else(String::new, |name| format!(" ({name})"));
+    let beat = match play.face {
+        1 => "Nothing is rarer than face 1.".to_owned(),
+        face => format!(
+            "Beaten by a face below {face}, {} or more.",
+            counted(u64::from(size), "card")
+        ),
+    };
+    let lines = vec![
+        Line::from(vec![
+            Span::raw(" "),
+            Span::styled(name, look.seat(play.seat)),
+            Span::raw(" played"),
+        ]),
+        Line::from(Span::styled(
+            format!(
+                " {}{what}",
+                play_words(play.face, play.quantity, play.jokers, faces)
+            ),
+            look.bold(),
+        )),
+        Line::from(format!(" {beat}")),
+    ];
+    frame.render_widget(Paragraph::new(lines), right);
+}
+
+/// What matters between two Shifts: how the last one ended, and what that makes of the person.
+fn between(look: Look, table: &Table, me: Option<u32>) -> Vec<Line<'static>> {
+    let last = table.shift.saturating_sub(1);
+    let mut spans = vec![Span::raw(format!("  Shift {last} ended: "))];
+    for (place, seat) in (1u32..).zip(&table.last_order) {
+        let dot = if place > 1 { " · " } else { "" };
+        spans.push(Span::raw(format!("{dot}{} ", ordinal(place))));
+        spans.push(Span::styled(table.name(*seat), look.seat(*seat)));
+    }
+    let mine = me.and_then(|me| table.seat(me)).map(|place| place.role);
+    let role = match mine {
+        Some(role) if role != v1::Role::Unspecified => format!(" You are {}.", title(role)),
+        _ => String::new(),
+    };
+    let now = format!("  Shift {} is dealt.{role}", table.shift);
+    vec![Line::from(now), Line::from(spans)]
+}
+
+/// A play in words: `2 × 7 + 1 joker`.
+pub(crate) fn play_words(face: u32, quantity: u32, jokers: u32, faces: u32) -> String {
+    if face > faces || quantity == 0 {
+        return "a joker alone".to_owned();
+    }
+    match jokers {
+        0 => format!("{quantity} × {face}"),
+        jokers => format!(
+            "{quantity} × {face} + {}",
+            counted(u64::from(jokers), "joker")
+        ),
+    }
+}
+
+fn waiting(table: &Table) -> String {
+    match table.free_seats() {
+        0 if table.seats.is_empty() => "Waiting for the table to be told.".to_owned(),
+        0 => "All seats are taken: the game is about to begin.".to_owned(),
+        free => format!(
+            "Waiting for {} to be taken.",
+            counted(u64::try_from(free).unwrap_or(0), "seat")
+        ),
+    }
+}

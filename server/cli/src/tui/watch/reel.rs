@@ -1,0 +1,184 @@
+//! The events of a game as a reel that is wound to and fro: where it stands, how fast it runs, whether hands are shown. Events, keys and the
+//! time go in; how it looks is in `view`.
+
+use chefshat_client::v1::{self, game_event::Kind};
+use ratatui::crossterm::event::KeyCode;
+
+use crate::tui::log::Scroll;
+use crate::tui::screen::Key;
+use crate::tui::table::Table;
+
+/// Milliseconds for an event at each speed, slowest first.
+const PACES_MS: [u64; 7] = [4000, 2000, 1000, 500, 250, 100, 25];
+/// The standard speed.
+const STANDARD_PACE: usize = 2;
+
+/// A reel.
+#[derive(Debug)]
+pub(super) struct Reel {
+    /// The table before the first event.
+    start: Table,
+    events: Vec<v1::GameEvent>,
+    /// How many events the table has taken.
+    pub(super) at: usize,
+    pub(super) table: Table,
+    pub(super) running: bool,
+    pace: usize,
+    /// When it last moved by itself.
+    moved_ms: u64,
+    /// More events may come.
+    pub(super) live: bool,
+    /// Why no more come although the game has not ended.
+    pub(super) lost: Option<String>,
+    pub(super) hands: bool,
+    pub(super) help: bool,
+    /// How far back the person looks at what happened.
+    pub(super) scroll: Scroll,
+    pub(super) left: bool,
+}
+
+impl Reel {
+    /// Of a game that is over: from its first deal, running.
+    pub(super) fn recorded(start: Table, events: Vec<v1::GameEvent>) -> Self {
+        let first = events.iter().position(is_deal).map_or(0, |at| at + 1);
+        let mut reel = Self::new(start, events, false);
+        reel.wind_to(first);
+        reel
+    }
+
+    /// Of a game that is being played: at its newest event.
+    pub(super) fn live(start: Table) -> Self {
+        Self::new(start, Vec::new(), true)
+    }
+
+    fn new(start: Table, events: Vec<v1::GameEvent>, live: bool) -> Self {
+        Self {
+            table: start.clone(),
+            start,
+            events,
+            at: 0,
+            running: true,
+            pace: STANDARD_PACE,
+            moved_ms: 0,
+            live,
+            lost: None,
+            hands: !live,
+            help: false,
+            scroll: Scroll::default(),
+            left: false,
+        }
+    }
+
+    /// How many events there are.
+    pub(super) fn len(&self) -> usize {
+        self.events.len()
+    }
+
+    /// Events a second.
+    pub(super) fn per_second(&self) -> f64 {
+        // At most 4000: exact.
+        1000.0 / f64::from(u32::try_from(PACES_MS[self.pace]).unwrap_or(u32::MAX))
+    }
+
+    /// An event of a game that is being played: shown at once by a reel that stands at its end and runs.
+    pub(super) fn push(&mut self, event: v1::GameEvent) {
+        let follows = self.running && self.at == self.events.len();
+        self.events.push(event);
+        if follows {
+            self.wind_to(self.events.len());
+        }
+    }
+
+    /// No more events will come; why, if the game has not ended.
+    pub(super) fn close(&mut self, why: Option<String>) {
+        self.live = false;
+        self.lost = why;
+    }
+
+    /// Lets it run; says whether it moved.
+    pub(super) fn tick(&mut self, now_ms: u64) -> bool {
+        let due = now_ms.saturating_sub(self.moved_ms) >= PACES_MS[self.pace];
+        if !self.running || !due || self.at == self.events.len() {
+            return false;
+        }
+        self.moved_ms = now_ms;
+        self.wind_to(self.at + 1);
+        true
+    }
+
+    /// Takes a key.
+    pub(super) fn key(&mut self, key: Key, now_ms: u64) {
+        let code = match key {
+            Key::Resized => return,
+            Key::Interrupt => {
+                self.left = true;
+                return;
+            }
+            Key::Code(code) => code,
+        };
+        if std::mem::take(&mut self.help) {
+            return;
+        }
+        if self.scroll.key(code, &self.table) {
+            // What is read does not run away.
+            self.running &= !self.scroll.is_open();
+            return;
+        }
+        self.moved_ms = now_ms;
+        match code {
+            KeyCode::Char('q') | KeyCode::Esc => self.left = true,
+            KeyCode::Char('?') => self.help = true,
+            KeyCode::Char('h') => self.hands = !self.hands,
+            KeyCode::Char(' ') => self.running = !self.running,
+            KeyCode::Up | KeyCode::Char('+') => {
+                self.pace = (self.pace + 1).min(PACES_MS.len() - 1);
+            }
+            KeyCode::Down | KeyCode::Char('-') => self.pace = self.pace.saturating_sub(1),
+            KeyCode::Left => self.stop_at(self.at.saturating_sub(1)),
+            KeyCode::Right => self.stop_at(self.at + 1),
+            KeyCode::Char('S') => self.stop_at(self.shift_before()),
+            KeyCode::Char('s') => self.stop_at(self.shift_after()),
+            KeyCode::Home => self.stop_at(0),
+            KeyCode::End => {
+                self.wind_to(self.events.len());
+                // A live game is followed from here on.
+                self.running = self.live;
+            }
+            _ => {}
+        }
+    }
+
+    fn stop_at(&mut self, at: usize) {
+        self.running = false;
+        self.wind_to(at);
+    }
+
+    /// Where the last deal before the present event was.
+    fn shift_before(&self) -> usize {
+        let before = &self.events[..self.at.saturating_sub(1)];
+        before.iter().rposition(is_deal).map_or(0, |at| at + 1)
+    }
+
+    /// Where the next deal is.
+    fn shift_after(&self) -> usize {
+        let after = self.events[self.at..].iter().position(is_deal);
+        after.map_or(self.events.len(), |at| self.at + at + 1)
+    }
+
+    /// Makes the table what it was after so many events.
+    fn wind_to(&mut self, at: usize) {
+        let at = at.min(self.events.len());
+        if at < self.at {
+            self.table = self.start.clone();
+            self.at = 0;
+        }
+        for event in &self.events[self.at..at] {
+            self.table.apply(event);
+        }
+        self.at = at;
+    }
+}
+
+fn is_deal(event: &v1::GameEvent) -> bool {
+    matches!(event.kind, Some(Kind::ShiftStarted(_)))
+}

@@ -1,0 +1,126 @@
+//! The screen of `chefshat watch`: the table, below it the hands where they are known, and the reel.
+
+use ratatui::Frame;
+use ratatui::layout::{Constraint, Layout, Rect};
+use ratatui::text::{Line, Span};
+use ratatui::widgets::Paragraph;
+
+use super::reel::Reel;
+use crate::narrator::MAX_NAME;
+use crate::tui::hand::Hand;
+use crate::tui::look::Look;
+use crate::tui::table::Table;
+use crate::tui::view::{boxed, draw as draw_table, end_lines, padded, popup};
+
+const KEYS: &str = " space stop  ←→ step  ↑↓ speed  s S Shift  PgUp story  h hands  ? keys  q end";
+
+const HELP: [&str; 10] = [
+    "space        stops, and runs again",
+    "← →          one event back, one on",
+    "s S          to the next deal, to the one before",
+    "PgUp PgDn    back and on in what happened",
+    "Home End     to the beginning, to the end (and follow a live game)",
+    "↑ ↓          faster, slower",
+    "h            shows or hides the hands (known once a game is over)",
+    "q            ends",
+    "",
+    "any key goes back",
+];
+
+/// Draws everything.
+pub(super) fn draw(frame: &mut Frame<'_>, look: Look, reel: &Reel) {
+    let table = &reel.table;
+    let seats = u16::try_from(table.seats.len()).unwrap_or(0);
+    let hands = if reel.hands {
+        seats.saturating_add(2)
+    } else {
+        0
+    };
+    // The pizza and the story need the rest; six hands at the least height leave the keys out, which ? tells too.
+    let rows = hands.saturating_add(2);
+    let status = match (reel.live, reel.running) {
+        (true, _) if reel.at < reel.len() => "● live, behind",
+        (true, true) => "● live",
+        (_, false) => "‖ stopped",
+        (false, true) if reel.at == reel.len() => "■ the end",
+        (false, true) => "▶ running",
+    };
+    let Some(area) = draw_table(frame, look, table, None, status, reel.scroll, rows) else {
+        return;
+    };
+    let [hands, bar, keys] = Layout::vertical([
+        Constraint::Length(hands),
+        Constraint::Length(1),
+        Constraint::Length(1),
+    ])
+    .areas(area);
+    if reel.hands {
+        draw_hands(frame, look, table, hands);
+    }
+    draw_bar(frame, look, reel, bar);
+    frame.render_widget(Paragraph::new(KEYS).style(look.dim()), keys);
+    if reel.help {
+        let lines = HELP.iter().map(|line| Line::from(*line)).collect();
+        popup(frame, look, "help", lines);
+    } else if let (Some(end), true, false) =
+        (&table.end, reel.at == reel.len(), reel.scroll.is_open())
+    {
+        let mut lines = end_lines(look, table, end);
+        lines.push(Line::default());
+        lines.push(Line::from(format!("game {}", table.game_id)));
+        popup(frame, look, "the game is over", lines);
+    }
+}
+
+fn draw_hands(frame: &mut Frame<'_>, look: Look, table: &Table, area: Rect) {
+    let lines = (0u32..).zip(&table.seats).map(|(seat, place)| {
+        let name = Span::styled(padded(&table.name(seat), MAX_NAME + 1), look.seat(seat));
+        let mut spans = vec![Span::raw(" "), name];
+        match &place.hand {
+            Some(hand) => spans.extend(cards(look, table.faces(), hand)),
+            None if table.started => spans.push(Span::styled(
+                "not shown while the game is played",
+                look.dim(),
+            )),
+            None => {}
+        }
+        Line::from(spans)
+    });
+    let lines: Vec<Line<'_>> = lines.collect();
+    frame.render_widget(Paragraph::new(lines).block(boxed(look, " hands ")), area);
+}
+
+/// A hand in a line: `2 5×3 11×2★ J`.
+fn cards(look: Look, faces: u32, hand: &Hand) -> Vec<Span<'static>> {
+    let stacks = hand.stacks().into_iter();
+    stacks
+        .map(|stack| {
+            let face = if stack.joker {
+                "J".to_owned()
+            } else {
+                stack.face.to_string()
+            };
+            let count = match stack.count {
+                1 => String::new(),
+                count => format!("×{count}"),
+            };
+            let star = if stack.golden { "★" } else { "" };
+            let style = look.card(stack.face, faces);
+            Span::styled(format!("{face}{count}{star} "), style)
+        })
+        .collect()
+}
+
+fn draw_bar(frame: &mut Frame<'_>, look: Look, reel: &Reel, area: Rect) {
+    if let Some(why) = &reel.lost {
+        let words = format!(" ! nothing more comes: {why}");
+        frame.render_widget(Paragraph::new(words).style(look.warning()), area);
+        return;
+    }
+    let words = format!(" {}/{} · {}/s ", reel.at, reel.len(), reel.per_second());
+    let room = usize::from(area.width).saturating_sub(words.chars().count() + 2);
+    let filled = (room * reel.at).checked_div(reel.len()).unwrap_or(0);
+    let bar = format!(" {}{}", "━".repeat(filled), "─".repeat(room - filled));
+    let line = Line::from(vec![Span::styled(bar, look.frame()), Span::raw(words)]);
+    frame.render_widget(Paragraph::new(line), area);
+}

@@ -1,0 +1,222 @@
+//! `chefshat verify`: replays records and names the first line that does not fit. What is checked is decided in `chefshat-records`; here
+//! files are found, checked on all cores, and told of.
+
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use chefshat_proto::v1::{self, record_line::Line};
+use chefshat_record::files::find_records;
+use chefshat_record::jsonl;
+use chefshat_record::jsonl::RecordFileError;
+use chefshat_record::replay::{Replayed, replay};
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use rayon::prelude::*;
+use serde_json::{Value, json};
+
+use super::numbers::counted;
+use super::{CommandError, data_dir};
+
+const HELP: &str = "\
+Everything is checked that can be: the seed against the commitment, every deal, whose decision it was and what was legal, every event, \
+reward, score and count. docs/records.md describes the form.
+
+Exit code 0: all records fit. 1: one does not, or there is none.
+
+Examples:
+  chefshat verify
+  chefshat verify ./chefshat-data/records game.jsonl
+  chefshat verify --data-dir ./chefshat-data --json";
+
+/// Records checked before they are told of: as many at a time keep all cores busy, and whoever watches sees them come.
+const AT_A_TIME: usize = 64;
+
+/// Replay records and name the first line that does not fit.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub(super) struct Verify {
+    /// Records, or folders of records (*.jsonl). Standard: the records of the data folder.
+    #[arg(value_name = "PATH")]
+    paths: Vec<PathBuf>,
+    /// Data folder whose records are checked when no PATH is named. Standard: chefshat in the user's data folder.
+    #[arg(long, env = "CHEFSHAT_DATA_DIR")]
+    data_dir: Option<PathBuf>,
+    /// Print one JSON object a record.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What a record says that fits.
+struct Fits {
+    header: v1::RecordHeader,
+    replayed: Replayed,
+}
+
+/// Why a file is no record that fits.
+struct Problem {
+    /// The first line that does not fit, from 1; none where the file could not be read.
+    line: Option<usize>,
+    problem: String,
+}
+
+impl Verify {
+    pub(super) fn run(self) -> Result<ExitCode, CommandError> {
+        let paths = if self.paths.is_empty() {
+            vec![data_dir::name(self.data_dir)?.join("records")]
+        } else {
+            self.paths
+        };
+        let files: Vec<PathBuf> = find_records(&paths)?
+            .into_iter()
+            .map(|file| file.path)
+            .collect();
+        let bar = ProgressBar::new(files.len().try_into().unwrap_or(u64::MAX)).with_style(
+            ProgressStyle::with_template(
+                "{bar:40} {human_pos} of {human_len} records, {eta} left",
+            )?,
+        );
+        let (mut fitting, mut decisions) = (0usize, 0u64);
+        for files in files.chunks(AT_A_TIME) {
+            let checked: Vec<_> = files
+                .par_iter()
+                .map(|file| {
+                    let checked = check(file);
+                    bar.inc(1);
+                    (file, checked)
+                })
+                .collect();
+            for (_, fits) in checked
+                .iter()
+                .filter_map(|(file, checked)| Some((file, checked.as_ref().ok()?)))
+            {
+                fitting += 1;
+                decisions += fits.replayed.decisions;
+            }
+            bar.suspend(|| tell(&checked, self.json))?;
+        }
+        bar.finish_and_clear();
+        if !self.json {
+            let mut out = anstream::stdout().lock();
+            match files.len() - fitting {
+                0 => writeln!(
+                    out,
+                    "{} {}, {}",
+                    counted(files.len() as u64, "record"),
+                    if fitting == 1 { "fits" } else { "fit" },
+                    counted(decisions, "decision")
+                )?,
+                wrong => writeln!(out, "{wrong} of {} records do not fit", files.len())?,
+            }
+        }
+        Ok(if fitting == files.len() {
+            ExitCode::SUCCESS
+        } else {
+            ExitCode::FAILURE
+        })
+    }
+}
+
+/// Reads and replays a record.
+fn check(file: &Path) -> Result<Fits, Problem> {
+    let lines = jsonl::read(file).map_err(|error| match error {
+        RecordFileError::Io { source, .. } => Problem {
+            line: None,
+            problem: source.to_string(),
+        },
+        RecordFileError::Line { line, problem, .. } => Problem {
+            line: Some(line),
+            problem: format!("the line {problem}"),
+        },
+    })?;
+    let replayed = replay(&lines).map_err(|error| Problem {
+        line: Some(error.line),
+        problem: error.problem,
+    })?;
+    match lines.into_iter().next().and_then(|line| line.line) {
+        Some(Line::Header(header)) => Ok(Fits { header, replayed }),
+        _ => unreachable!("a record that replays begins with its header"),
+    }
+}
+
+/// How the deals of a record were checked, in words.
+pub(super) fn deals(header: &v1::RecordHeader) -> &'static str {
+    use v1::GameOrigin::{Branched, Imported, Scripted};
+    let committed = !header.seed_commitment.is_empty();
+    match (header.origin(), committed) {
+        (Imported, _) => "cards of a real table, as far as they are known",
+        (Scripted, true) => "first hands scripted, then a committed seed",
+        (Scripted, false) => "first hands scripted, then a fixed seed",
+        (Branched, true) => "branched from a record, then a committed seed",
+        (Branched, false) => "branched from a record, then a fixed seed",
+        (_, true) => "committed seed",
+        (_, false) => "fixed seed",
+    }
+}
+
+/// How the game ended, in a word.
+pub(super) fn ending(replayed: &Replayed) -> &'static str {
+    match replayed.state {
+        v1::RoomState::Finished => "finished",
+        _ => "aborted",
+    }
+}
+
+fn tell(checked: &[(&PathBuf, Result<Fits, Problem>)], json: bool) -> Result<(), CommandError> {
+    let mut out = anstream::stdout().lock();
+    for (file, checked) in checked {
+        let name = file.display();
+        match (checked, json) {
+            (checked, true) => writeln!(out, "{}", json_report(file, checked))?,
+            (Ok(Fits { header, replayed }), false) => writeln!(
+                out,
+                "{name}: fits: {}, {} decisions, {} events, {}",
+                ending(replayed),
+                replayed.decisions,
+                replayed.events,
+                deals(header)
+            )?,
+            (
+                Err(Problem {
+                    line: Some(line),
+                    problem,
+                }),
+                false,
+            ) => {
+                writeln!(out, "{name}: line {line}: {problem}")?;
+            }
+            (
+                Err(Problem {
+                    line: None,
+                    problem,
+                }),
+                false,
+            ) => writeln!(out, "{name}: {problem}")?,
+        }
+    }
+    Ok(())
+}
+
+fn json_report(file: &Path, checked: &Result<Fits, Problem>) -> Value {
+    let file = file.display().to_string();
+    match checked {
+        Ok(Fits { header, replayed }) => json!({
+            "file": file,
+            "fits": true,
+            "game_id": header.game_id,
+            "state": ending(replayed),
+            "decisions": replayed.decisions,
+            "events": replayed.events,
+            "origin": header.origin().as_str_name(),
+            "seed_committed": !header.seed_commitment.is_empty(),
+            "line": null,
+            "problem": null,
+        }),
+        Err(Problem { line, problem }) => json!({
+            "file": file,
+            "fits": false,
+            "line": line,
+            "problem": problem,
+        }),
+    }
+}

@@ -1,0 +1,159 @@
+//! `chefshat conformance`: the vectors agree; damage and foreign files are named, with exit code 1. What kinds of damage are found is
+//! tested in `chefshat-arena`.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::{Value, json};
+use tempfile::TempDir;
+
+use super::run::chefshat;
+
+fn vectors(file: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../tests/fixtures/vectors")
+        .join(file)
+}
+
+/// A copy of the first lines of a file of vectors, the last of them changed.
+fn damaged(folder: &TempDir, file: &str, lines: usize, damage: impl FnOnce(&mut Value)) -> PathBuf {
+    let text = std::fs::read_to_string(vectors(file)).unwrap();
+    let mut lines: Vec<String> = text.lines().take(lines).map(str::to_owned).collect();
+    let last = lines.last_mut().unwrap();
+    let mut vector = serde_json::from_str(last).unwrap();
+    damage(&mut vector);
+    *last = vector.to_string();
+    let path = folder.path().join(file);
+    std::fs::write(&path, lines.join("\n")).unwrap();
+    path
+}
+
+fn conformance(path: &Path, flags: &[&str]) -> super::run::Ended {
+    let mut arguments = vec!["conformance", path.to_str().unwrap()];
+    arguments.extend(flags);
+    chefshat(&arguments)
+}
+
+#[test]
+fn the_vectors_agree() {
+    for (file, expected, counts) in [
+        (
+            "games.jsonl",
+            "all agree: 57 games (29553 decisions)",
+            (0, 57, 29_553),
+        ),
+        ("deals.jsonl", "all agree: 87 deals", (87, 0, 0)),
+    ] {
+        let ended = conformance(&vectors(file), &[]);
+        assert_eq!((ended.code, ended.stderr.as_str()), (Some(0), ""), "{file}");
+        assert!(
+            ended.stdout.trim_end().ends_with(expected),
+            "{}",
+            ended.stdout
+        );
+
+        let ended = conformance(&vectors(file), &["--json"]);
+        assert_eq!(ended.code, Some(0), "{file}");
+        let result: Value = serde_json::from_str(&ended.stdout).unwrap();
+        assert_eq!(
+            (
+                &result["agree"],
+                &result["disagreement"],
+                &result["problem"]
+            ),
+            (&json!(true), &Value::Null, &Value::Null)
+        );
+        assert_eq!(
+            (
+                result["deals"].clone(),
+                result["games"].clone(),
+                result["decisions"].clone()
+            ),
+            (json!(counts.0), json!(counts.1), json!(counts.2))
+        );
+    }
+}
+
+#[test]
+fn the_first_vector_that_does_not_agree_is_named() {
+    let folder = TempDir::new().unwrap();
+    let path = damaged(&folder, "games.jsonl", 3, |game| {
+        game["steps"][5][2] = json!([1, 199])
+    });
+    let ended = conformance(&path, &[]);
+    assert_eq!((ended.code, ended.stderr.as_str()), (Some(1), ""));
+    for expected in [
+        "line 3, step 5",
+        "where     steps[5], legal actions",
+        "expected  [1, 199]",
+        "got       [",
+        "before it: 2 games",
+    ] {
+        assert!(
+            ended.stdout.contains(expected),
+            "{expected}: {}",
+            ended.stdout
+        );
+    }
+
+    let ended = conformance(&path, &["--json"]);
+    assert_eq!(ended.code, Some(1));
+    let result: Value = serde_json::from_str(&ended.stdout).unwrap();
+    assert_eq!(
+        (&result["agree"], &result["games"]),
+        (&json!(false), &json!(2))
+    );
+    assert_eq!(
+        (
+            &result["disagreement"]["line"],
+            &result["disagreement"]["step"]
+        ),
+        (&json!(3), &json!(5))
+    );
+
+    let path = damaged(&folder, "deals.jsonl", 4, |deal| deal["leader"] = json!(9));
+    let ended = conformance(&path, &[]);
+    assert_eq!(ended.code, Some(1));
+    assert!(
+        ended.stdout.contains("line 4 does not agree") && ended.stdout.contains("where     leader"),
+        "{}",
+        ended.stdout
+    );
+}
+
+#[test]
+fn what_is_no_file_of_vectors_is_refused() {
+    let folder = TempDir::new().unwrap();
+    let write = |name: &str, text: &[u8]| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        path
+    };
+    let table = [
+        (folder.path().join("missing.jsonl"), "No such file"),
+        (folder.path().to_owned(), "is a folder"),
+        (write("empty", b""), "there are no vectors in it"),
+        (
+            write("binary", &[0, 159, 146, 150]),
+            "line 1 is not a vector: it is no JSON",
+        ),
+        (
+            write("foreign", b"{\"name\": \"chefshat\"}"),
+            "line 1 is not a vector: it is neither a game",
+        ),
+    ];
+    for (path, expected) in table {
+        let ended = conformance(&path, &[]);
+        assert_eq!(
+            (ended.code, ended.stdout.as_str()),
+            (Some(1), ""),
+            "{}",
+            path.display()
+        );
+        assert!(ended.stderr.contains(expected), "{}", ended.stderr);
+        assert!(
+            ended.stderr.contains(path.to_str().unwrap()),
+            "{}",
+            ended.stderr
+        );
+    }
+}

@@ -1,0 +1,140 @@
+//! `chefshat import`: transcripts and records of other servers come to lie among the records of a data folder, once. What a transcript may
+//! say, and what is refused, is tested in `chefshat-records`.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+use super::run::{Ended, chefshat};
+
+/// A game of two players that was watched to its end.
+pub(super) const TRANSCRIPT: &str = "\
+shift,seat,what,value
+,,rules,paper players=2 faces=4 jokers=0 target_shifts=1
+,0,human,Ana
+,1,robot,Pepper
+1,0,plays,4 G
+1,1,plays,2 2
+1,0,passes,
+1,1,plays,4 4
+1,0,plays,3 3
+1,1,passes,
+1,0,plays,1
+";
+
+fn fixture(file: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../tests/fixtures/records")
+        .join(file)
+}
+
+fn transcript(folder: &TempDir, text: &str) -> PathBuf {
+    let path = folder.path().join("table.csv");
+    std::fs::write(&path, text).unwrap();
+    path
+}
+
+fn import(file: &Path, flags: &[&str]) -> Ended {
+    let mut arguments = vec!["import", file.to_str().unwrap()];
+    arguments.extend(flags);
+    chefshat(&arguments)
+}
+
+#[test]
+fn a_transcript_becomes_a_record_that_fits() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = transcript(&folder, TRANSCRIPT);
+    let data_dir = folder.path().join("data");
+    let flags = ["--data-dir", data_dir.to_str().unwrap()];
+
+    let ended = import(&file, &[&flags[..], &["--json"]].concat());
+    assert_eq!((ended.code, ended.stderr.as_str()), (Some(0), ""));
+    let told: Value = serde_json::from_str(&ended.stdout).unwrap();
+    let game_id = told["game_id"].as_str().unwrap();
+    let path = data_dir.join("records").join(format!("{game_id}.jsonl"));
+    assert_eq!(told["file"], path.to_str().unwrap());
+    assert_eq!(
+        (&told["origin"], &told["state"], &told["decisions"]),
+        (
+            &"GAME_ORIGIN_IMPORTED".into(),
+            &"finished".into(),
+            &7.into()
+        )
+    );
+
+    let ended = chefshat(&["verify", flags[0], flags[1]]);
+    assert_eq!(ended.code, Some(0), "{}", ended.stdout);
+    assert!(
+        ended
+            .stdout
+            .contains("fits: finished, 7 decisions, 16 events, cards of a real table"),
+        "{}",
+        ended.stdout
+    );
+
+    // The same transcript is the same game.
+    let before = std::fs::read(&path).unwrap();
+    let ended = import(&file, &flags);
+    assert_eq!((ended.code, ended.stdout.as_str()), (Some(1), ""));
+    assert!(
+        ended.stderr.contains("is there already"),
+        "{}",
+        ended.stderr
+    );
+    assert_eq!(std::fs::read(&path).unwrap(), before);
+}
+
+#[test]
+fn a_row_that_cannot_be_is_named_and_nothing_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = transcript(&folder, &TRANSCRIPT.replace("1,0,plays,3 3", "1,0,plays,3"));
+    let out = folder.path().join("out");
+    let ended = import(&file, &["--out", out.to_str().unwrap()]);
+    assert_eq!((ended.code, ended.stdout.as_str()), (Some(1), ""));
+    assert!(
+        ended.stderr.contains("table.csv: line 9: ") && ended.stderr.contains("at least 2 cards"),
+        "{}",
+        ended.stderr
+    );
+    assert!(!out.exists());
+}
+
+#[test]
+fn a_record_of_another_server_is_verified_and_placed() {
+    let folder = tempfile::tempdir().unwrap();
+    let data_dir = folder.path().join("data");
+    let flags = ["--data-dir", data_dir.to_str().unwrap()];
+    let ended = import(&fixture("committed.jsonl"), &flags);
+    assert_eq!((ended.code, ended.stderr.as_str()), (Some(0), ""));
+    let placed = data_dir.join("records/22b73f3bba773c1120e1858de68cd801.jsonl");
+    assert!(
+        ended.stdout.contains(placed.to_str().unwrap()),
+        "{}",
+        ended.stdout
+    );
+    let values = |path: &Path| -> Vec<Value> {
+        let text = std::fs::read_to_string(path).unwrap();
+        let lines = text.lines();
+        lines
+            .map(|line| serde_json::from_str(line).unwrap())
+            .collect()
+    };
+    assert_eq!(values(&placed), values(&fixture("committed.jsonl")));
+
+    let damaged = folder.path().join("damaged.jsonl");
+    let text = std::fs::read_to_string(fixture("fixed.jsonl")).unwrap();
+    std::fs::write(
+        &damaged,
+        text.replacen("\"sequence\":\"5\"", "\"sequence\":\"6\"", 1),
+    )
+    .unwrap();
+    let ended = import(&damaged, &flags);
+    assert_eq!((ended.code, ended.stdout.as_str()), (Some(1), ""));
+    assert!(
+        ended.stderr.contains("sequence is 6 and must be 5"),
+        "{}",
+        ended.stderr
+    );
+    assert_eq!(data_dir.join("records").read_dir().unwrap().count(), 1);
+}

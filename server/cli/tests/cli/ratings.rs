@@ -1,0 +1,126 @@
+//! `chefshat ratings`: a leaderboard of the games that a server dealt and that all played themselves, of each once.
+
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+use tempfile::TempDir;
+
+use super::run::chefshat;
+use super::server::{json as json_of, run, serve};
+
+const AGENTS: [&str; 4] = ["greedy", "random", "random_unmasked", "trained"];
+
+fn fixtures() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/fixtures/records")
+}
+
+/// A data folder with the records of so many games that the server played with its own agents, and the server's own leaderboard.
+fn played(games: usize) -> (TempDir, Value) {
+    let folder = TempDir::new().unwrap();
+    let (_server, url) = serve(folder.path());
+    for _ in 0..games {
+        let mut create = vec!["room", "create", "--target-shifts", "1"];
+        create.extend(AGENTS.iter().flat_map(|agent| ["--seat", agent]));
+        let made = run(&url, &create);
+        assert_eq!(made.status.code(), Some(0), "{made:?}");
+    }
+    let records = folder.path().join("records");
+    let long_enough = Instant::now() + Duration::from_secs(60);
+    let filed = || {
+        let files = std::fs::read_dir(&records).into_iter().flatten();
+        let names = files.map(|file| file.unwrap().file_name().into_string().unwrap());
+        names.filter(|name| name.ends_with(".jsonl")).count()
+    };
+    while filed() < games {
+        assert!(Instant::now() < long_enough, "the games were not filed");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    let board = json_of(&run(&url, &["leaderboard", "--json"]));
+    (folder, board)
+}
+
+#[test]
+fn a_leaderboard_is_recomputed_from_the_records() {
+    let (folder, board) = played(12);
+    let data_dir = folder.path().to_str().unwrap();
+    let fixtures = fixtures();
+    let records = folder.path().join("records");
+    let (records, fixtures) = (records.to_str().unwrap(), fixtures.to_str().unwrap());
+    // The folder of twice the same records holds each game once.
+    let copies = folder.path().join("copies");
+    std::fs::create_dir(&copies).unwrap();
+    for file in std::fs::read_dir(records).unwrap() {
+        let file = file.unwrap();
+        std::fs::copy(file.path(), copies.join(file.file_name())).unwrap();
+    }
+    let copies = copies.to_str().unwrap();
+
+    let told = chefshat(&["ratings", "--json", records, fixtures, copies])
+        .well()
+        .json();
+    assert_eq!(told["records"], 14);
+    assert_eq!(told["rated_games"], 12);
+    assert_eq!(told["not_rated"], json!({"substituted": 1, "not_dealt": 1}));
+    // Whoever has the records comes to the same numbers as the server.
+    assert_eq!(board["rated_games"], told["rated_games"]);
+    assert_eq!(board["leaderboard"], told["leaderboard"]);
+    let lines = told["leaderboard"].as_array().unwrap();
+    let mut names: Vec<&str> = lines
+        .iter()
+        .map(|line| line["name"].as_str().unwrap())
+        .collect();
+    names.sort_unstable();
+    assert_eq!(names, AGENTS);
+    let bound =
+        |line: &Value| line["mean"].as_f64().unwrap() - 2.0 * line["deviation"].as_f64().unwrap();
+    for (two, place) in lines.windows(2).zip(1..) {
+        assert!(bound(&two[0]) >= bound(&two[1]), "{two:?}");
+        assert_eq!(two[0]["place"], place);
+    }
+    for line in lines {
+        assert_eq!(
+            (&line["games"], &line["kind"]),
+            (&json!(12), &json!("built-in"))
+        );
+        let places = line["places"].as_array().unwrap().iter();
+        assert_eq!(places.map(|times| times.as_u64().unwrap()).sum::<u64>(), 12);
+    }
+
+    let table = chefshat(&["ratings", "--data-dir", data_dir]).well();
+    table.assert_table_fits(5);
+    assert!(table.stdout.starts_with("12 rated games of 12 records\n"));
+    let sheet = chefshat(&["ratings", "--csv", records]).well().stdout;
+    assert_eq!(sheet.lines().count(), 5, "{sheet}");
+    assert!(sheet.starts_with("place,name,kind,mean,deviation,games,place_1,"));
+    for flags in [["--kind", "human"], ["--min-games", "13"]] {
+        let nobody = chefshat(&["ratings", "--json", records, flags[0], flags[1]]);
+        assert_eq!(nobody.well().json()["leaderboard"], json!([]));
+    }
+}
+
+#[test]
+fn damaged_records_are_named_and_left_out_on_request() {
+    let folder = TempDir::new().unwrap();
+    let damaged = folder.path().join("damaged.jsonl");
+    let whole = std::fs::read_to_string(fixtures().join("fixed.jsonl")).unwrap();
+    std::fs::write(&damaged, whole.replace("\"place\":2", "\"place\":3")).unwrap();
+    let (damaged, fixtures) = (damaged.to_str().unwrap(), fixtures());
+    let fixtures = fixtures.to_str().unwrap();
+    let refused = chefshat(&["ratings", damaged, fixtures]);
+    refused.assert_refused("damaged.jsonl: ");
+    refused.assert_refused("--skip-damaged");
+    let told = chefshat(&["ratings", "--json", "--skip-damaged", damaged, fixtures]).well();
+    assert!(told.stderr.contains("damaged.jsonl"), "{}", told.stderr);
+    let told = told.json();
+    assert_eq!((&told["records"], &told["damaged"]), (&json!(2), &json!(1)));
+}
+
+#[test]
+fn what_is_missing_is_said() {
+    let folder = TempDir::new().unwrap();
+    let data_dir = folder.path().to_str().unwrap();
+    chefshat(&["ratings", "--data-dir", data_dir]).assert_refused("--data-dir");
+    chefshat(&["ratings", data_dir]).assert_refused("holds no records");
+    chefshat(&["ratings", "--help"]).assert_helps("chefshat ratings ./chefshat-data/records");
+}

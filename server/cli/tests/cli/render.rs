@@ -1,0 +1,380 @@
+//! `chefshat render`: each kind of file comes out whole, of the size asked for; what cannot be drawn is said with what to do, and leaves
+//! nothing behind. What the pictures show is tested in `chefshat-records`.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::{Value, json};
+use tempfile::TempDir;
+
+use super::run::{Ended, chefshat};
+
+const DOCS: &str = include_str!("../../../../docs/pictures.md");
+
+fn fixture(file: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../tests/fixtures/records")
+        .join(file)
+}
+
+/// Draws the record of three players, small.
+fn render(out: &Path, flags: &[&str]) -> Ended {
+    let record = fixture("fixed.jsonl");
+    let mut arguments = vec!["render", record.to_str().unwrap()];
+    arguments.extend(["--out", out.to_str().unwrap(), "--width", "320"]);
+    arguments.extend(flags);
+    chefshat(&arguments)
+}
+
+fn files_in(folder: &TempDir) -> Vec<String> {
+    let mut names: Vec<String> = std::fs::read_dir(folder.path())
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    names
+}
+
+/// Width and height in the head of a PNG.
+fn png_size(bytes: &[u8]) -> (u32, u32) {
+    assert!(bytes.starts_with(b"\x89PNG\r\n\x1a\n"));
+    let number = |at: usize| u32::from_be_bytes(bytes[at..at + 4].try_into().unwrap());
+    (number(16), number(20))
+}
+
+#[test]
+fn pictures_are_of_the_size_asked_for() {
+    let folder = TempDir::new().unwrap();
+    for (name, flags, height) in [
+        ("end.png", &[][..], 200),
+        ("seat.png", &["--at", "57", "--seat", "2"], 200),
+        ("shift.png", &["--shift", "1", "--spectator"], 200),
+        ("figure.PNG", &["--at", "57", "--figure", "actions"], 226),
+    ] {
+        let out = folder.path().join(name);
+        let ended = render(&out, flags);
+        assert_eq!((ended.code, ended.stderr.as_str()), (Some(0), ""), "{name}");
+        let bytes = std::fs::read(&out).unwrap();
+        assert_eq!(png_size(&bytes), (320, height), "{name}");
+        let told = format!("{}: 320 × {height}, {} bytes\n", out.display(), bytes.len());
+        assert_eq!(ended.stdout, told);
+    }
+
+    // The same moment seen with other eyes is another picture, and the same one is the same.
+    let (one, other) = (folder.path().join("seat.png"), folder.path().join("b.png"));
+    render(&other, &["--at", "57", "--seat", "2"]);
+    assert_eq!(std::fs::read(&one).unwrap(), std::fs::read(&other).unwrap());
+    render(&other, &["--at", "57", "--seat", "1"]);
+    assert_ne!(std::fs::read(&one).unwrap(), std::fs::read(&other).unwrap());
+
+    let out = folder.path().join("end.svg");
+    let ended = render(&out, &["--json"]);
+    let svg = std::fs::read_to_string(&out).unwrap();
+    assert!(svg.starts_with("<svg ") && svg.trim_end().ends_with("</svg>"));
+    assert_eq!(
+        serde_json::from_str::<Value>(&ended.stdout).unwrap(),
+        json!({
+            "file": out.to_str().unwrap(),
+            "kind": "svg",
+            "width": 320,
+            "height": 200,
+            "frames": 1,
+            "seconds": 0.0,
+            "bytes": svg.len(),
+        })
+    );
+    assert!(
+        files_in(&folder)
+            .iter()
+            .all(|name| !name.ends_with(".part"))
+    );
+}
+
+#[test]
+fn letters_that_the_font_lacks_are_no_reason_to_complain() {
+    let folder = TempDir::new().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (transcript, record) = (path("table.csv"), path("table.jsonl"));
+    let written = "shift,seat,what,value,label
+,,table,厨房 Kitchen,
+,,rules,paper players=2 faces=4 jokers=1 target_shifts=1,
+,0,human,料理長,
+,1,robot,Ορέστης 👩‍🍳,
+1,0,hand,1 3 3 4 G,
+1,0,plays,4 G,
+1,0,expresses,,驚き
+1,1,plays,2 2,
+1,0,passes,,
+1,1,plays,4 J,
+1,0,plays,3 3,
+1,1,passes,,
+1,0,plays,1,
+";
+    std::fs::write(&transcript, written).unwrap();
+    let imported = chefshat(&["import", &transcript, "--out", &record]);
+    assert_eq!((imported.code, imported.stderr.as_str()), (Some(0), ""));
+    for (name, flags) in [
+        ("film.gif", &[][..]),
+        ("seat.gif", &["--seat", "1"]),
+        ("end.svg", &[]),
+        ("figure.png", &["--at", "1", "--figure", "actions"]),
+    ] {
+        let mut arguments = vec!["render", &record, "--width", "160"];
+        arguments.extend(flags);
+        let out = path(name);
+        arguments.extend(["--out", &out]);
+        let ended = chefshat(&arguments);
+        assert_eq!((ended.code, ended.stderr.as_str()), (Some(0), ""), "{name}");
+    }
+}
+
+#[test]
+fn what_only_another_seat_knows_of_is_not_drawn() {
+    let folder = TempDir::new().unwrap();
+    let draw = |name: &str, flags: &[&str]| {
+        let out = folder.path().join(name);
+        let ended = render(&out, flags);
+        assert_eq!(
+            (ended.code, ended.stderr.as_str()),
+            (Some(0), ""),
+            "{flags:?}"
+        );
+        std::fs::read(&out).unwrap()
+    };
+    // Seat 1 alone knows of decision 59, whether to declare. To others it is the end of the Shift before.
+    for eyes in [&["--seat", "2"][..], &["--spectator"]] {
+        let with = |flags: &[&'static str]| [eyes, flags].concat();
+        let shift = draw("a.png", &with(&["--shift", "1"]));
+        assert_eq!(shift, draw("a.png", &with(&["--at", "59"])));
+        let film = draw("a.gif", &with(&["--from", "59", "--to", "59"]));
+        assert!(film.starts_with(b"GIF89a"));
+    }
+    let own = ["--seat", "1"];
+    let shift = draw("a.png", &[&own[..], &["--shift", "1"]].concat());
+    assert_ne!(shift, draw("a.png", &[&own[..], &["--at", "59"]].concat()));
+}
+
+#[test]
+fn a_film_lasts_as_long_as_its_decisions() {
+    let folder = TempDir::new().unwrap();
+    let out = folder.path().join("film.gif");
+    // Decisions 94 to 96, the end of the Shift, the end of the game. Built-in agents take no time of their own.
+    for (flags, seconds) in [
+        (
+            &["--seconds-per-decision", "0.5"][..],
+            3.0 * 0.5 + 2.0 * 1.5,
+        ),
+        (&["--real-time"], 3.0 * 0.2 + 2.0 * 3.0),
+        (&["--real-time", "4"], 3.0 * 0.2 + 2.0 * 3.0),
+    ] {
+        let ended = render(&out, &[&["--from", "94", "--json"], flags].concat());
+        assert_eq!((ended.code, ended.stderr.as_str()), (Some(0), ""));
+        let told: Value = serde_json::from_str(&ended.stdout).unwrap();
+        assert_eq!(told["frames"], 5);
+        assert!(
+            (told["seconds"].as_f64().unwrap() - seconds).abs() < 1e-6,
+            "{told}"
+        );
+        let bytes = std::fs::read(&out).unwrap();
+        assert!(bytes.starts_with(b"GIF89a") && bytes.ends_with(b";"));
+        assert_eq!(told["bytes"], bytes.len());
+    }
+    assert_eq!(files_in(&folder), ["film.gif"]);
+}
+
+/// A program that takes the place of ffmpeg: it writes down what it was asked for and how much it was given.
+#[cfg(unix)]
+fn stand_in(folder: &Path, script: &str) -> String {
+    use std::os::unix::fs::PermissionsExt as _;
+    let program = folder.join("stand-in");
+    std::fs::write(&program, format!("#!/bin/sh\n{script}\n")).unwrap();
+    std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).unwrap();
+    program.to_str().unwrap().to_owned()
+}
+
+#[cfg(unix)]
+#[test]
+fn ffmpeg_is_given_every_picture() {
+    let (folder, tools) = (TempDir::new().unwrap(), TempDir::new().unwrap());
+    let out = folder.path().join("film.mp4");
+    let program = stand_in(
+        tools.path(),
+        "for last; do :; done; { echo \"$@\"; wc -c; } > \"$last\"",
+    );
+    let flags = ["--from", "3", "--to", "5", "--seconds-per-decision", "0.2"];
+    let ended = render(&out, &[&flags[..], &["--ffmpeg", &program]].concat());
+    assert_eq!((ended.code, ended.stderr.as_str()), (Some(0), ""));
+    let written = std::fs::read_to_string(&out).unwrap();
+    assert!(
+        written.contains("-video_size 320x200 -framerate 10"),
+        "{written}"
+    );
+    // Three decisions, two pictures each, four bytes a pixel.
+    let given = written.lines().last().unwrap().trim();
+    assert_eq!(given, (3 * 2 * 320 * 200 * 4).to_string());
+    assert_eq!(files_in(&folder), ["film.mp4"]);
+
+    // A failure is told in its words and leaves the file as it was.
+    let program = stand_in(tools.path(), "echo no such codec >&2; exit 3");
+    let ended = render(&out, &[&flags[..], &["--ffmpeg", &program]].concat());
+    assert_eq!(ended.code, Some(1));
+    assert!(ended.stderr.contains("no such codec"), "{}", ended.stderr);
+    assert_eq!(std::fs::read_to_string(&out).unwrap(), written);
+    assert_eq!(files_in(&folder), ["film.mp4"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn what_the_page_says_can_be_done() {
+    let (folder, tools) = (TempDir::new().unwrap(), TempDir::new().unwrap());
+    let program = stand_in(tools.path(), "for last; do :; done; cat > \"$last\"");
+    let record = fixture("committed.jsonl");
+    let samples: Vec<&str> = DOCS
+        .lines()
+        .filter_map(|line| line.strip_prefix("chefshat render game.jsonl "))
+        .collect();
+    assert_eq!(samples.len(), 5);
+    for sample in &samples {
+        let (flags, out) = sample.split_once("--out ").unwrap();
+        let out = folder.path().join(out);
+        let mut arguments = vec!["render", record.to_str().unwrap()];
+        arguments.extend(flags.split_whitespace());
+        arguments.extend(["--out", out.to_str().unwrap()]);
+        arguments.extend(["--ffmpeg", &program, "--width", "160"]);
+        let ended = chefshat(&arguments);
+        assert_eq!(
+            (ended.code, ended.stderr.as_str()),
+            (Some(0), ""),
+            "{sample}"
+        );
+        assert!(std::fs::metadata(&out).unwrap().len() > 0);
+    }
+    assert_eq!(files_in(&folder).len(), samples.len());
+}
+
+#[test]
+fn what_cannot_be_drawn_is_said() {
+    let folder = TempDir::new().unwrap();
+    for (name, flags, code, words) in [
+        (
+            "a.jpg",
+            &[][..],
+            1,
+            "choose a name that ends in .png, .svg, .gif or .mp4",
+        ),
+        (
+            "a",
+            &[],
+            1,
+            "choose a name that ends in .png, .svg, .gif or .mp4",
+        ),
+        (
+            "a.png",
+            &["--at", "97"],
+            1,
+            "there is no decision 97: the game has the decisions 1 to 96",
+        ),
+        ("a.png", &["--at", "0"], 1, "there is no decision 0"),
+        (
+            "a.png",
+            &["--at", "soon"],
+            2,
+            "write the number of a decision, from 1, or end",
+        ),
+        (
+            "a.png",
+            &["--shift", "3"],
+            1,
+            "there is no shift 3: the game has the shifts 1 to 2",
+        ),
+        (
+            "a.png",
+            &["--seat", "3"],
+            1,
+            "there is no seat 3: the game has the seats 0 to 2",
+        ),
+        (
+            "a.png",
+            &["--seat", "1", "--spectator"],
+            2,
+            "cannot be used with",
+        ),
+        ("a.png", &["--from", "3"], 1, "use --at"),
+        (
+            "a.gif",
+            &["--at", "3"],
+            1,
+            "use --from and --to, or --shift",
+        ),
+        (
+            "a.gif",
+            &["--from", "9", "--to", "3"],
+            1,
+            "--from 9 is after --to 3",
+        ),
+        (
+            "a.gif",
+            &["--from", "90", "--to", "97"],
+            1,
+            "there is no decision 97",
+        ),
+        (
+            "a.gif",
+            &["--seconds-per-decision", "0"],
+            2,
+            "write seconds above 0, at most 600",
+        ),
+        (
+            "a.gif",
+            &["--real-time", "nan"],
+            2,
+            "write a number above 0, at most 1000",
+        ),
+        (
+            "a.gif",
+            &["--figure", "actions"],
+            1,
+            "choose a name that ends in .png or .svg",
+        ),
+        ("a.png", &["--figure", "actions"], 1, "name it with --at"),
+        (
+            "a.png",
+            &["--figure", "actions", "--at", "3", "--spectator"],
+            1,
+            "no other viewer knows",
+        ),
+        (
+            "a.mp4",
+            &["--ffmpeg", "no-such-program"],
+            1,
+            "install ffmpeg, or choose a name that ends in .gif",
+        ),
+        ("no/such/folder/a.png", &[], 1, "no such file or directory"),
+    ] {
+        let ended = render(&folder.path().join(name), flags);
+        assert_eq!(ended.code, Some(code), "{name} {flags:?}: {}", ended.stderr);
+        assert!(
+            ended.stderr.to_lowercase().contains(words),
+            "{name} {flags:?}: {}",
+            ended.stderr
+        );
+        assert_eq!(files_in(&folder), [""; 0], "{name} {flags:?}");
+    }
+
+    let out = folder.path().join("a.png");
+    let no_record = Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml");
+    for (record, words) in [
+        (no_record.as_path(), "line 1 is not a line of a record"),
+        (Path::new("no-such-record.jsonl"), "no-such-record.jsonl"),
+    ] {
+        let arguments = [
+            "render",
+            record.to_str().unwrap(),
+            "--out",
+            out.to_str().unwrap(),
+        ];
+        let ended = chefshat(&arguments);
+        assert_eq!(ended.code, Some(1));
+        assert!(ended.stderr.contains(words), "{}", ended.stderr);
+        assert_eq!(files_in(&folder), [""; 0]);
+    }
+}

@@ -1,0 +1,141 @@
+//! `chefshat verify`: whole records are said to fit, a damaged one is named with file, line and problem. What kinds of damage are found is
+//! tested in `chefshat-records`.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::{Value, json};
+
+use super::run::chefshat;
+
+fn fixture(file: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../tests/fixtures/records")
+        .join(file)
+}
+
+/// A data folder with two records, the second damaged on line 9.
+fn data_dir() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let records = folder.path().join("records");
+    std::fs::create_dir(&records).unwrap();
+    std::fs::copy(fixture("committed.jsonl"), records.join("a.jsonl")).unwrap();
+    let text = std::fs::read_to_string(fixture("committed.jsonl")).unwrap();
+    let damaged: Vec<String> = (1..)
+        .zip(text.lines())
+        .map(|(number, line)| match number {
+            9 => line.replace("\"quantity\":3", "\"quantity\":2"),
+            _ => line.to_owned(),
+        })
+        .collect();
+    std::fs::write(records.join("b.jsonl"), damaged.join("\n") + "\n").unwrap();
+    std::fs::write(records.join("c.jsonl.part"), "half a li").unwrap();
+    std::fs::create_dir(records.join("d.jsonl")).unwrap();
+    folder
+}
+
+#[test]
+fn whole_records_fit() {
+    let (committed, fixed) = (fixture("committed.jsonl"), fixture("fixed.jsonl"));
+    let ended = chefshat(&[
+        "verify",
+        committed.to_str().unwrap(),
+        fixed.to_str().unwrap(),
+    ]);
+    assert_eq!((ended.code, ended.stderr.as_str()), (Some(0), ""));
+    let lines: Vec<&str> = ended.stdout.lines().collect();
+    let [first, second, last] = lines[..] else {
+        panic!("{}", ended.stdout)
+    };
+    assert!(
+        first.ends_with(
+            "committed.jsonl: fits: finished, 207 decisions, 284 events, committed seed"
+        ),
+        "{first}"
+    );
+    assert!(
+        second.ends_with("fixed.jsonl: fits: finished, 96 decisions, 130 events, fixed seed"),
+        "{second}"
+    );
+    assert_eq!(last, "2 records fit, 303 decisions");
+}
+
+#[test]
+fn a_damaged_record_is_named() {
+    let folder = data_dir();
+    let data_dir = folder.path().to_str().unwrap();
+    let ended = chefshat(&["verify", "--data-dir", data_dir]);
+    assert_eq!((ended.code, ended.stderr.as_str()), (Some(1), ""));
+    let lines: Vec<&str> = ended.stdout.lines().collect();
+    let [first, second, last] = lines[..] else {
+        panic!("{}", ended.stdout)
+    };
+    assert!(first.contains("a.jsonl: fits: finished"), "{first}");
+    assert!(
+        second.ends_with("b.jsonl: line 9: play.quantity is 2 and must be 3"),
+        "{second}"
+    );
+    assert_eq!(last, "1 of 2 records do not fit");
+
+    let records = folder.path().join("records");
+    let ended = chefshat(&["verify", "--json", records.to_str().unwrap()]);
+    assert_eq!((ended.code, ended.stderr.as_str()), (Some(1), ""));
+    let told: Vec<Value> = ended
+        .stdout
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    assert_eq!(told.len(), 2);
+    assert_eq!(
+        told[0],
+        json!({
+            "file": records.join("a.jsonl"),
+            "fits": true,
+            "game_id": "22b73f3bba773c1120e1858de68cd801",
+            "state": "finished",
+            "decisions": 207,
+            "events": 284,
+            "origin": "GAME_ORIGIN_DEALT",
+            "seed_committed": true,
+            "line": null,
+            "problem": null,
+        })
+    );
+    assert_eq!(
+        (&told[1]["fits"], &told[1]["line"]),
+        (&json!(false), &json!(9))
+    );
+}
+
+#[test]
+fn where_there_is_no_record_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let nowhere = folder.path().join("nowhere");
+    for (path, words) in [
+        (folder.path(), "holds no records (*.jsonl)"),
+        (nowhere.as_path(), "No such file"),
+    ] {
+        let ended = chefshat(&["verify", path.to_str().unwrap()]);
+        assert_eq!((ended.code, ended.stdout.as_str()), (Some(1), ""));
+        assert!(ended.stderr.contains(words), "{}", ended.stderr);
+    }
+    // Named twice it is still one.
+    let fixed = fixture("fixed.jsonl");
+    let fixed = fixed.to_str().unwrap();
+    let ended = chefshat(&["verify", fixed, fixed]);
+    assert!(
+        ended.stdout.ends_with("1 record fits, 96 decisions\n"),
+        "{}",
+        ended.stdout
+    );
+    let empty = folder.path().join("empty.jsonl");
+    std::fs::write(&empty, "").unwrap();
+    let ended = chefshat(&["verify", empty.to_str().unwrap()]);
+    assert_eq!((ended.code, ended.stderr.as_str()), (Some(1), ""));
+    assert!(
+        ended
+            .stdout
+            .contains("empty.jsonl: line 1: the line is missing: the file is empty"),
+        "{}",
+        ended.stdout
+    );
+}

@@ -1,0 +1,124 @@
+//! Whose game a row is of: what the header and the footer of its record say, and who sits where. The rows themselves are in `gather`.
+
+use std::sync::Arc;
+
+use chefshat_engine::RuleSet;
+use chefshat_proto::v1::{self, record_line::Line};
+
+use chefshat_record::convert::rules_from_proto;
+use chefshat_record::replay::{ReplayError, replay};
+
+/// The origin of games of real tables.
+pub(super) const IMPORTED: &str = "imported";
+
+/// What all rows of a game share.
+#[derive(Debug)]
+pub(super) struct GameInfo {
+    pub(super) game_id: String,
+    pub(super) room_name: String,
+    pub(super) origin: &'static str,
+    pub(super) rules: String,
+    pub(super) rule_set: RuleSet,
+    pub(super) rules_version: u32,
+    /// Microseconds since the Unix epoch; `None` for a game that no clock saw.
+    pub(super) created_at: Option<i64>,
+    pub(super) finished: bool,
+    pub(super) players: u8,
+    /// Size of the action space.
+    pub(super) actions: u16,
+    pub(super) server_version: String,
+    /// Who sat there when the game began, by seat.
+    pub(super) seats: Vec<Arc<SeatInfo>>,
+}
+
+/// Who sits on a seat.
+#[derive(Debug)]
+pub(super) struct SeatInfo {
+    pub(super) name: String,
+    pub(super) kind: &'static str,
+    pub(super) built_in: Option<String>,
+}
+
+impl SeatInfo {
+    /// Whoever has this name and kind; `built_in` is empty where it is no built-in agent.
+    pub(super) fn new(name: &str, kind: v1::ParticipantKind, built_in: &str) -> Self {
+        let built_in = Some(built_in).filter(|name| !name.is_empty());
+        Self {
+            name: name.to_owned(),
+            kind: match (built_in, kind) {
+                (Some(_), _) => "built_in",
+                (None, v1::ParticipantKind::Human) => "human",
+                (None, v1::ParticipantKind::Robot) => "robot",
+                (None, v1::ParticipantKind::Agent | v1::ParticipantKind::Unspecified) => "agent",
+            },
+            built_in: built_in.map(str::to_owned),
+        }
+    }
+}
+
+/// What the header and the footer say of a game, before it is replayed.
+///
+/// # Errors
+/// The first line that does not fit, where these lines are not as they must be.
+pub(super) fn checked_info(lines: &[v1::RecordLine]) -> Result<GameInfo, ReplayError> {
+    // What a replay says of a line that makes no sense is more to the point.
+    game_info(lines).or_else(|error| replay(lines).and(Err(error)))
+}
+
+fn game_info(lines: &[v1::RecordLine]) -> Result<GameInfo, ReplayError> {
+    let at_header = |problem: String| ReplayError { line: 1, problem };
+    let Some(Line::Header(header)) = lines.first().and_then(|line| line.line.as_ref()) else {
+        return Err(at_header("the first line must be the header".into()));
+    };
+    // It becomes the name of a folder.
+    if hex::decode_to_slice(&header.game_id, &mut [0; 16]).is_err() {
+        return Err(at_header(format!(
+            "the game id {:?} is not 32 hexadecimal digits",
+            header.game_id
+        )));
+    }
+    let rules = header
+        .rules
+        .as_ref()
+        .ok_or_else(|| at_header("the header has no rule set".into()))?;
+    let rule_set = rules_from_proto(rules).map_err(|error| at_header(error.to_string()))?;
+    if header.seats.len() != rule_set.players() {
+        return Err(at_header(format!(
+            "the header names {} seats, but the rule set has {} players",
+            header.seats.len(),
+            rule_set.players()
+        )));
+    }
+    let finished = matches!(
+        lines.last().and_then(|line| line.line.as_ref()),
+        Some(Line::Footer(footer)) if footer.state() == v1::RoomState::Finished
+    );
+    Ok(GameInfo {
+        game_id: header.game_id.clone(),
+        room_name: header.room_name.clone(),
+        origin: match header.origin() {
+            v1::GameOrigin::Unspecified | v1::GameOrigin::Dealt => "dealt",
+            v1::GameOrigin::FixedSeed => "fixed_seed",
+            v1::GameOrigin::Scripted => "scripted",
+            v1::GameOrigin::Branched => "branched",
+            v1::GameOrigin::Imported => IMPORTED,
+        },
+        rules: serde_json::to_string(rules).map_err(|error| at_header(error.to_string()))?,
+        rules_version: header.rules_version,
+        created_at: i64::try_from(header.created_at_ms)
+            .ok()
+            .filter(|at| *at > 0)
+            .and_then(|at| at.checked_mul(1000)),
+        finished,
+        players: u8::try_from(rule_set.players()).expect("at most six players"),
+        actions: rule_set.actions().size(),
+        rule_set,
+        server_version: header.server_version.clone(),
+        seats: header
+            .seats
+            .iter()
+            .map(|seat| SeatInfo::new(&seat.name, seat.kind(), &seat.built_in_agent))
+            .map(Arc::new)
+            .collect(),
+    })
+}

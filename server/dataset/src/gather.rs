@@ -1,0 +1,346 @@
+//! From a record to rows: what each decision's seat knew, did and got, and the expressions between. The record is replayed on the way, so
+//! that only records that fit together become rows. What a row's cells are is decided by the tables of columns.
+//!
+//! Rewards: a turn's row holds what the turn itself brought its seat, finishing included. What a seat gets when a Shift ends (the last
+//! seat's finishing part, everybody's points) falls to its last turn of that Shift, whoever took the turn that ended it. A seat that took
+//! no turn in a Shift has no row that could carry it.
+
+use std::sync::Arc;
+
+use chefshat_engine::{Action, ActionId, BySeat, Game, RewardScheme, Seat, Viewer};
+use chefshat_proto::v1::{self, DecisionKind, DecisionSource, game_event::Kind, record_line::Line};
+
+use super::column::Value;
+use super::decisions::{DecisionRow, RECORDED, Rewards};
+use super::expressions::ExpressionRow;
+use super::game::{GameInfo, IMPORTED, SeatInfo, checked_info};
+use chefshat_record::replay::{Moment, ReplayError, walk};
+
+/// A seat's latest expression.
+#[derive(Debug, Clone)]
+pub(super) struct LatestExpression {
+    expression: Arc<v1::Expression>,
+    public: bool,
+    elapsed_ms: u64,
+}
+
+impl LatestExpression {
+    /// Its fields, as the column of expressions has them, seen at a later moment.
+    pub(super) fn value_at(&self, elapsed_ms: u64) -> Value {
+        let expression = &self.expression;
+        Value::Struct(vec![
+            (&expression.label).into(),
+            expression.valence.into(),
+            expression.arousal.into(),
+            expression.dominance.into(),
+            expression.confidence.into(),
+            expression_source(expression).into(),
+            self.public.into(),
+            elapsed_ms.saturating_sub(self.elapsed_ms).into(),
+        ])
+    }
+}
+
+/// The rows of one game.
+#[derive(Debug)]
+pub(super) struct GameRows {
+    pub(super) game: Arc<GameInfo>,
+    /// Its decisions, in order.
+    pub(super) decisions: Vec<DecisionRow>,
+    /// Its expressions, in order.
+    pub(super) expressions: Vec<ExpressionRow>,
+}
+
+/// Replays a record and gathers its rows.
+///
+/// # Errors
+/// The first line that does not fit.
+pub(super) fn gather(lines: &[v1::RecordLine]) -> Result<GameRows, ReplayError> {
+    let game = Arc::new(checked_info(lines)?);
+    let mut gatherer = Gatherer::new(game);
+    walk(lines, |moment| gatherer.take(moment))?;
+    match gatherer.problem {
+        Some(problem) => Err(problem),
+        None => Ok(gatherer.rows),
+    }
+}
+
+/// What is known of a seat's part in an exchange.
+#[derive(Debug, Clone, Copy, Default)]
+struct Told {
+    gave: bool,
+    received: bool,
+}
+
+/// Gathers rows while a record is replayed.
+struct Gatherer {
+    rows: GameRows,
+    /// The first row of the Shift being played.
+    shift_from: usize,
+    /// The row of each seat's last turn in this Shift.
+    last_turn: BySeat<Option<usize>>,
+    /// Seats that have got rid of their cards in this Shift.
+    finished: u8,
+    /// Whose gifts, and whose gains, of this Shift's exchange are known.
+    told: BySeat<Told>,
+    /// Who sits where by now: before the game begins seats may change hands.
+    sitting: Vec<Option<Arc<SeatInfo>>>,
+    latest: Vec<Option<LatestExpression>>,
+    problem: Option<ReplayError>,
+}
+
+impl Gatherer {
+    fn new(game: Arc<GameInfo>) -> Self {
+        let players = game.seats.len();
+        let from_the_start = |seat: &Arc<SeatInfo>| seat.built_in.is_some().then(|| seat.clone());
+        Self {
+            sitting: game.seats.iter().map(from_the_start).collect(),
+            rows: GameRows {
+                game,
+                decisions: Vec::new(),
+                expressions: Vec::new(),
+            },
+            shift_from: 0,
+            last_turn: BySeat::filled(players, None),
+            finished: 0,
+            told: BySeat::filled(players, Told::default()),
+            latest: vec![None; players],
+            problem: None,
+        }
+    }
+
+    fn take(&mut self, moment: Moment<'_>) {
+        match moment.entry {
+            Line::Decision(record) => {
+                if let Some(game) = moment.game {
+                    self.decision(record, game, &moment);
+                }
+            }
+            Line::Event(event) => match &event.kind {
+                Some(Kind::Seated(seated)) => {
+                    let info = SeatInfo::new(&seated.name, seated.kind(), "");
+                    self.sit(seated.seat, Some(info));
+                }
+                Some(Kind::Vacated(vacated)) => self.sit(vacated.seat, None),
+                Some(Kind::ShiftStarted(_)) => {
+                    // Where hands are dealt nothing is hidden from the record.
+                    let all = self.rows.game.origin != IMPORTED;
+                    let told = Told {
+                        gave: all,
+                        received: all,
+                    };
+                    self.told = BySeat::filled(self.told.len(), told);
+                }
+                Some(Kind::CardsExchanged(exchanged)) if !exchanged.cards.is_empty() => {
+                    self.told[Seat::new(exchanged.giver as usize)].gave = true;
+                    self.told[Seat::new(exchanged.receiver as usize)].received = true;
+                }
+                Some(Kind::SeatFinished(finished)) => self.seat_finished(finished),
+                Some(Kind::ShiftEnded(ended)) => self.shift_ended(ended),
+                Some(Kind::GameEnded(ended)) => self.game_ended(ended),
+                Some(Kind::ExpressionShown(shown)) => {
+                    let expression = shown.expression.as_ref();
+                    self.expression(moment.line, shown.seat, event.elapsed_ms, expression, true);
+                }
+                _ => {}
+            },
+            Line::PrivateExpression(private) => {
+                let expression = private.expression.as_ref();
+                self.expression(
+                    moment.line,
+                    private.seat,
+                    private.elapsed_ms,
+                    expression,
+                    false,
+                );
+            }
+            Line::Header(_) | Line::Footer(_) => {}
+        }
+    }
+
+    /// Somebody takes a seat or leaves it. What was expressed on it before was another's.
+    fn sit(&mut self, seat: u32, who: Option<SeatInfo>) {
+        let seat = seat as usize;
+        if let (Some(sitting), Some(latest)) =
+            (self.sitting.get_mut(seat), self.latest.get_mut(seat))
+        {
+            *sitting = who.map(Arc::new);
+            *latest = None;
+        }
+    }
+
+    fn decision(&mut self, record: &v1::DecisionRecord, game: &Game, moment: &Moment<'_>) {
+        let info = Arc::clone(&self.rows.game);
+        let rules = info.rule_set;
+        let seat = Seat::new(record.seat as usize);
+        let seen = game.observe(Viewer::Seat(seat));
+        let action = ActionId::new(u16::try_from(record.action).expect("a decision that replays"));
+        let is_turn = record.kind() == DecisionKind::Turn;
+        let mut rewards = Rewards::default();
+        let mut invalid_rewards = Rewards::default();
+        if is_turn {
+            let shed = match rules.actions().decode(action) {
+                Some(Action::Play {
+                    quantity, jokers, ..
+                }) => quantity + jokers,
+                Some(Action::LoneJoker) => 1,
+                _ => 0,
+            };
+            let left = seen.cards_left[seat].saturating_sub(shed);
+            rewards = RewardScheme::ALL.map(|scheme| scheme.turn(&rules, left, None));
+            let attempts = record.invalid_attempts.len() as f32;
+            // Added to zero, because none of something negative is a negative zero.
+            invalid_rewards = RewardScheme::ALL.map(|scheme| 0.0 + attempts * scheme.invalid());
+            self.last_turn[seat] = Some(self.rows.decisions.len());
+        }
+        let built_in = info.seats[seat.index()].built_in.is_some();
+        let untimed = info.origin == IMPORTED && record.decision_time_us == 0;
+        let measured = !built_in
+            && !untimed
+            && !matches!(
+                record.source(),
+                DecisionSource::Substitute | DecisionSource::Recorded
+            );
+        self.rows.decisions.push(DecisionRow {
+            game: info,
+            hand_known: moment.hands_known[seat],
+            golden_known: moment.golden_known[seat],
+            gave_known: self.told[seat].gave,
+            received_known: self.told[seat].received,
+            number: self.rows.decisions.len() as u64 + 1,
+            decision_id: record.decision_id,
+            turn: is_turn.then(|| game.shift_turns() + 1),
+            phase: match record.kind() {
+                DecisionKind::Unspecified | DecisionKind::Turn => "turn",
+                DecisionKind::Exchange => "exchange",
+                DecisionKind::SpecialAction => "special_action",
+            },
+            seat: seat.index(),
+            mask: game.legal_actions(),
+            action: action.index(),
+            text: record.text.clone(),
+            invalid_attempts: record.invalid_attempts.clone(),
+            source: source_name(record.source()),
+            decision_time_us: measured.then_some(record.decision_time_us),
+            elapsed_ms: record.elapsed_ms,
+            expressions: self.latest.clone(),
+            rewards,
+            invalid_rewards,
+            shift_points: None,
+            shift_place: None,
+            game_points: None,
+            game_place: None,
+            seen,
+        });
+    }
+
+    /// The seat's last turn made it finish.
+    fn seat_finished(&mut self, finished: &v1::SeatFinished) {
+        self.finished += 1;
+        let seat = Seat::new(finished.seat as usize);
+        let place = u8::try_from(finished.place).expect("a place of an event that replays");
+        if let Some(row) = self.last_turn[seat] {
+            let rules = self.rows.game.rule_set;
+            self.rows.decisions[row].rewards =
+                RewardScheme::ALL.map(|scheme| scheme.turn(&rules, 0, Some(place)));
+        }
+    }
+
+    fn shift_ended(&mut self, ended: &v1::ShiftEnded) {
+        for (&number, place) in ended.order.iter().zip(1u8..) {
+            let seat = Seat::new(number as usize);
+            let points = ended.shift_points[seat.index()];
+            for row in &mut self.rows.decisions[self.shift_from..] {
+                if row.seat == seat.index() {
+                    row.shift_points = Some(points);
+                    row.shift_place = Some(place);
+                }
+            }
+            let Some(last) = self.last_turn[seat] else {
+                continue;
+            };
+            let rewards = &mut self.rows.decisions[last].rewards;
+            for (reward, scheme) in rewards.iter_mut().zip(RewardScheme::ALL) {
+                *reward += scheme
+                    .shift_end(place, points, place <= self.finished)
+                    .unwrap_or(0.0);
+            }
+        }
+        self.shift_from = self.rows.decisions.len();
+        self.last_turn = BySeat::filled(self.last_turn.len(), None);
+        self.finished = 0;
+    }
+
+    fn game_ended(&mut self, ended: &v1::GameEnded) {
+        for standing in &ended.standings {
+            for row in &mut self.rows.decisions {
+                if row.seat == standing.seat as usize {
+                    row.game_points = Some(standing.points);
+                    row.game_place = u8::try_from(standing.place).ok();
+                }
+            }
+        }
+    }
+
+    fn expression(
+        &mut self,
+        line: usize,
+        seat: u32,
+        elapsed_ms: u64,
+        expression: Option<&v1::Expression>,
+        public: bool,
+    ) {
+        let seat = seat as usize;
+        let (Some(latest), Some(expression)) = (self.latest.get_mut(seat), expression) else {
+            self.problem.get_or_insert_with(|| ReplayError {
+                line,
+                problem: "an expression of nobody, or of nothing".into(),
+            });
+            return;
+        };
+        *latest = Some(LatestExpression {
+            expression: Arc::new(expression.clone()),
+            public,
+            elapsed_ms,
+        });
+        self.rows.expressions.push(ExpressionRow {
+            game: Arc::clone(&self.rows.game),
+            seat,
+            player: self.sitting[seat].clone(),
+            elapsed_ms,
+            decisions_before: self.rows.decisions.len() as u64,
+            public,
+            expression: expression.clone(),
+        });
+    }
+}
+
+fn source_name(source: DecisionSource) -> &'static str {
+    match source {
+        DecisionSource::Unspecified | DecisionSource::Agent => "agent",
+        DecisionSource::Timeout => "timeout",
+        DecisionSource::Invalid => "invalid",
+        DecisionSource::Disconnected => "disconnected",
+        DecisionSource::Substitute => "substitute",
+        DecisionSource::Recorded => RECORDED,
+    }
+}
+
+/// Where an expression was read from, if that is said.
+pub(super) fn expression_source(expression: &v1::Expression) -> Option<&'static str> {
+    match expression.source() {
+        v1::ExpressionSource::Unspecified => None,
+        v1::ExpressionSource::Face => Some("face"),
+        v1::ExpressionSource::Voice => Some("voice"),
+        v1::ExpressionSource::SelfReport => Some("self_report"),
+        v1::ExpressionSource::Model => Some("model"),
+    }
+}
+
+/// Microseconds since the Unix epoch. Parts of a microsecond are dropped.
+pub(super) fn moment_us(moment: &chefshat_proto::Timestamp) -> i64 {
+    moment
+        .seconds
+        .saturating_mul(1_000_000)
+        .saturating_add(i64::from(moment.nanos / 1000))
+}

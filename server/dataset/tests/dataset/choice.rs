@@ -1,0 +1,116 @@
+//! Which records become part of a dataset: damaged ones, repeated ones, filters.
+
+use chefshat_dataset::{Export, ExportError, Filter};
+use chefshat_record::files::find_records;
+
+use super::{Stage, a_record, header, players};
+
+#[test]
+fn damaged_records_are_named_and_nothing_is_put_in_place() {
+    let mut damaged = a_record(2);
+    damaged.pop();
+    let stage = Stage::new(&[("a.jsonl", a_record(1)), ("b.jsonl", damaged)]);
+    std::fs::write(stage.records().join("c.jsonl"), "{}\nno record\n").unwrap();
+    let error = stage.run(&stage.export()).unwrap_err().to_string();
+    assert!(
+        error.contains("b.jsonl: line ") && error.contains("c.jsonl: line "),
+        "{error}"
+    );
+    assert!(
+        !error.contains("a.jsonl") && error.contains("--skip-damaged"),
+        "{error}"
+    );
+    assert_eq!(stage.left_lying(), [""; 0]);
+    let skipping = Export {
+        skip_damaged: true,
+        ..stage.export()
+    };
+    let exported = stage.run(&skipping).unwrap();
+    assert_eq!((exported.games, exported.left_out.len()), (1, 2));
+    assert_eq!(stage.left_lying(), ["out"]);
+}
+
+#[test]
+fn a_game_comes_once() {
+    let stage = Stage::new(&[("a.jsonl", a_record(1)), ("b.jsonl", a_record(1))]);
+    let exported = stage.run(&stage.export()).unwrap();
+    assert_eq!(exported.games, 1);
+    assert!(exported.left_out[0].problem.contains("a.jsonl"));
+    let file = stage.records().join("a.jsonl");
+    let twice = find_records(&[file.clone(), stage.records(), file]).unwrap();
+    assert_eq!(twice.len(), 2);
+}
+
+#[test]
+fn filters_leave_out_games() {
+    let stage = Stage::new(&[("a.jsonl", a_record(1)), ("b.jsonl", a_record(2))]);
+    let with = |filter| Export {
+        filter,
+        replace: true,
+        ..stage.export()
+    };
+    let room = with(Filter {
+        room_name: Some("room 2".into()),
+        ..Filter::default()
+    });
+    let exported = stage.run(&room).unwrap();
+    assert_eq!((exported.games, exported.filtered), (1, 1));
+    let kind = match players(&a_record(1))[0].built_in_agent.as_str() {
+        "" => "agent",
+        _ => "built_in",
+    };
+    let there = with(Filter {
+        player_kind: Some(kind.into()),
+        finished_only: true,
+        ..Filter::default()
+    });
+    assert_eq!(stage.run(&there).unwrap().games, 2);
+    let human = with(Filter {
+        player_kind: Some("human".into()),
+        ..Filter::default()
+    });
+    assert!(matches!(
+        stage.run(&human),
+        Err(ExportError::NothingLeft { records: 2 })
+    ));
+    // What was there stays.
+    assert_eq!(
+        stage
+            .rows("decisions")
+            .iter()
+            .filter(|row| row["number"] == 1)
+            .count(),
+        2
+    );
+}
+
+#[test]
+fn a_moment_after_the_year_9999_harms_its_own_record_alone() {
+    const LAST_MS: u64 = 253_402_300_799_999;
+    let (mut last, mut beyond) = (a_record(2), a_record(3));
+    header(&mut last).created_at_ms = LAST_MS;
+    header(&mut beyond).created_at_ms = LAST_MS + 1;
+    let stage = Stage::new(&[
+        ("a.jsonl", a_record(1)),
+        ("b.jsonl", last),
+        ("c.jsonl", beyond),
+    ]);
+    let error = stage.run(&stage.export()).unwrap_err().to_string();
+    assert!(
+        error.contains("c.jsonl: line 1: createdAtMs is 253402300800000, after the year 9999"),
+        "{error}"
+    );
+    assert!(!error.contains("b.jsonl"), "{error}");
+    let skipping = Export {
+        skip_damaged: true,
+        ..stage.export()
+    };
+    let exported = stage.run(&skipping).unwrap();
+    assert_eq!((exported.games, exported.left_out.len()), (2, 1));
+    let rows = stage.rows("decisions");
+    let of_last = rows.iter().rfind(|row| row["room_name"] == "room 2");
+    assert_eq!(
+        of_last.unwrap()["created_at"],
+        "9999-12-31T23:59:59.999+00:00"
+    );
+}

@@ -1,0 +1,365 @@
+//! From joining to leaving: seats taken, streams opened, broken off and ended, the end of the game and of the process, and what happens
+//! because time has passed.
+
+use std::collections::BTreeSet;
+use std::process::ExitStatus;
+use std::time::Duration;
+
+use chefshat_proto::v1;
+use tonic::{Code, Status};
+
+use super::seats::{Asked, SeatKey, Stand, StreamSeen};
+use super::{Exam, Phase, StreamId, Venue};
+use crate::fault::Fault;
+
+impl Exam {
+    /// The agent asked for a seat, with this join code, and this came of it.
+    pub fn joined(
+        &mut self,
+        code: &str,
+        answer: Result<&v1::JoinRoomResponse, &Status>,
+        now: Duration,
+    ) {
+        if self.is_done() {
+            return;
+        }
+        let Venue::Room { join_code, .. } = &self.venue else {
+            return;
+        };
+        if !code.eq_ignore_ascii_case(join_code) {
+            if let (Err(status), Phase::Starting) = (answer, self.phase) {
+                let got = format!("join code {code:?}: {}", status.message());
+                self.fatal(Fault::JoinRefused, "the join code it was given", got);
+            }
+            return;
+        }
+        if self.phase != Phase::Starting {
+            return self.fatal(
+                Fault::JoinedAgain,
+                "the ticket of the seat it has",
+                "it asked for a seat with the same join code again",
+            );
+        }
+        match answer {
+            Ok(_) => {
+                self.phase = Phase::Joined;
+                self.demand(
+                    Fault::NeverAttached,
+                    "an attachment with the ticket it was given",
+                    Some(now + self.patience.each),
+                );
+            }
+            Err(status) => {
+                let got = status.message().to_owned();
+                self.fatal(Fault::JoinRefused, "a request that the server accepts", got);
+            }
+        }
+    }
+
+    /// The agent's process could not be started.
+    pub fn not_started(&mut self, why: &str) {
+        self.fatal(Fault::CommandFailed, "a program that starts", why);
+    }
+
+    /// The agent opened a Play stream.
+    pub fn opened(&mut self) -> StreamId {
+        self.streams.push(StreamSeen::default());
+        self.streams.len() - 1
+    }
+
+    /// The agent plays by calls that are not examined.
+    pub fn unexamined(&mut self, call: &str) {
+        if !self.is_done() {
+            let got = format!("a call of PlayService.{call}");
+            self.fatal(Fault::NoPlayStream, "a stream of PlayService.Play", got);
+        }
+    }
+
+    pub(super) fn attaching(&mut self, stream: StreamId, attach: &v1::Attach) {
+        if let Some(key) = self.tickets.get(&attach.ticket) {
+            let next = self.seats.get(key).map_or(1, |seen| seen.last_event + 1);
+            if attach.from_sequence > next && !attach.snapshot {
+                let from = attach.from_sequence;
+                self.fault(
+                    Fault::EventsSkipped,
+                    format!("events asked for from {next} on, or from the beginning"),
+                    format!("events asked for from {from} on"),
+                );
+            }
+        }
+        let seen = &mut self.streams[stream];
+        let asked = Asked {
+            ticket: attach.ticket.clone(),
+            no_mask: attach.no_mask,
+        };
+        seen.asked.insert(seen.attachments, asked);
+        seen.attachments += 1;
+    }
+
+    pub(super) fn attached(&mut self, stream: StreamId, handle: u32, attached: &v1::Attached) {
+        let key = SeatKey {
+            room_id: attached.room_id.clone(),
+            seat: attached.seat,
+        };
+        let asked = self.streams[stream].asked.remove(&handle);
+        self.streams[stream].bound.insert(handle, key.clone());
+        let seen = self.seats.entry(key.clone()).or_default();
+        seen.live_from = attached.next_sequence;
+        seen.own = match &self.venue {
+            Venue::Room { room_id, .. } => *room_id == attached.room_id,
+            Venue::Tournament { tournament_id } => *tournament_id == attached.tournament_id,
+        };
+        let own = seen.own;
+        seen.no_mask = asked.as_ref().is_some_and(|asked| asked.no_mask);
+        let newest = seen.newest();
+        if let Some(decision) = seen.decisions.get_mut(&newest)
+            && decision.stand == Stand::Answered
+        {
+            // Whether its answer arrived the agent cannot know: it may give it again.
+            decision.stand = Stand::Open;
+            decision.tampered = true;
+        }
+        if let Some(asked) = asked {
+            self.tickets.insert(asked.ticket, key.clone());
+        }
+        if own {
+            let attached = self.streams.iter().flat_map(|stream| stream.bound.values());
+            self.together = self.together.max(attached.count());
+            if self.phase == Phase::Joined {
+                self.phase = Phase::Playing;
+            }
+            for answered in [
+                Fault::NeverAttached,
+                Fault::DidNotReconnect,
+                Fault::LeftEarly,
+                Fault::NeverResumed,
+            ] {
+                self.fulfil(answered);
+            }
+        }
+    }
+
+    pub(super) fn refused(&mut self, stream: StreamId, handle: u32, refused: &v1::Refused) {
+        let got = format!("{} ({})", refused.message, refused.reason);
+        if self.streams[stream].asked.remove(&handle).is_some() {
+            self.fatal(Fault::AttachRefused, "an attachment that is accepted", got);
+        } else if refused.reason != "HANDLE_UNKNOWN" {
+            self.fault(Fault::CommandRefused, "commands that are accepted", got);
+        }
+    }
+
+    pub(super) fn detached(
+        &mut self,
+        stream: StreamId,
+        handle: u32,
+        reason: v1::DetachReason,
+        now: Duration,
+    ) {
+        let seen = &mut self.streams[stream];
+        seen.ended.insert(handle);
+        let key = seen.bound.remove(&handle);
+        if reason == v1::DetachReason::TournamentOver {
+            return self.tournament_over(now);
+        }
+        let Some(key) = key.filter(|_| reason == v1::DetachReason::GameOver) else {
+            return;
+        };
+        self.settle_before(&key, u64::MAX);
+        let seen = self.seats.entry(key.clone()).or_default();
+        seen.over = true;
+        let (own, met) = (seen.own, seen.kinds.clone());
+        if own && matches!(self.venue, Venue::Room { .. }) {
+            self.weigh_losses(&key);
+            self.game_over(&met, now);
+        }
+    }
+
+    /// The agent is attached as a participant of the tournament.
+    pub(super) fn entered(&mut self, stream: StreamId, handle: u32, entered: &v1::Entered) {
+        self.streams[stream].asked.remove(&handle);
+        let Venue::Tournament { tournament_id } = &self.venue else {
+            return;
+        };
+        if *tournament_id == entered.tournament_id {
+            if self.phase == Phase::Starting {
+                self.phase = Phase::Playing;
+            }
+            for answered in [Fault::NeverJoined, Fault::LeftEarly] {
+                self.fulfil(answered);
+            }
+        }
+    }
+
+    /// The agent has been told that the tournament is over.
+    fn tournament_over(&mut self, now: Duration) {
+        let together = self.together;
+        if together < 2 && !self.is_done() {
+            self.fault(
+                Fault::OneAtATime,
+                "several games at a time",
+                format!("never more than {together}"),
+            );
+        }
+        let met: BTreeSet<i32> = (self.seats.values())
+            .flat_map(|seen| seen.kinds.iter().copied())
+            .collect();
+        self.game_over(&met, now);
+    }
+
+    /// The agent has been told that its game is over.
+    fn game_over(&mut self, met: &BTreeSet<i32>, now: Duration) {
+        if self.is_done() {
+            return;
+        }
+        let asked_since = (self.seats.values()).any(|seen| seen.newest() > seen.read_after);
+        if let Some(demand) = self.demand.take()
+            && (demand.fault == Fault::NeverResumed
+                || demand.fault == Fault::StoppedAfterClosed && asked_since)
+        {
+            self.fault(
+                demand.fault,
+                demand.expected,
+                "nothing of the kind until the game was over",
+            );
+        }
+        let missed = (self.case.kinds.iter()).find(|kind| !met.contains(&i32::from(**kind)));
+        if let Some(kind) = missed {
+            let got = format!("none ({})", kind.as_str_name());
+            self.fault(
+                Fault::NotExamined,
+                "decisions of every kind of the case",
+                got,
+            );
+        }
+        if !self.plan.is_empty() && self.findings.is_empty() {
+            self.fault(
+                Fault::NotExamined,
+                "a game long enough for the case",
+                "it was over before the examiner could do what the case is about",
+            );
+        }
+        self.phase = Phase::Over;
+        self.demand(
+            Fault::NeverLeft,
+            match self.venue {
+                Venue::Room { .. } => "the stream to be left after Detached (GAME_OVER)",
+                Venue::Tournament { .. } => {
+                    "the stream to be left after Detached (TOURNAMENT_OVER)"
+                }
+            },
+            Some(now + self.patience.each),
+        );
+    }
+
+    /// The examiner breaks a stream off.
+    pub(super) fn cut(&mut self, stream: StreamId, now: Duration) {
+        self.streams[stream].cut = true;
+        self.demand(
+            Fault::DidNotReconnect,
+            "a new stream, and an attachment with the same ticket, after the connection was lost",
+            Some(now + self.patience.each),
+        );
+    }
+
+    /// The agent half-closed a stream, or ended it; a `Status` says how if it was with an error.
+    pub fn left(&mut self, stream: StreamId, status: Option<&Status>, now: Duration) {
+        let seen = &mut self.streams[stream];
+        if self.phase == Phase::Done || seen.cut || std::mem::replace(&mut seen.closed, true) {
+            return;
+        }
+        if let Some(status) = status.filter(|status| status.code() == Code::OutOfRange) {
+            let got = status.message().to_owned();
+            return self.fatal(Fault::MessageRefused, "messages of at most 64 KiB", got);
+        }
+        match self.phase {
+            Phase::Over if self.streams.iter().all(|it| it.closed || it.cut) => {
+                if self.started {
+                    self.demand(
+                        Fault::NeverExited,
+                        "the process to end after its game",
+                        Some(now + self.patience.each),
+                    );
+                } else {
+                    self.phase = Phase::Done;
+                }
+            }
+            Phase::Playing if self.demand.is_none() => self.demand(
+                Fault::LeftEarly,
+                "the agent to stay until its game is over",
+                Some(now + self.patience.each),
+            ),
+            _ => {}
+        }
+    }
+
+    /// The server ended a stream.
+    pub fn ended(&mut self, stream: StreamId, status: Option<&Status>) {
+        self.streams[stream].closed = true;
+        if let Some(status) = status.filter(|_| !self.is_done()) {
+            let got = format!("the server ended the stream: {}", status.message());
+            self.fatal(
+                Fault::MessageRefused,
+                "messages that the server accepts",
+                got,
+            );
+        }
+    }
+
+    /// The agent did not read what was sent to it for as long as the examiner waits.
+    pub fn deaf(&mut self) {
+        if !self.is_done() {
+            self.fatal(
+                Fault::NotReading,
+                "an agent that reads what it is sent",
+                "nothing was read for too long",
+            );
+        }
+    }
+
+    /// The agent's process has ended.
+    pub fn exited(&mut self, status: ExitStatus) {
+        match self.phase {
+            Phase::Done => {}
+            Phase::Over if status.success() => self.phase = Phase::Done,
+            Phase::Over => self.fatal(
+                Fault::ExitStatus,
+                "exit status 0 after a finished game",
+                status.to_string(),
+            ),
+            _ => {
+                self.demand
+                    .take_if(|demand| demand.fault == Fault::LeftEarly);
+                let expected = "the agent to play until its game is over";
+                self.failed(
+                    Fault::ExitedEarly,
+                    expected,
+                    format!("its process ended: {status}"),
+                );
+            }
+        }
+    }
+
+    /// When [`Exam::tick`] must be called although nothing happens.
+    pub fn wake_at(&self) -> Duration {
+        let limit = self.patience.case();
+        let by = self.demand.as_ref().and_then(|demand| demand.by);
+        by.map_or(limit, |by| by.min(limit))
+    }
+
+    /// Time has passed.
+    pub fn tick(&mut self, now: Duration) {
+        if self.is_done() || now < self.wake_at() {
+            return;
+        }
+        if now >= self.patience.case() {
+            let got = format!("it was not over after {} s", now.as_secs());
+            return self.fatal(Fault::CaseTooLong, "an end of the case", got);
+        }
+        let waited = match self.phase {
+            Phase::Starting => self.patience.start,
+            _ => self.patience.each,
+        };
+        let got = format!("nothing of the kind within {:.1} s", waited.as_secs_f64());
+        self.failed(Fault::CaseTooLong, "an end of the case", got);
+    }
+}

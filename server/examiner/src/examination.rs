@@ -1,0 +1,263 @@
+//! One case from the making of its room to the end of the agent's process, and what came of it.
+
+use std::io;
+use std::net::{Ipv4Addr, SocketAddr};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Duration;
+
+use chefshat_client::Client;
+use chefshat_proto::v1::{self, tournament_service_client::TournamentServiceClient};
+use tokio::net::TcpListener;
+use tokio::time::sleep_until;
+
+use super::case::{Case, Patience, Place};
+use super::exam::{Exam, Venue};
+use super::fault::{Fault, Finding};
+use super::process::{AgentCommand, AgentProcess, Places};
+use super::relay::{self, Desk};
+use chefshat_server::host::{Host, HostError};
+
+/// Name of the agent on the seat.
+const NAME: &str = "examined";
+/// Last lines of an agent's output that are shown with a fault.
+const LAST_LINES: usize = 8;
+
+/// Why an examination could not be held. Nothing an agent does brings it about.
+#[derive(Debug, thiserror::Error)]
+pub enum ExaminationError {
+    /// A socket or file.
+    #[error("the examiner has no socket or file: {0}")]
+    Io(#[from] io::Error),
+    /// The server did not do as it was asked.
+    #[error("the examiner's own server: {0}")]
+    Server(#[from] chefshat_client::Error),
+    /// It did not end well.
+    #[error(transparent)]
+    Stopped(#[from] HostError),
+    /// It left something out.
+    #[error("the examiner's own server did not say which room it made")]
+    NoRoom,
+}
+
+/// Where a case waits for an agent that somebody starts by hand.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Waiting {
+    /// Where the examiner listens.
+    pub address: SocketAddr,
+    /// The join code.
+    pub code: String,
+}
+
+/// What came of a case.
+#[derive(Debug)]
+pub struct Outcome {
+    /// What was found; nothing if it was passed.
+    pub findings: Vec<Finding>,
+    /// How long it took.
+    pub took: Duration,
+    /// The last lines the agent wrote.
+    pub last_lines: Vec<String>,
+}
+
+impl Outcome {
+    /// Whether nothing was found.
+    pub fn is_passed(&self) -> bool {
+        self.findings.is_empty()
+    }
+
+    /// Whether other cases would show the same: there is no agent to examine.
+    pub fn is_hopeless(&self) -> bool {
+        let hopeless = [
+            Fault::CommandFailed,
+            Fault::NeverJoined,
+            Fault::NoPlayStream,
+        ];
+        (self.findings.iter()).any(|finding| hopeless.contains(&finding.fault))
+    }
+}
+
+/// An examiner who has a server and waits for cases.
+#[derive(Debug)]
+pub struct Examination {
+    host: Host,
+    client: Client,
+    listen: SocketAddr,
+    patience: Patience,
+    logs: Option<PathBuf>,
+}
+
+impl Examination {
+    /// An examiner that listens on `listen` (port 0: another port for each case) and writes what agents print into the folder `logs`.
+    ///
+    /// # Errors
+    /// When its server does not start.
+    pub async fn new(
+        listen: Option<SocketAddr>,
+        patience: Patience,
+        logs: Option<PathBuf>,
+    ) -> Result<Self, ExaminationError> {
+        let host = Host::in_memory(None).await?;
+        Ok(Self {
+            client: Client::connect(host.url()).await?,
+            host,
+            listen: listen.unwrap_or(SocketAddr::from((Ipv4Addr::LOCALHOST, 0))),
+            patience,
+            logs,
+        })
+    }
+
+    /// Plays a case, with an agent started by this command; without one `waiting` is told where somebody may start one.
+    ///
+    /// # Errors
+    /// When the case cannot be held.
+    pub async fn examine(
+        &self,
+        case: &'static Case,
+        command: Option<&AgentCommand>,
+        waiting: impl FnOnce(&Waiting),
+    ) -> Result<Outcome, ExaminationError> {
+        let channel = self.client.channel();
+        let Opened {
+            venue,
+            code,
+            owner_token,
+        } = self.open(case).await?;
+        let listener = TcpListener::bind(self.listen).await?;
+        let address = listener.local_addr()?;
+        let exam = Exam::new(case, self.patience, venue.clone(), command.is_some());
+        let desk = Desk::new(exam, self.patience.each);
+        let relay = tokio::spawn(relay::serve(listener, channel, Arc::clone(&desk)));
+        let mut last_lines = match command {
+            None => {
+                waiting(&Waiting { address, code });
+                watch(&desk, None).await?;
+                Vec::new()
+            }
+            Some(command) => {
+                let places = Places {
+                    address: address.to_string(),
+                    code,
+                    name: NAME.into(),
+                };
+                let log = (self.logs.as_ref()).map(|logs| logs.join(format!("{}.log", case.name)));
+                match AgentProcess::start(command, &places, log).await {
+                    Ok(mut process) => {
+                        watch(&desk, Some(&mut process)).await?;
+                        process.finish(LAST_LINES).await
+                    }
+                    Err(error) => {
+                        let program = command.words().first().cloned().unwrap_or_default();
+                        desk.show(|exam, _| exam.not_started(&format!("{program}: {error}")));
+                        Vec::new()
+                    }
+                }
+            }
+        };
+        relay.abort();
+        self.close(venue, owner_token).await;
+        let findings = desk.look().findings().to_vec();
+        if findings.is_empty() {
+            last_lines.clear();
+        }
+        Ok(Outcome {
+            findings,
+            took: desk.elapsed(),
+            last_lines,
+        })
+    }
+
+    /// Makes what a case is played in.
+    async fn open(&self, case: &Case) -> Result<Opened, ExaminationError> {
+        let client = &self.client;
+        match case.place {
+            Place::Room(room) => {
+                let mut request = room(&self.patience);
+                request.name = format!("examination: {}", case.name);
+                let made = client.create_room(request).await?;
+                let room = made.room.ok_or(ExaminationError::NoRoom)?;
+                Ok(Opened {
+                    venue: Venue::Room {
+                        room_id: room.room_id,
+                        join_code: made.join_code.clone(),
+                    },
+                    code: made.join_code,
+                    owner_token: made.owner_token,
+                })
+            }
+            Place::Tournament(settings) => {
+                let request = v1::CreateTournamentRequest {
+                    settings: Some(settings(&self.patience)),
+                };
+                let mut service = TournamentServiceClient::new(client.channel());
+                let made = service.create_tournament(request).await;
+                let made = made.map_err(chefshat_client::Error::from)?.into_inner();
+                let tournament = made.tournament.ok_or(ExaminationError::NoRoom)?;
+                Ok(Opened {
+                    venue: Venue::Tournament {
+                        tournament_id: tournament.tournament_id,
+                    },
+                    code: made.join_code,
+                    owner_token: made.owner_token,
+                })
+            }
+        }
+    }
+
+    /// Closes it. What has ended by itself is closed already, as it were.
+    async fn close(&self, venue: Venue, owner_token: String) {
+        let client = &self.client;
+        match venue {
+            Venue::Room { room_id, .. } => {
+                let _closed = client.close_room(room_id, owner_token).await;
+            }
+            Venue::Tournament { tournament_id } => {
+                let request = v1::CloseTournamentRequest {
+                    tournament_id,
+                    owner_token,
+                };
+                let mut service = TournamentServiceClient::new(client.channel());
+                let _closed = service.close_tournament(request).await;
+            }
+        }
+    }
+
+    /// Ends the examiner's server.
+    ///
+    /// # Errors
+    /// When it did not end well.
+    pub async fn stop(self) -> Result<(), ExaminationError> {
+        drop(self.client);
+        Ok(self.host.stop().await?)
+    }
+}
+
+/// What was made for a case.
+struct Opened {
+    venue: Venue,
+    code: String,
+    owner_token: String,
+}
+
+/// Waits until there is nothing more to see.
+async fn watch(desk: &Desk, mut process: Option<&mut AgentProcess>) -> io::Result<()> {
+    let mut running = process.is_some();
+    while !desk.look().is_done() {
+        let exited = async {
+            match &mut process {
+                Some(process) if running => process.ended().await,
+                _ => std::future::pending().await,
+            }
+        };
+        tokio::select! {
+            () = desk.changed() => {}
+            () = sleep_until(desk.wake_at()) => desk.show(Exam::tick),
+            status = exited => {
+                let status = status?;
+                running = false;
+                desk.show(|exam, _| exam.exited(status));
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,286 @@
+//! The agent's process: started from a command with places left open, in a process group of its own, so that all of it ends with its case;
+//! what it writes is read, and the last of it kept.
+
+use std::collections::VecDeque;
+use std::ffi::OsString;
+use std::io;
+use std::path::PathBuf;
+use std::process::{ExitStatus, Stdio};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use rustix::process::{Pid, Signal, kill_process_group};
+use tokio::io::{AsyncRead, AsyncReadExt as _, AsyncWriteExt as _};
+use tokio::process::{Child, Command};
+use tokio::task::JoinHandle;
+use tokio::time::timeout;
+
+/// Bytes of an agent's output that are written to its log.
+const MAX_LOG_BYTES: usize = 16 * 1024 * 1024;
+/// Bytes of it that are kept to be shown.
+const MAX_TAIL_BYTES: usize = 4 * 1024;
+/// How long the last of it is waited for when the process has ended.
+const LAST_WORDS: Duration = Duration::from_secs(1);
+
+/// A command with places left open: `{address}`, `{url}`, `{code}` or `{tournament}`, and `{name}`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct AgentCommand(Vec<String>);
+
+/// What is put into the open places of a command.
+#[derive(Debug, Clone)]
+pub(super) struct Places {
+    /// `host:port` of the examiner.
+    pub(super) address: String,
+    /// Join code of the room or the tournament.
+    pub(super) code: String,
+    /// Name to show.
+    pub(super) name: String,
+}
+
+impl AgentCommand {
+    /// A command that takes a seat in a room, its words not yet filled in.
+    ///
+    /// # Errors
+    /// What is missing, in words.
+    pub fn new(words: Vec<String>) -> Result<Self, String> {
+        Self::mentioning("{code}", words)
+    }
+
+    /// A command, for the shell, that takes part in a tournament.
+    ///
+    /// # Errors
+    /// What is missing, in words.
+    pub fn for_tournament(line: &str) -> Result<Self, String> {
+        let words = ["sh", "-c", line].map(str::to_owned).to_vec();
+        Self::mentioning("{tournament}", words)
+    }
+
+    fn mentioning(code: &str, words: Vec<String>) -> Result<Self, String> {
+        let mentions = |place: &str| words.iter().any(|word| word.contains(place));
+        if !mentions(code) {
+            return Err(format!(
+                "the command must say {code} where the join code goes, for instance --code {code}"
+            ));
+        }
+        if !mentions("{address}") && !mentions("{url}") {
+            return Err(
+                "the command must say {address} (host:port) or {url} (http://host:port) where the server's address goes"
+                    .into(),
+            );
+        }
+        Ok(Self(words))
+    }
+
+    /// The command as it was typed.
+    pub fn words(&self) -> &[String] {
+        &self.0
+    }
+
+    fn filled(&self, places: &Places) -> Vec<OsString> {
+        let url = format!("http://{}", places.address);
+        let fill = |word: &String| {
+            word.replace("{address}", &places.address)
+                .replace("{url}", &url)
+                .replace("{code}", &places.code)
+                .replace("{tournament}", &places.code)
+                .replace("{name}", &places.name)
+                .into()
+        };
+        self.0.iter().map(fill).collect()
+    }
+}
+
+/// A process that was started. It, and whatever it started, is killed when this is dropped.
+#[derive(Debug)]
+pub(super) struct AgentProcess {
+    child: Child,
+    group: Option<Pid>,
+    log: Arc<Mutex<Log>>,
+    readers: Vec<JoinHandle<()>>,
+}
+
+/// What the process has written.
+#[derive(Debug, Default)]
+struct Log {
+    tail: VecDeque<u8>,
+}
+
+impl AgentProcess {
+    /// Starts it. `log`: a file for what it writes.
+    pub(super) async fn start(
+        command: &AgentCommand,
+        places: &Places,
+        log: Option<PathBuf>,
+    ) -> io::Result<Self> {
+        let file = match log {
+            Some(path) => Some(tokio::fs::File::create(path).await?),
+            None => None,
+        };
+        let mut words = command.filled(places).into_iter();
+        let program = words.next().unwrap_or_default();
+        let mut child = Command::new(program)
+            .args(words)
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .process_group(0)
+            .kill_on_drop(true)
+            .spawn()?;
+        let group = child
+            .id()
+            .and_then(|id| i32::try_from(id).ok())
+            .and_then(Pid::from_raw);
+        let kept = Arc::new(Mutex::new(Log::default()));
+        let file = Arc::new(tokio::sync::Mutex::new((file, MAX_LOG_BYTES)));
+        let mut readers = Vec::new();
+        if let Some(stdout) = child.stdout.take() {
+            readers.push(tokio::spawn(keep(
+                stdout,
+                Arc::clone(&kept),
+                Arc::clone(&file),
+            )));
+        }
+        if let Some(stderr) = child.stderr.take() {
+            readers.push(tokio::spawn(keep(stderr, Arc::clone(&kept), file)));
+        }
+        Ok(Self {
+            child,
+            group,
+            log: kept,
+            readers,
+        })
+    }
+
+    /// Waits until it has ended.
+    pub(super) async fn ended(&mut self) -> io::Result<ExitStatus> {
+        self.child.wait().await
+    }
+
+    /// Ends it, and gives the last lines it wrote.
+    pub(super) async fn finish(mut self, most: usize) -> Vec<String> {
+        self.kill();
+        for reader in std::mem::take(&mut self.readers) {
+            // What left the group may hold its output open; nobody waits for that.
+            let _read = timeout(LAST_WORDS, reader).await;
+        }
+        self.last_lines(most)
+    }
+
+    fn kill(&self) {
+        if let Some(group) = self.group {
+            // There may be nothing left of it.
+            let _gone = kill_process_group(group, Signal::KILL);
+        }
+    }
+
+    fn last_lines(&self, most: usize) -> Vec<String> {
+        let log = self.log.lock().unwrap_or_else(PoisonError::into_inner);
+        let bytes: Vec<u8> = log.tail.iter().copied().collect();
+        let text = String::from_utf8_lossy(&bytes);
+        let lines: Vec<&str> = text.lines().collect();
+        let from = lines.len().saturating_sub(most);
+        // What an agent writes may hold anything; a terminal is to see text.
+        let plain = |line: &&str| line.chars().filter(|it| !it.is_control()).collect();
+        lines[from..].iter().map(plain).collect()
+    }
+}
+
+impl Drop for AgentProcess {
+    fn drop(&mut self) {
+        self.kill();
+    }
+}
+
+/// Reads what a process writes to the end, and keeps the last of it.
+async fn keep(
+    mut source: impl AsyncRead + Unpin,
+    log: Arc<Mutex<Log>>,
+    file: Arc<tokio::sync::Mutex<(Option<tokio::fs::File>, usize)>>,
+) {
+    let mut buffer = [0; 4096];
+    while let Ok(count @ 1..) = source.read(&mut buffer).await {
+        let read = &buffer[..count];
+        {
+            let mut log = log.lock().unwrap_or_else(PoisonError::into_inner);
+            log.tail.extend(read);
+            let excess = log.tail.len().saturating_sub(MAX_TAIL_BYTES);
+            log.tail.drain(..excess);
+        }
+        let mut file = file.lock().await;
+        let (file, left) = &mut *file;
+        if let Some(file) = file {
+            let written = &read[..count.min(*left)];
+            *left -= written.len();
+            // A log that cannot be written is no reason to stop reading.
+            let _lost = file.write_all(written).await;
+            let _lost = file.flush().await;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::process::*;
+
+    fn words(text: &str) -> Vec<String> {
+        text.split(' ').map(str::to_owned).collect()
+    }
+
+    #[test]
+    fn places_are_filled_in_wherever_they_stand() {
+        let command = AgentCommand::new(words("run --server={url} {address} {code}/{name} {}"));
+        let places = Places {
+            address: "127.0.0.1:7".into(),
+            code: "BCDF".into(),
+            name: "Ada".into(),
+        };
+        let filled = command.expect("it says where they go").filled(&places);
+        let expected = words("run --server=http://127.0.0.1:7 127.0.0.1:7 BCDF/Ada {}");
+        assert_eq!(
+            filled,
+            expected.iter().map(OsString::from).collect::<Vec<_>>()
+        );
+    }
+
+    #[test]
+    fn a_command_that_cannot_find_its_room_is_refused() {
+        for (command, missing) in [("run", "{code}"), ("run {code}", "{address}")] {
+            let problem = AgentCommand::new(words(command)).expect_err("something is missing");
+            assert!(problem.contains(missing), "{problem}");
+        }
+    }
+
+    #[tokio::test]
+    async fn the_whole_group_ends_with_its_guard_and_its_last_lines_are_kept() {
+        let command = AgentCommand(words("sh -c XXX"));
+        let script = "echo one; echo two; sleep 600 & echo $!; wait";
+        let command =
+            AgentCommand((command.0.iter().map(|word| word.replace("XXX", script))).collect());
+        let places = Places {
+            address: String::new(),
+            code: String::new(),
+            name: String::new(),
+        };
+        let process = AgentProcess::start(&command, &places, None)
+            .await
+            .expect("there is a shell");
+        let lines = loop {
+            let lines = process.last_lines(2);
+            if lines.len() == 2 && lines[0] == "two" {
+                break lines;
+            }
+            tokio::time::sleep(std::time::Duration::from_millis(10)).await;
+        };
+        let sleeper: i32 = lines[1].parse().expect("a process id");
+        let sleeper = Pid::from_raw(sleeper).expect("not zero");
+        assert!(rustix::process::test_kill_process(sleeper).is_ok());
+        drop(process);
+        // Its end takes a moment, and whoever inherits it may leave it as a zombie: it is not running any more.
+        let stat = format!("/proc/{}/stat", sleeper.as_raw_nonzero());
+        while let Ok(stat) = std::fs::read_to_string(&stat)
+            && !stat.contains(") Z ")
+        {
+            tokio::time::sleep(std::time::Duration::from_millis(10)).await;
+        }
+    }
+}

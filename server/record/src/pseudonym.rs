@@ -1,0 +1,212 @@
+//! Taking a participant out of a record: the name gives way to a pseudonym, and what the participant expressed or said about decisions is
+//! dropped. What was played stays, so that the record still replays. Where records are kept, and which of them a participant is in, is not
+//! known here.
+
+use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
+
+/// Longest name of a room, characters.
+const MAX_ROOM_NAME: usize = 64;
+
+/// Who is to be taken out, and what stands in its place.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Pseudonym {
+    /// The name.
+    pub name: String,
+    /// What takes its place, 1..=64 characters.
+    pub pseudonym: String,
+}
+
+/// What was taken out.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct TakenOut {
+    /// Places in which the name stood.
+    pub names: u64,
+    /// Expressions dropped.
+    pub expressions: u64,
+    /// Annotations dropped.
+    pub annotations: u64,
+}
+
+impl std::ops::AddAssign for TakenOut {
+    fn add_assign(&mut self, more: Self) {
+        self.names += more.names;
+        self.expressions += more.expressions;
+        self.annotations += more.annotations;
+    }
+}
+
+/// The seats that one participant has in a game, as it is followed from its beginning.
+#[derive(Debug, Clone, Default)]
+pub struct OwnSeats(Vec<u32>);
+
+impl OwnSeats {
+    /// Those at the beginning of a record: of a real table, where nobody sits down.
+    pub fn at_start(lines: &[v1::RecordLine], name: &str) -> Self {
+        let mut own = Self::default();
+        for line in lines.iter().filter_map(|line| line.line.as_ref()) {
+            match line {
+                Line::Header(header) => {
+                    for seat in &header.seats {
+                        let is_own = seat.built_in_agent.is_empty() && seat.name == name;
+                        own.seated(seat.seat, is_own);
+                    }
+                }
+                Line::Event(event) => {
+                    if let Some(Kind::Seated(seated)) = &event.kind {
+                        own.vacated(seated.seat);
+                    }
+                }
+                _ => {}
+            }
+        }
+        own
+    }
+
+    /// Follows the next event.
+    pub fn follow(&mut self, event: &v1::GameEvent, name: &str) {
+        match &event.kind {
+            Some(Kind::Seated(seated)) => self.seated(seated.seat, seated.name == name),
+            Some(Kind::Vacated(vacated)) => self.vacated(vacated.seat),
+            _ => {}
+        }
+    }
+
+    /// Somebody sits down.
+    pub fn seated(&mut self, seat: u32, own: bool) {
+        self.vacated(seat);
+        if own {
+            self.0.push(seat);
+        }
+    }
+
+    /// A seat becomes free again.
+    pub fn vacated(&mut self, seat: u32) {
+        self.0.retain(|known| *known != seat);
+    }
+
+    /// Whether a seat is the participant's.
+    pub fn has(&self, seat: u32) -> bool {
+        self.0.contains(&seat)
+    }
+}
+
+impl Pseudonym {
+    /// Takes the participant out of a record. Built-in agents of the same name stay.
+    pub fn take_out(&self, lines: &mut Vec<v1::RecordLine>) -> TakenOut {
+        let mut out = TakenOut::default();
+        let mut own = OwnSeats::at_start(lines, &self.name);
+        let mut dropped_events = 0;
+        lines.retain_mut(|line| match &mut line.line {
+            Some(Line::Header(header)) => {
+                out.names += self.in_seats(&mut header.seats);
+                true
+            }
+            Some(Line::Decision(decision)) => {
+                if own.has(decision.seat) && decision.annotations.take().is_some() {
+                    out.annotations += 1;
+                }
+                true
+            }
+            Some(Line::Event(event)) => {
+                if let Some(Kind::ExpressionShown(shown)) = &event.kind
+                    && own.has(shown.seat)
+                {
+                    out.expressions += 1;
+                    dropped_events += 1;
+                    return false;
+                }
+                event.sequence = event.sequence.saturating_sub(dropped_events);
+                own.follow(event, &self.name);
+                match &mut event.kind {
+                    Some(Kind::Seated(seated)) if seated.name == self.name => {
+                        seated.name.clone_from(&self.pseudonym);
+                        out.names += 1;
+                    }
+                    Some(Kind::GameStarted(started)) => {
+                        out.names += self.in_seats(&mut started.seats);
+                    }
+                    _ => {}
+                }
+                true
+            }
+            Some(Line::PrivateExpression(expression)) => {
+                let drop = own.has(expression.seat);
+                out.expressions += u64::from(drop);
+                !drop
+            }
+            Some(Line::Footer(footer)) => {
+                footer.events = footer.events.saturating_sub(dropped_events);
+                true
+            }
+            None => true,
+        });
+        // A room is often named after one of those who play in it.
+        if out.names > 0
+            && let Some(Line::Header(header)) =
+                lines.first_mut().and_then(|line| line.line.as_mut())
+        {
+            out.names += self.in_text(&mut header.room_name);
+        }
+        out
+    }
+
+    /// Puts the pseudonym in the place of the name among seats; how often.
+    pub fn in_seats(&self, seats: &mut [v1::Participant]) -> u64 {
+        let mut found = 0;
+        for seat in seats {
+            if seat.built_in_agent.is_empty() && seat.name == self.name {
+                seat.name.clone_from(&self.pseudonym);
+                found += 1;
+            }
+        }
+        found
+    }
+
+    /// Puts the pseudonym in the place of the name where it stands as words of its own in the name of a room; how often.
+    pub fn in_text(&self, text: &mut String) -> u64 {
+        let is_part = |character: Option<char>| character.is_some_and(char::is_alphanumeric);
+        let (mut said, mut rest, mut found) = (String::new(), text.as_str(), 0);
+        while !self.name.is_empty()
+            && let Some(at) = rest.find(&self.name)
+        {
+            let (before, after) = (&rest[..at], &rest[at + self.name.len()..]);
+            let alone = !is_part(before.chars().next_back().or(said.chars().next_back()))
+                && !is_part(after.chars().next());
+            said.push_str(before);
+            said.push_str(if alone { &self.pseudonym } else { &self.name });
+            found += u64::from(alone);
+            rest = after;
+        }
+        if found > 0 {
+            said.push_str(rest);
+            *text = said.chars().take(MAX_ROOM_NAME).collect();
+        }
+        found
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::pseudonym::*;
+
+    #[test]
+    fn a_name_is_found_in_the_name_of_a_room_where_it_is_a_word() {
+        let pseudonym = Pseudonym {
+            name: "Ana".into(),
+            pseudonym: "X".into(),
+        };
+        for (text, expected, times) in [
+            ("Ana’s table", "X’s table", 1),
+            ("Ana and Ana", "X and X", 2),
+            ("Banana", "Banana", 0),
+            ("AnaAna", "AnaAna", 0),
+            ("Havana, Ana", "Havana, X", 1),
+            ("Anatole", "Anatole", 0),
+            ("", "", 0),
+        ] {
+            let mut said = text.to_owned();
+            assert_eq!(pseudonym.in_text(&mut said), times, "{text}");
+            assert_eq!(said, expected);
+        }
+    }
+}

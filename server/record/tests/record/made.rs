@@ -1,0 +1,274 @@
+//! Records made for tests: a game is played by random choices, and written down as a server writes it.
+
+use chefshat_engine::{ActionId, BySeat, DecisionKind, Event, Game, RuleSet, Script, Seed};
+use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
+use chefshat_record::branch::Branch;
+use chefshat_record::convert::{
+    By, action_space, event_kind, rules_to_proto, script_to_proto, seat_number,
+};
+
+/// Invalid attempts after which the default is taken.
+const ATTEMPTS: u32 = 10;
+
+/// How a game is to be made.
+pub(crate) struct Making<'a> {
+    pub(crate) rules: RuleSet,
+    pub(crate) seed: Seed,
+    pub(crate) script: Option<Script>,
+    pub(crate) branch: Option<&'a Branch>,
+    /// What makes the random choices.
+    pub(crate) chance: u64,
+}
+
+impl Making<'_> {
+    /// A game that is simply dealt.
+    pub(crate) fn dealt(rules: RuleSet, seed: u8, chance: u64) -> Self {
+        Making {
+            rules,
+            seed: Seed([seed; 32]),
+            script: None,
+            branch: None,
+            chance,
+        }
+    }
+
+    /// The record of the game. `source` says how the decision of a number, from 0, came about.
+    pub(crate) fn record(&self, source: impl Fn(u64) -> v1::DecisionSource) -> Vec<v1::RecordLine> {
+        let mut lines = Lines {
+            lines: vec![Line::Header(self.header())],
+            events: 0,
+        };
+        for seat in self.header().seats {
+            lines.event(Kind::Seated(Box::new(v1::Seated {
+                seat: seat.seat,
+                name: seat.name,
+                kind: seat.kind,
+            })));
+        }
+        lines.event(Kind::GameStarted(Box::new(self.started())));
+        let taken_over: Vec<(Seed, ActionId)> = self
+            .branch
+            .iter()
+            .flat_map(|branch| &branch.taken_over)
+            .flat_map(|part| part.actions.iter().map(|action| (part.seed, *action)))
+            .collect();
+        let seed_at = |decisions: usize| {
+            let part = taken_over.get(decisions);
+            part.map_or(self.seed, |(seed, _)| *seed)
+        };
+        let first = self
+            .branch
+            .map_or(self.seed, |branch| branch.taken_over[0].seed);
+        let mut events = Vec::new();
+        let note = |event| events.push(event);
+        let mut game = match &self.script {
+            None => Game::new(self.rules, first, note),
+            Some(script) => Game::scripted(self.rules, first, script, note).unwrap(),
+        };
+        self.tell(&mut lines, &mut events, v1::DecisionSource::Agent);
+        let mut chance = self.chance;
+        let mut numbers = BySeat::filled(self.rules.players(), 0);
+        let mut substituted = BySeat::filled(self.rules.players(), false);
+        let mut decisions: u64 = 0;
+        while let Some(open) = game.decision() {
+            let index = usize::try_from(decisions).unwrap();
+            game.reseed(seed_at(index));
+            let legal = game.legal_actions();
+            let (action, source) = match taken_over.get(index) {
+                Some((_, action)) => (*action, v1::DecisionSource::Recorded),
+                None => {
+                    chance = chance
+                        .wrapping_mul(6364136223846793005)
+                        .wrapping_add(1442695040888963407);
+                    let pick = (chance >> 33) as usize % legal.len();
+                    match source(decisions) {
+                        source @ (v1::DecisionSource::Agent | v1::DecisionSource::Substitute) => {
+                            (legal.nth(pick).unwrap(), source)
+                        }
+                        by_default => (game.default_action().unwrap(), by_default),
+                    }
+                }
+            };
+            let by_substitute = source == v1::DecisionSource::Substitute;
+            if by_substitute != std::mem::replace(&mut substituted[open.seat], by_substitute) {
+                let seat = seat_number(open.seat);
+                lines.event(if by_substitute {
+                    Kind::Substituted(v1::Substituted {
+                        seat,
+                        built_in_agent: "random".into(),
+                    })
+                } else {
+                    Kind::Returned(v1::Returned { seat })
+                });
+            }
+            numbers[open.seat] += 1;
+            decisions += 1;
+            let space = self.rules.actions();
+            let illegal = (0..space.size())
+                .find(|action| !legal.contains(ActionId::new(*action)))
+                .unwrap();
+            let attempts = match source {
+                v1::DecisionSource::Invalid => ATTEMPTS as usize,
+                _ => 0,
+            };
+            lines.lines.push(Line::Decision(v1::DecisionRecord {
+                seat: seat_number(open.seat),
+                decision_id: numbers[open.seat],
+                kind: match open.kind {
+                    DecisionKind::Turn => v1::DecisionKind::Turn,
+                    DecisionKind::Exchange => v1::DecisionKind::Exchange,
+                    DecisionKind::SpecialAction => v1::DecisionKind::SpecialAction,
+                }
+                .into(),
+                action: action.index().into(),
+                text: space.text(action).unwrap(),
+                source: source.into(),
+                invalid_attempts: vec![illegal.into(); attempts],
+                action_mask: legal.to_bytes(space.size()),
+                ..v1::DecisionRecord::default()
+            }));
+            game.apply(action, |event| events.push(event)).unwrap();
+            self.tell(&mut lines, &mut events, source);
+        }
+        if let Line::Header(header) = &mut lines.lines[0] {
+            for (seat, substituted) in header.seats.iter_mut().zip(substituted.values()) {
+                seat.substituted = *substituted;
+            }
+        }
+        let standings = game.standings().unwrap();
+        lines.event(Kind::GameEnded(Box::new(v1::GameEnded {
+            standings: standings
+                .iter()
+                .map(|(place, seat, points)| v1::Standing {
+                    seat: seat_number(seat),
+                    points,
+                    place: place.into(),
+                })
+                .collect(),
+            reveal: Some(v1::SeedReveal {
+                game_seed: self.seed.0.to_vec(),
+                ..v1::SeedReveal::default()
+            }),
+        })));
+        lines.lines.push(Line::Footer(v1::RecordFooter {
+            state: v1::RoomState::Finished.into(),
+            events: lines.events,
+            decisions,
+        }));
+        let whole = lines.lines.into_iter();
+        whole
+            .map(|line| v1::RecordLine { line: Some(line) })
+            .collect()
+    }
+
+    fn tell(&self, lines: &mut Lines, events: &mut Vec<Event>, source: v1::DecisionSource) {
+        let by = By {
+            source,
+            decision_time_us: 0,
+        };
+        for event in events.drain(..) {
+            if let Some(kind) = event_kind(&event, self.rules.actions(), by) {
+                lines.event(kind);
+            }
+        }
+    }
+
+    fn header(&self) -> v1::RecordHeader {
+        let start = v1::GameStart {
+            scripted: (self.script.as_ref())
+                .map(|script| script_to_proto(script, self.rules.faces())),
+            branched_from: self.branch.map(|branch| v1::BranchPoint {
+                game_id: "0123456789abcdef0123456789abcdef".into(),
+                decisions: count(branch),
+                same_deals: false,
+            }),
+            taken_over: (self.branch.iter().flat_map(|branch| &branch.taken_over))
+                .map(|part| v1::TakenOver {
+                    decisions: part.actions.len() as u64,
+                    game_seed: part.seed.0.to_vec(),
+                })
+                .collect(),
+        };
+        let origin = match (&self.branch, &self.script) {
+            (Some(_), _) => v1::GameOrigin::Branched,
+            (None, Some(_)) => v1::GameOrigin::Scripted,
+            (None, None) => v1::GameOrigin::FixedSeed,
+        };
+        v1::RecordHeader {
+            format_version: 1,
+            game_id: "89abcdef0123456789abcdef01234567".into(),
+            origin: origin.into(),
+            rules: Some(rules_to_proto(&self.rules)),
+            rules_version: chefshat_engine::RULES_VERSION,
+            room_id: "fedcba9876543210fedcba9876543210".into(),
+            policy: Some(v1::RoomPolicy {
+                decision_time_ms: Some(10_000),
+                bank_ms: Some(0),
+                max_invalid_attempts: Some(ATTEMPTS),
+                max_timeouts: Some(3),
+                substitute: "random".into(),
+                pace_ms: Some(0),
+                waiting_time_ms: Some(1_000),
+                spectators: Some(true),
+                spectator_delay_decisions: Some(0),
+                spectators_see_hands: Some(false),
+                ..v1::RoomPolicy::default()
+            }),
+            seats: (0..)
+                .take(self.rules.players())
+                .map(|seat| v1::Participant {
+                    seat,
+                    name: format!("player {seat}"),
+                    kind: v1::ParticipantKind::Agent.into(),
+                    connected: true,
+                    ..v1::Participant::default()
+                })
+                .collect(),
+            action_space: Some(action_space(&self.rules.actions())),
+            start: (origin != v1::GameOrigin::FixedSeed).then_some(start),
+            ..v1::RecordHeader::default()
+        }
+    }
+}
+
+impl Making<'_> {
+    /// What everybody is told when the game begins.
+    fn started(&self) -> v1::GameStarted {
+        let header = self.header();
+        v1::GameStarted {
+            game_id: header.game_id,
+            rules: header.rules,
+            rules_version: header.rules_version,
+            policy: header.policy,
+            seats: header.seats,
+            action_space: header.action_space,
+            hand_size: self.rules.hand_size().into(),
+            seed_commitment: header.seed_commitment,
+        }
+    }
+}
+
+/// Decisions that a game takes over.
+pub(crate) fn count(branch: &Branch) -> u64 {
+    branch
+        .taken_over
+        .iter()
+        .map(|part| part.actions.len() as u64)
+        .sum()
+}
+
+struct Lines {
+    lines: Vec<Line>,
+    events: u64,
+}
+
+impl Lines {
+    fn event(&mut self, kind: Kind) {
+        self.events += 1;
+        self.lines.push(Line::Event(v1::GameEvent {
+            sequence: self.events,
+            kind: Some(kind),
+            ..v1::GameEvent::default()
+        }));
+    }
+}

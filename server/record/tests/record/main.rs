@@ -1,0 +1,14 @@
+//! The tests of records, one binary. A module for each subject.
+
+#![allow(
+    clippy::unwrap_used,
+    reason = "a test fails by it, in its helpers as well"
+)]
+
+mod branches;
+mod damage;
+mod files;
+pub(crate) mod made;
+mod outcome;
+mod table;
+mod verify;

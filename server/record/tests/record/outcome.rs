@@ -1,0 +1,295 @@
+//! What each seat did is told from its record as it stands, and which games count for ratings.
+
+use std::path::Path;
+
+use chefshat_engine::{RuleSet, RuleSetSpec, Stop};
+use chefshat_proto::v1::{self, DecisionSource, record_line::Line};
+use chefshat_record::jsonl;
+use chefshat_record::outcome::{Identity, Outcome, OutcomeError, Unrated, outcome};
+
+use super::made::Making;
+
+fn rules() -> RuleSet {
+    let spec = RuleSetSpec {
+        stop: Stop::Shifts(3),
+        ..RuleSetSpec::default()
+    };
+    spec.validate().unwrap()
+}
+
+fn fixture(name: &str) -> Vec<v1::RecordLine> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/fixtures/records");
+    jsonl::read(&folder.join(name)).unwrap()
+}
+
+/// The record of a game that a server dealt, all of whose seats decided themselves.
+fn dealt() -> Vec<v1::RecordLine> {
+    let mut lines = Making::dealt(rules(), 7, 3).record(|_| DecisionSource::Agent);
+    header(&mut lines).origin = v1::GameOrigin::Dealt.into();
+    lines
+}
+
+fn header(lines: &mut [v1::RecordLine]) -> &mut v1::RecordHeader {
+    match &mut lines[0].line {
+        Some(Line::Header(header)) => header,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn last<T>(lines: &mut [v1::RecordLine], of: impl Fn(&mut Line) -> Option<&mut T>) -> &mut T {
+    let mut lines = lines.iter_mut().rev();
+    lines
+        .find_map(|line| line.line.as_mut().and_then(&of))
+        .unwrap()
+}
+
+fn standings(lines: &mut [v1::RecordLine]) -> &mut Vec<v1::Standing> {
+    last(lines, |line| match line {
+        Line::Event(event) => match &mut event.kind {
+            Some(v1::game_event::Kind::GameEnded(ended)) => Some(&mut ended.standings),
+            _ => None,
+        },
+        _ => None,
+    })
+}
+
+/// By seat: place, points, decisions, wrong actions, timeouts, timed decisions, time of these, performance score in hundredths.
+fn figures(outcome: &Outcome) -> Vec<[u64; 8]> {
+    let seats = outcome.seats.iter();
+    seats
+        .map(|seat| {
+            [
+                u64::from(seat.place),
+                seat.points,
+                seat.decisions,
+                seat.wrong_actions,
+                seat.timeouts,
+                seat.timed_decisions,
+                seat.decision_time_us,
+                (seat.performance_score * 100.0).round() as u64,
+            ]
+        })
+        .collect()
+}
+
+#[test]
+fn what_was_counted_by_hand_is_told() {
+    // Counted with a script from the lines of the file.
+    let played = outcome(&fixture("committed.jsonl")).unwrap();
+    assert_eq!(
+        figures(&played),
+        [
+            [4, 0, 56, 143, 0, 0, 0, 0],
+            [2, 9, 46, 0, 0, 0, 0, 168],
+            [3, 3, 8, 0, 6, 2, 60_788, 56],
+            [1, 15, 39, 0, 0, 39, 50_065, 280],
+        ]
+    );
+    assert_eq!(played.shifts, 3);
+    assert_eq!(played.game_id, "22b73f3bba773c1120e1858de68cd801");
+    assert_eq!(played.ended_at_ms, 1_795_160_537_402 + 207);
+    let substituted: Vec<bool> = played.seats.iter().map(|seat| seat.substituted).collect();
+    assert_eq!(substituted, [false, false, true, false]);
+    assert_eq!(played.unrated, Some(Unrated::Substituted));
+    let identities = played.places();
+    let expected = [
+        ("random_unmasked", true, 4),
+        ("greedy", true, 2),
+        ("Rolf", false, 3),
+        ("Greta", false, 1),
+    ];
+    let expected = expected.map(|(name, built_in, place)| {
+        let name = name.to_owned();
+        let kind = v1::ParticipantKind::Agent;
+        (
+            Identity {
+                name,
+                kind,
+                built_in,
+            },
+            place,
+        )
+    });
+    assert_eq!(identities, expected);
+
+    let fixed = outcome(&fixture("fixed.jsonl")).unwrap();
+    assert_eq!(fixed.unrated, Some(Unrated::NotDealt));
+    assert_eq!(fixed.seats.len(), 3);
+}
+
+#[test]
+fn the_performance_score_is_that_of_the_engine() {
+    use chefshat_engine::{ActionId, Game, MetricsRecorder, Seed};
+    let lines = dealt();
+    let mut recorder = MetricsRecorder::new(rules(), None);
+    let mut scores = Vec::new();
+    let mut note = |event: chefshat_engine::Event| {
+        if let Some(shift) = recorder.on_event(&event) {
+            scores = shift
+                .seats
+                .iter()
+                .map(|(_, seat)| seat.performance)
+                .collect();
+        }
+    };
+    let mut game = Game::new(rules(), Seed([7; 32]), &mut note);
+    for line in &lines {
+        if let Some(Line::Decision(decision)) = &line.line {
+            let action = ActionId::new(u16::try_from(decision.action).unwrap());
+            game.apply(action, &mut note).unwrap();
+        }
+    }
+    let told = outcome(&lines).unwrap();
+    assert_eq!(scores.len(), 4);
+    for (seat, score) in told.seats.iter().zip(&scores) {
+        assert!((seat.performance_score - score).abs() < 1e-12, "{scores:?}");
+    }
+}
+
+#[test]
+fn a_game_that_all_played_themselves_is_rated() {
+    let played = outcome(&dealt()).unwrap();
+    assert!(played.is_rated());
+    let decisions: u64 = played.seats.iter().map(|seat| seat.decisions).sum();
+    let lines = dealt();
+    let told = lines
+        .iter()
+        .filter(|line| matches!(line.line, Some(Line::Decision(_))));
+    assert_eq!(decisions, told.count() as u64);
+}
+
+#[test]
+fn lost_decisions_count_and_those_of_others_do_not() {
+    let record = |source: fn(u64) -> DecisionSource| {
+        let mut lines = Making::dealt(rules(), 7, 3).record(source);
+        header(&mut lines).origin = v1::GameOrigin::Dealt.into();
+        let decisions = lines.iter().filter_map(|line| match &line.line {
+            Some(Line::Decision(decision)) => Some(decision.source()),
+            _ => None,
+        });
+        let all: Vec<DecisionSource> = decisions.collect();
+        (outcome(&lines).unwrap(), all)
+    };
+    let sum = |outcome: &Outcome, of: usize| -> u64 {
+        figures(outcome).iter().map(|figures| figures[of]).sum()
+    };
+    let (lost, all) = record(|number| match number % 3 {
+        0 => DecisionSource::Timeout,
+        1 => DecisionSource::Disconnected,
+        _ => DecisionSource::Invalid,
+    });
+    let of = |source| all.iter().filter(|other| **other == source).count() as u64;
+    assert!(of(DecisionSource::Invalid) > 0);
+    assert!(lost.is_rated(), "whoever is late plays badly, but plays");
+    assert_eq!(sum(&lost, 2), all.len() as u64);
+    assert_eq!(sum(&lost, 3), 10 * of(DecisionSource::Invalid));
+    assert_eq!(
+        sum(&lost, 4),
+        of(DecisionSource::Timeout) + of(DecisionSource::Disconnected)
+    );
+
+    let (replaced, all) = record(|number| match number {
+        0..20 => DecisionSource::Agent,
+        _ => DecisionSource::Substitute,
+    });
+    assert_eq!(sum(&replaced, 2), 20);
+    assert!(all.len() > 20);
+    assert_eq!(replaced.unrated, Some(Unrated::Substituted));
+}
+
+#[test]
+fn games_that_say_nothing_of_skill_are_not_rated() {
+    let unrated = |change: fn(&mut v1::RecordHeader)| {
+        let mut lines = dealt();
+        change(header(&mut lines));
+        outcome(&lines).unwrap().unrated
+    };
+    type Case = (fn(&mut v1::RecordHeader), Option<Unrated>);
+    let cases: [Case; 6] = [
+        (
+            |header| header.origin = v1::GameOrigin::Branched.into(),
+            Some(Unrated::NotDealt),
+        ),
+        (
+            |header| header.seats[3].substituted = true,
+            Some(Unrated::Substituted),
+        ),
+        (
+            |header| header.seats[1].name = header.seats[2].name.clone(),
+            Some(Unrated::SameParticipant),
+        ),
+        (
+            |header| {
+                for seat in &mut header.seats[..2] {
+                    seat.built_in_agent = "greedy".into();
+                }
+            },
+            Some(Unrated::SameParticipant),
+        ),
+        (
+            |header| header.seats[1].built_in_agent = "replay".into(),
+            Some(Unrated::RecordedPlayer),
+        ),
+        // A person may have the name of an agent.
+        (
+            |header| {
+                header.seats[1].name = header.seats[2].name.clone();
+                header.seats[1].kind = v1::ParticipantKind::Human.into();
+                header.seats[0].built_in_agent = "greedy".into();
+                header.seats[3].name = "greedy".into();
+            },
+            None,
+        ),
+    ];
+    for (number, (change, expected)) in cases.into_iter().enumerate() {
+        assert_eq!(unrated(change), expected, "case {number}");
+    }
+}
+
+#[test]
+fn what_is_no_finished_game_has_no_outcome() {
+    let broken = |change: fn(&mut Vec<v1::RecordLine>)| {
+        let mut lines = dealt();
+        change(&mut lines);
+        outcome(&lines).map(|outcome| outcome.seats.len())
+    };
+    type Case = (fn(&mut Vec<v1::RecordLine>), OutcomeError);
+    let cases: [Case; 7] = [
+        (Vec::clear, OutcomeError::NoHeader),
+        (|lines| drop(lines.remove(0)), OutcomeError::NoHeader),
+        (|lines| drop(lines.pop()), OutcomeError::NotFinished),
+        (
+            |lines| {
+                let footer = last(lines, |line| match line {
+                    Line::Footer(footer) => Some(footer),
+                    _ => None,
+                });
+                footer.state = v1::RoomState::Aborted.into();
+            },
+            OutcomeError::NotFinished,
+        ),
+        (
+            |lines| standings(lines).truncate(3),
+            OutcomeError::Standings,
+        ),
+        (
+            |lines| standings(lines)[0].seat = standings(lines)[1].seat,
+            OutcomeError::Standings,
+        ),
+        (
+            |lines| standings(lines)[3].place = 5,
+            OutcomeError::Standings,
+        ),
+    ];
+    for (number, (change, expected)) in cases.into_iter().enumerate() {
+        assert_eq!(broken(change), Err(expected), "case {number}");
+    }
+    let strange = broken(|lines| {
+        let decision = last(lines, |line| match line {
+            Line::Decision(decision) => Some(decision),
+            _ => None,
+        });
+        decision.seat = 4;
+    });
+    assert!(matches!(strange, Err(OutcomeError::Seat(_))), "{strange:?}");
+}

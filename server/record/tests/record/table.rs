@@ -1,0 +1,405 @@
+//! Games of real tables: whatever of a game was written down, it becomes a record that replays, with what nobody wrote down left out; what
+//! cannot have happened is refused at its row. Here is what these tests share, and what is taken.
+
+mod known;
+mod refused;
+
+use std::fmt::Write as _;
+
+use chefshat_engine::{RuleSet, RuleSetSpec, Stop};
+use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
+use chefshat_record::replay::replay;
+use chefshat_record::table::import;
+
+use super::made::Making;
+
+/// What of a game is written down.
+#[derive(Debug, Clone, Copy)]
+struct Told {
+    /// Seats whose hands are, one bit for each.
+    hands: u32,
+    /// Seats whose gifts are, one bit for each.
+    gifts: u32,
+    /// Whether declined special actions are.
+    declines: bool,
+    /// How many turns are.
+    turns: usize,
+}
+
+const NOTHING: Told = Told {
+    hands: 0,
+    gifts: 0,
+    declines: false,
+    turns: usize::MAX,
+};
+const EVERYTHING: Told = Told {
+    hands: u32::MAX,
+    gifts: u32::MAX,
+    declines: true,
+    turns: usize::MAX,
+};
+
+fn rules_text(rules: &RuleSet) -> String {
+    let spec = rules.spec();
+    let on = |on| if on { "on" } else { "off" };
+    let mut text = format!(
+        "paper players={} faces={} jokers={} exchange={} special_actions={}",
+        spec.players,
+        spec.faces,
+        spec.jokers,
+        on(spec.exchange),
+        on(spec.special_actions)
+    );
+    match spec.stop {
+        Stop::Points(points) => write!(text, " target_points={points}"),
+        Stop::Shifts(shifts) => write!(text, " target_shifts={shifts}"),
+    }
+    .unwrap();
+    let points: Vec<String> = spec.points.iter().map(u32::to_string).collect();
+    write!(text, " points={}", points.join("/")).unwrap();
+    if spec.opening == chefshat_engine::Opening::AnyTopFace {
+        text.push_str(" opening=any_top_face");
+    }
+    if spec.opening_pass {
+        text.push_str(" opening_pass=allowed");
+    }
+    if spec.pass_scope == chefshat_engine::PassScope::Turn {
+        text.push_str(" pass_scope=turn");
+    }
+    text
+}
+
+fn cards_text(cards: &[u32], golden: bool, faces: u32) -> String {
+    let mut golden = golden;
+    let words: Vec<String> = cards
+        .iter()
+        .map(|card| match *card {
+            card if card > faces => "J".to_owned(),
+            card if card == faces && std::mem::take(&mut golden) => "G".to_owned(),
+            card => card.to_string(),
+        })
+        .collect();
+    words.join(" ")
+}
+
+/// The game of a record as somebody might have written it down who saw only a part of it.
+fn transcript(rules: &RuleSet, lines: &[v1::RecordLine], told: Told) -> String {
+    let faces = u32::from(rules.faces());
+    let mut text = String::from("shift,seat,what,value\n");
+    writeln!(text, ",,rules,{}", rules_text(rules)).unwrap();
+    for seat in 0..rules.players() {
+        writeln!(text, ",{seat},human,player {seat}").unwrap();
+    }
+    let (mut shift, mut turns, mut rows) = (0, 0, String::new());
+    for line in lines {
+        if turns >= told.turns {
+            break;
+        }
+        match line.line.as_ref().unwrap() {
+            Line::Decision(decision) if told.declines && decision.text == "decline" => {
+                writeln!(rows, "{shift},{},declines,", decision.seat).unwrap();
+            }
+            Line::Event(event) => match event.kind.as_ref().unwrap() {
+                Kind::ShiftStarted(started) => {
+                    shift = started.shift;
+                    for hand in &started.hands {
+                        if told.hands >> hand.seat & 1 == 1 {
+                            let cards = cards_text(&hand.cards, hand.golden, faces);
+                            writeln!(rows, "{shift},{},hand,{cards}", hand.seat).unwrap();
+                        }
+                    }
+                }
+                Kind::SpecialActionDeclared(declared) => {
+                    writeln!(rows, "{shift},{},declares,", declared.seat).unwrap();
+                }
+                Kind::CardsExchanged(exchanged) if told.gifts >> exchanged.giver & 1 == 1 => {
+                    let cards = cards_text(&exchanged.cards, exchanged.golden, faces);
+                    writeln!(rows, "{shift},{},gives,{cards}", exchanged.giver).unwrap();
+                }
+                Kind::Play(play) => {
+                    turns += 1;
+                    let mut cards = vec![play.face; play.quantity as usize];
+                    cards.extend(vec![faces + 1; play.jokers as usize]);
+                    let cards = cards_text(&cards, false, faces);
+                    writeln!(rows, "{shift},{},plays,{cards}", play.seat).unwrap();
+                }
+                Kind::Pass(pass) => {
+                    turns += 1;
+                    writeln!(rows, "{shift},{},passes,", pass.seat).unwrap();
+                }
+                Kind::SeatFinished(finished) => {
+                    let place = finished.place;
+                    writeln!(rows, "{shift},{},finishes,{place}", finished.seat).unwrap();
+                }
+                _ => {}
+            },
+            _ => {}
+        }
+    }
+    text + &rows
+}
+
+fn spec(players: u8, faces: u8, shifts: u32) -> RuleSetSpec {
+    RuleSetSpec {
+        players,
+        faces,
+        stop: Stop::Shifts(shifts),
+        ..RuleSetSpec::default()
+    }
+}
+
+/// The public events and decisions of a game, without numbers and what may be unknown.
+fn course(lines: &[v1::RecordLine]) -> Vec<String> {
+    let kinds = lines.iter().filter_map(|line| match &line.line {
+        Some(Line::Event(event)) => event.kind.clone(),
+        _ => None,
+    });
+    kinds
+        .filter_map(|kind| match kind {
+            Kind::Seated(_) | Kind::GameStarted(_) => None,
+            Kind::ShiftStarted(started) => Some(format!("Shift {}", started.shift)),
+            Kind::CardsExchanged(exchanged) => Some(format!(
+                "{} gives {} to {}",
+                exchanged.giver, exchanged.count, exchanged.receiver
+            )),
+            Kind::GameEnded(ended) => Some(format!("{:?}", ended.standings)),
+            other => Some(format!("{other:?}")),
+        })
+        .collect()
+}
+
+#[test]
+fn whatever_is_told_of_a_game_becomes_a_record_that_replays() {
+    let original = RuleSetSpec {
+        stop: Stop::Shifts(3),
+        ..RuleSetSpec::preset("original2020").unwrap()
+    };
+    let specs = [
+        spec(4, 11, 4),
+        original,
+        spec(2, 7, 3),
+        spec(3, 9, 3),
+        spec(5, 11, 3),
+        spec(6, 12, 3),
+        spec(4, 4, 6),
+        spec(3, 4, 6),
+    ];
+    let some = |hands, gifts| Told {
+        hands,
+        gifts,
+        ..NOTHING
+    };
+    let tellings = [
+        NOTHING,
+        EVERYTHING,
+        some(1, 3),
+        some(0b101, 0),
+        some(0, 0b1111),
+        some(2, u32::MAX),
+    ];
+    let mut games = 0;
+    for spec in specs {
+        let rules = spec.validate().unwrap();
+        for chance in 0..2 {
+            let played = Making::dealt(rules, 7 + chance, chance.into())
+                .record(|_| v1::DecisionSource::Agent);
+            for told in tellings {
+                let text = transcript(&rules, &played, told);
+                let record = import(text.as_bytes())
+                    .unwrap_or_else(|error| panic!("{error}\n{told:?}\n{text}"));
+                assert_eq!(course(&record), course(&played), "{told:?}");
+                assert_eq!(replay(&record).unwrap().state, v1::RoomState::Finished);
+                games += 1;
+            }
+        }
+    }
+    assert_eq!(games, 8 * 2 * 6);
+}
+
+#[test]
+fn a_game_that_was_broken_off_is_told_as_far_as_it_went() {
+    let rules = spec(4, 11, 3).validate().unwrap();
+    let played = Making::dealt(rules, 5, 9).record(|_| v1::DecisionSource::Agent);
+    let turns = course(&played)
+        .iter()
+        .filter(|event| event.starts_with("Play(") || event.starts_with("Pass("))
+        .count();
+    assert!(turns > 100, "{turns} turns");
+    for hands in [0, 0b1000] {
+        for turns in (0..turns).step_by(7) {
+            let told = Told {
+                hands,
+                turns,
+                ..NOTHING
+            };
+            let text = transcript(&rules, &played, told);
+            let record = import(text.as_bytes())
+                .unwrap_or_else(|error| panic!("after {turns} turns: {error}\n{text}"));
+            let replayed = replay(&record).unwrap();
+            assert_eq!(replayed.state, v1::RoomState::Aborted);
+            assert!(course(&played).starts_with(&course(&record)[..course(&record).len() - 1]));
+        }
+    }
+}
+
+/// A short game with one card set aside, as the documentation tells it.
+fn documented() -> String {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/records.md");
+    let text = std::fs::read_to_string(path).unwrap();
+    let (_, block) = text.split_once("```csv\n").expect("there is an example");
+    block.split_once("```").unwrap().0.to_owned()
+}
+
+#[test]
+fn the_documented_transcript_becomes_a_record() {
+    let text = documented();
+    let record = import(text.as_bytes()).unwrap();
+    assert_eq!(record, import(text.as_bytes()).unwrap(), "twice the same");
+    let replayed = replay(&record).unwrap();
+    assert_eq!((replayed.decisions, replayed.events), (7, 17));
+    assert_eq!(replayed.standings[0].seat, 0);
+    let Some(Line::Header(header)) = &record[0].line else {
+        panic!("{:?}", record[0])
+    };
+    assert_eq!(header.origin(), v1::GameOrigin::Imported);
+    assert_eq!(header.room_name, "Lab table 3");
+    assert_eq!(header.created_at_ms, 1_773_500_400_000);
+    // Ana's hand was shown. Of Pepper's, one card was neither played nor seen, and another was set aside.
+    let known = known::knowledge(&record);
+    assert!(
+        known
+            .iter()
+            .all(|(seat, hand, mask)| (*hand, *mask) == (*seat == 0, *seat == 0))
+    );
+    let times: Vec<(u64, u64)> = record
+        .iter()
+        .filter_map(|line| match &line.line {
+            Some(Line::Decision(decision)) => {
+                Some((decision.elapsed_ms, decision.decision_time_us))
+            }
+            _ => None,
+        })
+        .collect();
+    assert_eq!(
+        times[..3],
+        [(4500, 3_100_000), (9000, 2_250_000), (12_000, 1_000_000)]
+    );
+    let shown = record.iter().find_map(|line| match &line.line {
+        Some(Line::Event(event)) => match &event.kind {
+            Some(Kind::ExpressionShown(shown)) => Some((event.elapsed_ms, shown.seat)),
+            _ => None,
+        },
+        _ => None,
+    });
+    assert_eq!(shown, Some((12_500, 0)));
+}
+
+/// The second Shift of a game in which everything was written down, told as if nothing before it had been watched.
+fn from_the_second_shift() -> (String, Vec<v1::RecordLine>) {
+    let rules = spec(4, 11, 2).validate().unwrap();
+    let played = Making::dealt(rules, 11, 2).record(|_| v1::DecisionSource::Agent);
+    let whole = transcript(&rules, &played, EVERYTHING);
+    let (_, second) = whole.split_once("\n2,").unwrap();
+    let ended = played.iter().find_map(|line| match &line.line {
+        Some(Line::Event(event)) => match &event.kind {
+            Some(Kind::ShiftEnded(ended)) => Some(ended.clone()),
+            _ => None,
+        },
+        _ => None,
+    });
+    let ended = ended.unwrap();
+    let mut text: String = whole
+        .lines()
+        .take(6)
+        .map(|line| format!("{line}\n"))
+        .collect();
+    for (seat, role) in ended
+        .order
+        .iter()
+        .zip(["Chef", "Sous-Chef", "Waiter", "Dishwasher"])
+    {
+        let points = ended.points[*seat as usize];
+        writeln!(text, "2,{seat},role,{role}\n2,{seat},points,{points}").unwrap();
+    }
+    (text + "2," + second, played)
+}
+
+#[test]
+fn a_game_can_be_told_from_a_later_shift_on() {
+    let (text, played) = from_the_second_shift();
+    let record = import(text.as_bytes()).unwrap_or_else(|error| panic!("{error}\n{text}"));
+    let (all, later) = (course(&played), course(&record));
+    assert_eq!(later[..], all[all.len() - later.len()..]);
+    assert!(later[0].starts_with("Shift 2"));
+
+    let without_roles = text.replace(",role,Chef", ",note,Chef");
+    assert!(import(without_roles.as_bytes()).is_err());
+    let twice_chef = text.replacen(",role,Waiter", ",role,Chef", 1);
+    let error = import(twice_chef.as_bytes()).unwrap_err();
+    assert!(
+        error.problem.contains("needs a row `role` for each seat"),
+        "{error}"
+    );
+}
+
+/// A game of six with 122 cards, of whose second Shift two hands of rare cards were seen: few of the many gifts there might be are left.
+const SPARSE: &str = "\
+shift,seat,what,value
+,,rules,paper players=6 faces=15 jokers=2 target_points=60
+,0,human,a
+,1,human,b
+,2,human,c
+,3,human,d
+,4,human,e
+,5,human,f
+2,0,role,Chef
+2,1,role,Sous-Chef
+2,2,role,Cook
+2,3,role,Cook
+2,4,role,Waiter
+2,5,role,Dishwasher
+2,2,hand,1 2 2 3 3 3 4 4 4 4 5 5 5 5 5 6 6 6 6 6
+2,3,hand,6 7 7 7 7 7 7 7 8 8 8 8 8 8 8 8 9 9 9 9
+2,0,plays,G 15
+2,1,passes,
+2,2,passes,
+";
+
+#[test]
+fn gifts_that_fit_are_found_where_most_do_not() {
+    let record = import(SPARSE.as_bytes()).unwrap();
+    assert_eq!(replay(&record).unwrap().decisions, 3);
+    // With these gifts nothing is left to be found.
+    let seen = SPARSE.replace(
+        "2,0,plays",
+        "2,5,gives,9 9\n2,4,gives,9\n2,0,gives,15 15\n2,1,gives,15\n2,0,plays",
+    );
+    let record = import(seen.as_bytes()).unwrap();
+    assert_eq!(replay(&record).unwrap().decisions, 6);
+}
+
+/// A game of which two Shifts were watched; what was noted of the second was written down after its last turn.
+const NOTED: &str = "\
+shift,seat,what,value
+,,rules,paper players=2 faces=4 jokers=1 target_points=100 exchange=off special_actions=off
+,0,human,Ana
+,1,robot,Pepper
+1,0,plays,4 4 4 4
+1,1,passes,
+1,0,plays,1
+1,1,points,0
+2,1,role,Dishwasher
+2,1,plays,4 4 4 4
+2,0,passes,
+2,1,plays,3
+2,1,finishes,1
+2,0,role,Chef
+2,0,points,5
+3,0,role,Dishwasher
+";
+
+#[test]
+fn what_is_noted_of_a_shift_may_be_written_down_after_it() {
+    let record = import(NOTED.as_bytes()).unwrap();
+    assert_eq!(replay(&record).unwrap().decisions, 6);
+}

@@ -1,0 +1,210 @@
+//! Cutting a film: the lines of a record, as they are replayed, become frames. Which of them are shown is decided by whoever asks.
+
+use std::time::Duration;
+
+use chefshat_engine::{BySeat, Game, Seat, SeatOrder, Viewer};
+use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
+
+use super::super::chronicle::{Chronicle, play_cards};
+use super::super::scene::{Card, Hand, Now, Scene};
+use super::{Frame, When};
+use chefshat_record::convert::{rules_from_proto, seat_from_number};
+use chefshat_record::replay::Moment;
+
+/// Who sits at the table when a record begins; `None` if its rules make no sense, which the replay refuses.
+pub(super) fn chronicle_of(header: &v1::RecordHeader, viewer: Viewer) -> Option<Chronicle> {
+    let rules = rules_from_proto(header.rules.as_ref()?).ok()?;
+    Some(Chronicle::new(
+        &header.room_name,
+        &header.seats,
+        &rules,
+        viewer,
+    ))
+}
+
+/// A film being cut.
+pub(super) struct Cut {
+    viewer: Viewer,
+    chronicle: Option<Chronicle>,
+    pub(super) frames: Vec<Frame>,
+    pub(super) decisions: u64,
+    pub(super) shifts: u32,
+    /// The play that the last decision brought, if it was one.
+    last_play: Option<v1::Play>,
+    /// Whether a Shift has been dealt that has not ended.
+    dealt: bool,
+}
+
+impl Cut {
+    /// A film with nothing in it, as this viewer sees it.
+    pub(super) fn new(viewer: Viewer) -> Self {
+        Self {
+            viewer,
+            chronicle: None,
+            frames: Vec::new(),
+            decisions: 0,
+            shifts: 0,
+            last_play: None,
+            dealt: false,
+        }
+    }
+
+    /// Takes the next line of the record.
+    pub(super) fn take(&mut self, moment: &Moment<'_>) {
+        match (moment.entry, moment.game) {
+            (Line::Header(header), _) => self.chronicle = chronicle_of(header, self.viewer),
+            (Line::Decision(decision), Some(game)) => {
+                self.decisions += 1;
+                self.last_play = None;
+                let when = When::Decision(self.decisions);
+                let time = Duration::from_micros(decision.decision_time_us);
+                self.shoot(when, game, moment, time);
+            }
+            (Line::Event(event), game) => {
+                let Some(kind) = &event.kind else { return };
+                if let Some(chronicle) = &mut self.chronicle {
+                    chronicle.note(kind);
+                }
+                match (kind, game) {
+                    (Kind::Play(play), _) => self.last_play = Some(*play),
+                    (Kind::ShiftStarted(started), _) => {
+                        self.shifts = started.shift;
+                        self.dealt = true;
+                    }
+                    (Kind::ShiftEnded(ended), Some(game)) => {
+                        self.end_shift(ended, game);
+                        self.dealt = false;
+                    }
+                    (Kind::GameEnded(_), Some(game)) => self.end_game(game),
+                    (Kind::GameAborted(_), Some(game)) => self.abort(game, moment),
+                    _ => {}
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// A decision that the viewer may not know of makes no frame, and its number is in none: a gap would tell that somebody declined.
+    fn shoot(&mut self, when: When, game: &Game, moment: &Moment<'_>, decision_time: Duration) {
+        if let Some(chronicle) = &self.chronicle {
+            let mut scene = Scene::of(game, chronicle, self.viewer, &moment.hands_known);
+            scene.hide_golden(&moment.golden_known);
+            if let When::Decision(decision) = when {
+                if scene.now == Now::Dealt {
+                    return;
+                }
+                scene.decision = Some(decision).filter(|_| self.viewer == Viewer::Everything);
+            }
+            self.frames.push(Frame {
+                when,
+                scene,
+                decision_time,
+            });
+        }
+    }
+
+    /// The rules deal the next Shift as soon as one has ended; at a real table nobody may have dealt it.
+    fn abort(&mut self, game: &Game, moment: &Moment<'_>) {
+        if self.dealt {
+            self.shoot(When::End, game, moment, Duration::ZERO);
+        } else if let Some(mut last) = self.frames.last().cloned() {
+            last.when = When::End;
+            self.frames.push(last);
+        }
+        if let Some(last) = self.frames.last_mut() {
+            last.scene.now = Now::Aborted;
+            for seat in &mut last.scene.seats {
+                seat.deciding = false;
+            }
+        }
+    }
+
+    /// The game goes on to the next Shift at once; the end of the one before is drawn from the scene of its last decision.
+    fn end_shift(&mut self, ended: &v1::ShiftEnded, game: &Game) {
+        let (Some(last), Some(chronicle)) = (self.frames.last(), &self.chronicle) else {
+            return;
+        };
+        let players = game.rules().players();
+        let order: Vec<Seat> = ended
+            .order
+            .iter()
+            .filter_map(|&number| seat_from_number(number, players))
+            .collect();
+        let (Some(order), Some(points)) = (
+            SeatOrder::from_slice(&order),
+            BySeat::from_slice(&ended.shift_points),
+        ) else {
+            return;
+        };
+        let mut scene = last.scene.clone();
+        if let Some(play) = &self.last_play
+            && let Some(seat) = seat_from_number(play.seat, players)
+            && let Some(shown) = scene.seats.get_mut(seat.index())
+        {
+            scene.board = play_cards(play, false);
+            scene.board_by = Some(seat);
+            shown.hand.take(&scene.board);
+            for card in &scene.board {
+                let index = card.face().map_or(scene.faces, |face| face - 1);
+                if let Some((played, _)) = scene.played.get_mut(usize::from(index)) {
+                    *played += 1;
+                }
+            }
+        }
+        for (seat, shown) in scene.seats.iter_mut().enumerate() {
+            let seat = Seat::new(seat);
+            shown.deciding = false;
+            shown.place = order.place_of(seat).unwrap_or(0);
+            shown.points = ended.points.get(seat.index()).copied().unwrap_or(0);
+        }
+        scene.log = chronicle.log().cloned().collect();
+        scene.turn = ended.turns;
+        scene.decision = None;
+        scene.now = Now::ShiftOver {
+            points,
+            adjudicated: ended.adjudicated,
+        };
+        self.frames.push(Frame {
+            when: When::ShiftEnd(ended.shift),
+            scene,
+            decision_time: Duration::ZERO,
+        });
+    }
+
+    fn end_game(&mut self, game: &Game) {
+        if let (Some(last), Some(standings)) = (self.frames.last(), game.standings()) {
+            let mut scene = last.scene.clone();
+            for (place, seat, _) in standings.iter() {
+                if let Some(shown) = scene.seats.get_mut(seat.index()) {
+                    shown.place = place;
+                }
+            }
+            scene.now = Now::GameOver(standings);
+            self.frames.push(Frame {
+                when: When::End,
+                scene,
+                decision_time: Duration::ZERO,
+            });
+        }
+    }
+}
+
+impl Hand {
+    /// Takes the cards of a play out of the hand.
+    fn take(&mut self, play: &[Card]) {
+        match self {
+            Hand::Open(cards) => {
+                for card in play {
+                    // The Golden card goes last of its face and lies first of it; plays do not tell it apart.
+                    let same = |held: &Card| held.face() == card.face();
+                    if let Some(index) = cards.iter().rposition(same) {
+                        cards.remove(index);
+                    }
+                }
+            }
+            Hand::Hidden(count) | Hand::Unknown(count) => {
+                *count = count.saturating_sub(u8::try_from(play.len()).unwrap_or(u8::MAX));
+            }
+        }
+    }
+}

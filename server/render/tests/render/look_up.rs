@@ -1,0 +1,114 @@
+//! The look-up table of a decision: it agrees with the mask and is for the seat that decides.
+
+use chefshat_engine::{Action, ActionId, DecisionKind, Game, Seed, Viewer};
+use chefshat_render::{Demand, Eyes, Figure, FilmError, State, figure_at};
+
+use super::{chronicle, fixture, rules};
+
+#[test]
+fn the_look_up_table_agrees_with_the_mask() {
+    let tables = [(4, 11), (3, 4), (6, 15)];
+    let mut legal = 0;
+    for (players, faces) in tables {
+        let rules = rules(players, faces);
+        let chronicle = chronicle(&rules, &[], Viewer::Everything);
+        let mut game = Game::new(rules, Seed([9; 32]), |_| {});
+        let mut turn = 0;
+        while let Some(open) = game.decision() {
+            let figure = Figure::of(&game, &chronicle).unwrap();
+            assert_eq!(figure.seat, open.seat);
+            check(&game, &figure);
+            legal += figure.legal;
+            turn += 1;
+            let mask = game.legal_actions();
+            game.apply(mask.nth(turn % mask.len()).unwrap(), |_| {})
+                .unwrap();
+        }
+        assert!(Figure::of(&game, &chronicle).is_none());
+    }
+    assert!(legal > 1000);
+}
+
+/// Every action of the mask is told as legal and no other, and what is told of the others follows from hand and board.
+fn check(game: &Game, figure: &Figure) {
+    let (space, mask) = (game.rules().actions(), game.legal_actions());
+    let hand = game.hands()[figure.seat];
+    let mut told: Vec<(Action, State)> = vec![(Action::Pass, figure.pass)];
+    told.extend(figure.lone_joker.map(|state| (Action::LoneJoker, state)));
+    for (face, quantities) in (1..).zip(&figure.plays) {
+        let face = chefshat_engine::Face::new(face).unwrap();
+        assert_eq!(quantities.len(), usize::from(face.get()));
+        for (quantity, states) in (1..).zip(quantities) {
+            for (jokers, &state) in (0..).zip(states) {
+                let play = Action::Play {
+                    face,
+                    quantity,
+                    jokers,
+                };
+                let held = hand.count(face) >= quantity && hand.jokers() >= jokers;
+                let allowed = match figure.demand {
+                    None => false,
+                    Some(Demand::Anything) => true,
+                    Some(Demand::Golden(only) | Demand::Face(only)) => face.get() == only,
+                    Some(Demand::Beat { face: most, size }) => {
+                        face.get() <= most && quantity + jokers >= size
+                    }
+                };
+                let expected = match (held, allowed) {
+                    (true, true) => State::Legal,
+                    (true, false) => State::NotAllowed,
+                    (false, true) => State::NotInHand,
+                    (false, false) => State::Impossible,
+                };
+                assert_eq!(state, expected, "{play}");
+                told.push((play, state));
+            }
+        }
+    }
+    let faces = (1..=figure.faces).filter_map(chefshat_engine::Face::new);
+    let gifts = faces.map(Action::Give).chain([Action::GiveJoker]);
+    told.extend(gifts.zip(figure.gives.iter().copied()));
+    told.extend(
+        [Action::Declare, Action::Decline]
+            .into_iter()
+            .zip(figure.special.iter().copied()),
+    );
+    let mut legal: Vec<ActionId> = told
+        .iter()
+        .filter(|(_, state)| *state == State::Legal)
+        .map(|(meaning, _)| space.encode(*meaning).unwrap())
+        .collect();
+    legal.sort();
+    assert_eq!(legal, mask.iter().collect::<Vec<_>>());
+    assert_eq!(figure.legal, legal.len());
+    let kind = game.decision().unwrap().kind;
+    assert_eq!(figure.demand.is_some(), kind == DecisionKind::Turn);
+}
+
+#[test]
+fn the_look_up_table_is_for_the_seat_that_decides() {
+    let lines = fixture("committed.jsonl");
+    let seat = figure_at(&lines, Eyes::All, 7).unwrap().seat;
+    let own = u32::try_from(seat.index()).unwrap();
+    assert_eq!(figure_at(&lines, Eyes::Seat(own), 7).unwrap().seat, seat);
+    for (eyes, decision, words) in [
+        (
+            Eyes::All,
+            208,
+            "there is no decision 208: the game has the decisions 1 to 207",
+        ),
+        (
+            Eyes::Seat(9),
+            7,
+            "there is no seat 9: the game has the seats 0 to 3",
+        ),
+    ] {
+        let error = figure_at(&lines, eyes, decision).unwrap_err();
+        assert_eq!(error.to_string(), words);
+    }
+    for eyes in [Eyes::Spectator, Eyes::Seat((own + 1) % 4)] {
+        let error = figure_at(&lines, eyes, 7).unwrap_err();
+        assert_eq!(error, FilmError::HandNotSeen { decision: 7 });
+        assert!(!error.to_string().contains("seat "), "not even whose it is");
+    }
+}

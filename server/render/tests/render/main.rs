@@ -1,0 +1,290 @@
+//! Pictures: what the scenes of a recorded game show. What they hide, the look-up table and the drawings have modules of their own.
+
+#![allow(
+    clippy::unwrap_used,
+    reason = "a test fails by it, in its helpers as well"
+)]
+
+mod drawing;
+mod hidden;
+mod look_up;
+#[path = "../../../record/tests/record/made.rs"]
+mod made;
+
+use std::path::Path;
+
+use chefshat_engine::{BySeat, Game, RuleSet, RuleSetSpec, Stop, Viewer};
+use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
+use chefshat_record::jsonl;
+use chefshat_record::table::import;
+use chefshat_render::{
+    Card, Chronicle, Demand, Eyes, Film, FilmError, Hand, Happening, Now, Painter, Scene, Sort,
+    When,
+};
+
+fn fixture(file: &str) -> Vec<v1::RecordLine> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/fixtures/records");
+    jsonl::read(&folder.join(file)).unwrap()
+}
+
+fn film(file: &str, eyes: Eyes) -> Film {
+    Film::new(&fixture(file), eyes).unwrap()
+}
+
+fn rules(players: u8, faces: u8) -> RuleSet {
+    let spec = RuleSetSpec {
+        players,
+        faces,
+        stop: Stop::Shifts(2),
+        ..RuleSetSpec::default()
+    };
+    spec.validate().unwrap()
+}
+
+/// Who sits at a table with these names, as one viewer sees what happens there.
+fn chronicle(rules: &RuleSet, names: &[&str], viewer: Viewer) -> Chronicle {
+    let seats: Vec<v1::Participant> = (0..)
+        .zip(names)
+        .map(|(seat, name)| v1::Participant {
+            seat,
+            name: (*name).to_owned(),
+            kind: v1::ParticipantKind::Robot.into(),
+            ..v1::Participant::default()
+        })
+        .collect();
+    Chronicle::new("kitchen", &seats, rules, viewer)
+}
+
+fn scene(game: &Game, viewer: Viewer) -> Scene {
+    let rules = game.rules();
+    let known = BySeat::filled(rules.players(), true);
+    Scene::of(game, &chronicle(rules, &[], viewer), viewer, &known)
+}
+
+#[test]
+fn a_film_has_a_frame_for_every_moment() {
+    let film = film("fixed.jsonl", Eyes::All);
+    let shape: Vec<When> = film.frames().iter().map(|frame| frame.when).collect();
+    assert_eq!(film.decisions(), 96);
+    assert_eq!(shape.len(), 96 + 2 + 1);
+    assert_eq!(shape[0], When::Decision(1));
+    assert_eq!(
+        shape[shape.len() - 3..],
+        [When::Decision(96), When::ShiftEnd(2), When::End]
+    );
+
+    let first = &film.at(When::Decision(1)).unwrap().scene;
+    let Now::Turn {
+        seat,
+        demand,
+        may_pass,
+    } = first.now
+    else {
+        panic!("{:?}", first.now)
+    };
+    assert_eq!((demand, may_pass), (Demand::Golden(11), false));
+    let Hand::Open(hand) = &first.seats[seat.index()].hand else {
+        panic!("all hands are open")
+    };
+    assert_eq!((hand.len(), hand.contains(&Card::Golden(11))), (22, true));
+    assert!(hand.is_sorted_by_key(|card| card.face().unwrap_or(12)));
+    assert_eq!(first.log, [Happening::Dealt(1)]);
+    assert_eq!(
+        first.seats[0].participant.sort,
+        Sort::BuiltIn("greedy".into())
+    );
+
+    // The opening is answered with the Golden card on the board.
+    let second = &film.at(When::Decision(2)).unwrap().scene;
+    assert_eq!(
+        (second.board[0], second.board_by),
+        (Card::Golden(11), Some(seat))
+    );
+    let Now::Turn { demand, .. } = second.now else {
+        panic!("{:?}", second.now)
+    };
+    let size = u8::try_from(second.board.len()).unwrap();
+    assert_eq!(demand, Demand::Beat { face: 10, size });
+
+    for shift in [1, 2] {
+        let over = &film.at(When::ShiftEnd(shift)).unwrap().scene;
+        let places: Vec<u8> = over.seats.iter().map(|seat| seat.place).collect();
+        assert_eq!(places.iter().sum::<u8>(), 1 + 2 + 3);
+        for seat in &over.seats {
+            let held = match &seat.hand {
+                Hand::Open(cards) => cards.len(),
+                hand => panic!("{hand:?}"),
+            };
+            assert_eq!(held == 0, seat.place < 3, "only the last holds cards");
+        }
+        let played: u8 = over.played.iter().map(|(played, _)| played).sum();
+        let held: usize = over
+            .seats
+            .iter()
+            .map(|seat| match &seat.hand {
+                Hand::Open(cards) => cards.len(),
+                _ => 0,
+            })
+            .sum();
+        assert_eq!(
+            usize::from(played) + held,
+            66,
+            "of 68 cards 2 are set aside"
+        );
+        assert!(matches!(over.now, Now::ShiftOver { .. }));
+    }
+    assert!(matches!(
+        film.at(When::End).unwrap().scene.now,
+        Now::GameOver(_)
+    ));
+}
+
+#[test]
+fn a_part_of_a_film_is_what_was_asked_for() {
+    let film = film("fixed.jsonl", Eyes::All);
+    let whens = |frames: Vec<&chefshat_render::Frame>| -> Vec<When> {
+        frames.iter().map(|frame| frame.when).collect()
+    };
+    let first = whens(film.shift(1).unwrap());
+    assert_eq!(first[0], When::Decision(1));
+    assert_eq!(first.last(), Some(&When::ShiftEnd(1)));
+    let turns = u64::try_from(first.len() - 1).unwrap();
+
+    // The end of a Shift stands between decisions, and is no part of a row that stops before it.
+    assert_eq!(
+        whens(film.range(turns..=turns + 1).unwrap()),
+        [
+            When::Decision(turns),
+            When::ShiftEnd(1),
+            When::Decision(turns + 1)
+        ]
+    );
+    assert_eq!(
+        whens(film.range(turns..=turns).unwrap()),
+        [When::Decision(turns)]
+    );
+    assert_eq!(
+        whens(film.range(96..=96).unwrap()),
+        [When::Decision(96), When::ShiftEnd(2), When::End]
+    );
+    assert_eq!(film.range(1..=96).unwrap().len(), film.frames().len());
+
+    for (problem, words) in [
+        (
+            film.at(When::Decision(97)).map(drop),
+            "there is no decision 97: the game has the decisions 1 to 96",
+        ),
+        (
+            film.range(0..=3).map(drop),
+            "there is no decision 0: the game has the decisions 1 to 96",
+        ),
+        (
+            film.shift(3).map(drop),
+            "there is no Shift 3: the game has the Shifts 1 to 2",
+        ),
+        (
+            film.at(When::ShiftEnd(0)).map(drop),
+            "there is no Shift 0: the game has the Shifts 1 to 2",
+        ),
+    ] {
+        assert_eq!(problem.unwrap_err().to_string(), words);
+    }
+    let error = Film::new(&fixture("fixed.jsonl"), Eyes::Seat(3)).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "there is no seat 3: the game has the seats 0 to 2"
+    );
+    let cut = &fixture("fixed.jsonl")[..20];
+    assert!(matches!(
+        Film::new(cut, Eyes::All).unwrap_err(),
+        FilmError::Replay(_)
+    ));
+}
+
+#[test]
+fn a_game_that_was_given_up_is_drawn_as_far_as_it_went() {
+    let mut lines = fixture("fixed.jsonl");
+    let reveal = lines.iter().find_map(|line| match line.line.as_ref()? {
+        Line::Event(event) => match event.kind.as_ref()? {
+            Kind::GameEnded(ended) => ended.reveal.clone(),
+            _ => None,
+        },
+        _ => None,
+    });
+    let is_decision = |line: &v1::RecordLine| matches!(line.line, Some(Line::Decision(_)));
+    let tenth = (0..lines.len())
+        .filter(|&index| is_decision(&lines[index]))
+        .nth(9)
+        .unwrap();
+    lines.truncate(tenth);
+    let events = lines
+        .iter()
+        .filter(|line| matches!(line.line, Some(Line::Event(_))))
+        .count();
+    let sequence = u64::try_from(events).unwrap() + 1;
+    let aborted = v1::GameEvent {
+        sequence,
+        kind: Some(Kind::GameAborted(Box::new(v1::GameAborted {
+            reason: v1::AbortReason::Closed.into(),
+            reveal,
+        }))),
+        ..v1::GameEvent::default()
+    };
+    let footer = v1::RecordFooter {
+        state: v1::RoomState::Aborted.into(),
+        events: sequence,
+        decisions: 9,
+    };
+    for line in [Line::Event(aborted), Line::Footer(footer)] {
+        lines.push(v1::RecordLine { line: Some(line) });
+    }
+
+    let film = Film::new(&lines, Eyes::Seat(0)).unwrap();
+    assert_eq!((film.decisions(), film.frames().len()), (9, 10));
+    let scene = &film.at(When::End).unwrap().scene;
+    assert_eq!(scene.now, Now::Aborted);
+    assert!(scene.seats.iter().all(|seat| !seat.deciding));
+    assert!(Painter::new().table(scene).contains("There is no result."));
+    assert_eq!(
+        film.at(When::ShiftEnd(1)).unwrap_err().to_string(),
+        "Shift 1 was not played to its end"
+    );
+}
+
+#[test]
+fn a_real_game_that_was_left_between_two_shifts_ends_as_its_last_shift_did() {
+    let transcript = "shift,seat,what,value
+,,rules,paper players=2 faces=4 jokers=1 target_points=100
+,0,human,Ana
+,1,robot,Pepper
+1,0,plays,4 4 4 4
+1,1,passes,
+1,0,plays,1
+";
+    let film = |transcript: &str| {
+        let lines = import(transcript.as_bytes()).unwrap();
+        Film::new(&lines, Eyes::All).unwrap()
+    };
+    let left = film(transcript);
+    let [.., before, last] = left.frames() else {
+        panic!("{} frames", left.frames().len())
+    };
+    assert_eq!((before.when, last.when), (When::ShiftEnd(1), When::End));
+    let given_up = Scene {
+        now: Now::Aborted,
+        ..before.scene.clone()
+    };
+    assert_eq!(last.scene, given_up, "nobody dealt a second Shift");
+
+    // Of a Shift that was dealt the cards lie there, though nobody had decided anything.
+    let left = film(&format!("{transcript}2,0,hand,1 2 2 3 3\n"));
+    let last = left.frames().last().unwrap();
+    assert_eq!(
+        (last.scene.now.clone(), last.scene.shift),
+        (Now::Aborted, 2)
+    );
+    let whens: Vec<When> = (left.shift(2).unwrap().iter())
+        .map(|frame| frame.when)
+        .collect();
+    assert_eq!(whens, [When::End]);
+}

@@ -1,0 +1,133 @@
+//! What goes into a room's core and what it says to it: an answer as it arrived, what became of it, why somebody is refused.
+
+use std::time::Duration;
+
+use chefshat_engine::Seat;
+
+use super::{MAX_EXPRESSIONS_PER_SEAT, MAX_SEATINGS};
+use crate::journal::{Fill, SeatedParticipant};
+
+/// How a seat stands, as everybody may know it.
+#[derive(Debug, Clone, Copy)]
+pub struct SeatStanding<'a> {
+    /// What fills it.
+    pub fill: Fill,
+    /// Who has taken it.
+    pub participant: Option<&'a SeatedParticipant>,
+    /// Whether an agent is attached.
+    pub connected: bool,
+    /// Whether a substitute plays for it.
+    pub substituted: bool,
+}
+
+/// Why a seat cannot be taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum JoinError {
+    /// All seats are taken.
+    #[error("every seat of this room is taken")]
+    RoomFull,
+    /// Seats were taken and given back again and again.
+    #[error("seats of this room were taken {MAX_SEATINGS} times; make a new room")]
+    TooManySeatings,
+    /// The seat asked for is taken.
+    #[error("this seat is taken; leave `seat` unset to take any free one")]
+    SeatTaken,
+    /// There is no such seat.
+    #[error("this room has no such seat")]
+    NoSuchSeat,
+    /// The free seats are reserved for other kinds.
+    #[error("the free seats of this room are reserved for participants of another kind")]
+    KindNotAdmitted,
+    /// The game has begun.
+    #[error("the game of this room has begun; nobody can join any more")]
+    GameStarted,
+    /// The game has ended.
+    #[error(
+        "the game of this room is over; make a new room, or ask its creator for the new join code"
+    )]
+    GameOver,
+}
+
+/// Why a seat cannot be given back.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum LeaveError {
+    /// The game has begun.
+    #[error(
+        "the game of this room has begun; the seat stays yours, and a substitute plays for it when you are gone"
+    )]
+    GameStarted,
+    /// The game has ended.
+    #[error("the game of this room is over; there is nothing to leave")]
+    GameOver,
+}
+
+/// Why an expression is not taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum ExpressError {
+    /// The game is over.
+    #[error("the game is over")]
+    GameOver,
+    /// The seat has expressed too much.
+    #[error("a seat may express itself at most {MAX_EXPRESSIONS_PER_SEAT} times in a game")]
+    TooMany,
+}
+
+/// An answer as it arrived.
+#[derive(Debug)]
+pub struct AnswerInput {
+    /// The seat that answers.
+    pub seat: Seat,
+    /// The decision it answers.
+    pub decision_id: u64,
+    /// The action, as it was sent.
+    pub action: u32,
+    /// Annotations, encoded.
+    pub annotations: Option<Box<[u8]>>,
+    /// Annotations were sent that cannot be recorded.
+    pub annotations_refused: bool,
+    /// When the answer was read.
+    pub arrived: Duration,
+    /// When the decision was handed to the transport, if it was.
+    pub handed: Option<Duration>,
+}
+
+/// What became of an answer.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Answered {
+    /// The verdict.
+    pub verdict: Verdict,
+    /// Measured decision time; zero where there is none.
+    pub time: Duration,
+    /// Annotations were over their limit.
+    pub annotations_dropped: bool,
+}
+
+/// Whether an answer counts.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Verdict {
+    /// The action was taken.
+    Accepted,
+    /// The action is not legal.
+    Invalid {
+        /// Why, in words.
+        detail: String,
+        /// Attempts left; `None` when unlimited.
+        attempts_left: Option<u32>,
+        /// Reward of the attempt, where the room has a scheme.
+        reward: Option<f32>,
+    },
+    /// The decision is closed.
+    Closed,
+    /// There has been no such decision.
+    Unknown,
+}
+
+impl Answered {
+    pub(super) fn closed(verdict: Verdict) -> Self {
+        Self {
+            verdict,
+            time: Duration::ZERO,
+            annotations_dropped: false,
+        }
+    }
+}

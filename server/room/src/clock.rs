@@ -1,0 +1,317 @@
+//! Everything a room does because time has passed: deadlines and banks, default decisions, substitution, the decisions of built-in
+//! agents, seats that are not attached in time.
+
+use std::time::Duration;
+
+use chefshat_agents::BuiltInAgent;
+use chefshat_engine::{Game, Seat, Viewer};
+
+use super::{
+    BUILT_IN_BUDGET, Core, JOIN_HOLD, LOOK_AGAIN, MAX_HANDOVER, RECALL_TIME, REPLAY_COST, State,
+};
+use crate::journal::{AbortReason, Change, Fill, ParticipantKind, Source};
+use crate::policy::AbortPolicy;
+
+impl Core {
+    /// When the room must next be told that time has passed; `None` when nothing depends on it.
+    pub fn deadline(&self) -> Option<Duration> {
+        match self.state {
+            State::Waiting => {
+                let hold = self.holds().map(|(_, until)| until).min();
+                let given_up = self.waits_until();
+                Some(hold.map_or(given_up, |hold| hold.min(given_up)))
+            }
+            State::Playing => {
+                let open = self.open.as_ref()?;
+                let seat = open.decision.seat;
+                Some(if self.is_automatic(seat) {
+                    open.released + self.pace()
+                } else {
+                    let deadline = open.start.unwrap_or(open.released) + self.time_allowed(seat);
+                    deadline.max(open.look_again)
+                })
+            }
+            State::Finished | State::Aborted(_) => None,
+        }
+    }
+
+    /// Time has passed. `handed` is when the open decision was handed to its seat's transport, if it was.
+    pub fn tick(&mut self, now: Duration, handed: Option<Duration>) {
+        match self.state {
+            State::Waiting => self.tick_waiting(now),
+            State::Playing => self.tick_playing(now, handed),
+            State::Finished | State::Aborted(_) => {}
+        }
+    }
+
+    /// Ends the game without a result, unless it has ended.
+    pub fn abort(&mut self, now: Duration, reason: AbortReason) {
+        if !self.state.is_over() {
+            self.commit(now, Change::Aborted(reason));
+        }
+    }
+
+    /// Lets built-in agents and substitutes decide as far as they may now.
+    pub(super) fn advance(&mut self, now: Duration) {
+        let mut budget = BUILT_IN_BUDGET;
+        while budget > 0 {
+            if self.state == State::Playing && self.is_too_long() {
+                self.abort(now, AbortReason::TooLong);
+            }
+            let due = self.state == State::Playing
+                && self.open.as_ref().is_some_and(|open| {
+                    self.is_automatic(open.decision.seat) && open.released + self.pace() <= now
+                });
+            if !due {
+                return;
+            }
+            budget = budget.saturating_sub(self.cost_of_open());
+            self.decide_automatically(now);
+        }
+    }
+
+    /// What a built-in agent or substitute waits before it decides.
+    pub fn pace(&self) -> Duration {
+        let mut participants = self
+            .seats
+            .iter()
+            .filter_map(|seat| seat.participant.as_ref());
+        let with_people = participants.any(|it| it.kind == ParticipantKind::Human);
+        self.header.policy.pace_of(with_people)
+    }
+
+    /// What the open decision of a built-in agent counts for.
+    fn cost_of_open(&self) -> usize {
+        let replayed = self.open.as_ref().is_some_and(|open| {
+            matches!(self.seats[open.decision.seat.index()].fill, Fill::Replay(_))
+        });
+        if replayed { REPLAY_COST } else { 1 }
+    }
+
+    /// Time a seat has for a decision before its bank is touched.
+    fn decision_time(&self, seat: Seat) -> Duration {
+        let participant = self.seats[seat.index()].participant.as_ref();
+        let policy = &self.header.policy;
+        policy.decision_time_of(participant.map(|participant| participant.kind))
+    }
+
+    /// Time a seat has for a decision, its bank included.
+    pub(super) fn time_allowed(&self, seat: Seat) -> Duration {
+        self.decision_time(seat) + self.seats[seat.index()].bank_left
+    }
+
+    /// What is left of a seat's bank after a decision that took `time`.
+    pub(super) fn bank_after(&self, seat: Seat, time: Duration) -> Duration {
+        let beyond = time.saturating_sub(self.decision_time(seat));
+        self.seats[seat.index()].bank_left.saturating_sub(beyond)
+    }
+
+    /// Time left for the open decision: before the bank is touched, and in the bank.
+    pub fn time_left(&self, now: Duration) -> (Duration, Duration) {
+        let Some(open) = &self.open else {
+            return (Duration::ZERO, Duration::ZERO);
+        };
+        let used = now.saturating_sub(open.start.unwrap_or(now));
+        (
+            self.decision_time(open.decision.seat).saturating_sub(used),
+            self.bank_after(open.decision.seat, used),
+        )
+    }
+
+    /// Settles when the clock of the open decision began, if it is not settled yet. It never begins again.
+    pub(super) fn settle_start(&mut self, now: Duration, handed: Option<Duration>) {
+        let Some(seat) = self.open.as_ref().map(|open| open.decision.seat) else {
+            return;
+        };
+        let connected = self.seats[seat.index()].connection.is_some();
+        let recalled_until = self.recalled_until(seat);
+        let Some(open) = &mut self.open else { return };
+        if open.start.is_some() {
+            return;
+        }
+        let latest = open.released + MAX_HANDOVER;
+        (open.start, open.look_again) = match (handed, connected, recalled_until) {
+            (Some(handed), _, _) => (Some(handed.clamp(open.released, latest)), Duration::ZERO),
+            (None, false, Some(until)) if now < until => (None, until),
+            (None, false, Some(until)) => (Some(open.released.max(until)), Duration::ZERO),
+            (None, false, None) => (Some(open.released), Duration::ZERO),
+            (None, true, _) if now >= latest => (Some(latest), Duration::ZERO),
+            (None, true, _) => (None, now + LOOK_AGAIN),
+        };
+    }
+
+    /// A seat that comes back after a restart of the server has all the time for the decision that waits for it.
+    pub(super) fn restart_clock(&mut self, now: Duration, seat: Seat) {
+        let recalled = self.seats[seat.index()].recalled;
+        if let Some(open) = &mut self.open
+            && recalled
+            && open.start.is_none()
+        {
+            open.release_anew(now);
+        }
+    }
+
+    /// The seat whose decision is open waits for our word since then.
+    pub(super) fn wait_for_word(&mut self, since: Duration) {
+        if let Some(open) = &mut self.open {
+            open.waits.get_or_insert(since);
+        }
+    }
+
+    /// Until when a seat is waited for that has not come back since the server was restarted.
+    fn recalled_until(&self, seat: Seat) -> Option<Duration> {
+        self.restarted
+            .filter(|_| self.seats[seat.index()].recalled)
+            .map(|at| at + RECALL_TIME)
+    }
+
+    fn holds(&self) -> impl Iterator<Item = (Seat, Duration)> + '_ {
+        self.all_seats().filter_map(|seat| {
+            let state = &self.seats[seat.index()];
+            // A participant of a tournament has its seat, whenever it comes.
+            let held = self.header.tournament.is_none() && !state.ever_attached;
+            (state.participant.is_some() && held).then_some((seat, state.joined_at + JOIN_HOLD))
+        })
+    }
+
+    /// When a room is given up whose seats have not come. A restart leaves them time to come back.
+    fn waits_until(&self) -> Duration {
+        let after_restart = self.restarted.map_or(Duration::ZERO, |at| at + JOIN_HOLD);
+        self.header.policy.waiting_time.max(after_restart)
+    }
+
+    fn tick_waiting(&mut self, now: Duration) {
+        let expired: Vec<Seat> = self
+            .holds()
+            .filter(|(_, until)| *until <= now)
+            .map(|(seat, _)| seat)
+            .collect();
+        for seat in expired {
+            self.commit(now, Change::Vacated(seat));
+        }
+        if now >= self.waits_until() {
+            self.abort(now, AbortReason::NeverStarted);
+        }
+    }
+
+    fn tick_playing(&mut self, now: Duration, handed: Option<Duration>) {
+        self.settle_start(now, handed);
+        if let Some(open) = &self.open {
+            let seat = open.decision.seat;
+            // While the seat waits for our word its clock stands.
+            let by = open.waits.map_or(now, |since| since.min(now));
+            let late = open
+                .start
+                .is_some_and(|start| start + self.time_allowed(seat) <= by);
+            if late && !self.is_automatic(seat) {
+                self.time_out(now);
+            }
+        }
+        self.advance(now);
+    }
+
+    /// Takes the default decision for a seat whose time is up, and what follows from its being late too often.
+    fn time_out(&mut self, now: Duration) {
+        let Some(open) = &self.open else { return };
+        let seat = open.decision.seat;
+        let time = now.saturating_sub(open.start.unwrap_or(open.released));
+        let source = if self.seats[seat.index()].connection.is_some() {
+            Source::Timeout
+        } else {
+            Source::Disconnected
+        };
+        self.take_default(now, seat, source, time);
+        if self.state == State::Playing
+            && self.seats[seat.index()].timeouts >= self.header.policy.max_timeouts
+        {
+            self.lose(now, seat);
+        }
+    }
+
+    /// Takes the default decision.
+    pub(super) fn take_default(
+        &mut self,
+        now: Duration,
+        seat: Seat,
+        source: Source,
+        time: Duration,
+    ) {
+        let action = self
+            .game
+            .as_deref()
+            .and_then(Game::default_action)
+            .expect("an open decision has a default");
+        let bank_left = self.bank_after(seat, time);
+        let decided = self.decided(seat, action, source, time, bank_left);
+        self.commit(now, Change::Decided(decided));
+    }
+
+    /// A seat has been late too often: a substitute plays for it, or the game is given up.
+    fn lose(&mut self, now: Duration, seat: Seat) {
+        let others_lost = self
+            .seats
+            .iter()
+            .enumerate()
+            .filter(|(index, state)| {
+                *index != seat.index() && matches!(state.fill, Fill::Open { .. })
+            })
+            .all(|(_, state)| state.substituted);
+        let abort = match self.header.policy.abort {
+            AbortPolicy::AnyLost => true,
+            AbortPolicy::AllLost => others_lost,
+            AbortPolicy::Never => false,
+        };
+        if abort {
+            self.abort(now, AbortReason::ParticipantsLost);
+            return;
+        }
+        self.give_substitute(seat);
+        self.commit(now, Change::Substituted(seat));
+    }
+
+    /// Makes the agent that plays for a seat while it is substituted.
+    pub(super) fn give_substitute(&mut self, seat: Seat) {
+        let substitute = self.header.policy.substitute;
+        let seed = self.header.seed.agent_seed(seat.index());
+        self.seats[seat.index()]
+            .agent
+            .get_or_insert_with(|| Box::new(BuiltInAgent::new(substitute, seed)));
+    }
+
+    fn decide_automatically(&mut self, now: Duration) {
+        let (Some(open), Some(game)) = (&self.open, self.game.as_deref()) else {
+            return;
+        };
+        let seat = open.decision.seat;
+        let attempts = open.attempts;
+        let observation = game.observe(Viewer::Seat(seat));
+        let legal = game.legal_actions();
+        let state = &mut self.seats[seat.index()];
+        let agent = state
+            .agent
+            .as_mut()
+            .expect("an automatic seat has its agent");
+        let action = agent.decide(&observation, &legal);
+        let bank_left = state.bank_left;
+        if legal.contains(action) {
+            let source = if state.substituted {
+                Source::Substitute
+            } else {
+                Source::Agent
+            };
+            let decided = self.decided(seat, action, source, Duration::ZERO, bank_left);
+            self.commit(now, Change::Decided(decided));
+        } else {
+            self.commit(
+                now,
+                Change::Attempted {
+                    seat,
+                    action: action.index().into(),
+                },
+            );
+            if attempts + 1 >= self.attempts_limit() {
+                self.take_default(now, seat, Source::Invalid, Duration::ZERO);
+            }
+        }
+    }
+}

@@ -1,0 +1,329 @@
+//! What a change does to the state and to the log. The same for a change that has just been made and for one read from a journal: nothing
+//! here looks at a clock, a connection or a generator.
+
+use std::time::Duration;
+
+use chefshat_engine::{ActionId, DecisionKind, Event, Game, Seat, Seed};
+
+use super::{Answered, Core, LastAnswer, MAX_GAME_CHANGES, OpenDecision, State, Verdict};
+use crate::journal::{Change, Decided, Source};
+use crate::log::{ByWhom, GameHappening, Happening, MAX_GAME_EVENTS};
+
+impl Core {
+    pub(super) fn fold(&mut self, at: Duration, change: &Change) {
+        self.changes += 1;
+        match change {
+            Change::Seated { seat, participant } => {
+                let state = &mut self.seats[seat.index()];
+                state.participant = Some(participant.clone());
+                state.bank_left = self.header.policy.bank_of(Some(participant.kind));
+                state.joined_at = at;
+                state.ever_attached = false;
+                self.log
+                    .push(at, Happening::Seated(*seat, participant.clone()));
+            }
+            Change::Vacated(seat) => {
+                let state = &mut self.seats[seat.index()];
+                state.participant = None;
+                state.connection = None;
+                state.away = false;
+                state.entropy = Vec::new();
+                self.log.push(at, Happening::Vacated(*seat));
+            }
+            Change::Started { entropy } => self.begin(at, entropy),
+            Change::Disconnected(seat) => {
+                self.seats[seat.index()].away = true;
+                self.log.push(at, Happening::Disconnected(*seat));
+            }
+            Change::Returned(seat) => {
+                let state = &mut self.seats[seat.index()];
+                state.away = false;
+                state.substituted = false;
+                state.timeouts = 0;
+                self.log.push(at, Happening::Returned(*seat));
+                if let Some(open) = &mut self.open
+                    && open.decision.seat == *seat
+                    && open.start.is_none()
+                {
+                    open.released = at;
+                }
+            }
+            Change::Substituted(seat) => {
+                let state = &mut self.seats[seat.index()];
+                state.substituted = true;
+                state.ever_substituted = true;
+                self.log.push(at, Happening::Substituted(*seat));
+            }
+            Change::Attempted { .. } => {
+                if let Some(open) = &mut self.open {
+                    open.attempts += 1;
+                }
+            }
+            Change::Decided(decided) => self.decide(at, decided),
+            Change::Expressed {
+                seat,
+                record_only,
+                expression,
+            } => {
+                self.seats[seat.index()].expressions += 1;
+                if !record_only {
+                    self.log
+                        .push(at, Happening::Expressed(*seat, expression.clone()));
+                }
+            }
+            Change::ServerRestarted => self.restart(at),
+            Change::Aborted(reason) => {
+                self.state = State::Aborted(*reason);
+                self.open = None;
+                self.log.push(at, Happening::GameAborted(*reason));
+            }
+        }
+    }
+
+    /// Nobody is connected any more, and the open decision has all its time again.
+    fn restart(&mut self, at: Duration) {
+        self.restarted = Some(at);
+        for state in &mut self.seats {
+            if state.participant.is_none() {
+                continue;
+            }
+            state.connection = None;
+            state.recalled = true;
+            match self.state {
+                // Its ticket has to be attached again within the time in which it had to be at first.
+                State::Waiting => {
+                    state.ever_attached = false;
+                    state.joined_at = at;
+                }
+                _ => state.away = true,
+            }
+        }
+        if let Some(open) = &mut self.open {
+            open.release_anew(at);
+        }
+        self.log.push(at, Happening::ServerRestarted);
+    }
+
+    fn begin(&mut self, at: Duration, entropy: &[Vec<u8>]) {
+        self.entropy = entropy.to_vec();
+        self.state = State::Playing;
+        self.log.push(at, Happening::GameStarted);
+        self.log_before_deal = self.log.len();
+        let recorded = self.header.start.branch.as_ref();
+        let seed = recorded
+            .and_then(|branch| branch.taken_over.first())
+            .map_or_else(|| self.seed_for(0), |part| part.seed);
+        let mut events = std::mem::take(&mut self.events);
+        let note = |event| events.push(event);
+        let game = match &self.header.start.script {
+            None => Game::new(self.header.rules, seed, note),
+            Some(script) => Game::scripted(self.header.rules, seed, script, note)
+                .expect("a script is tried before a room is made with it"),
+        };
+        self.game = Some(Box::new(game));
+        self.reseed();
+        self.events = events;
+        self.log_events(
+            at,
+            ByWhom {
+                source: Source::Agent,
+                time_us: 0,
+                reward: None,
+            },
+        );
+        self.note_decision();
+        self.open_next(at);
+    }
+
+    fn decide(&mut self, at: Duration, decided: &Decided) {
+        let mut events = std::mem::take(&mut self.events);
+        self.game
+            .as_mut()
+            .expect("a decision is taken in a game that has begun")
+            .apply(decided.action, |event| events.push(event))
+            .expect("only legal actions are made changes");
+        self.events = events;
+        let seat = &mut self.seats[decided.seat.index()];
+        seat.bank_left = Duration::from_millis(decided.bank_left_ms.into());
+        seat.annotation_bytes += decided.annotations.as_ref().map_or(0, |bytes| bytes.len());
+        match decided.source {
+            Source::Agent => {
+                seat.timeouts = 0;
+                seat.last_answer = Some(LastAnswer {
+                    decision_id: seat.decisions,
+                    action: decided.action.index().into(),
+                    answered: Answered {
+                        verdict: Verdict::Accepted,
+                        time: Duration::from_micros(decided.time_us),
+                        annotations_dropped: false,
+                    },
+                });
+            }
+            Source::Timeout | Source::Disconnected => seat.timeouts += 1,
+            Source::Invalid | Source::Substitute | Source::Recorded => {}
+        }
+        self.log_events(
+            at,
+            ByWhom {
+                source: decided.source,
+                time_us: decided.time_us,
+                reward: None,
+            },
+        );
+        self.decisions += 1;
+        if decided.source == Source::Recorded {
+            self.reseed();
+        }
+        self.note_decision();
+        self.open_next(at);
+    }
+
+    /// Has later Shifts dealt from the seed they are to be dealt from.
+    fn reseed(&mut self) {
+        let seed = self.seed_for(self.decisions);
+        if let Some(game) = &mut self.game {
+            game.reseed(seed);
+        }
+    }
+
+    /// The seed from which a Shift is dealt that begins after so many decisions: one that was taken over, or the game's own.
+    fn seed_for(&self, decisions: u64) -> Seed {
+        let mut end = 0;
+        self.header
+            .start
+            .branch
+            .iter()
+            .flat_map(|branch| &branch.taken_over)
+            .find(|part| {
+                end += u64::try_from(part.actions.len()).unwrap_or(u64::MAX);
+                decisions < end
+            })
+            .map_or_else(
+                || self.header.seed.game_seed(&self.entropy),
+                |part| part.seed,
+            )
+    }
+
+    /// Remembers how far spectators with a delay may see after this decision.
+    fn note_decision(&mut self) {
+        if self.header.policy.spectator_delay_decisions > 0 {
+            self.log_after_decision
+                .push(u32::try_from(self.log.len()).unwrap_or(u32::MAX));
+        }
+    }
+
+    /// Moves the events of one action to the log, with the rewards they brought.
+    fn log_events(&mut self, at: Duration, by: ByWhom) {
+        let events = std::mem::take(&mut self.events);
+        let scheme = self.header.policy.reward_scheme;
+        for (index, event) in events.iter().enumerate() {
+            let mut rewards = Vec::new();
+            if let Some(scheme) = scheme {
+                scheme.of_events(&self.header.rules, &events, |seat, value, bringer| {
+                    if bringer == index {
+                        rewards.push((seat, value));
+                    }
+                });
+            }
+            let reward = rewards.first().map(|(_, value)| *value);
+            let by = ByWhom { reward, ..by };
+            let happening = match *event {
+                Event::Played {
+                    seat,
+                    action,
+                    cards_left,
+                    ..
+                } => Happening::Played {
+                    seat,
+                    action,
+                    cards_left,
+                    by,
+                },
+                Event::Passed { seat, cards_left } => Happening::Passed {
+                    seat,
+                    cards_left,
+                    by,
+                },
+                Event::PizzaDone {
+                    pizza,
+                    last_to_play,
+                    next_leader,
+                } => Happening::PizzaDone {
+                    pizza,
+                    last_to_play,
+                    next_leader,
+                },
+                Event::SeatFinished { seat, place } => Happening::SeatFinished { seat, place },
+                Event::GameEnded { .. } => {
+                    self.state = State::Finished;
+                    Happening::GameEnded
+                }
+                Event::ShiftStarted { .. }
+                | Event::RolesAssigned { .. }
+                | Event::SpecialActionDeclared { .. }
+                | Event::CardsExchanged { .. }
+                | Event::ShiftEnded { .. } => Happening::Game(Box::new(GameHappening {
+                    event: *event,
+                    by,
+                    rewards,
+                })),
+            };
+            self.log.push(at, happening);
+        }
+        self.events = events;
+        self.events.clear();
+    }
+
+    /// Opens the next decision of the game, if there is one.
+    fn open_next(&mut self, at: Duration) {
+        self.open = self
+            .game
+            .as_ref()
+            .and_then(|game| game.decision())
+            .map(|decision| {
+                let seat = &mut self.seats[decision.seat.index()];
+                seat.decisions += 1;
+                OpenDecision {
+                    decision,
+                    id: seat.decisions,
+                    released: at,
+                    told: false,
+                    start: None,
+                    look_again: Duration::ZERO,
+                    waits: None,
+                    attempts: 0,
+                }
+            });
+    }
+
+    /// Whether the log or the journal has reached its bound.
+    pub(super) fn is_too_long(&self) -> bool {
+        self.log.len() >= MAX_GAME_EVENTS || self.changes >= MAX_GAME_CHANGES
+    }
+
+    /// The change by which a decision is taken.
+    pub(super) fn decided(
+        &self,
+        seat: Seat,
+        action: ActionId,
+        source: Source,
+        time: Duration,
+        bank_left: Duration,
+    ) -> Decided {
+        Decided {
+            seat,
+            action,
+            source,
+            time_us: u64::try_from(time.as_micros()).unwrap_or(u64::MAX),
+            bank_left_ms: u32::try_from(bank_left.as_millis()).unwrap_or(u32::MAX),
+            annotations: None,
+        }
+    }
+
+    /// Whether the open decision is a turn, which alone is rewarded.
+    pub fn open_is_turn(&self) -> bool {
+        self.open
+            .as_ref()
+            .is_some_and(|open| open.decision.kind == DecisionKind::Turn)
+    }
+}

@@ -1,0 +1,180 @@
+//! Names and secrets: room and game ids, join codes, tickets, owner tokens. Secrets are random from the operating system, kept as hashes
+//! and compared in constant time.
+
+use std::fmt;
+
+use rand::TryRng as _;
+use sha2::{Digest as _, Sha256};
+use subtle::ConstantTimeEq as _;
+
+/// Letters of a join code: no vowels (no words), nothing that looks like something else.
+const CODE_LETTERS: &[u8; 27] = b"23456789BCDFGHJKMNPQRSTVWXZ";
+const CODE_LENGTH: usize = 8;
+
+/// Random bytes from the operating system.
+///
+/// # Panics
+/// When the operating system has no randomness to give, without which no room can be fair.
+pub fn random_bytes<const N: usize>() -> [u8; N] {
+    let mut bytes = [0; N];
+    rand::rngs::SysRng
+        .try_fill_bytes(&mut bytes)
+        .expect("the operating system gives random bytes");
+    bytes
+}
+
+/// Identifies a room or a game: 16 bytes, written as 32 hexadecimal digits.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Id(pub [u8; 16]);
+
+impl Id {
+    /// A new random id.
+    pub fn random() -> Self {
+        Self(random_bytes())
+    }
+
+    /// Reads 32 hexadecimal digits.
+    pub fn parse(text: &str) -> Option<Self> {
+        let mut bytes = [0; 16];
+        hex::decode_to_slice(text, &mut bytes).ok()?;
+        Some(Self(bytes))
+    }
+}
+
+impl fmt::Display for Id {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(&hex::encode(self.0))
+    }
+}
+
+impl fmt::Debug for Id {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, formatter)
+    }
+}
+
+/// The hash under which a secret is kept.
+#[derive(Clone, Copy, Debug)]
+pub struct SecretHash([u8; 32]);
+
+impl SecretHash {
+    /// The hash of a secret.
+    pub fn of(secret: &[u8]) -> Self {
+        Self(Sha256::digest(secret).into())
+    }
+
+    /// The hash that was kept.
+    pub fn from_bytes(bytes: [u8; 32]) -> Self {
+        Self(bytes)
+    }
+
+    /// What to keep.
+    pub fn bytes(&self) -> &[u8; 32] {
+        &self.0
+    }
+
+    /// Whether this is the hash of `secret`, in constant time.
+    pub fn matches(&self, secret: &[u8]) -> bool {
+        self.is(&Self::of(secret))
+    }
+
+    /// Whether two secrets are the same, in constant time.
+    pub fn is(&self, other: &Self) -> bool {
+        self.0.ct_eq(&other.0).into()
+    }
+}
+
+/// A secret that belongs to a room: the room's id and 256 random bits, written as 96 hexadecimal
+/// digits: a word that no command line takes for an option. A ticket or an owner token.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub struct Token {
+    /// The room it belongs to.
+    pub room: Id,
+    /// The secret.
+    pub secret: [u8; 32],
+}
+
+impl Token {
+    /// A new token for a room.
+    pub fn random(room: Id) -> Self {
+        Self {
+            room,
+            secret: random_bytes(),
+        }
+    }
+
+    /// Reads a token; `None` if the word is none.
+    pub fn parse(word: &str) -> Option<Self> {
+        let mut bytes = [0; 48];
+        hex::decode_to_slice(word, &mut bytes).ok()?;
+        let (room, secret) = bytes.split_at(16);
+        Some(Self {
+            room: Id(room.try_into().ok()?),
+            secret: secret.try_into().ok()?,
+        })
+    }
+
+    /// The word that is given to the client.
+    pub fn word(&self) -> String {
+        hex::encode([self.room.0.as_slice(), &self.secret].concat())
+    }
+
+    /// The hash to keep.
+    pub fn hash(&self) -> SecretHash {
+        SecretHash::of(&self.secret)
+    }
+}
+
+impl fmt::Debug for Token {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "Token({}, secret withheld)", self.room)
+    }
+}
+
+/// A new join code: eight letters, about 38 bits.
+pub fn join_code() -> String {
+    // A byte is taken modulo 27 only below the largest multiple of 27, so that every letter is as likely as any other.
+    let mut code = String::with_capacity(CODE_LENGTH);
+    while code.len() < CODE_LENGTH {
+        let [byte] = random_bytes::<1>();
+        if byte < 243 {
+            code.push(char::from(CODE_LETTERS[usize::from(byte % 27)]));
+        }
+    }
+    code
+}
+
+/// A join code as it is compared: without spaces and dashes, in capitals.
+pub fn normal_code(code: &str) -> String {
+    code.chars()
+        .filter(char::is_ascii_alphanumeric)
+        .map(|letter| letter.to_ascii_uppercase())
+        .take(64)
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::ids::*;
+
+    #[test]
+    fn words_read_back() {
+        let id = Id::random();
+        assert_eq!(Id::parse(&id.to_string()), Some(id));
+        assert_eq!(Id::parse("12"), None);
+        let token = Token::random(id);
+        assert_eq!(Token::parse(&token.word()), Some(token));
+        assert_eq!(Token::parse(&token.word()[1..]), None);
+        assert!(token.hash().matches(&token.secret));
+        assert!(!token.hash().matches(&Token::random(id).secret));
+        assert!(!format!("{token:?}").contains(&token.word()));
+    }
+
+    #[test]
+    fn codes_have_their_letters_and_ignore_case() {
+        let code = join_code();
+        assert_eq!(code.len(), CODE_LENGTH);
+        assert!(code.bytes().all(|letter| CODE_LETTERS.contains(&letter)));
+        assert_eq!(normal_code(&format!(" {}-", code.to_lowercase())), code);
+    }
+}

@@ -1,0 +1,378 @@
+//! What participants do: join, attach, leave, answer, express, come back. Each input is checked against the state; what is not right is
+//! answered and changes nothing.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use chefshat_engine::{ActionError, Seat};
+
+use super::answers::{AnswerInput, Answered, ExpressError, JoinError, LeaveError, Verdict};
+use super::{
+    ConnectionId, Core, MAX_ANNOTATION_BYTES, MAX_ANNOTATION_BYTES_PER_GAME, MAX_CONNECTION_EVENTS,
+    MAX_EXPRESSIONS_PER_SEAT, MAX_SEATINGS, State,
+};
+use crate::journal::{Change, Fill, ParticipantKind, SeatedParticipant, Source};
+use crate::log::Happening;
+
+impl Core {
+    /// Takes a seat.
+    ///
+    /// # Errors
+    /// Why none can be taken; the room is then as it was.
+    pub fn join(
+        &mut self,
+        now: Duration,
+        wanted: Option<u32>,
+        participant: SeatedParticipant,
+    ) -> Result<Seat, JoinError> {
+        match self.state {
+            State::Waiting => {}
+            State::Playing => return Err(JoinError::GameStarted),
+            State::Finished | State::Aborted(_) => return Err(JoinError::GameOver),
+        }
+        let log = self.log.since(0).iter();
+        let seatings = log.filter(|it| matches!(it.happening, Happening::Seated(..)));
+        if seatings.count() >= MAX_SEATINGS {
+            return Err(JoinError::TooManySeatings);
+        }
+        let seat = match wanted {
+            Some(number) => {
+                let seat = self
+                    .all_seats()
+                    .find(|seat| u32::try_from(seat.index()) == Ok(number))
+                    .ok_or(JoinError::NoSuchSeat)?;
+                if !self.is_free(seat) {
+                    return Err(JoinError::SeatTaken);
+                }
+                if !self.admits(seat, participant.kind) {
+                    return Err(JoinError::KindNotAdmitted);
+                }
+                seat
+            }
+            None => {
+                // A seat reserved for this very kind comes first, so that seats open to all stay free for others.
+                let mut free: Vec<Seat> = self.all_seats().filter(|s| self.is_free(*s)).collect();
+                if free.is_empty() {
+                    return Err(JoinError::RoomFull);
+                }
+                free.retain(|seat| self.admits(*seat, participant.kind));
+                *free
+                    .iter()
+                    .find(|seat| {
+                        matches!(
+                            self.seats[seat.index()].fill,
+                            Fill::Open {
+                                reserved_for: Some(_)
+                            }
+                        )
+                    })
+                    .or(free.first())
+                    .ok_or(JoinError::KindNotAdmitted)?
+            }
+        };
+        self.commit(
+            now,
+            Change::Seated {
+                seat,
+                participant: Box::new(participant),
+            },
+        );
+        Ok(seat)
+    }
+
+    /// Gives a seat back before the game begins.
+    ///
+    /// # Errors
+    /// The game has begun.
+    pub fn leave(&mut self, now: Duration, seat: Seat) -> Result<(), LeaveError> {
+        match self.state {
+            State::Waiting => {}
+            State::Playing => return Err(LeaveError::GameStarted),
+            State::Finished | State::Aborted(_) => return Err(LeaveError::GameOver),
+        }
+        self.commit(now, Change::Vacated(seat));
+        Ok(())
+    }
+
+    /// Seats a participant before anybody is told of the room.
+    pub fn seat(&mut self, seat: Seat, participant: SeatedParticipant) {
+        let participant = Box::new(participant);
+        self.commit(Duration::ZERO, Change::Seated { seat, participant });
+    }
+
+    /// Attaches a connection to a seat, which asked for it at `arrived`. Whoever was attached before has lost the seat.
+    pub fn attach(
+        &mut self,
+        now: Duration,
+        seat: Seat,
+        connection: ConnectionId,
+        entropy: Vec<u8>,
+        arrived: Duration,
+        handed_before: Option<Duration>,
+    ) {
+        // Whoever comes to hear how a game ended was not there at its end.
+        if self.state.is_over() {
+            return;
+        }
+        if self.awaited_from(seat).is_some() {
+            self.settle_start(now, handed_before);
+            self.restart_clock(now, seat);
+            self.wait_for_word(arrived);
+        }
+        let state = &mut self.seats[seat.index()];
+        state.recalled = false;
+        state.connection = Some(connection);
+        state.ever_attached = true;
+        // What one table adds to the seed would make its deals other than those of the series.
+        let dealt_alike = self.header.series().is_some();
+        if self.state == State::Waiting && !dealt_alike {
+            state.entropy = entropy;
+        }
+        if state.away || state.substituted {
+            self.returned(now, seat);
+        }
+        self.start_if_complete(now);
+        self.advance(now);
+    }
+
+    /// A connection has gone. Does nothing if the seat has a newer one.
+    pub fn lost(
+        &mut self,
+        now: Duration,
+        seat: Seat,
+        connection: ConnectionId,
+        handed: Option<Duration>,
+    ) {
+        // Of a game that is over it stays known who was there at its end.
+        if self.seats[seat.index()].connection != Some(connection) || self.state.is_over() {
+            return;
+        }
+        self.seats[seat.index()].connection = None;
+        if self.awaited_from(seat).is_some() {
+            self.settle_start(now, handed);
+        }
+        let state = &mut self.seats[seat.index()];
+        if state.connection_events < MAX_CONNECTION_EVENTS {
+            state.connection_events += 1;
+            self.commit(now, Change::Disconnected(seat));
+        }
+    }
+
+    /// The seat's agent says that it plays itself again.
+    pub fn resume(&mut self, now: Duration, seat: Seat) {
+        if self.seats[seat.index()].substituted {
+            self.returned(now, seat);
+        }
+    }
+
+    /// Somebody expresses something; `expression` is the encoded message.
+    ///
+    /// # Errors
+    /// Why it is not taken.
+    pub fn express(
+        &mut self,
+        now: Duration,
+        seat: Seat,
+        record_only: bool,
+        expression: Box<[u8]>,
+    ) -> Result<(), ExpressError> {
+        if self.state.is_over() {
+            return Err(ExpressError::GameOver);
+        }
+        if self.seats[seat.index()].expressions >= MAX_EXPRESSIONS_PER_SEAT {
+            return Err(ExpressError::TooMany);
+        }
+        self.commit(
+            now,
+            Change::Expressed {
+                seat,
+                record_only,
+                expression,
+            },
+        );
+        Ok(())
+    }
+
+    /// An answer has arrived.
+    pub fn answer(&mut self, now: Duration, input: AnswerInput) -> Answered {
+        let seat = input.seat;
+        if let Some(last) = &self.seats[seat.index()].last_answer
+            && last.decision_id == input.decision_id
+        {
+            return if last.action == input.action {
+                last.answered.clone()
+            } else {
+                Answered::closed(Verdict::Closed)
+            };
+        }
+        if input.decision_id == 0 || input.decision_id > self.seats[seat.index()].decisions {
+            return Answered::closed(Verdict::Unknown);
+        }
+        let open = match self.awaited_from(seat) {
+            Some(open) if open.id == input.decision_id => open.clone(),
+            _ => return Answered::closed(Verdict::Closed),
+        };
+        self.settle_start(now, input.handed);
+        let start = self
+            .open
+            .as_ref()
+            .and_then(|open| open.start)
+            .unwrap_or(open.released);
+        let time = input.arrived.saturating_sub(start);
+        if time >= self.time_allowed(seat) {
+            // It arrived after the deadline, before the room was told that the time was up.
+            self.tick(now, input.handed);
+            return Answered {
+                time,
+                ..Answered::closed(Verdict::Closed)
+            };
+        }
+        let answered = match self.refusal(input.action) {
+            Some(error) => self.invalid(now, &input, time, open.attempts + 1, &error),
+            None => self.accept(now, input, time),
+        };
+        self.advance(now);
+        answered
+    }
+
+    fn accept(&mut self, now: Duration, input: AnswerInput, time: Duration) -> Answered {
+        let seat = input.seat;
+        let taken_already = self.seats[seat.index()].annotation_bytes;
+        let (annotations, annotations_dropped) = match input.annotations {
+            Some(bytes)
+                if bytes.len() > MAX_ANNOTATION_BYTES
+                    || taken_already + bytes.len() > MAX_ANNOTATION_BYTES_PER_GAME =>
+            {
+                (None, true)
+            }
+            annotations => (annotations, input.annotations_refused),
+        };
+        let bank_left = self.bank_after(seat, time);
+        let mut decided = self.decided(
+            seat,
+            Self::action_from(input.action),
+            Source::Agent,
+            time,
+            bank_left,
+        );
+        decided.annotations = annotations;
+        self.commit(now, Change::Decided(decided));
+        let last = self.seats[seat.index()]
+            .last_answer
+            .as_mut()
+            .expect("a decision by the agent has just been folded");
+        last.answered.annotations_dropped = annotations_dropped;
+        last.answered.clone()
+    }
+
+    fn invalid(
+        &mut self,
+        now: Duration,
+        input: &AnswerInput,
+        time: Duration,
+        attempts: u32,
+        error: &ActionError,
+    ) -> Answered {
+        let limit = self.header.policy.max_invalid_attempts;
+        let reward = self
+            .header
+            .policy
+            .reward_scheme
+            .filter(|_| self.open_is_turn())
+            .map(|scheme| scheme.invalid());
+        self.commit(
+            now,
+            Change::Attempted {
+                seat: input.seat,
+                action: input.action,
+            },
+        );
+        if attempts >= self.attempts_limit() {
+            self.take_default(now, input.seat, Source::Invalid, time);
+        } else {
+            self.wait_for_word(input.arrived);
+        }
+        Answered {
+            verdict: Verdict::Invalid {
+                detail: error.to_string(),
+                attempts_left: limit.map(|limit| limit.saturating_sub(attempts)),
+                reward,
+            },
+            time,
+            annotations_dropped: false,
+        }
+    }
+
+    /// Why an action cannot be taken now; `None` if it can.
+    fn refusal(&self, action: u32) -> Option<ActionError> {
+        let action = Self::action_from(action);
+        if self.legal_actions().contains(action) {
+            return None;
+        }
+        // The engine says why when it is asked to do it; the copy is thrown away.
+        self.game()
+            .and_then(|game| game.clone().apply(action, |_| {}).err())
+    }
+
+    fn returned(&mut self, now: Duration, seat: Seat) {
+        let state = &mut self.seats[seat.index()];
+        if state.connection_events >= MAX_CONNECTION_EVENTS && !state.substituted {
+            return;
+        }
+        state.connection_events += 1;
+        if !self.state.is_over() {
+            self.commit(now, Change::Returned(seat));
+        }
+    }
+
+    fn start_if_complete(&mut self, now: Duration) {
+        let complete = self.state == State::Waiting
+            && self
+                .seats
+                .iter()
+                .all(|seat| seat.fill.is_built_in() || seat.connection.is_some());
+        if complete {
+            let entropy = self
+                .seats
+                .iter_mut()
+                .map(|seat| std::mem::take(&mut seat.entropy))
+                .collect();
+            self.commit(now, Change::Started { entropy });
+            self.take_over(now);
+        }
+    }
+
+    /// Takes the decisions of the record that the game branches from.
+    fn take_over(&mut self, now: Duration) {
+        let header = Arc::clone(&self.header);
+        let parts = header.start.branch.iter().flat_map(|b| &b.taken_over);
+        for action in parts.flat_map(|part| &part.actions) {
+            let seat = self
+                .open
+                .as_ref()
+                .map(|open| open.decision.seat)
+                .expect("a record is replayed before a room branches from it");
+            let bank_left = self.seats[seat.index()].bank_left;
+            let decided = self.decided(seat, *action, Source::Recorded, Duration::ZERO, bank_left);
+            self.commit(now, Change::Decided(decided));
+        }
+    }
+
+    /// A room without open seats begins by itself.
+    pub fn begin_if_all_built_in(&mut self, now: Duration) {
+        self.start_if_complete(now);
+        self.advance(now);
+    }
+
+    fn is_free(&self, seat: Seat) -> bool {
+        let state = &self.seats[seat.index()];
+        state.participant.is_none() && matches!(state.fill, Fill::Open { .. })
+    }
+
+    fn admits(&self, seat: Seat, kind: ParticipantKind) -> bool {
+        match self.seats[seat.index()].fill {
+            Fill::Open { reserved_for } => reserved_for.is_none_or(|wanted| wanted == kind),
+            Fill::BuiltIn(_) | Fill::Replay(_) => false,
+        }
+    }
+}

@@ -1,0 +1,127 @@
+//! Going on with a game after the server was restarted: its journal is read back, entry by entry, each checked before it is folded, because
+//! a file can be damaged. Built-in agents are asked again what they were asked then, so that their generators stand where they stood.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use chefshat_engine::MAX_ENTROPY;
+use chefshat_engine::{Seat, Viewer};
+
+use super::Core;
+use crate::journal::{Change, Entry, Fill, GameHeader, Source};
+
+/// Why a game cannot be gone on with.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("entry {entry} of its journal does not fit: {problem}")]
+pub struct BadJournal {
+    /// Number of the entry, from 1.
+    pub entry: usize,
+    /// What is wrong with it.
+    pub problem: &'static str,
+}
+
+impl Core {
+    /// A room as it stood after the entries of a journal, with everybody's connection lost, unless its game is over.
+    ///
+    /// # Errors
+    /// The first entry that does not fit what was before it.
+    pub fn revived(
+        header: Arc<GameHeader>,
+        journal: &[Entry],
+        now: Duration,
+    ) -> Result<Self, BadJournal> {
+        let mut core = Self::new(header);
+        for (index, entry) in journal.iter().enumerate() {
+            core.check(&entry.change).map_err(|problem| BadJournal {
+                entry: index + 1,
+                problem,
+            })?;
+            core.remind_agents(&entry.change);
+            core.refold(entry);
+        }
+        if !core.state.is_over() {
+            core.commit(now, Change::ServerRestarted);
+        }
+        Ok(core)
+    }
+
+    fn check(&self, change: &Change) -> Result<(), &'static str> {
+        if self.state.is_over() {
+            return Err("the game was over before it");
+        }
+        let begun = self.game.is_some();
+        match change {
+            Change::Seated { seat, .. } | Change::Vacated(seat) => {
+                self.check_open_seat(*seat)?;
+                check(!begun, "the game has begun")
+            }
+            Change::Disconnected(seat) | Change::Returned(seat) | Change::Substituted(seat) => {
+                self.check_open_seat(*seat)
+            }
+            Change::Started { entropy } => {
+                check(!begun, "the game begins twice")?;
+                check(
+                    entropy.len() == self.seats.len(),
+                    "not one part for each seat",
+                )?;
+                let bounded = entropy.iter().all(|bytes| bytes.len() <= MAX_ENTROPY);
+                check(bounded, "a seat adds too much to the seed")
+            }
+            Change::Attempted { seat, .. } => self.check_decision(*seat),
+            Change::Decided(decided) => {
+                self.check_decision(decided.seat)?;
+                let legal = self.legal_actions().contains(decided.action);
+                check(legal, "the action is not legal")
+            }
+            Change::Expressed { seat, .. } => self.check_seat(*seat),
+            Change::Aborted(_) | Change::ServerRestarted => Ok(()),
+        }
+    }
+
+    fn check_seat(&self, seat: Seat) -> Result<(), &'static str> {
+        check(seat.index() < self.seats.len(), "there is no such seat")
+    }
+
+    fn check_open_seat(&self, seat: Seat) -> Result<(), &'static str> {
+        self.check_seat(seat)?;
+        let open = matches!(self.seats[seat.index()].fill, Fill::Open { .. });
+        check(open, "the seat is a built-in agent's")
+    }
+
+    fn check_decision(&self, seat: Seat) -> Result<(), &'static str> {
+        let open = self.open.as_ref().map(|open| open.decision.seat);
+        check(open == Some(seat), "no decision of this seat is open")
+    }
+
+    /// Moves the generators of built-in agents to where they stood after a change.
+    fn remind_agents(&mut self, change: &Change) {
+        let asked = match change {
+            Change::Attempted { seat, .. } => *seat,
+            Change::Decided(decided)
+                if matches!(decided.source, Source::Agent | Source::Substitute) =>
+            {
+                decided.seat
+            }
+            Change::Substituted(seat) => {
+                self.give_substitute(*seat);
+                return;
+            }
+            _ => return,
+        };
+        let agent = self.seats[asked.index()].agent.as_ref();
+        if !self.is_automatic(asked) || !agent.is_some_and(|agent| agent.has_generator()) {
+            return;
+        }
+        let legal = self.legal_actions();
+        let observation = self.observe(Viewer::Seat(asked));
+        if let (Some(observation), Some(agent)) =
+            (observation, &mut self.seats[asked.index()].agent)
+        {
+            agent.decide(&observation, &legal);
+        }
+    }
+}
+
+fn check(holds: bool, problem: &'static str) -> Result<(), &'static str> {
+    if holds { Ok(()) } else { Err(problem) }
+}

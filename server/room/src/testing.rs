@@ -1,0 +1,240 @@
+//! A room under an invented clock, for tests of the core and of what a server makes of it: what happens when is said by the tests.
+#![allow(missing_docs, reason = "test support")]
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::Duration;
+
+use chefshat_engine::{
+    ActionId, BySeat, Cards, Game, RULES_VERSION, RuleSetSpec, Seat, SeedPlan, Stop,
+};
+
+use crate::ids::{Id, SecretHash};
+use crate::journal::{
+    Change, Decided, Entry, Fill, GameHeader, GameStart, ParticipantKind, SeatedParticipant,
+};
+use crate::log::Happening;
+use crate::policy::Policy;
+use crate::{AnswerInput, Answered, ConnectionId, Core, JoinError, Verdict};
+
+pub const OPEN: Fill = Fill::Open { reserved_for: None };
+
+pub fn ms(milliseconds: u64) -> Duration {
+    Duration::from_millis(milliseconds)
+}
+
+/// A room on a table: the core, a clock, and the journal that a store would have kept.
+pub struct Table {
+    pub core: Core,
+    pub now: Duration,
+    pub journal: Vec<Entry>,
+    pub connections: u64,
+    /// How long the store takes for what it is given next.
+    pub store_takes: Duration,
+}
+
+impl Table {
+    /// A room whose seats are free.
+    pub fn empty(policy: Policy, fills: Vec<Fill>) -> Self {
+        Self::with_rules(policy, fills, RuleSetSpec::default())
+    }
+
+    pub fn with_rules(policy: Policy, fills: Vec<Fill>, rules: RuleSetSpec) -> Self {
+        let header = Arc::new(GameHeader {
+            room_id: Id([1; 16]),
+            game_id: Id([2; 16]),
+            name: "table".into(),
+            rules: rules.validate().expect("the rule set makes sense"),
+            rules_version: RULES_VERSION,
+            policy,
+            called: BTreeMap::new(),
+            recorded: BTreeMap::new(),
+            start: GameStart::default(),
+            fills,
+            seed: SeedPlan::Fixed { game_seed: [7; 32] },
+            created_at_ms: 0,
+            join_code: "CODE".into(),
+            owner: SecretHash::of(b"owner"),
+            tournament: None,
+        });
+        Self {
+            core: Core::new(header),
+            now: Duration::ZERO,
+            journal: Vec::new(),
+            connections: 0,
+            store_takes: Duration::ZERO,
+        }
+    }
+
+    /// A room of four remote agents whose game has begun.
+    pub fn playing(policy: Policy) -> Self {
+        let mut table = Self::empty(policy, vec![OPEN; 4]);
+        table.fill();
+        table
+    }
+
+    pub fn fill(&mut self) {
+        let seats: Vec<Seat> = self.core.all_seats().collect();
+        for _ in &seats {
+            let _ = self.join(ParticipantKind::Agent);
+        }
+        for seat in seats {
+            self.attach(seat);
+        }
+    }
+
+    pub fn join(&mut self, kind: ParticipantKind) -> Result<Seat, JoinError> {
+        let joined = self.core.join(
+            self.now,
+            None,
+            SeatedParticipant {
+                name: "somebody".into(),
+                kind,
+                ticket: SecretHash::of(b"ticket"),
+            },
+        );
+        self.keep();
+        joined
+    }
+
+    pub fn attach(&mut self, seat: Seat) -> ConnectionId {
+        self.connections += 1;
+        let connection = ConnectionId(self.connections);
+        // The connection before it, where there is one, has handed over everything.
+        let handed = (self.core.standing(seat).connected).then_some(self.now);
+        self.core
+            .attach(self.now, seat, connection, Vec::new(), self.now, handed);
+        self.keep();
+        connection
+    }
+
+    pub fn lost(&mut self, seat: Seat, connection: ConnectionId) {
+        self.core.lost(self.now, seat, connection, None);
+        self.keep();
+    }
+
+    /// Lets time pass, ringing at every deadline on the way.
+    pub fn pass_time(&mut self, time: Duration) {
+        let until = self.now + time;
+        while let Some(deadline) = self.core.deadline().filter(|deadline| *deadline <= until) {
+            self.now = self.now.max(deadline);
+            // The transport, where there is one, took every request the moment it was released.
+            let connected = |seat| self.core.standing(seat).connected;
+            let handed = (self.core.open())
+                .filter(|open| connected(open.decision.seat))
+                .map(|open| open.released);
+            self.core.tick(self.now, handed);
+            self.keep();
+        }
+        self.now = until;
+    }
+
+    pub fn open(&self) -> (Seat, u64) {
+        let open = self.core.open().expect("a decision is open");
+        (open.decision.seat, open.id)
+    }
+
+    pub fn legal(&self, index: usize) -> u32 {
+        let legal = self.core.legal_actions();
+        let action = legal.nth(index % legal.len()).expect("below the length");
+        action.index().into()
+    }
+
+    /// An action that is not legal now.
+    pub fn illegal(&self) -> u32 {
+        let legal = self.core.legal_actions();
+        (0..500)
+            .find(|number| !legal.contains(ActionId::new(*number)))
+            .expect("not everything is legal")
+            .into()
+    }
+
+    pub fn answer(&mut self, seat: Seat, decision_id: u64, action: u32) -> Answered {
+        let handed = self.core.open().map(|open| open.released);
+        let answered = self.core.answer(
+            self.now,
+            AnswerInput {
+                seat,
+                decision_id,
+                action,
+                annotations: None,
+                annotations_refused: false,
+                arrived: self.now,
+                handed,
+            },
+        );
+        self.keep();
+        answered
+    }
+
+    /// The seat whose decision is open takes its first legal action.
+    pub fn play_one(&mut self) -> Seat {
+        let (seat, id) = self.open();
+        let action = self.legal(0);
+        assert_eq!(self.answer(seat, id, action).verdict, Verdict::Accepted);
+        seat
+    }
+
+    pub fn keep(&mut self) {
+        self.journal.append(self.core.unkept());
+        self.now += std::mem::take(&mut self.store_takes);
+        self.core.released(self.now);
+    }
+
+    pub fn last_decision(&self) -> &Decided {
+        self.journal
+            .iter()
+            .rev()
+            .find_map(|entry| match &entry.change {
+                Change::Decided(decided) => Some(decided),
+                _ => None,
+            })
+            .expect("a decision has been taken")
+    }
+
+    pub fn happened(&self, wanted: impl Fn(&Happening) -> bool) -> usize {
+        self.core
+            .log()
+            .since(0)
+            .iter()
+            .filter(|entry| wanted(&entry.happening))
+            .count()
+    }
+
+    /// The journal, folded anew, gives the same log and the same game.
+    pub fn assert_replays(&self) {
+        let replayed = Core::replay(Arc::clone(self.core.header()), &self.journal);
+        assert_eq!(
+            format!("{:?}", replayed.log()),
+            format!("{:?}", self.core.log())
+        );
+        assert_eq!(replayed.state(), self.core.state());
+        assert_eq!(replayed.decisions(), self.core.decisions());
+        assert_eq!(
+            replayed.open().map(|open| (open.decision, open.id)),
+            self.core.open().map(|open| (open.decision, open.id))
+        );
+    }
+}
+
+/// Rules under which a game is over after one Shift.
+pub fn one_shift() -> RuleSetSpec {
+    RuleSetSpec {
+        stop: Stop::Shifts(1),
+        ..RuleSetSpec::default()
+    }
+}
+
+impl Core {
+    /// Puts other hands in place of those dealt, in the game and in the log, as a test of what is hidden needs it. `None` if they make no game.
+    pub fn replace_hands(
+        &mut self,
+        change: impl FnOnce(&Game) -> Option<BySeat<Cards>>,
+    ) -> Option<()> {
+        let game = self.game.as_ref().expect("the game has begun");
+        let hands = change(game)?;
+        self.game = Some(Box::new(game.with_hands(hands).ok()?));
+        self.log.replace_hands(&hands);
+        Some(())
+    }
+}

@@ -1,0 +1,421 @@
+//! Deadlines, banks, defaults, substitution, giving up.
+
+use chefshat_agents::AgentKind;
+
+use super::*;
+use crate::journal::AbortReason;
+use crate::policy::{AbortPolicy, KindClock};
+
+fn quick() -> Policy {
+    Policy {
+        decision_time: ms(1000),
+        bank: ms(500),
+        ..Policy::default()
+    }
+}
+
+#[test]
+fn a_deadline_takes_the_default_and_is_called_timeout() {
+    let mut table = Table::playing(quick());
+    let (seat, _) = table.open();
+    table.pass_time(ms(1499));
+    assert_eq!(table.core.decisions(), 0, "the bank is not used up yet");
+    table.pass_time(ms(1));
+    assert_eq!(table.core.decisions(), 1);
+    let decided = table.last_decision();
+    assert_eq!((decided.seat, decided.source), (seat, Source::Timeout));
+    assert_eq!(decided.bank_left_ms, 0);
+    assert_eq!(decided.time_us, 1_500_000);
+    table.assert_replays();
+}
+
+#[test]
+fn the_bank_pays_for_what_is_over_the_time_of_a_decision() {
+    let mut table = Table::playing(quick());
+    let (seat, id) = table.open();
+    table.pass_time(ms(1200));
+    let (left, bank) = table.core.time_left(table.now);
+    // Nobody has told the core yet when the request was handed over.
+    assert!(left <= ms(1000) && bank <= ms(500));
+    let action = table.legal(0);
+    let answered = table.answer(seat, id, action);
+    assert_eq!(answered.verdict, Verdict::Accepted);
+    assert_eq!(answered.time, ms(1200));
+    assert_eq!(table.last_decision().bank_left_ms, 300);
+    // Its next decision has 1000 + 300 milliseconds.
+    while table.open().0 != seat {
+        table.play_one();
+    }
+    table.pass_time(ms(1300));
+    assert_eq!(table.last_decision().seat, seat);
+    assert_eq!(table.last_decision().source, Source::Timeout);
+}
+
+#[test]
+fn an_answer_that_arrived_in_time_counts_even_if_it_waited_in_a_queue() {
+    let mut table = Table::playing(quick());
+    let (seat, id) = table.open();
+    let action = table.legal(0);
+    let answer = |arrived| AnswerInput {
+        seat,
+        decision_id: id,
+        action,
+        annotations: None,
+        annotations_refused: false,
+        arrived,
+        handed: Some(ms(0)),
+    };
+    let mut late = Table::playing(quick());
+    assert_eq!(
+        late.core.answer(ms(1600), answer(ms(1500))).verdict,
+        Verdict::Closed,
+        "arrived at the deadline"
+    );
+    late.keep();
+    assert_eq!(late.last_decision().source, Source::Timeout);
+    assert_eq!(
+        table.core.answer(ms(1600), answer(ms(1499))).verdict,
+        Verdict::Accepted
+    );
+}
+
+#[test]
+fn the_clock_begins_when_the_transport_takes_the_request_but_not_for_ever_later() {
+    let mut table = Table::playing(quick());
+    // Not handed over at all: the clock begins after MAX_HANDOVER.
+    let latest = super::super::MAX_HANDOVER;
+    for now in [1500, 3000, 4999] {
+        table.core.tick(ms(now), None);
+    }
+    assert_eq!(table.core.decisions(), 0);
+    table.core.tick(latest, None);
+    assert_eq!(table.core.deadline(), Some(latest + ms(1500)));
+    table.core.tick(latest + ms(1500), None);
+    assert_eq!(table.core.decisions(), 1);
+
+    let mut table = Table::playing(quick());
+    table.core.tick(ms(1500), Some(ms(700)));
+    assert_eq!(table.core.decisions(), 0);
+    assert_eq!(table.core.deadline(), Some(ms(2200)));
+}
+
+#[test]
+fn a_room_does_not_spin_while_a_transport_takes_nothing() {
+    let mut table = Table::playing(Policy {
+        decision_time: ms(10),
+        bank: ms(0),
+        ..Policy::default()
+    });
+    let mut rings = 0;
+    while table.core.decisions() == 0 {
+        let deadline = table.core.deadline().expect("a decision is open");
+        assert!(
+            deadline > table.now,
+            "a deadline that has passed rings at once, again and again"
+        );
+        table.now = deadline;
+        table.core.tick(table.now, None);
+        rings += 1;
+    }
+    assert!(rings < 300, "{rings} rings");
+    assert_eq!(table.now, super::super::MAX_HANDOVER + ms(10));
+}
+
+#[test]
+fn invalid_answers_do_not_move_the_deadline_and_end_in_the_default() {
+    let mut table = Table::playing(Policy {
+        max_invalid_attempts: Some(3),
+        ..quick()
+    });
+    let (seat, id) = table.open();
+    let wrong = table.illegal();
+    let deadline = table.core.deadline();
+    for left in [2, 1] {
+        table.now += ms(100);
+        match table.answer(seat, id, wrong).verdict {
+            Verdict::Invalid {
+                attempts_left,
+                detail,
+                ..
+            } => {
+                assert_eq!(attempts_left, Some(left));
+                assert!(!detail.is_empty());
+            }
+            other => panic!("{other:?}"),
+        }
+        assert_eq!(table.core.deadline(), deadline);
+    }
+    assert!(matches!(
+        table.answer(seat, id, wrong).verdict,
+        Verdict::Invalid {
+            attempts_left: Some(0),
+            ..
+        }
+    ));
+    assert_eq!(table.last_decision().source, Source::Invalid);
+    assert_eq!(table.core.decisions(), 1);
+    assert_eq!(table.answer(seat, id, wrong).verdict, Verdict::Closed);
+    table.assert_replays();
+}
+
+#[test]
+fn without_a_limit_of_attempts_a_decision_stays_open() {
+    let mut table = Table::playing(Policy {
+        max_invalid_attempts: None,
+        ..Policy::default()
+    });
+    let (seat, id) = table.open();
+    for _ in 1..super::super::MAX_ATTEMPTS {
+        let wrong = table.illegal();
+        assert!(matches!(
+            table.answer(seat, id, wrong).verdict,
+            Verdict::Invalid {
+                attempts_left: None,
+                ..
+            }
+        ));
+    }
+    assert_eq!(table.open(), (seat, id));
+    // But a record must hold them.
+    let wrong = table.illegal();
+    table.answer(seat, id, wrong);
+    assert_eq!(table.last_decision().source, Source::Invalid);
+}
+
+#[test]
+fn a_silent_seat_is_substituted_and_comes_back() {
+    let mut table = Table::playing(Policy {
+        max_timeouts: 2,
+        bank: ms(0),
+        abort: AbortPolicy::Never,
+        ..quick()
+    });
+    let (silent, _) = table.open();
+    let mut lost = 0;
+    while !table.core.standing(silent).substituted {
+        if table.open().0 == silent {
+            table.pass_time(ms(1000));
+            lost += 1;
+        } else {
+            table.play_one();
+        }
+    }
+    assert_eq!(lost, 2);
+    assert_eq!(
+        table.happened(|event| matches!(event, Happening::Substituted(seat) if *seat == silent)),
+        1
+    );
+    // The substitute plays without being asked for.
+    for _ in 0..8 {
+        assert_ne!(table.open().0, silent);
+        table.play_one();
+    }
+    let by_substitute = |happening: &Happening| match happening {
+        Happening::Played { seat, by, .. } | Happening::Passed { seat, by, .. } => {
+            *seat == silent && by.source == Source::Substitute
+        }
+        _ => false,
+    };
+    assert!(table.happened(by_substitute) > 0);
+    table.core.resume(table.now, silent);
+    table.keep();
+    assert!(!table.core.standing(silent).substituted);
+    while table.open().0 != silent {
+        table.play_one();
+    }
+    table.play_one();
+    assert_eq!(table.last_decision().source, Source::Agent);
+    table.assert_replays();
+}
+
+#[test]
+fn a_seat_that_attaches_anew_plays_itself_again() {
+    let mut table = Table::playing(Policy {
+        max_timeouts: 1,
+        bank: ms(0),
+        pace: Some(ms(400)),
+        abort: AbortPolicy::Never,
+        ..quick()
+    });
+    let (seat, _) = table.open();
+    table.pass_time(ms(1000));
+    assert!(table.core.standing(seat).substituted);
+    while table.open().0 != seat {
+        table.play_one();
+    }
+    // The substitute waits its pace; the agent comes back first and gets the decision with a clock of its own.
+    table.pass_time(ms(300));
+    table.attach(seat);
+    assert_eq!(table.open().0, seat);
+    assert!(table.core.awaited().is_some());
+    assert_eq!(table.core.deadline(), Some(table.now + ms(1000)));
+    table.play_one();
+    table.assert_replays();
+}
+
+#[test]
+fn disconnected_is_not_timeout_and_does_not_stop_the_clock() {
+    let mut table = Table::playing(quick());
+    let (seat, id) = table.open();
+    let connection = ConnectionId(u64::try_from(seat.index()).expect("small") + 1);
+    table.pass_time(ms(400));
+    table.lost(seat, connection);
+    assert_eq!(
+        table.happened(|event| matches!(event, Happening::Disconnected(_))),
+        1
+    );
+    table.pass_time(ms(600));
+    table.attach(seat);
+    assert_eq!(
+        table.happened(|event| matches!(event, Happening::Returned(_))),
+        1
+    );
+    assert_eq!(table.open(), (seat, id), "still the same decision");
+    assert_eq!(
+        table.core.time_left(table.now),
+        (ms(0), ms(500)),
+        "the time really left"
+    );
+    let connection = ConnectionId(table.connections);
+    table.lost(seat, connection);
+    table.pass_time(ms(500));
+    assert_eq!(table.last_decision().source, Source::Disconnected);
+    table.assert_replays();
+}
+
+#[test]
+fn a_game_without_its_participants_is_given_up_as_the_policy_says() {
+    for (policy, lost_seats) in [
+        (AbortPolicy::AnyLost, Some(1)),
+        (AbortPolicy::AllLost, Some(4)),
+        (AbortPolicy::Never, None),
+    ] {
+        let mut table = Table::playing(Policy {
+            max_timeouts: 1,
+            bank: ms(0),
+            abort: policy,
+            ..quick()
+        });
+        table.pass_time(Duration::from_secs(3600));
+        let substituted = table.happened(|event| matches!(event, Happening::Substituted(_)));
+        match lost_seats {
+            Some(lost) => {
+                assert_eq!(
+                    table.core.state(),
+                    State::Aborted(AbortReason::ParticipantsLost)
+                );
+                assert_eq!(substituted, lost - 1, "{policy:?}");
+            }
+            None => assert_eq!(table.core.state(), State::Finished),
+        }
+        table.assert_replays();
+    }
+}
+
+#[test]
+fn built_in_agents_play_by_themselves_at_their_pace() {
+    let fills = vec![
+        Fill::BuiltIn(AgentKind::Greedy),
+        Fill::BuiltIn(AgentKind::Random),
+        Fill::BuiltIn(AgentKind::RandomUnmasked),
+        Fill::BuiltIn(AgentKind::Greedy),
+    ];
+    let mut table = Table::empty(
+        Policy {
+            pace: Some(ms(100)),
+            max_invalid_attempts: Some(5),
+            ..Policy::default()
+        },
+        fills,
+    );
+    table.core.begin_if_all_built_in(table.now);
+    table.keep();
+    assert_eq!(table.core.decisions(), 0);
+    table.pass_time(ms(1000));
+    assert_eq!(table.core.decisions(), 10);
+    table.pass_time(Duration::from_secs(3600));
+    assert_eq!(table.core.state(), State::Finished);
+    let by_default = |source| {
+        table
+            .journal
+            .iter()
+            .filter(|entry| matches!(&entry.change, Change::Decided(decided) if decided.source == source))
+            .count()
+    };
+    assert!(
+        by_default(Source::Invalid) > 0,
+        "random_unmasked was wrong five times in a row"
+    );
+    assert_eq!(by_default(Source::Timeout), 0);
+    table.assert_replays();
+}
+
+#[test]
+fn kinds_of_participants_may_have_clocks_of_their_own() {
+    let policy = Policy {
+        clocks: vec![KindClock {
+            kind: ParticipantKind::Human,
+            decision_time: Some(ms(5000)),
+            bank: Some(ms(2000)),
+        }],
+        ..quick()
+    };
+    for (kind, allowed, bank_after) in [
+        (ParticipantKind::Human, 7000, 1000),
+        (ParticipantKind::Robot, 1500, 250),
+    ] {
+        let mut table = Table::empty(policy.clone(), vec![OPEN; 4]);
+        for _ in 0..4 {
+            table.join(kind).expect("a seat is free");
+        }
+        for seat in table.core.all_seats() {
+            table.attach(seat);
+        }
+        let (seat, id) = table.open();
+        table.pass_time(ms(allowed - bank_after));
+        let action = table.legal(0);
+        assert_eq!(table.answer(seat, id, action).verdict, Verdict::Accepted);
+        assert_eq!(u64::from(table.last_decision().bank_left_ms), bank_after);
+        let decisions = table.core.decisions();
+        table.pass_time(ms(allowed - 1));
+        assert_eq!(table.core.decisions(), decisions, "{kind:?} has time left");
+        table.pass_time(ms(1));
+        assert_eq!(table.core.decisions(), decisions + 1);
+        assert_eq!(table.last_decision().source, Source::Timeout);
+        table.assert_replays();
+    }
+}
+
+#[test]
+fn built_in_agents_wait_a_second_where_a_person_plays() {
+    for (kind, pace) in [
+        (ParticipantKind::Human, ms(1000)),
+        (ParticipantKind::Agent, Duration::ZERO),
+    ] {
+        let fills = [
+            OPEN,
+            Fill::BuiltIn(AgentKind::Greedy),
+            Fill::BuiltIn(AgentKind::Random),
+            Fill::BuiltIn(AgentKind::Random),
+        ];
+        let mut table = Table::empty(Policy::default(), fills.to_vec());
+        let seat = table.join(kind).expect("a seat is free");
+        table.attach(seat);
+        if table.open().0 == seat {
+            table.play_one();
+        }
+        match kind {
+            ParticipantKind::Human => {
+                assert_ne!(table.open().0, seat, "a built-in agent thinks");
+                assert_eq!(table.core.deadline(), Some(table.now + pace));
+                let decisions = table.core.decisions();
+                table.pass_time(pace - ms(1));
+                assert_eq!(table.core.decisions(), decisions);
+                table.pass_time(ms(1));
+                assert!(table.core.decisions() > decisions);
+            }
+            _ => assert_eq!(table.open().0, seat, "the built-in agents have decided"),
+        }
+        table.assert_replays();
+    }
+}

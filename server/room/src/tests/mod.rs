@@ -1,0 +1,17 @@
+//! The core of a room under an invented clock: what happens when is said by the tests.
+
+mod clocks;
+mod revival;
+mod seats;
+mod strange;
+
+use std::time::Duration;
+
+use chefshat_engine::Seat;
+
+use super::{AnswerInput, ConnectionId, Core, State, Verdict};
+use crate::ids::SecretHash;
+use crate::journal::{Change, Fill, ParticipantKind, SeatedParticipant, Source};
+use crate::log::Happening;
+use crate::policy::Policy;
+use crate::testing::{OPEN, Table, ms, one_shift};

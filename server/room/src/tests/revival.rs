@@ -1,0 +1,351 @@
+//! A server that was restarted: the game stands where its journal left it, everybody is given time to come back, and nothing that a
+//! built-in agent would have done is changed by it.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use chefshat_agents::AgentKind;
+use chefshat_engine::{ActionId, Seat};
+
+use super::{AnswerInput, Core, OPEN, Table, Verdict, ms, one_shift};
+use crate::journal::{Change, Fill, ParticipantKind, Source};
+use crate::log::Happening;
+use crate::policy::Policy;
+use crate::{BadJournal, ConnectionId, JOIN_HOLD, RECALL_TIME, State};
+
+impl Table {
+    /// The server dies, and is back after `downtime`.
+    fn restart(&mut self, downtime: Duration) {
+        self.now += downtime;
+        let header = Arc::clone(self.core.header());
+        self.core =
+            Core::revived(header, &self.journal, self.now).expect("the journal is as it was kept");
+        self.keep();
+    }
+}
+
+fn policy() -> Policy {
+    Policy {
+        decision_time: ms(1_000),
+        bank: ms(500),
+        ..Policy::default()
+    }
+}
+
+#[test]
+fn the_open_decision_stays_open_and_its_clock_waits_for_the_seat() {
+    let mut table = Table::playing(policy());
+    for _ in 0..20 {
+        table.play_one();
+    }
+    let (seat, id) = table.open();
+    let legal = table.core.legal_actions();
+    // Its time is nearly up when the server dies.
+    table.pass_time(ms(1_400));
+    table.restart(Duration::from_secs(3_600));
+    assert_eq!(table.open(), (seat, id));
+    assert_eq!(table.core.legal_actions(), legal);
+    assert_eq!(
+        table.happened(|it| matches!(it, Happening::ServerRestarted)),
+        1
+    );
+    table.assert_replays();
+    // It comes back late, but within the time it is given, and has all its time again.
+    table.pass_time(RECALL_TIME - ms(10));
+    assert_eq!(table.open(), (seat, id), "it was waited for");
+    table.attach(seat);
+    assert_eq!(table.happened(|it| matches!(it, Happening::Returned(_))), 1);
+    let (left, bank) = table.core.time_left(table.now);
+    assert_eq!((left, bank), (ms(1_000), ms(500)));
+    table.pass_time(ms(1_499));
+    assert_eq!(table.open(), (seat, id), "it still has a millisecond");
+    let action = table.legal(0);
+    assert_eq!(table.answer(seat, id, action).verdict, Verdict::Accepted);
+    assert_eq!(table.last_decision().source, Source::Agent);
+    table.assert_replays();
+}
+
+#[test]
+fn who_does_not_come_back_is_late_as_ever() {
+    let mut table = Table::playing(policy());
+    table.play_one();
+    let (seat, id) = table.open();
+    table.restart(ms(10));
+    table.pass_time(RECALL_TIME + ms(1_499));
+    assert_eq!(table.open(), (seat, id));
+    table.pass_time(ms(1));
+    assert_ne!(table.open(), (seat, id));
+    assert_eq!(table.last_decision().source, Source::Disconnected);
+}
+
+#[test]
+fn the_next_seat_is_waited_for_as_well() {
+    let mut table = Table::playing(policy());
+    let (first, _) = table.open();
+    table.restart(ms(10));
+    table.attach(first);
+    let first = table.play_one();
+    let (second, id) = table.open();
+    assert_ne!(first, second);
+    table.pass_time(RECALL_TIME - ms(10));
+    assert_eq!(table.open(), (second, id), "it was waited for");
+    table.attach(second);
+    table.play_one();
+}
+
+#[test]
+fn an_answer_that_was_acknowledged_is_acknowledged_again() {
+    let mut table = Table::playing(policy());
+    let (seat, decision_id) = table.open();
+    let action = table.legal(0);
+    let answered = table.answer(seat, decision_id, action);
+    table.restart(ms(10));
+    table.attach(seat);
+    let again = table.core.answer(
+        table.now,
+        AnswerInput {
+            seat,
+            decision_id,
+            action,
+            annotations: None,
+            annotations_refused: false,
+            arrived: table.now,
+            handed: None,
+        },
+    );
+    assert_eq!(again, answered);
+    assert!(table.core.unkept().is_empty(), "it counts once");
+}
+
+#[test]
+fn built_in_agents_do_what_they_would_have_done() {
+    let fills = [
+        Fill::BuiltIn(AgentKind::Random),
+        Fill::BuiltIn(AgentKind::RandomUnmasked),
+        Fill::BuiltIn(AgentKind::Greedy),
+        Fill::BuiltIn(AgentKind::Random),
+    ];
+    let paced = Policy {
+        pace: Some(ms(10)),
+        ..Policy::default()
+    };
+    let play = |restarts: &[u64]| {
+        let mut table = Table::with_rules(paced.clone(), fills.to_vec(), one_shift());
+        table.core.begin_if_all_built_in(table.now);
+        table.keep();
+        for decisions in restarts {
+            table.pass_time(ms(10 * decisions));
+            table.restart(ms(5));
+        }
+        table.pass_time(Duration::from_secs(60));
+        assert_eq!(table.core.state(), State::Finished);
+        table.assert_replays();
+        let actions: Vec<(Seat, ActionId)> = table
+            .journal
+            .iter()
+            .filter_map(|entry| match &entry.change {
+                Change::Decided(decided) => Some((decided.seat, decided.action)),
+                _ => None,
+            })
+            .collect();
+        actions
+    };
+    let undisturbed = play(&[]);
+    assert!(undisturbed.len() > 30);
+    assert_eq!(play(&[1]), undisturbed);
+    assert_eq!(play(&[7, 0, 13, 8]), undisturbed);
+}
+
+#[test]
+fn what_the_store_takes_is_nobodys_time_and_delays_nothing_twice() {
+    let mut table = Table::playing(policy());
+    // The store takes three seconds; only then is the next seat told.
+    table.store_takes = ms(3_000);
+    table.play_one();
+    let (seat, id) = table.open();
+    table.pass_time(ms(1_499));
+    assert_eq!(table.open(), (seat, id), "it still has a millisecond");
+    // Whatever else is kept meanwhile does not give it more.
+    table.core.released(table.now);
+    table.pass_time(ms(1));
+    assert_ne!(table.open(), (seat, id));
+    assert_eq!(table.last_decision().time_us, 1_500_000);
+}
+
+#[test]
+fn a_seat_that_waits_for_the_store_has_the_time_given_back() {
+    // Its answer is refused after half a second, and the store takes three to keep that.
+    let mut table = Table::playing(policy());
+    let (seat, id) = table.open();
+    table.pass_time(ms(500));
+    let wrong = table.illegal();
+    table.store_takes = ms(3_000);
+    assert_ne!(table.answer(seat, id, wrong).verdict, Verdict::Accepted);
+    table.pass_time(ms(999));
+    let action = table.legal(0);
+    let answered = table.answer(seat, id, action);
+    assert_eq!(answered.verdict, Verdict::Accepted);
+    assert_eq!(answered.time, ms(1_499), "thinking time alone");
+
+    // It loses its connection and comes back after half a second, which the store takes three to keep.
+    let (seat, id) = table.open();
+    let connection = u64::try_from(seat.index()).expect("small") + 1;
+    table.lost(seat, ConnectionId(connection));
+    let lost = table.now;
+    table.pass_time(ms(500));
+    table.store_takes = ms(3_000);
+    table.attach(seat);
+    table.pass_time(ms(999));
+    assert_eq!(table.open(), (seat, id));
+    table.pass_time(ms(1));
+    assert_eq!(table.last_decision().seat, seat);
+    assert_eq!(table.last_decision().time_us, 1_500_000);
+    assert_eq!(table.now, lost + ms(4_500));
+}
+
+#[test]
+fn the_alarm_does_not_ring_for_a_seat_that_waits_for_the_store() {
+    let mut table = Table::playing(policy());
+    let (seat, id) = table.open();
+    table.pass_time(ms(500));
+    // The room was busy with the store, and finds the answer and the end of the time at once.
+    let answer = AnswerInput {
+        seat,
+        decision_id: id,
+        action: table.illegal(),
+        annotations: None,
+        annotations_refused: false,
+        arrived: table.now,
+        handed: Some(Duration::ZERO),
+    };
+    table.now += ms(3_000);
+    table.core.answer(table.now, answer);
+    table.core.tick(table.now, Some(Duration::ZERO));
+    table.keep();
+    assert_eq!(table.open(), (seat, id));
+    table.pass_time(ms(1_000));
+    assert_eq!(table.last_decision().source, Source::Timeout);
+    assert_eq!(table.last_decision().time_us, 1_500_000);
+}
+
+#[test]
+fn wrong_answers_buy_no_time_from_a_store_that_is_as_usual() {
+    let mut table = Table::playing(policy());
+    let (seat, id) = table.open();
+    let opened = table.now;
+    for _ in 0..5 {
+        table.pass_time(ms(100));
+        let wrong = table.illegal();
+        table.store_takes = ms(20);
+        table.answer(seat, id, wrong);
+    }
+    table.pass_time(opened + ms(1_500) - table.now);
+    assert_eq!(table.last_decision().source, Source::Timeout);
+    assert_eq!(table.last_decision().seat, seat);
+}
+
+#[test]
+fn a_substitute_plays_on_until_its_seat_comes_back() {
+    let mut table = Table::playing(policy());
+    while table.happened(|it| matches!(it, Happening::Substituted(_))) == 0 {
+        let (seat, _) = table.open();
+        if seat == Seat::new(2) {
+            // As long as it takes it to be late, and no longer.
+            table.pass_time(ms(10));
+        } else {
+            table.play_one();
+        }
+    }
+    table.restart(ms(10));
+    assert!(table.core.standing(Seat::new(2)).substituted);
+    table.attach(Seat::new(2));
+    assert!(!table.core.standing(Seat::new(2)).substituted);
+    table.assert_replays();
+}
+
+#[test]
+fn a_room_that_waits_keeps_its_seats_for_those_who_come_back() {
+    let mut table = Table::empty(
+        Policy {
+            waiting_time: ms(10_000),
+            ..policy()
+        },
+        vec![OPEN; 4],
+    );
+    for _ in 0..4 {
+        table.join(ParticipantKind::Agent).expect("a seat is free");
+    }
+    table.attach(Seat::new(0));
+    // The time it would have waited is long over when the server is back.
+    table.restart(Duration::from_secs(86_400));
+    assert_eq!(table.core.state(), State::Waiting);
+    table.pass_time(JOIN_HOLD - ms(1));
+    assert_eq!(table.core.state(), State::Waiting);
+    for seat in 0..4 {
+        table.attach(Seat::new(seat));
+    }
+    assert_eq!(table.core.state(), State::Playing);
+    table.assert_replays();
+
+    let mut deserted = Table::empty(policy(), vec![OPEN; 4]);
+    deserted.join(ParticipantKind::Agent).expect("free");
+    deserted.attach(Seat::new(0));
+    deserted.restart(ms(10));
+    deserted.pass_time(JOIN_HOLD);
+    assert_eq!(
+        deserted.happened(|it| matches!(it, Happening::Vacated(_))),
+        1
+    );
+}
+
+#[test]
+fn a_game_that_was_over_stays_over() {
+    let mut table = Table::with_rules(policy(), vec![OPEN; 4], one_shift());
+    table.fill();
+    while table.core.state() == State::Playing {
+        table.play_one();
+    }
+    let entries = table.journal.len();
+    table.restart(ms(10));
+    assert_eq!(table.core.state(), State::Finished);
+    assert_eq!(table.journal.len(), entries);
+}
+
+#[test]
+fn a_journal_that_does_not_fit_is_refused() {
+    let mut table = Table::playing(policy());
+    for _ in 0..5 {
+        table.play_one();
+    }
+    let header = table.core.header();
+    let last = table.journal.len() - 1;
+    type Damage = fn(&mut Change);
+    let damages: [(&str, Damage); 4] = [
+        ("not legal", |change| {
+            if let Change::Decided(decided) = change {
+                decided.action = ActionId::new(9_999);
+            }
+        }),
+        ("of this seat", |change| {
+            if let Change::Decided(decided) = change {
+                decided.seat = Seat::new((decided.seat.index() + 1) % 4);
+            }
+        }),
+        ("twice", |change| {
+            *change = Change::Started {
+                entropy: vec![Vec::new(); 4],
+            };
+        }),
+        ("no such seat", |change| {
+            *change = Change::Disconnected(Seat::new(5))
+        }),
+    ];
+    for (words, damage) in damages {
+        let mut journal = table.journal.clone();
+        damage(&mut journal[last].change);
+        let refused = Core::revived(Arc::clone(header), &journal, table.now);
+        let BadJournal { entry, problem } = refused.expect_err(words);
+        assert_eq!(entry, last + 1);
+        assert!(problem.contains(words), "{problem}");
+    }
+}

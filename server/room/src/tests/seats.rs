@@ -1,0 +1,272 @@
+//! Joining, attaching, answering: who may do what.
+
+use chefshat_engine::RewardScheme;
+
+use super::*;
+use crate::journal::AbortReason;
+use crate::{ExpressError, JOIN_HOLD, JoinError, LeaveError, MAX_SEATINGS};
+
+#[test]
+fn seats_are_given_to_those_they_are_reserved_for() {
+    let human = Fill::Open {
+        reserved_for: Some(ParticipantKind::Human),
+    };
+    let mut table = Table::empty(Policy::default(), vec![OPEN, human, OPEN, human]);
+    let seats: Vec<_> = [
+        ParticipantKind::Human,
+        ParticipantKind::Robot,
+        ParticipantKind::Agent,
+        ParticipantKind::Agent,
+        ParticipantKind::Human,
+        ParticipantKind::Human,
+    ]
+    .into_iter()
+    .map(|kind| table.join(kind).map(Seat::index))
+    .collect();
+    assert_eq!(
+        seats,
+        [
+            Ok(1),
+            Ok(0),
+            Ok(2),
+            Err(JoinError::KindNotAdmitted),
+            Ok(3),
+            Err(JoinError::RoomFull)
+        ]
+    );
+}
+
+#[test]
+fn a_seat_that_is_never_attached_is_freed() {
+    let mut table = Table::empty(Policy::default(), vec![OPEN; 4]);
+    for _ in 0..4 {
+        table.join(ParticipantKind::Agent).expect("there is space");
+    }
+    table.attach(Seat::new(2));
+    table.pass_time(JOIN_HOLD);
+    assert_eq!(
+        table.happened(|event| matches!(event, Happening::Vacated(_))),
+        3
+    );
+    assert!(table.core.standing(Seat::new(2)).participant.is_some());
+    assert!(table.join(ParticipantKind::Human).is_ok());
+    table.pass_time(Duration::from_secs(3600));
+    assert_eq!(
+        table.core.state(),
+        State::Aborted(AbortReason::NeverStarted)
+    );
+    assert_eq!(table.join(ParticipantKind::Human), Err(JoinError::GameOver));
+    table.assert_replays();
+}
+
+#[test]
+fn the_game_begins_when_every_seat_is_attached() {
+    let mut table = Table::empty(Policy::default(), vec![OPEN; 4]);
+    for _ in 0..4 {
+        table.join(ParticipantKind::Agent).expect("there is space");
+    }
+    for seat in 0..3 {
+        table.attach(Seat::new(seat));
+    }
+    assert_eq!(table.core.state(), State::Waiting);
+    table.attach(Seat::new(3));
+    assert_eq!(table.core.state(), State::Playing);
+}
+
+#[test]
+fn answers_are_taken_once_and_acknowledged_twice() {
+    let mut table = Table::playing(Policy::default());
+    let (seat, id) = table.open();
+    let other = table
+        .core
+        .all_seats()
+        .find(|other| *other != seat)
+        .expect("there are four seats");
+    let action = table.legal(0);
+    assert_eq!(
+        table.answer(other, 1, action).verdict,
+        Verdict::Unknown,
+        "it was not asked yet"
+    );
+    assert_eq!(table.answer(seat, id + 1, action).verdict, Verdict::Unknown);
+    assert_eq!(table.answer(seat, 0, action).verdict, Verdict::Unknown);
+    table.now += ms(20);
+    let first = table.answer(seat, id, action);
+    assert_eq!(first.verdict, Verdict::Accepted);
+    table.now += ms(20);
+    let journal = table.journal.len();
+    assert_eq!(table.answer(seat, id, action), first, "the same word");
+    assert_eq!(
+        table.answer(seat, id, action + 1).verdict,
+        Verdict::Closed,
+        "another answer"
+    );
+    assert_eq!(table.journal.len(), journal, "nothing has changed");
+}
+
+#[test]
+fn the_newest_connection_has_the_seat() {
+    let mut table = Table::playing(Policy::default());
+    let seat = Seat::new(0);
+    let newer = table.attach(seat);
+    table.lost(seat, ConnectionId(1));
+    assert!(
+        table.core.standing(seat).connected,
+        "the older one is not missed"
+    );
+    table.lost(seat, newer);
+    assert!(!table.core.standing(seat).connected);
+}
+
+#[test]
+fn rewards_go_to_turns_and_to_invalid_attempts() {
+    let mut table = Table::playing(Policy {
+        reward_scheme: Some(RewardScheme::Validity),
+        ..Policy::default()
+    });
+    let (seat, id) = table.open();
+    let wrong = table.illegal();
+    assert!(matches!(
+        table.answer(seat, id, wrong).verdict,
+        Verdict::Invalid { reward: Some(reward), .. } if reward == -1.0
+    ));
+    table.play_one();
+    assert_eq!(
+        table.happened(|event| matches!(
+            event,
+            Happening::Played { by, .. } if by.reward == Some(1.0)
+        )),
+        1
+    );
+}
+
+#[test]
+fn expressions_are_public_or_for_the_record_alone_and_bounded() {
+    let mut table = Table::playing(Policy::default());
+    let seat = Seat::new(1);
+    let express = |table: &mut Table, record_only| {
+        let said = table
+            .core
+            .express(table.now, seat, record_only, Box::default());
+        table.keep();
+        said
+    };
+    let events = table.core.log().len();
+    assert_eq!(express(&mut table, true), Ok(()));
+    assert_eq!(table.core.log().len(), events, "nobody is told");
+    assert_eq!(express(&mut table, false), Ok(()));
+    assert_eq!(table.core.log().len(), events + 1);
+    for _ in 2..super::super::MAX_EXPRESSIONS_PER_SEAT {
+        express(&mut table, true).expect("below the limit");
+    }
+    assert_eq!(express(&mut table, true), Err(ExpressError::TooMany));
+    table.core.abort(table.now, AbortReason::Closed);
+    assert_eq!(express(&mut table, true), Err(ExpressError::GameOver));
+}
+
+#[test]
+fn annotations_are_capped() {
+    let mut table = Table::playing(Policy::default());
+    let annotate = |table: &mut Table, bytes: usize| {
+        let (seat, decision_id) = table.open();
+        let action = table.legal(0);
+        let answered = table.core.answer(
+            table.now,
+            AnswerInput {
+                seat,
+                decision_id,
+                action,
+                annotations: Some(vec![0; bytes].into_boxed_slice()),
+                annotations_refused: false,
+                arrived: table.now,
+                handed: None,
+            },
+        );
+        table.keep();
+        (answered, table.answer(seat, decision_id, action))
+    };
+    let limit = super::super::MAX_ANNOTATION_BYTES;
+    let (kept, again) = annotate(&mut table, limit);
+    assert!(!kept.annotations_dropped && kept == again);
+    let (dropped, again) = annotate(&mut table, limit + 1);
+    assert_eq!(dropped.verdict, Verdict::Accepted);
+    assert!(dropped.annotations_dropped && dropped == again);
+    assert!(table.last_decision().annotations.is_none());
+}
+
+#[test]
+fn delayed_spectators_see_what_is_so_many_decisions_old() {
+    let mut table = Table::with_rules(
+        Policy {
+            spectator_delay_decisions: 3,
+            ..Policy::default()
+        },
+        vec![OPEN; 4],
+        one_shift(),
+    );
+    table.fill();
+    // The deal itself is not told before three decisions have been taken: it may show all hands.
+    let told = table.core.visible_to_spectators();
+    assert!(matches!(
+        table.core.log().since(told - 1),
+        [first, second, ..]
+            if matches!(first.happening, Happening::GameStarted)
+                && matches!(second.happening, Happening::Game(_))
+    ));
+    let mut lengths = vec![table.core.log().len()];
+    while table.core.state() == State::Playing {
+        table.play_one();
+        lengths.push(table.core.log().len());
+        if table.core.state() == State::Playing {
+            let visible = lengths
+                .len()
+                .checked_sub(4)
+                .map_or(told, |index| lengths[index]);
+            assert_eq!(table.core.visible_to_spectators(), visible);
+        }
+    }
+    assert_eq!(table.core.visible_to_spectators(), table.core.log().len());
+}
+
+#[test]
+fn a_seat_that_was_given_back_knows_nothing_of_who_had_it() {
+    let mut table = Table::empty(Policy::default(), vec![OPEN; 4]);
+    let seats: Vec<Seat> = table.core.all_seats().collect();
+    for _ in &seats {
+        table.join(ParticipantKind::Agent).expect("a seat is free");
+    }
+    // One is connected when it leaves, one was lost before, one came and went, all but the last.
+    let connection = table.attach(seats[1]);
+    table.lost(seats[1], connection);
+    table.attach(seats[2]);
+    for seat in &seats[..3] {
+        assert_eq!(table.core.leave(table.now, *seat), Ok(()));
+        table.keep();
+    }
+    assert!(table.core.standing(seats[1]).participant.is_none());
+    assert!(!table.core.standing(seats[2]).connected);
+    table.attach(seats[3]);
+    assert!(table.core.open().is_none(), "three seats are free");
+    for seat in &seats[..3] {
+        assert_eq!(table.join(ParticipantKind::Human), Ok(*seat));
+        table.attach(*seat);
+    }
+    let returned = table.happened(|it| matches!(it, Happening::Returned(_)));
+    assert_eq!(returned, 0, "they are others than those who went");
+    assert_eq!(
+        table.core.leave(table.now, seats[0]),
+        Err(LeaveError::GameStarted)
+    );
+    table.assert_replays();
+}
+
+#[test]
+fn seats_cannot_be_taken_and_given_back_for_ever() {
+    let mut table = Table::empty(Policy::default(), vec![OPEN; 4]);
+    for _ in 0..MAX_SEATINGS {
+        let seat = table.join(ParticipantKind::Agent).expect("a seat is free");
+        assert_eq!(table.core.leave(table.now, seat), Ok(()));
+    }
+    let error = table.join(ParticipantKind::Agent).expect_err("too often");
+    assert_eq!(error, JoinError::TooManySeatings);
+}

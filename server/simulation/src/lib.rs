@@ -1,0 +1,35 @@
+//! Chef's Hat offline: built-in agents, single games, batches of games on all cores with tables of metrics, comparisons of two
+//! agents on duplicate deals, the paper's experiment on the game's mechanics, agents that play from a network file, and checking an engine
+//! against test vectors. Nothing here knows of rooms, clocks or the protocol.
+//!
+//! ```
+//! use chefshat_agents::AgentKind;
+//! use chefshat_simulation::Batch;
+//! use chefshat_engine::{RuleSetSpec, Seat};
+//!
+//! let rules = RuleSetSpec::default().validate()?;
+//! let agents = [AgentKind::Greedy, AgentKind::Random, AgentKind::Random, AgentKind::Random];
+//! let table = Batch::new(rules, &agents, 20, 7)?.run(|games| println!("{games} more games"));
+//! println!("greedy takes {:.2} points a Shift", table.points_per_shift(Seat::new(0)));
+//! # assert_eq!(table.games, 20);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod batch;
+pub mod calibration;
+pub mod conformance;
+mod duplicate;
+mod fold;
+pub mod mechanics;
+mod rules_form;
+mod table;
+pub mod tournament;
+pub mod vector;
+
+pub use batch::{Batch, BatchError};
+pub use duplicate::{
+    Comparison, Contender, Duplicate, DuplicateError, Figure, Measured, Newcomer, SameSeat,
+    SeatPlan, Seating,
+};
+pub use rules_form::{OpeningName, PassScopeName, RulesForm, RulesFormError};
+pub use table::{BatchTable, SeatTable};

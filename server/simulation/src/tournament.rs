@@ -1,0 +1,151 @@
+//! Playing a tournament of built-in agents offline, on all cores: the one place here that plays games. What comes out depends on the
+//! tournament and the seed alone, never on the number of threads.
+
+use chefshat_engine::{
+    ActionId, Decision, Event, MAX_SEATS, MetricsRecorder, RuleSet, Seat, Seed, ShiftMetrics,
+};
+use rayon::prelude::*;
+use thiserror::Error;
+
+use chefshat_agents::is_wrong_action;
+use chefshat_agents::seating_agent_seed;
+use chefshat_agents::{AgentKind, BuiltInAgent, Listener, game_seed, play};
+use chefshat_tournament::{Change, Ended, Game, SeatPlayed};
+use chefshat_tournament::{State, Tournament};
+
+/// Why a tournament cannot be played offline.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+pub enum OfflineProblem {
+    /// The rule set is for another number of players.
+    #[error("rules for {rules} players, tables of {seats}")]
+    Players {
+        /// Players of the rule set.
+        rules: usize,
+        /// Seats of a table.
+        seats: usize,
+    },
+    /// Somebody is not a built-in agent.
+    #[error("participant {0} is not a built-in agent")]
+    NotBuiltIn(usize),
+}
+
+/// Plays a tournament that has begun from where it stands to its end, on the threads of the rayon pool it is called in. Game n is dealt as
+/// game n of a batch of this seed, or as game d if d is the number of its deal. `progress` is called from any of those threads for every game.
+///
+/// # Errors
+/// If somebody takes part who cannot be played here, or the rule set is for another number of players.
+pub fn play_offline(
+    tournament: &mut Tournament,
+    rules: RuleSet,
+    seed: u64,
+    progress: impl Fn() + Sync,
+) -> Result<(), OfflineProblem> {
+    let (players, seats) = (rules.players(), tournament.settings().players);
+    if players != seats {
+        return Err(OfflineProblem::Players {
+            rules: players,
+            seats,
+        });
+    }
+    let kinds = tournament.participants().iter().enumerate();
+    let kinds = kinds.map(|(who, entrant)| entrant.built_in.ok_or(OfflineProblem::NotBuiltIn(who)));
+    let kinds: Vec<AgentKind> = kinds.collect::<Result<_, _>>()?;
+    while tournament.state() == State::Playing {
+        // Built-in agents keep nobody waiting, so no time passes.
+        let Some(change) = tournament.next(0) else {
+            play_called(tournament, &kinds, rules, seed, &progress);
+            continue;
+        };
+        tournament.fold(&change);
+    }
+    Ok(())
+}
+
+/// Plays all games that have been called.
+fn play_called(
+    tournament: &mut Tournament,
+    kinds: &[AgentKind],
+    rules: RuleSet,
+    seed: u64,
+    progress: &(impl Fn() + Sync),
+) {
+    let called: Vec<usize> = tournament.playing().collect();
+    assert!(
+        !called.is_empty(),
+        "a tournament of built-in agents goes on"
+    );
+    let changes: Vec<Change> = called
+        .into_par_iter()
+        .map(|index| {
+            let ended = play_game(&tournament.games()[index], index, kinds, rules, seed);
+            progress();
+            tournament
+                .ended(index, ended)
+                .expect("it is one of the games that are being played")
+        })
+        .collect();
+    changes.iter().for_each(|change| tournament.fold(change));
+}
+
+fn play_game(game: &Game, index: usize, kinds: &[AgentKind], rules: RuleSet, seed: u64) -> Ended {
+    let deal = game.deal.map_or(index as u64, u64::from);
+    let dealt_by = game_seed(seed, deal);
+    let mut agents: [BuiltInAgent; MAX_SEATS] = std::array::from_fn(|seat| {
+        let kind = game.seats.get(seat).map(|&who| kinds[who]);
+        BuiltInAgent::new(kind.unwrap_or_default(), agent_seed(dealt_by, index, seat))
+    });
+    let mut listener = Witness {
+        recorder: MetricsRecorder::new(rules, None),
+        seats: vec![SeatPlayed::default(); game.seats.len()],
+        last_shift: None,
+    };
+    let standings = play(
+        rules,
+        dealt_by,
+        None,
+        |seat, observation, legal| agents[seat.index()].decide(observation, legal),
+        &mut listener,
+    );
+    let last = listener.last_shift.expect("a game has at least one Shift");
+    let mut seats = listener.seats;
+    for (place, seat, points) in standings.iter() {
+        let played = &mut seats[seat.index()];
+        played.place = usize::from(place);
+        played.points = points;
+        played.performance_score = last.seats[seat].performance;
+    }
+    Ended::Played {
+        shifts: last.shift,
+        seats,
+    }
+}
+
+/// Agents draw anew in each game, also where the deal is the same.
+fn agent_seed(dealt_by: Seed, index: usize, seat: usize) -> [u8; 32] {
+    seating_agent_seed(dealt_by, index, Seat::new(seat))
+}
+
+/// Counts what the seats of a game do.
+struct Witness {
+    recorder: MetricsRecorder,
+    seats: Vec<SeatPlayed>,
+    last_shift: Option<ShiftMetrics>,
+}
+
+impl Listener for Witness {
+    fn on_event(&mut self, event: &Event) {
+        if let Some(shift) = self.recorder.on_event(event) {
+            self.last_shift = Some(shift);
+        }
+    }
+
+    fn on_decision(&mut self, decision: Decision, _: ActionId) {
+        self.seats[decision.seat.index()].decisions += 1;
+    }
+
+    fn on_invalid(&mut self, decision: Decision, _: ActionId) {
+        if is_wrong_action(decision) {
+            self.seats[decision.seat.index()].wrong_actions += 1;
+        }
+    }
+}

@@ -1,0 +1,74 @@
+//! Two agents in the same seats: what is dealt alike tells them apart with fewer games, and the stated errors are true.
+
+use chefshat_agents::AgentKind;
+use chefshat_engine::{RuleSetSpec, Stop};
+use chefshat_simulation::{Contender, Measured, Newcomer, SameSeat};
+
+fn measured(slips: [u8; 2], seed: u64, games: &[u64]) -> Vec<Measured> {
+    let spec = RuleSetSpec {
+        stop: Stop::Shifts(1),
+        ..RuleSetSpec::default()
+    };
+    let newcomer = |slips_percent| Newcomer {
+        plays: Contender::Kind(AgentKind::Greedy),
+        slips_percent,
+    };
+    let same_seat = SameSeat {
+        rules: spec.validate().unwrap(),
+        newcomers: slips.map(newcomer),
+        others: Contender::Kind(AgentKind::Greedy),
+        seed,
+    };
+    same_seat.measure(games, |_| {})
+}
+
+#[test]
+fn agents_that_do_the_same_do_not_differ_on_the_same_deals() {
+    let [same] = measured([0, 0], 1, &[200])[..] else {
+        panic!("one was asked for")
+    };
+    assert_eq!(
+        (same.games, same.difference, same.duplicate_error),
+        (200, 0.0, 0.0)
+    );
+    assert!(same.independent_error > 0.05, "{same:?}");
+    assert_eq!(same.gain(), None);
+}
+
+#[test]
+fn what_is_known_grows_with_the_games() {
+    let steps = measured([0, 20], 2, &[100, 400, 1600]);
+    let games: Vec<u64> = steps.iter().map(|step| step.games).collect();
+    assert_eq!(games, [100, 400, 1600]);
+    for step in &steps {
+        assert!(step.duplicate_error < step.independent_error, "{step:?}");
+    }
+    assert!(steps[2].gain().unwrap() > 1.5, "{steps:?}");
+    // The error halves when the games are four times as many.
+    for two in steps.windows(2) {
+        let ratio = two[0].duplicate_error / two[1].duplicate_error;
+        assert!((1.5..2.7).contains(&ratio), "{ratio}");
+    }
+    // The same games come to the same, however they are asked for.
+    let at_once = measured([0, 20], 2, &[400]);
+    assert!((at_once[0].difference - steps[1].difference).abs() < 1e-12);
+}
+
+#[test]
+fn the_stated_error_is_that_of_many_repetitions() {
+    let repetitions: Vec<Measured> = (0..60)
+        .map(|seed| measured([0, 20], 100 + seed, &[50])[0])
+        .collect();
+    let count = repetitions.len() as f64;
+    let mean = repetitions.iter().map(|one| one.difference).sum::<f64>() / count;
+    let squares = repetitions
+        .iter()
+        .map(|one| (one.difference - mean).powi(2));
+    let found = (squares.sum::<f64>() / (count - 1.0)).sqrt();
+    let stated = repetitions
+        .iter()
+        .map(|one| one.duplicate_error)
+        .sum::<f64>()
+        / count;
+    assert!((0.7..1.4).contains(&(found / stated)), "{found} {stated}");
+}

@@ -1,0 +1,135 @@
+//! Tournaments of built-in agents, played offline: the same for the same seed, whatever the number of threads; better agents stand higher.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use chefshat_agents::AgentKind;
+use chefshat_engine::{RuleSet, RuleSetSpec};
+use chefshat_simulation::tournament::{OfflineProblem, play_offline};
+use chefshat_tournament::{Deals, Format, State, Tournament};
+use rayon::ThreadPoolBuilder;
+
+use crate::support::{begun, entrant, settings};
+
+fn rules() -> RuleSet {
+    RuleSetSpec::default().validate().unwrap()
+}
+
+/// A tournament that greedy agents (the even numbers) and random ones have joined, begun.
+fn field(format: Format, deals: Deals, participants: usize) -> Tournament {
+    let mut settings = settings(format);
+    settings.deals = deals;
+    settings.games_per_pairing = 2;
+    let mut tournament = Tournament::new(settings).unwrap();
+    for number in 0..participants {
+        let mut entrant = entrant(&format!("agent {number}"));
+        entrant.built_in = Some(if number % 2 == 0 {
+            AgentKind::Greedy
+        } else {
+            AgentKind::Random
+        });
+        let change = tournament.join(entrant).unwrap();
+        tournament.fold(&change);
+    }
+    for change in tournament.begin().unwrap() {
+        tournament.fold(&change);
+    }
+    tournament
+}
+
+fn play(tournament: &mut Tournament, seed: u64, threads: usize) -> usize {
+    let games = AtomicUsize::new(0);
+    let pool = ThreadPoolBuilder::new().num_threads(threads).build();
+    let progress = || {
+        games.fetch_add(1, Ordering::Relaxed);
+    };
+    pool.unwrap()
+        .install(|| play_offline(tournament, rules(), seed, progress))
+        .unwrap();
+    games.into_inner()
+}
+
+#[test]
+fn better_agents_stand_higher_in_every_format() {
+    for format in Format::ALL {
+        for deals in Deals::ALL {
+            let mut tournament = field(format, deals, 8);
+            let games = play(&mut tournament, 5, 2);
+            assert_eq!(tournament.state(), State::Finished);
+            assert_eq!(games, tournament.games_expected());
+            let standings = tournament.standings();
+            assert_eq!(standings[0].participant % 2, 0, "{format:?}, {deals:?}");
+            let greedy = |upper: &[chefshat_tournament::Standing]| {
+                upper
+                    .iter()
+                    .filter(|line| line.participant % 2 == 0)
+                    .count()
+            };
+            assert!(greedy(&standings[..4]) >= 3, "{format:?}, {deals:?}");
+            assert!(standings.iter().all(|line| line.performance_score >= 0.0));
+        }
+    }
+}
+
+#[test]
+fn threads_make_no_difference_and_the_seed_does() {
+    let start = field(Format::Swiss, Deals::SameAtAllTables, 12);
+    let [one, three, other] = [(5, 1), (5, 3), (6, 1)].map(|(seed, threads)| {
+        let mut tournament = start.clone();
+        play(&mut tournament, seed, threads);
+        tournament
+    });
+    assert!(one == three);
+    assert!(one != other);
+}
+
+#[test]
+fn duplicate_deals_are_the_same_cards() {
+    // Agents that draw nothing, the same in all seats: rotating them through a deal changes who, not what happens.
+    let mut settings = settings(Format::RoundRobin);
+    settings.deals = Deals::Rotated;
+    settings.rounds = Some(2);
+    let mut tournament = Tournament::new(settings).unwrap();
+    for number in 0..4 {
+        let mut entrant = entrant(&format!("agent {number}"));
+        entrant.built_in = Some(AgentKind::Greedy);
+        let change = tournament.join(entrant).unwrap();
+        tournament.fold(&change);
+    }
+    for change in tournament.begin().unwrap() {
+        tournament.fold(&change);
+    }
+    play(&mut tournament, 3, 2);
+    let places = |game: usize| {
+        let result = tournament.games()[game].result().unwrap();
+        let seats = result.seats.iter();
+        seats
+            .map(|seat| (seat.did.place, seat.did.points))
+            .collect::<Vec<_>>()
+    };
+    for game in 1..4 {
+        assert_eq!(places(game), places(0), "one deal");
+        assert_eq!(places(4 + game), places(4), "another one");
+    }
+    assert_ne!(places(4), places(0));
+    let standings = tournament.standings();
+    assert!(
+        standings
+            .iter()
+            .all(|line| line.score == standings[0].score),
+        "everybody has played every hand"
+    );
+}
+
+#[test]
+fn what_cannot_be_played_offline_is_refused() {
+    let mut with_people = begun(settings(Format::Swiss), 4);
+    let refused = play_offline(&mut with_people, rules(), 0, || {});
+    assert_eq!(refused, Err(OfflineProblem::NotBuiltIn(0)));
+    let spec = RuleSetSpec {
+        players: 3,
+        ..RuleSetSpec::default()
+    };
+    let rules = spec.validate().unwrap();
+    let refused = play_offline(&mut with_people, rules, 0, || {});
+    assert_eq!(refused, Err(OfflineProblem::Players { rules: 3, seats: 4 }));
+}

@@ -1,0 +1,222 @@
+//! What episodes bring and how they end: rewards, last views, places.
+
+use std::collections::BTreeMap;
+use std::num::NonZeroU64;
+
+use chefshat_agents::{AgentKind, BuiltInAgent, game_seed};
+use chefshat_engine::{ActionId, Game, RewardScheme, RuleSetSpec, Stop, Viewer};
+use chefshat_simulation::vector::{
+    Episode, InvalidActions, Seeds, Start, VectorGames, VectorSetup,
+};
+
+use super::*;
+
+#[test]
+fn rewards_add_up_to_what_the_shifts_say() {
+    for scheme in RewardScheme::ALL {
+        for episode in [Episode::Shift, Episode::Game] {
+            let setup = all_client(4)
+                .with_total_games(NonZeroU64::new(8))
+                .unwrap()
+                .with_rewards(Some(scheme))
+                .with_episode(episode)
+                .with_statistics(true)
+                .with_invalid_actions(InvalidActions::AskAgain { limit: None });
+            let (mut games, mut batch) = VectorGames::new(setup);
+            // By game and seat, of the episode that goes on: what was told, and what the Shifts say.
+            let mut told: BTreeMap<(u32, u8), f64> = BTreeMap::new();
+            let mut counted: BTreeMap<(u32, u8), f64> = BTreeMap::new();
+            let (mut wrong, mut episodes, mut brought) = (0u64, 0, false);
+            loop {
+                let shifts = &batch.shifts;
+                let sums = f32s(&shifts.reward_sums);
+                for (game, sums) in u32s(&shifts.games).into_iter().zip(sums.chunks(4)) {
+                    for (seat, sum) in (0..).zip(sums) {
+                        *counted.entry((game, seat)).or_default() += f64::from(*sum);
+                    }
+                }
+                let endings = &batch.endings;
+                let rewards = f32s(&endings.rewards);
+                for (row, game) in u32s(&endings.games).into_iter().enumerate() {
+                    let key = (game, endings.seats[row]);
+                    let told = told.remove(&key).unwrap_or(0.0) + f64::from(rewards[row]);
+                    let counted = counted.remove(&key).unwrap();
+                    let close = (told - counted).abs() < 1e-3;
+                    assert!(close, "{} by {episode:?}: {told} {counted}", scheme.name());
+                    episodes += 1;
+                    brought |= told != 0.0;
+                }
+                let rewards = f32s(&batch.rewards);
+                for (row, game) in u32s(&batch.games).into_iter().enumerate() {
+                    let reward = f64::from(rewards[row]);
+                    *told.entry((game, batch.seats[row])).or_default() += reward;
+                }
+                wrong += u32s(&shifts.wrong).into_iter().map(u64::from).sum::<u64>();
+                if batch.done {
+                    break;
+                }
+                // Every fifth answer at a turn is wrong: no card is given there.
+                let mut actions = some_actions(&batch);
+                for (row, action) in actions.iter_mut().enumerate() {
+                    if batch.kinds[row] == 1 && (batch.step + row as u64).is_multiple_of(5) {
+                        *action = ActionId::new(201);
+                    }
+                }
+                batch = games.step(&actions).unwrap();
+            }
+            assert_eq!(batch.totals.games, 8);
+            assert!(wrong > 100 && batch.totals.invalid_attempts == wrong);
+            assert!(told.is_empty() && counted.is_empty());
+            assert!(brought && episodes >= 8 * 4, "{}", scheme.name());
+        }
+    }
+}
+
+#[test]
+fn an_episode_ends_for_every_seat_with_what_it_saw_last() {
+    // A game of one Shift ends where the same Shift of a longer game does, so its last view is the one wanted.
+    let spec = |shifts| RuleSetSpec {
+        stop: Stop::Shifts(shifts),
+        ..RuleSetSpec::default()
+    };
+    let setup = |shifts| {
+        let rules = spec(shifts).validate().unwrap();
+        VectorSetup::new(rules, 3, &[None; 4], Seeds::Base(3))
+            .unwrap()
+            .with_rewards(Some(RewardScheme::Points))
+            .with_statistics(true)
+    };
+    let mut endings = Vec::new();
+    for shifts in [1, 2] {
+        let setup = setup(shifts).with_total_games(NonZeroU64::new(3)).unwrap();
+        let (mut games, mut batch) = VectorGames::new(setup);
+        let mut first: BTreeMap<u32, String> = BTreeMap::new();
+        while first.len() < 3 {
+            batch = games.step(&some_actions(&batch)).unwrap();
+            let ended = &batch.endings;
+            assert_eq!(ended.rows % 4, 0, "one row for each seat");
+            for (row, game) in u32s(&ended.games).into_iter().enumerate() {
+                let part = |column: &[u8], width: usize| column[row * width..][..width].to_vec();
+                let seen = &ended.observations;
+                let place = ended.places_taken[row];
+                let view = format!(
+                    "{:?}",
+                    (
+                        (
+                            ended.seats[row],
+                            ended.ends[row],
+                            place,
+                            part(&ended.rewards, 4)
+                        ),
+                        (
+                            part(&seen.hands, 12),
+                            seen.golden[row],
+                            part(&seen.boards, 3)
+                        ),
+                        (
+                            part(&seen.cards_left, 4),
+                            part(&seen.passed, 4),
+                            part(&seen.places, 4)
+                        ),
+                        (
+                            part(&seen.points, 16),
+                            part(&seen.played, 12),
+                            part(&seen.shifts, 4)
+                        ),
+                        part(&seen.pizzas, 4),
+                    )
+                );
+                assert_eq!(ended.game_over[row], u8::from(shifts == 1));
+                assert_eq!(part(&seen.places, 4)[usize::from(ended.seats[row])], place);
+                let points = u32s(&part(&seen.points, 16))[usize::from(ended.seats[row])];
+                assert_eq!(points, [5, 3, 1, 0][usize::from(place) - 1]);
+                first.entry(game).or_default().push_str(&view);
+            }
+        }
+        endings.push(first);
+    }
+    assert_eq!(endings[0], endings[1]);
+}
+
+#[test]
+fn a_game_as_episode_ends_with_the_places_of_the_game() {
+    let setup = all_client(2)
+        .with_total_games(NonZeroU64::new(4))
+        .unwrap()
+        .with_episode(Episode::Game)
+        .with_records(true);
+    let mut ended: BTreeMap<u64, Vec<u8>> = BTreeMap::new();
+    let mut indices: BTreeMap<u32, u64> = BTreeMap::new();
+    let played = play_out(setup, |_, batch| {
+        let endings = &batch.endings;
+        for (game, place) in u32s(&endings.games).iter().zip(&endings.places_taken) {
+            ended.entry(indices[game]).or_default().push(*place);
+        }
+        assert!(endings.game_over.iter().all(|over| *over == 1));
+        for (game, index) in u32s(&batch.beginnings.games)
+            .into_iter()
+            .zip(u64s(&batch.beginnings.indices))
+        {
+            indices.insert(game, index);
+        }
+    });
+    assert_eq!((ended.len(), played.len()), (4, 4));
+    for game in played {
+        let mut alone = Game::new(rules(), game.seed, |_| {});
+        for taken in &game.decisions {
+            alone.apply(taken.action, |_| {}).unwrap();
+        }
+        let standings = alone.standings().unwrap();
+        let mut places = vec![0; 4];
+        for (place, seat, _) in standings.iter() {
+            places[seat.index()] = place;
+        }
+        assert_eq!(ended[&game.index], places);
+    }
+}
+
+#[test]
+fn a_shift_joined_midway_counts_its_seats_from_there() {
+    // Greedy players until the first seat has finished; from there on random ones.
+    let mut game = Game::new(rules(), game_seed(3, 3), |_| {});
+    let mut greedy = BuiltInAgent::new(AgentKind::Greedy, [0; 32]);
+    let mut turns = 0;
+    while game
+        .observe(Viewer::Spectator)
+        .places
+        .values()
+        .all(|place| *place == 0)
+    {
+        let open = game.decision().unwrap();
+        let view = game.observe(Viewer::Seat(open.seat));
+        let action = greedy.decide(&view, &game.legal_actions());
+        game.apply(action, |_| {}).unwrap();
+        turns += 1;
+    }
+    let start = Start::Point {
+        game: Box::new(game),
+        same_deals: true,
+    };
+    let setup = all_client(1)
+        .with_start(start)
+        .unwrap()
+        .with_rewards(Some(RewardScheme::PaperIntended))
+        .with_statistics(true);
+    let (mut games, mut batch) = VectorGames::new(setup);
+    let mut told = [0.0; 4];
+    while batch.shifts.rows == 0 {
+        batch = games.step(&some_actions(&batch)).unwrap();
+        for (seat, reward) in batch.seats.iter().zip(f32s(&batch.rewards)) {
+            told[usize::from(*seat)] += reward;
+        }
+    }
+    for (seat, reward) in batch.endings.seats.iter().zip(f32s(&batch.endings.rewards)) {
+        told[usize::from(*seat)] += reward;
+    }
+    let counted: u32 = u32s(&batch.shifts.valid).iter().sum();
+    assert_eq!(u32s(&batch.shifts.turns), [counted + turns]);
+    // The rewards of the places fit those that were taken before.
+    for (sum, told) in f32s(&batch.shifts.reward_sums).into_iter().zip(told) {
+        assert!((sum - told).abs() < 1e-4, "{sum} {told}");
+    }
+}

@@ -1,0 +1,239 @@
+//! Each game goes as it goes alone, from wherever it begins.
+
+use std::collections::BTreeMap;
+use std::num::NonZeroU64;
+
+use chefshat_agents::{AgentKind, BuiltInAgent, Listener, agent_seed, game_seed};
+use chefshat_engine::{ActionId, Decision, DecisionKind, Game, Mask, Script, Seat, Viewer};
+use chefshat_simulation::vector::{Seeds, Start, StepError, VectorGames, VectorSetup};
+
+use super::*;
+
+#[test]
+fn every_game_goes_as_it_goes_alone() {
+    let setup = against(
+        [
+            AgentKind::Greedy,
+            AgentKind::Random,
+            AgentKind::RandomUnmasked,
+        ],
+        5,
+    )
+    .with_total_games(NonZeroU64::new(23))
+    .unwrap()
+    .with_records(true);
+    // The mask, hand and cards left that were shown, and the answer, game by game.
+    type Shown = (Mask, Vec<u8>, Vec<u8>, ActionId);
+    let mut rows: BTreeMap<u64, Vec<Shown>> = BTreeMap::new();
+    let mut indices: BTreeMap<u32, u64> = BTreeMap::new();
+    let played = play_out(setup, |_, batch| {
+        for (game, index) in u32s(&batch.beginnings.games)
+            .into_iter()
+            .zip(u64s(&batch.beginnings.indices))
+        {
+            indices.insert(game, index);
+        }
+        let actions = some_actions(batch);
+        for (row, (game, mask)) in u32s(&batch.games).iter().zip(masks(batch)).enumerate() {
+            let part = |column: &[u8], width: usize| column[row * width..][..width].to_vec();
+            let hand = part(&batch.observations.hands, 12);
+            let left = part(&batch.observations.cards_left, 4);
+            rows.entry(indices[game])
+                .or_default()
+                .push((mask, hand, left, actions[row]));
+        }
+    });
+    let mut found: Vec<u64> = played.iter().map(|game| game.index).collect();
+    found.sort_unstable();
+    assert_eq!(found, (0..23).collect::<Vec<_>>(), "each game once");
+    for game in &played {
+        assert_eq!(game.seed, game_seed(7, game.index));
+        assert_eq!(u64::from(game.game), game.index % 5);
+        let mut alone = Game::new(rules(), game.seed, |_| {});
+        let mut seen = rows[&game.index].iter();
+        for taken in &game.decisions {
+            let open = alone.decision().unwrap();
+            for attempt in &taken.attempts {
+                assert!(!alone.legal_actions().contains(*attempt));
+            }
+            if open.seat == Seat::new(0) {
+                let (mask, hand, left, action) = seen.next().unwrap();
+                let view = alone.observe(Viewer::Seat(open.seat));
+                assert_eq!(*mask, alone.legal_actions());
+                assert!(view.hand.counts(11).eq(hand.iter().copied()));
+                assert_eq!(view.cards_left.as_slice(), left);
+                assert_eq!(*action, taken.action);
+            }
+            alone.apply(taken.action, |_| {}).unwrap();
+        }
+        assert!(alone.is_over() && seen.next().is_none());
+    }
+    let wrong = played.iter().flat_map(|game| &game.decisions);
+    assert!(wrong.map(|taken| taken.attempts.len()).sum::<usize>() > 1000);
+}
+
+#[test]
+fn with_the_owner_as_a_built_in_agent_the_games_are_those_of_a_batch() {
+    struct Taken(Vec<ActionId>);
+    impl Listener for Taken {
+        fn on_decision(&mut self, _: Decision, action: ActionId) {
+            self.0.push(action);
+        }
+    }
+    let kinds = [
+        AgentKind::Random,
+        AgentKind::Greedy,
+        AgentKind::Random,
+        AgentKind::Greedy,
+    ];
+    let alone = chefshat_simulation::Batch::new(rules(), &kinds, 6, 7).unwrap();
+    let agents = [None, Some(kinds[1]), None, Some(kinds[3])];
+    let setup = VectorSetup::new(rules(), 3, &agents, Seeds::Base(7))
+        .unwrap()
+        .with_total_games(NonZeroU64::new(6))
+        .unwrap()
+        .with_records(true);
+    let (mut games, mut batch) = VectorGames::new(setup);
+    let mut minds: BTreeMap<(u32, usize), BuiltInAgent> = BTreeMap::new();
+    let mut played = Vec::new();
+    // The owner's agents see the game as the engine shows it, so the games are followed beside.
+    let mut tables: BTreeMap<u32, Game> = BTreeMap::new();
+    let mut others: BTreeMap<(u32, usize), BuiltInAgent> = BTreeMap::new();
+    while !batch.done {
+        for (game, index) in u32s(&batch.beginnings.games)
+            .into_iter()
+            .zip(u64s(&batch.beginnings.indices))
+        {
+            let seed = game_seed(7, index);
+            tables.insert(game, Game::new(rules(), seed, |_| {}));
+            for (seat, kind) in kinds.into_iter().enumerate() {
+                let mind = BuiltInAgent::new(kind, agent_seed(seed, Seat::new(seat)));
+                let whose = if seat % 2 == 0 {
+                    &mut minds
+                } else {
+                    &mut others
+                };
+                whose.insert((game, seat), mind);
+            }
+        }
+        let mut actions = Vec::new();
+        for game in u32s(&batch.games) {
+            let table = tables.get_mut(&game).unwrap();
+            loop {
+                let open = table.decision().unwrap();
+                let key = (game, open.seat.index());
+                let view = table.observe(Viewer::Seat(open.seat));
+                let legal = table.legal_actions();
+                if let Some(mind) = minds.get_mut(&key) {
+                    let action = mind.decide(&view, &legal);
+                    table.apply(action, |_| {}).unwrap();
+                    actions.push(action);
+                    break;
+                }
+                let action = others.get_mut(&key).unwrap().decide(&view, &legal);
+                table.apply(action, |_| {}).unwrap();
+            }
+        }
+        batch = games.step(&actions).unwrap();
+        played.append(&mut batch.played);
+    }
+    assert_eq!(played.len(), 6);
+    for game in played {
+        let mut taken = Taken(Vec::new());
+        alone.play_game(game.index, &mut taken);
+        let actions: Vec<ActionId> = game.decisions.iter().map(|taken| taken.action).collect();
+        assert_eq!(actions, taken.0);
+    }
+}
+
+#[test]
+fn games_begin_anew_when_asked() {
+    let setup = all_client(3);
+    let (mut games, first) = VectorGames::new(setup.clone());
+    let mut batch = games.step(&some_actions(&first)).unwrap();
+    for _ in 0..7 {
+        batch = games.step(&some_actions(&batch)).unwrap();
+    }
+    let some = games.reset_some(&[1]).unwrap();
+    assert_eq!(u32s(&some.beginnings.games), [1]);
+    assert_eq!(
+        u64s(&some.beginnings.indices),
+        [4],
+        "game 1 goes on with index 1 + 3"
+    );
+    assert_eq!(some.rows, 3);
+    let part = |batch: &Batch, row: usize| batch.observations.hands[row * 12..][..12].to_vec();
+    assert_eq!(part(&some, 0), part(&batch, 0));
+    assert_ne!(part(&some, 1), part(&batch, 1));
+    let again = games.reset(None);
+    assert_eq!(
+        u64s(&again.beginnings.indices),
+        [3, 7, 5],
+        "each goes on with its next index"
+    );
+    let again = games.reset(Some(Seeds::Base(7)));
+    assert_eq!(u64s(&again.beginnings.indices), [0, 1, 2]);
+    assert_eq!(again.observations.hands, first.observations.hands);
+    let other = games.reset(Some(Seeds::List(vec![game_seed(7, 2)].into())));
+    assert_eq!(part(&other, 0), part(&first, 2));
+    assert_eq!(part(&other, 1), part(&first, 2));
+    assert_eq!(
+        games.reset_some(&[3]).unwrap_err(),
+        StepError::NoGame { game: 3, last: 2 }
+    );
+    for wrong in [[1, 1], [2, 1]] {
+        let error = games.reset_some(&wrong).unwrap_err();
+        assert_eq!(error, StepError::Order { game: 1 });
+    }
+    let none = games.reset_some(&[]).unwrap();
+    assert_eq!((none.rows, none.beginnings.rows), (3, 0));
+    assert_eq!(none.observations.hands, other.observations.hands);
+
+    // No more games are begun than there are to be in all.
+    let setup = all_client(3).with_total_games(NonZeroU64::new(4)).unwrap();
+    let (mut games, _) = VectorGames::new(setup);
+    let next = games.reset(None);
+    assert_eq!(u64s(&next.beginnings.indices), [3]);
+    assert_eq!((u32s(&next.games), next.done), (vec![0], false));
+    let over = games.reset_some(&[0]).unwrap();
+    assert!(over.done && over.rows == 0);
+}
+
+#[test]
+fn games_begin_with_hands_or_at_a_point() {
+    let dealt = Game::new(rules(), game_seed(1, 1), |_| {});
+    let script = Script::first_shift(*dealt.hands());
+    let setup = all_client(3)
+        .with_start(Start::Script(Box::new(script)))
+        .unwrap();
+    let (_, batch) = VectorGames::new(setup);
+    let opener = dealt.decision().unwrap().seat;
+    let hand: Vec<u8> = dealt.hands()[opener].counts(11).collect();
+    assert_eq!(batch.observations.hands, hand.repeat(3));
+
+    let mut game = dealt;
+    while game.shift() < 2 || game.decision().unwrap().kind != DecisionKind::Turn {
+        let legal = game.legal_actions();
+        game.apply(some_action(&legal, 1, 1), |_| {}).unwrap();
+    }
+    for (same_deals, differ) in [(true, false), (false, true)] {
+        let setup = all_client(2)
+            .with_start(Start::Point {
+                game: Box::new(game.clone()),
+                same_deals,
+            })
+            .unwrap();
+        let (mut games, mut batch) = VectorGames::new(setup);
+        let seen: Vec<u8> = game.hands()[game.decision().unwrap().seat]
+            .counts(11)
+            .collect();
+        assert_eq!(batch.observations.hands, seen.repeat(2));
+        // Both games are played alike until the next deal, which is one for both, or each game's own.
+        while u32s(&batch.observations.shifts) == [2, 2] {
+            let action = some_action(&masks(&batch)[0], 1, 1);
+            batch = games.step(&[action, action]).unwrap();
+        }
+        let (one, two) = batch.observations.hands.split_at(12);
+        assert_eq!(one != two, differ);
+    }
+}

@@ -1,0 +1,219 @@
+//! Two games that differ only in cards a viewer may not know, played by the same decisions under the same clock, give that viewer the same
+//! messages to the byte. A leak planted on purpose is caught by the same comparison.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use chefshat_engine::{ActionId, BySeat, Cards, Seat, SeedPlan, Stop, Viewer};
+use chefshat_proto::v1;
+use chefshat_record::convert::{decision_kind, observation_to_proto};
+use chefshat_room::journal::GameHeader;
+use chefshat_room::policy::Policy;
+use chefshat_room::testing::{OPEN, Table, ms};
+use chefshat_room::{Core, OpenDecision, Verdict};
+use prost::Message as _;
+
+use crate::convert;
+
+/// Two cards of different faces, one in each of two hands, change places.
+fn swapped(hands: &BySeat<Cards>, one: Seat, other: Seat, faces: u8) -> Option<BySeat<Cards>> {
+    let counts = |seat: Seat| hands[seat].counts(faces).collect::<Vec<u8>>();
+    let (mut ours, mut theirs) = (counts(one), counts(other));
+    // Not the top face: who holds the Golden card is known.
+    let top = usize::from(faces) - 1;
+    let mine = (0..top).find(|face| ours[*face] > 0 && theirs[*face] == 0)?;
+    let yours = (0..top)
+        .rev()
+        .find(|face| theirs[*face] > 0 && *face != mine)?;
+    ours[mine] -= 1;
+    theirs[mine] += 1;
+    theirs[yours] -= 1;
+    ours[yours] += 1;
+    let mut hands = *hands;
+    hands[one] = Cards::from_counts(faces, &ours, hands[one].has_golden())?;
+    hands[other] = Cards::from_counts(faces, &theirs, hands[other].has_golden())?;
+    Some(hands)
+}
+
+/// Everything the viewer is told of a table: all events, and the decision that is open if it is its own.
+fn told(table: &Table, viewer: Seat, see: Viewer) -> Vec<Vec<u8>> {
+    let mut messages: Vec<Vec<u8>> = (0..table.core.log().len())
+        .filter_map(|position| convert::view(&table.core, position, see))
+        .map(|event| event.encode_to_vec())
+        .collect();
+    if let Some(open) = table
+        .core
+        .open()
+        .filter(|open| open.decision.seat == viewer)
+    {
+        let mut written = Vec::new();
+        crate::wire::encode_decision(&table.core, open, table.now, true, &mut written);
+        messages.push(written);
+    }
+    messages
+}
+
+/// A table and one like it in which two hidden cards have changed places, as if they had been dealt so.
+fn pair(viewer: Seat, one: Seat, other: Seat, seed: u8) -> Option<(Table, Table)> {
+    let table = |seed| {
+        let mut table = Table::empty(
+            Policy {
+                reward_scheme: Some(chefshat_engine::RewardScheme::Paper),
+                ..Policy::default()
+            },
+            vec![OPEN; 4],
+        );
+        let mut header = GameHeader::clone(table.core.header());
+        header.seed = SeedPlan::Fixed {
+            game_seed: [seed; 32],
+        };
+        table.core = Core::new(Arc::new(header));
+        table.fill();
+        table
+    };
+    assert!(viewer != one && viewer != other);
+    let (plain, mut other_table) = (table(seed), table(seed));
+    other_table
+        .core
+        .replace_hands(|game| swapped(game.hands(), one, other, game.rules().faces()))?;
+    Some((plain, other_table))
+}
+
+/// Plays both tables by the same decisions until one of them cannot take the other's; how many turns that was.
+fn play_both(
+    plain: &mut Table,
+    swapped: &mut Table,
+    mut each: impl FnMut(&Table, &Table),
+) -> usize {
+    for turn in 0.. {
+        each(plain, swapped);
+        let (seat, id) = plain.open();
+        assert_eq!(swapped.open(), (seat, id));
+        let common: Vec<ActionId> = plain
+            .core
+            .legal_actions()
+            .iter()
+            .filter(|action| swapped.core.legal_actions().contains(*action))
+            .collect();
+        let shift = plain.core.game().expect("it has begun").shift();
+        if common.is_empty() || shift > 1 {
+            return turn;
+        }
+        let action = common[turn % common.len()].index().into();
+        for table in [&mut *plain, &mut *swapped] {
+            table.now += ms(10);
+            assert_eq!(table.answer(seat, id, action).verdict, Verdict::Accepted);
+        }
+        if plain.core.game().expect("it has begun").shift() > 1 {
+            // The next Shift is dealt anew; what had been hidden is played or known by then.
+            return turn;
+        }
+    }
+    unreachable!("a Shift ends")
+}
+
+#[test]
+fn hidden_cards_change_nothing_that_is_told() {
+    let seats = [0, 1, 2, 3].map(Seat::new);
+    let mut turns = 0;
+    for seed in 0..40 {
+        let viewer = seats[usize::from(seed) % 4];
+        let (one, other) = (
+            seats[(viewer.index() + 1) % 4],
+            seats[(viewer.index() + 2) % 4],
+        );
+        let Some((mut plain, mut swapped)) = pair(viewer, one, other, seed) else {
+            continue;
+        };
+        turns += play_both(&mut plain, &mut swapped, |plain, swapped| {
+            for see in [Viewer::Seat(viewer), Viewer::Spectator] {
+                assert_eq!(told(plain, viewer, see), told(swapped, viewer, see));
+            }
+        });
+    }
+    assert!(turns > 400, "only {turns} turns were compared");
+}
+
+/// The open decision as a message: what is written straight must be this.
+fn decision_request(
+    core: &Core,
+    open: &OpenDecision,
+    now: Duration,
+    with_mask: bool,
+) -> v1::DecisionRequest {
+    let observation = core.observe(Viewer::Seat(open.decision.seat));
+    let (time_left, bank_left) = core.time_left(now);
+    let size = core.header().rules.actions().size();
+    let mut request = v1::DecisionRequest {
+        decision_id: open.id,
+        kind: decision_kind(open.decision.kind).into(),
+        observation: observation.map(|seen| observation_to_proto(&seen)),
+        action_mask: if with_mask {
+            core.legal_actions().to_bytes(size)
+        } else {
+            Vec::new()
+        },
+        time_left_ms: convert::millis(time_left),
+        bank_left_ms: convert::millis(bank_left),
+        invalid_attempts_left: core.attempts_left(),
+        default_action: core.default_action().expect("it is open").index().into(),
+        ..v1::DecisionRequest::default()
+    };
+    chefshat_record::convert::put_requirement(
+        &mut request,
+        core.requirement().expect("it is open"),
+    );
+    request
+}
+
+#[test]
+fn a_decision_written_straight_is_the_message_that_is_said() {
+    let sizes = [(4, 11, 2), (2, 4, 0), (6, 15, 2), (3, 5, 1)];
+    for (players, faces, jokers) in sizes {
+        let rules = chefshat_engine::RuleSetSpec {
+            players,
+            faces,
+            jokers,
+            stop: Stop::Shifts(4),
+            ..chefshat_engine::RuleSetSpec::default()
+        };
+        let policy = Policy {
+            max_invalid_attempts: (players != 2).then_some(10),
+            ..Policy::default()
+        };
+        let mut table = Table::with_rules(policy, vec![OPEN; usize::from(players)], rules);
+        table.fill();
+        let mut decisions = 0;
+        while let Some(open) = table.core.open().cloned() {
+            for with_mask in [true, false] {
+                let message = decision_request(&table.core, &open, table.now, with_mask);
+                let mut written = Vec::new();
+                crate::wire::encode_decision(
+                    &table.core,
+                    &open,
+                    table.now,
+                    with_mask,
+                    &mut written,
+                );
+                assert_eq!(written, message.encode_to_vec());
+            }
+            decisions += 1;
+            table.now += ms(7);
+            table.play_one();
+        }
+        assert!(decisions > 30);
+    }
+}
+
+#[test]
+fn a_planted_leak_is_caught() {
+    let [viewer, one, other] = [0, 1, 2].map(Seat::new);
+    let (plain, swapped) = (0..40)
+        .find_map(|seed| pair(viewer, one, other, seed))
+        .expect("some deal has two cards to change");
+    // The leak: a view that withholds nothing.
+    assert_ne!(
+        told(&plain, viewer, Viewer::Everything),
+        told(&swapped, viewer, Viewer::Everything)
+    );
+}

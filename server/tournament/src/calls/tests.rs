@@ -1,0 +1,263 @@
+//! What follows is the same as if every game that is due were looked at whenever somebody asks, but few are.
+
+use std::collections::BTreeMap;
+
+use super::super::chance::Chance;
+use super::super::{Deals, Entrant, EntrantKind, Format, Settings};
+use super::*;
+use chefshat_agents::AgentKind;
+
+fn settings() -> Settings {
+    Settings {
+        format: Format::RoundRobin,
+        players: 4,
+        points: vec![5, 3, 1, 0],
+        rounds: Some(50),
+        games_per_pairing: 1,
+        deals: Deals::Independent,
+        max_participants: 400,
+        start_when_joined: None,
+        no_show_ms: 1000,
+        max_calls: 2,
+        max_parallel: 256,
+        draw_seed: [7; 32],
+        filler: AgentKind::Random,
+    }
+}
+
+fn join(tournament: &mut Tournament, max_games: usize, built_in: Option<AgentKind>) {
+    let change = tournament.join(Entrant {
+        name: format!("agent {}", tournament.participants().len()),
+        kind: EntrantKind::Agent,
+        built_in,
+        filler: false,
+        stateless: true,
+        max_games,
+    });
+    tournament.fold(&change.expect("there is space"));
+}
+
+fn end_one(tournament: &mut Tournament, game: usize, ended: Ended) {
+    let change = tournament.ended(game, ended).expect("it is being played");
+    tournament.fold(&change);
+}
+
+fn played() -> Ended {
+    let seats = (1..=4).map(|place| SeatPlayed {
+        place,
+        ..SeatPlayed::default()
+    });
+    Ended::Played {
+        shifts: 3,
+        seats: seats.collect(),
+    }
+}
+
+/// Begins, with so many rounds in which everybody meets anybody.
+fn draw(tournament: &mut Tournament, rounds: u32, chance: &mut Chance) {
+    tournament.fold(&Change::Begun { rounds });
+    let mut order: Vec<usize> = (0..tournament.participants().len()).collect();
+    for round in 1..=rounds {
+        chance.shuffle(&mut order);
+        let tables = order.chunks_exact(4);
+        tournament.fold(&Change::Drawn {
+            round,
+            byes: tables.remainder().to_vec(),
+            tables: tables.map(<[usize]>::to_vec).collect(),
+        });
+    }
+}
+
+/// Looks at every game that is due, in order.
+#[derive(Default)]
+struct Scan {
+    waits: BTreeMap<usize, u64>,
+}
+
+impl Scan {
+    fn next(&mut self, course: &Course, floor: &Floor, now_ms: u64) -> Option<Change> {
+        let settings = &course.settings;
+        if course.state != State::Playing {
+            return None;
+        }
+        if course.is_round_over() {
+            return Some(Change::Finished);
+        }
+        if course.playing.len() >= settings.max_parallel {
+            self.waits.clear();
+            return None;
+        }
+        for &(_, index) in &course.due {
+            let game = &course.games[index];
+            match readiness(course, floor, game) {
+                Readiness::Busy(_) => drop(self.waits.remove(&index)),
+                Readiness::Ready(forfeited) => return Some(called(index, game, forfeited)),
+                Readiness::Missing(missing) => {
+                    let since = *self.waits.entry(index).or_insert(now_ms);
+                    if now_ms - since < settings.no_show_ms {
+                        continue;
+                    }
+                    let game = index;
+                    return Some(if course.games[game].calls + 1 < settings.max_calls {
+                        Change::Rescheduled { game, missing }
+                    } else {
+                        called(game, &course.games[game], missing)
+                    });
+                }
+            }
+        }
+        None
+    }
+
+    fn fold(&mut self, change: &Change) {
+        match change {
+            Change::Called { game, .. }
+            | Change::Rescheduled { game, .. }
+            | Change::Voided { game } => drop(self.waits.remove(game)),
+            _ => {}
+        }
+    }
+
+    fn wake_at(&self, course: &Course) -> Option<u64> {
+        let since = self.waits.values().min()?;
+        Some(since + course.settings.no_show_ms)
+    }
+}
+
+/// Plays a tournament in which everything happens, by chance; gives how often it was asked and what became of it.
+fn compare(seed: u8) -> (usize, BTreeMap<&'static str, usize>) {
+    let mut chance = Chance::of_round([seed; 32], 1);
+    let mut tournament = Tournament::new(Settings {
+        games_per_pairing: 1 + chance.below(3) as u32,
+        max_calls: 1 + chance.below(3) as u32,
+        max_parallel: [1, 2, 256][chance.below(3)],
+        ..settings()
+    })
+    .expect("it makes sense");
+    let participants = 4 + chance.below(9);
+    for _ in 0..participants {
+        let built_in = (chance.below(8) == 0).then_some(AgentKind::Random);
+        join(&mut tournament, 1 + chance.below(2), built_in);
+    }
+    draw(&mut tournament, 6, &mut chance);
+    let mut scan = Scan::default();
+    let (mut now_ms, mut asked) = (0, 0);
+    let mut happened = BTreeMap::new();
+    while tournament.state() == State::Playing {
+        loop {
+            let expected = scan.next(&tournament.course, &tournament.floor, now_ms);
+            let next = tournament.next(now_ms);
+            assert_eq!(next, expected, "seed {seed}, {now_ms} ms");
+            asked += 1;
+            let Some(change) = next else { break };
+            let what = match &change {
+                Change::Called { forfeited, .. } if forfeited.is_empty() => "called",
+                Change::Called { .. } => "forfeited",
+                Change::Rescheduled { .. } => "rescheduled",
+                Change::Voided { .. } => "voided",
+                _ => "other",
+            };
+            *happened.entry(what).or_default() += 1;
+            tournament.fold(&change);
+            scan.fold(&change);
+        }
+        let wake_at = tournament.wake_at();
+        assert_eq!(wake_at, scan.wake_at(&tournament.course), "seed {seed}");
+        now_ms += chance.below(700) as u64;
+        for _ in 0..chance.below(4) {
+            let who = chance.below(participants);
+            // Mostly there, but for the first, who comes seldom.
+            let present = chance.below(8) >= if who == 0 { 7 } else { 2 };
+            tournament.set_present(who, present);
+            let Tournament { course, floor, .. } = &tournament;
+            let is_there = |who: &usize| floor.is_present(course, *who);
+            (scan.waits).retain(|&game, _| !course.games[game].seats.iter().all(is_there));
+        }
+        let playing: Vec<usize> = tournament.playing().collect();
+        for game in playing {
+            let ended = match chance.below(10) {
+                0 => Ended::Aborted,
+                1 => Ended::NeverStarted {
+                    missing: vec![tournament.games()[game].seats[chance.below(4)]],
+                },
+                2..5 => played(),
+                _ => continue,
+            };
+            end_one(&mut tournament, game, ended);
+        }
+    }
+    (asked, happened)
+}
+
+#[test]
+fn what_follows_is_what_looking_at_every_game_would_tell() {
+    let mut happened: BTreeMap<&str, usize> = BTreeMap::new();
+    for seed in 0..100 {
+        let (asked, tally) = compare(seed);
+        assert!(asked > 10);
+        for (what, times) in tally {
+            *happened.entry(what).or_default() += times;
+        }
+    }
+    for what in ["called", "forfeited", "rescheduled", "voided"] {
+        assert!(happened[what] > 50, "{happened:?}");
+    }
+}
+
+/// A tournament of so many rounds, all of them drawn.
+fn drawn(participants: usize, rounds: u32) -> Tournament {
+    let mut tournament = Tournament::new(settings()).expect("it makes sense");
+    (0..participants).for_each(|_| join(&mut tournament, 1, None));
+    draw(&mut tournament, rounds, &mut Chance::of_round([1; 32], 1));
+    tournament
+}
+
+fn follow(tournament: &mut Tournament, now_ms: u64) -> usize {
+    let mut changes = 0;
+    while let Some(change) = tournament.next(now_ms) {
+        tournament.fold(&change);
+        changes += 1;
+    }
+    changes
+}
+
+#[test]
+fn few_games_are_looked_at_when_one_has_ended() {
+    let mut tournament = drawn(400, 50);
+    (0..400).for_each(|who| tournament.set_present(who, true));
+    follow(&mut tournament, 0);
+    let games = tournament.games().len() as u64;
+    assert_eq!(games, 5000);
+    assert!(tournament.floor.looks < 2 * games);
+    // One after the other, the one that was called first ends first.
+    loop {
+        let Some(game) = tournament.playing().next() else {
+            break;
+        };
+        end_one(&mut tournament, game, played());
+        follow(&mut tournament, 0);
+    }
+    assert_eq!(tournament.state(), State::Finished);
+    let looks = tournament.floor.looks;
+    assert!(looks < 40 * games, "{looks}");
+}
+
+#[test]
+fn few_games_are_looked_at_while_everybody_is_away() {
+    let mut tournament = drawn(400, 50);
+    let games = tournament.games().len() as u64;
+    assert_eq!(follow(&mut tournament, 0), 0);
+    assert_eq!(tournament.floor.looks, games);
+    for now_ms in 1..100 {
+        assert_eq!(follow(&mut tournament, now_ms), 0);
+    }
+    assert_eq!(tournament.floor.looks, games, "nothing has happened");
+    tournament.set_present(0, true);
+    assert_eq!(follow(&mut tournament, 100), 0);
+    assert_eq!(tournament.floor.looks, games + 50, "only its own");
+    // Called again, then given up.
+    assert_eq!(follow(&mut tournament, 1000) as u64, games);
+    assert_eq!(follow(&mut tournament, 2000) as u64, games - 49);
+    let looks = tournament.floor.looks;
+    assert!(looks < 8 * games, "{looks}");
+}

@@ -1,0 +1,315 @@
+//! How sure it is that of two participants the one with the higher mean score is the better one, and how many games would settle it. Which
+//! two are asked about, and which games count, is decided by the caller.
+//!
+//! What is independent of each other is not games but *occasions*. Of two who always sat at the same tables these are all games dealt from one
+//! deal, or, where no deal comes twice, the single game. Of two who met others it is the round: in all its games each had the same
+//! opponents, better or worse ones than the other's. On one occasion two participants may have been at the same table, where what one gains the other loses, or at different tables with the
+//! same cards, where luck is shared and cancels out in the difference. Summing up each occasion before anything is said of chance
+//! does right by all of these: if both played once on every occasion it is the paired difference, if they never shared one it is
+//! Welch's.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::Tournament;
+use crate::statistics::Moments;
+
+/// What a participant scored in one game.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scored {
+    /// The deal, if other games were dealt from it, too; else the game. Any numbers that keep them apart.
+    pub occasion: u64,
+    /// The score.
+    pub score: f64,
+}
+
+/// How sure the order of two participants is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OrderConfidence {
+    /// Mean score of the upper minus that of the lower one.
+    pub difference: f64,
+    /// Standard error of it; 0 with fewer than two occasions each, or if chance decided nothing.
+    pub standard_error: f64,
+    /// How likely the difference is the right way round, 0..=1, of Student's distribution: 0.5 if nothing is known, below that if the
+    /// scores speak against the order (in a knockout, whoever got further may have scored less).
+    pub confidence: f64,
+    /// How many more games of each would bring it to [`SURE`] if the difference and the share of common occasions stay. `None` if it is
+    /// there, or cannot be said.
+    pub more_games: Option<u64>,
+}
+
+/// Two neighbours in the standings.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Neighbours {
+    /// The upper one, by number.
+    pub upper: usize,
+    /// The lower one.
+    pub lower: usize,
+    /// How sure their order is.
+    pub order: OrderConfidence,
+}
+
+/// When an order counts as settled.
+pub const SURE: f64 = 0.95;
+/// The normal distribution's 95 % point.
+const Z_SURE: f64 = 1.644_853_626_951_472_2;
+
+/// Scores are whole numbers: a standard error below this is nothing but rounding.
+const ROUNDING: f64 = 1e-9;
+
+/// How sure it is that the one with the scores `upper` is better than the one with the scores `lower`.
+pub fn order_confidence(upper: &[Scored], lower: &[Scored]) -> OrderConfidence {
+    let (means, games) = ([mean(upper), mean(lower)], [upper.len(), lower.len()]);
+    let difference = match means[0] - means[1] {
+        level if level.abs() < ROUNDING => 0.0,
+        difference => difference,
+    };
+    let few = occasions(upper).min(occasions(lower));
+    if few < 2 {
+        return OrderConfidence {
+            difference: if few == 0 { 0.0 } else { difference },
+            standard_error: 0.0,
+            confidence: 0.5,
+            more_games: None,
+        };
+    }
+    let standard_error = standard_error(upper, lower, means);
+    let confidence = if standard_error > 0.0 {
+        below(difference / standard_error, few - 1)
+    } else {
+        // All occasions told the same. Had the two been equal, each would have gone either way.
+        let other_way = 0.5f64.powi(i32::try_from(few).unwrap_or(i32::MAX));
+        match difference.total_cmp(&0.0) {
+            std::cmp::Ordering::Greater => 1.0 - other_way,
+            std::cmp::Ordering::Less => other_way,
+            std::cmp::Ordering::Equal => 0.5,
+        }
+    };
+    OrderConfidence {
+        difference,
+        standard_error,
+        confidence,
+        more_games: (difference > 0.0 && confidence < SURE).then(|| {
+            let needed = if standard_error > 0.0 {
+                let games = games[0].max(games[1]) as f64;
+                games * (Z_SURE * standard_error / difference).powi(2) - games
+            } else {
+                (1.0 - SURE).log(0.5) - few as f64
+            };
+            // A float becomes the nearest integer that there is.
+            needed.ceil().max(1.0) as u64
+        }),
+    }
+}
+
+impl Tournament {
+    /// How sure the order of each two neighbours in the standings is (none before a game has counted), from the top, by the scores of all games
+    /// that counted. Of two who always sat at the same tables, every deal or game tells something. Others met others, who were better or worse, in all games of a
+    /// round: of them it is whole rounds that tell.
+    pub fn order_confidence(&self) -> Vec<Neighbours> {
+        let mut played: Vec<Vec<Played>> = vec![Vec::new(); self.participants().len()];
+        for (number, game) in (0u64..).zip(self.games()) {
+            for seat in game.result().iter().flat_map(|result| &result.seats) {
+                played[seat.participant].push(Played {
+                    game: number,
+                    // Even numbers are deals, odd ones games.
+                    deal: game.deal.map_or(2 * number + 1, |deal| 2 * u64::from(deal)),
+                    round: game.round,
+                    score: f64::from(seat.score),
+                });
+            }
+        }
+        // Before, they stand in no order that could be right or wrong.
+        let ordered = (self.has_counted()).then(|| self.standings());
+        let standings = ordered.unwrap_or_default();
+        standings
+            .windows(2)
+            .map(|two| {
+                let (upper, lower) = (two[0].participant, two[1].participant);
+                let order = confidence_of(&played[upper], &played[lower]);
+                Neighbours {
+                    upper,
+                    lower,
+                    order,
+                }
+            })
+            .collect()
+    }
+}
+
+/// A game as one participant played it.
+#[derive(Debug, Clone, Copy)]
+struct Played {
+    game: u64,
+    deal: u64,
+    round: u32,
+    score: f64,
+}
+
+fn confidence_of(upper: &[Played], lower: &[Played]) -> OrderConfidence {
+    let games = |played: &[Played]| played.iter().map(|it| it.game).collect::<Vec<u64>>();
+    let always_met = games(upper) == games(lower);
+    let scored = |played: &[Played]| -> Vec<Scored> {
+        let scores = played.iter().map(|it| Scored {
+            occasion: if always_met { it.deal } else { it.round.into() },
+            score: it.score,
+        });
+        scores.collect()
+    };
+    order_confidence(&scored(upper), &scored(lower))
+}
+
+fn occasions(scores: &[Scored]) -> usize {
+    let occasions: BTreeSet<u64> = scores.iter().map(|scored| scored.occasion).collect();
+    occasions.len()
+}
+
+fn mean(scores: &[Scored]) -> f64 {
+    let mut moments = Moments::default();
+    scores.iter().for_each(|scored| moments.add(scored.score));
+    moments.mean()
+}
+
+/// The standard error of the difference of the means: what each occasion adds to it beyond what was to be expected, squared and summed. Each
+/// participant's part is widened by n / (n - 1) for its n occasions, because its mean was taken from the same games. Both have two
+/// occasions at least.
+fn standard_error(upper: &[Scored], lower: &[Scored], means: [f64; 2]) -> f64 {
+    let mut by_occasion: BTreeMap<u64, f64> = BTreeMap::new();
+    for ((scores, mean), sign) in [upper, lower].into_iter().zip(means).zip([1.0, -1.0]) {
+        let mut own: BTreeMap<u64, f64> = BTreeMap::new();
+        for scored in scores {
+            *own.entry(scored.occasion).or_default() += scored.score - mean;
+        }
+        let occasions = own.len() as f64;
+        let widened = (occasions / (occasions - 1.0)).sqrt();
+        for (occasion, sum) in own {
+            let part = by_occasion.entry(occasion).or_default();
+            *part += sign * widened * sum / scores.len() as f64;
+        }
+    }
+    let squares = by_occasion.values().map(|part| part * part);
+    let error = squares.sum::<f64>().sqrt();
+    if error < ROUNDING { 0.0 } else { error }
+}
+
+/// The share of Student's distribution with so many degrees of freedom, at least one, below so many standard errors: with few occasions
+/// the error itself is not well known. By Wallace's approximation (1959), which is off by at most some thousandths.
+fn below(errors: f64, freedom: usize) -> f64 {
+    let freedom = freedom as f64;
+    let shrunk = (freedom * (errors * errors / freedom).ln_1p())
+        .sqrt()
+        .copysign(errors);
+    let deviations = shrunk * (8.0 * freedom + 1.0) / (8.0 * freedom + 3.0);
+    libm::erfc(-deviations / std::f64::consts::SQRT_2) / 2.0
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::confidence::*;
+
+    fn scores(first: u64, scores: &[f64]) -> Vec<Scored> {
+        (first..)
+            .zip(scores)
+            .map(|(occasion, &score)| Scored { occasion, score })
+            .collect()
+    }
+
+    const UPPER: [f64; 5] = [5.0, 3.0, 5.0, 1.0, 5.0];
+    const LOWER: [f64; 5] = [3.0, 1.0, 3.0, 0.0, 5.0];
+
+    fn close(left: f64, right: f64) {
+        assert!((left - right).abs() < 1e-9, "{left} is not {right}");
+    }
+
+    #[test]
+    fn common_occasions_are_paired() {
+        let sure = order_confidence(&scores(0, &UPPER), &scores(0, &LOWER));
+        // The differences are 2, 2, 2, 1, 0: mean 1.4, variance 0.8.
+        close(sure.difference, 1.4);
+        close(sure.standard_error, (0.8f64 / 5.0).sqrt());
+        // 3.5 standard errors, 4 degrees of freedom; from a table of Student's distribution.
+        assert!((sure.confidence - 0.9876).abs() < 0.001, "{sure:?}");
+        assert_eq!(sure.more_games, None);
+    }
+
+    #[test]
+    fn scores_that_share_nothing_are_compared_as_welch_does() {
+        let sure = order_confidence(&scores(0, &UPPER), &scores(10, &LOWER[..4]));
+        // Variances 3.2 of five and 2.25 of four; means 3.8 and 1.75.
+        close(sure.difference, 2.05);
+        close(sure.standard_error, (3.2f64 / 5.0 + 2.25 / 4.0).sqrt());
+    }
+
+    #[test]
+    fn what_one_gains_and_the_other_loses_makes_the_difference_less_sure() {
+        let upper = [5.0, 3.0, 5.0, 3.0, 5.0, 3.0, 3.0];
+        let lower = upper.map(|score| 8.0 - score);
+        let apart = order_confidence(&scores(0, &upper), &scores(10, &lower));
+        let together = order_confidence(&scores(0, &upper), &scores(0, &lower));
+        let ratio = together.standard_error / apart.standard_error;
+        close(ratio, std::f64::consts::SQRT_2);
+    }
+
+    #[test]
+    fn games_of_one_deal_are_one_occasion() {
+        // Every deal is played twice, with the same outcome: nothing is known that once would not tell.
+        let once = order_confidence(&scores(0, &UPPER), &scores(0, &LOWER));
+        let twice = |values: &[f64]| [scores(0, values), scores(0, values)].concat();
+        let both = order_confidence(&twice(&UPPER), &twice(&LOWER));
+        close(both.standard_error, once.standard_error);
+        close(both.confidence, once.confidence);
+    }
+
+    #[test]
+    fn so_many_more_games_would_settle_it() {
+        let upper = [5.0, 3.0, 0.0, 5.0, 1.0, 3.0, 5.0, 0.0];
+        let lower = [3.0, 5.0, 1.0, 0.0, 3.0, 1.0, 3.0, 5.0];
+        let now = order_confidence(&scores(0, &upper), &scores(20, &lower));
+        let more = now.more_games.expect("it is not sure yet");
+        assert!((0.5..SURE).contains(&now.confidence), "{now:?}");
+        // The same games again and again come to the same difference, as sure as was said.
+        let repeated = |values: &[f64], times: usize| values.repeat(times);
+        let after = |times| {
+            let (upper, lower) = (repeated(&upper, times), repeated(&lower, times));
+            order_confidence(&scores(0, &upper), &scores(1_000_000, &lower))
+        };
+        let enough = (8 + more).div_ceil(8);
+        let enough = usize::try_from(enough).expect("a small number");
+        assert!(after(enough + 1).confidence > SURE);
+        assert!(after(enough / 2).confidence < SURE);
+    }
+
+    #[test]
+    fn what_nothing_is_known_of_is_left_open() {
+        let none = order_confidence(&[], &scores(0, &LOWER));
+        let one = order_confidence(&scores(0, &[5.0]), &scores(0, &LOWER));
+        for unknown in [none, one] {
+            assert_eq!((unknown.standard_error, unknown.confidence), (0.0, 0.5));
+            assert_eq!(unknown.more_games, None);
+        }
+        let one_deal: Vec<Scored> = [5.0, 5.0].map(|score| Scored { occasion: 7, score }).into();
+        let unsure = order_confidence(&one_deal, &scores(0, &LOWER));
+        assert_eq!((unsure.confidence, unsure.more_games), (0.5, None));
+        let same = order_confidence(&scores(0, &UPPER), &scores(0, &UPPER));
+        assert_eq!((same.difference, same.confidence), (0.0, 0.5));
+        assert_eq!(same.more_games, None);
+    }
+
+    #[test]
+    fn a_few_games_that_all_tell_the_same_are_not_certainty() {
+        let always = |games: usize| {
+            let first = scores(0, &vec![5.0; games]);
+            order_confidence(&first, &scores(0, &vec![3.0; games]))
+        };
+        let shifted = UPPER.map(|score| score - 0.9);
+        let by_rounding = order_confidence(&scores(0, &UPPER), &scores(0, &shifted));
+        assert_eq!(
+            (by_rounding.standard_error, by_rounding.confidence),
+            (0.0, 0.968_75)
+        );
+        assert_eq!(always(3).confidence, 0.875);
+        assert_eq!(always(3).more_games, Some(2));
+        assert!(always(5).confidence > SURE);
+        let against = order_confidence(&scores(0, &[3.0; 3]), &scores(0, &[5.0; 3]));
+        assert_eq!((against.confidence, against.more_games), (0.125, None));
+    }
+}

@@ -1,0 +1,339 @@
+//! What always holds, whoever comes and goes and whatever becomes of games: a tournament ends, nobody sits at too many tables, every game
+//! counts once, the same changes lead to the same tournament, and one that was interrupted goes on.
+
+use std::collections::BTreeMap;
+
+use chefshat_agents::AgentKind;
+use chefshat_tournament::{
+    Change, Deals, Ended, Entrant, EntrantKind, Format, GameState, Settings, State, Tournament,
+};
+use proptest::prelude::*;
+
+use super::support::{played, settings};
+
+/// Who takes part in a run, and what happens to whom.
+#[derive(Debug, Clone)]
+struct Plan {
+    settings: Settings,
+    entrants: Vec<Entrant>,
+    /// What chance decides, one number after the other, over and over.
+    dice: Vec<u8>,
+}
+
+fn entrants() -> impl Strategy<Value = Vec<Entrant>> {
+    let entrant = (1..=3usize, prop::bool::weighted(0.2));
+    let sizes = prop_oneof![2..=12usize, 13..=64usize];
+    sizes
+        .prop_flat_map(move |count| prop::collection::vec(entrant.clone(), count))
+        .prop_map(|kinds| {
+            let numbered = kinds.into_iter().enumerate();
+            let entrant = |(number, (max_games, is_built_in)): (usize, (usize, bool))| Entrant {
+                name: format!("entrant {number}"),
+                kind: EntrantKind::Robot,
+                built_in: is_built_in.then_some(AgentKind::Greedy),
+                filler: false,
+                stateless: true,
+                max_games,
+            };
+            numbered.map(entrant).collect()
+        })
+}
+
+fn plans() -> impl Strategy<Value = Plan> {
+    let what = (
+        prop::sample::select(Format::ALL.to_vec()),
+        prop::sample::select(Deals::ALL.to_vec()),
+        2..=6usize,
+        1..=3u32,
+        1..=5u32,
+    );
+    let how = (1..=3u32, 1..=8usize, any::<[u8; 32]>());
+    let dice = prop::collection::vec(any::<u8>(), 16..200);
+    (what, how, entrants(), dice).prop_map(|(what, how, entrants, dice)| {
+        let (format, deals, players, games_per_pairing, rounds) = what;
+        let (max_calls, max_parallel, draw_seed) = how;
+        let is_knockout = format == Format::Knockout;
+        let players = if is_knockout { 4 } else { players };
+        let settings = Settings {
+            players,
+            points: (0..players as u32).rev().collect(),
+            rounds: (!is_knockout).then_some(rounds),
+            games_per_pairing,
+            deals,
+            max_calls,
+            max_parallel,
+            draw_seed,
+            ..settings(format)
+        };
+        Plan {
+            settings,
+            entrants,
+            dice,
+        }
+    })
+}
+
+/// A run of a plan: the tournament, its changes so far, and who is there.
+struct Run {
+    tournament: Tournament,
+    changes: Vec<Change>,
+    present: BTreeMap<usize, bool>,
+    dice: Vec<u8>,
+    rolls: usize,
+    now_ms: u64,
+}
+
+impl Run {
+    fn die(&mut self, sides: u8) -> u8 {
+        // When they are used up they begin again, each one higher: a course of events that goes round in circles is no test of whether it ends.
+        let (turn, roll) = (self.rolls / self.dice.len(), self.rolls % self.dice.len());
+        self.rolls += 1;
+        self.dice[roll].wrapping_add(turn as u8) % sides
+    }
+
+    fn fold(&mut self, change: Change) {
+        let games = self.tournament.games();
+        if let Change::Called { game, forfeited } = &change {
+            assert_eq!(games[*game].state, GameState::Due);
+            for who in &games[*game].seats {
+                let comes = !forfeited.contains(who);
+                assert!(!comes || self.tournament.is_present(*who));
+            }
+        }
+        self.tournament.fold(&change);
+        self.changes.push(change);
+        self.check();
+    }
+
+    /// Nobody sits at more tables than it said, and there are no more games than may be.
+    fn check(&self) {
+        let games = self.tournament.games();
+        let mut sits = vec![0; self.tournament.participants().len()];
+        for game in self.tournament.playing() {
+            for &who in &games[game].seats {
+                sits[who] += usize::from(!games[game].forfeited.contains(&who));
+            }
+        }
+        for (entrant, tables) in self.tournament.participants().iter().zip(sits) {
+            assert!(entrant.built_in.is_some() || tables <= entrant.max_games);
+        }
+        let parallel = self.tournament.playing().count();
+        assert!(parallel <= self.tournament.settings().max_parallel);
+    }
+
+    fn follow(&mut self) {
+        while let Some(change) = self.tournament.next(self.now_ms) {
+            self.fold(change);
+        }
+    }
+
+    /// Somebody comes or goes.
+    fn wander(&mut self) {
+        let participants = self.tournament.participants().len();
+        let who = (usize::from(self.die(255)) * 7 + usize::from(self.die(255))) % participants;
+        let is_present = self.die(3) > 0;
+        self.present.insert(who, is_present);
+        self.tournament.set_present(who, is_present);
+    }
+
+    /// A game ends, one way or another.
+    fn end_one(&mut self) {
+        let playing: Vec<usize> = self.tournament.playing().collect();
+        if playing.is_empty() {
+            return;
+        }
+        let game = playing[usize::from(self.die(255)) % playing.len()];
+        let seats = self.tournament.games()[game].seats.clone();
+        let ended = match self.die(8) {
+            0 => Ended::Aborted,
+            1 => Ended::NeverStarted {
+                missing: vec![seats[usize::from(self.die(6)) % seats.len()]],
+            },
+            turn => {
+                let mut places: Vec<usize> = (1..=seats.len()).collect();
+                places.rotate_left(usize::from(turn) % seats.len());
+                played(&places)
+            }
+        };
+        let change = self.tournament.ended(game, ended).unwrap();
+        self.fold(change);
+    }
+
+    /// The server goes down and comes up again: nobody is there, games that were being played are not.
+    fn restart(&mut self) {
+        let mut tournament = Tournament::new(self.tournament.settings().clone()).unwrap();
+        self.changes
+            .iter()
+            .for_each(|change| tournament.fold(change));
+        assert!(tournament == self.tournament);
+        self.tournament = tournament;
+        let playing: Vec<usize> = self.tournament.playing().collect();
+        for game in playing {
+            let change = self.tournament.ended(game, Ended::Aborted).unwrap();
+            self.fold(change);
+        }
+        for (&who, &is_present) in &self.present {
+            self.tournament.set_present(who, is_present);
+        }
+    }
+
+    fn games_left(&self) -> usize {
+        self.tournament.games_expected() - self.tournament.games_over()
+    }
+}
+
+fn run(plan: Plan) -> Run {
+    let mut run = Run {
+        tournament: Tournament::new(plan.settings).unwrap(),
+        changes: Vec::new(),
+        present: BTreeMap::new(),
+        dice: plan.dice,
+        rolls: 0,
+        now_ms: 0,
+    };
+    for (number, entrant) in plan.entrants.into_iter().enumerate() {
+        let change = run.tournament.join(entrant).unwrap();
+        run.fold(change);
+        run.tournament.set_present(number, true);
+        run.present.insert(number, true);
+    }
+    run.tournament
+        .begin()
+        .unwrap()
+        .into_iter()
+        .for_each(|change| run.fold(change));
+    // Each game ends at most once for each call and each participant; half of the steps below end one, or let time pass.
+    let calls = run.tournament.settings().max_calls as usize;
+    let players = run.tournament.settings().players;
+    let most = 40 * (run.games_left() + 1) * (calls + players);
+    for step in 0.. {
+        assert!(step < most, "no end after {step} steps");
+        run.follow();
+        if run.tournament.state() != State::Playing {
+            break;
+        }
+        match run.die(16) {
+            0 | 1 => run.wander(),
+            2 if run.die(8) == 0 => run.restart(),
+            _ if run.tournament.playing().next().is_some() => run.end_one(),
+            _ => match run.tournament.wake_at() {
+                Some(at_ms) => run.now_ms = run.now_ms.max(at_ms),
+                // Only somebody who is to come can hold it up.
+                None => panic!("nothing goes on, and nobody is waited for"),
+            },
+        }
+    }
+    run
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 96, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn it_always_ends_and_adds_up(plan in plans()) {
+        let run = run(plan);
+        let tournament = &run.tournament;
+        prop_assert_eq!(tournament.state(), State::Finished);
+        prop_assert_eq!(tournament.games().len(), tournament.games_expected());
+        prop_assert!(tournament.games().iter().all(|game| game.is_over()));
+
+        // Every game counted or was given up once.
+        let mut over = vec![0; tournament.games().len()];
+        for change in &run.changes {
+            if let Change::Counted { game, .. } | Change::Voided { game } = change {
+                over[*game] += 1;
+            }
+        }
+        prop_assert!(over.iter().all(|&times| times == 1));
+
+        // The standings are those of the games.
+        let standings = tournament.standings();
+        let places: Vec<u32> = standings.iter().map(|line| line.place).collect();
+        let expected: Vec<u32> = match tournament.has_counted() {
+            true => (1..=standings.len() as u32).collect(),
+            false => vec![0; standings.len()],
+        };
+        prop_assert_eq!(places, expected);
+        for line in &standings {
+            let seats: Vec<_> = tournament
+                .games()
+                .iter()
+                .filter_map(|game| game.result())
+                .flat_map(|result| &result.seats)
+                .filter(|seat| seat.participant == line.participant)
+                .collect();
+            prop_assert_eq!(line.games as usize, seats.len());
+            prop_assert_eq!(line.score, seats.iter().map(|seat| u64::from(seat.score)).sum::<u64>());
+            prop_assert_eq!(line.places.iter().sum::<u32>(), line.games);
+        }
+        if tournament.settings().format != Format::Knockout {
+            let mean = standings.iter().map(|line| line.mean_score());
+            prop_assert!(mean.is_sorted_by(|better, worse| better >= worse));
+        }
+
+        // The same changes lead to the same tournament.
+        let mut again = Tournament::new(tournament.settings().clone()).unwrap();
+        run.changes.iter().for_each(|change| again.fold(change));
+        prop_assert!(&again == tournament);
+        prop_assert_eq!(again.standings(), standings);
+    }
+}
+
+#[test]
+fn it_goes_on_from_wherever_it_was_interrupted() {
+    for format in Format::ALL {
+        let plan = Plan {
+            settings: settings(format),
+            entrants: (0..9)
+                .map(|number| Entrant {
+                    name: format!("entrant {number}"),
+                    kind: EntrantKind::Human,
+                    built_in: Some(AgentKind::Random),
+                    filler: false,
+                    stateless: false,
+                    max_games: 1,
+                })
+                .collect(),
+            dice: vec![3, 9, 5],
+        };
+        let whole = run(plan);
+        let standings = whole.tournament.standings();
+        for cut in 0..=whole.changes.len() {
+            let mut resumed = Tournament::new(whole.tournament.settings().clone()).unwrap();
+            let (before, after) = whole.changes.split_at(cut);
+            before.iter().for_each(|change| resumed.fold(change));
+            for change in after {
+                // What the tournament decides by itself it decides as before.
+                if resumed.state() == State::Playing
+                    && !matches!(
+                        change,
+                        Change::Counted { .. } | Change::Rescheduled { .. } | Change::Voided { .. }
+                    )
+                {
+                    assert_eq!(
+                        resumed.next(0).as_ref(),
+                        Some(change),
+                        "{format:?}, cut at {cut}"
+                    );
+                }
+                resumed.fold(change);
+            }
+            assert!(resumed == whole.tournament);
+            assert_eq!(resumed.standings(), standings);
+        }
+    }
+}
+
+#[test]
+fn every_size_comes_to_its_end_in_every_format() {
+    for format in Format::ALL {
+        for participants in 2..=33 {
+            let mut settings = settings(format);
+            settings.rounds = (format != Format::Knockout).then_some(4);
+            let mut tournament = super::support::begun(settings, participants);
+            super::support::play_through(&mut tournament);
+            assert_eq!(tournament.state(), State::Finished);
+            assert_eq!(tournament.games().len(), tournament.games_expected());
+        }
+    }
+}

@@ -1,0 +1,172 @@
+//! Tournaments for tests: settings, participants, and a hall in which games end without being played. What is expected is in the other
+//! modules.
+
+use chefshat_agents::AgentKind;
+use chefshat_tournament::{
+    Change, Deals, Ended, Entrant, EntrantKind, Format, SeatPlayed, Settings, State, Tournament,
+};
+
+/// Settings of a tournament of up to 64 at tables of four.
+pub(crate) fn settings(format: Format) -> Settings {
+    Settings {
+        format,
+        players: 4,
+        points: vec![5, 3, 1, 0],
+        rounds: None,
+        games_per_pairing: 1,
+        deals: Deals::Independent,
+        max_participants: 64,
+        start_when_joined: None,
+        no_show_ms: 1000,
+        max_calls: 2,
+        max_parallel: 64,
+        draw_seed: [7; 32],
+        filler: AgentKind::Random,
+    }
+}
+
+/// An agent, one game at a time.
+pub(crate) fn entrant(name: &str) -> Entrant {
+    Entrant {
+        name: name.to_owned(),
+        kind: EntrantKind::Agent,
+        built_in: None,
+        filler: false,
+        stateless: true,
+        max_games: 1,
+    }
+}
+
+/// A tournament that so many have joined, all of them present.
+pub(crate) fn joined(settings: Settings, participants: usize) -> Tournament {
+    let mut tournament = Tournament::new(settings).unwrap();
+    for number in 0..participants {
+        let change = tournament
+            .join(entrant(&format!("agent {number}")))
+            .unwrap();
+        tournament.fold(&change);
+        tournament.set_present(number, true);
+    }
+    tournament
+}
+
+/// The same, begun.
+pub(crate) fn begun(settings: Settings, participants: usize) -> Tournament {
+    let mut tournament = joined(settings, participants);
+    for change in tournament.begin().unwrap() {
+        tournament.fold(&change);
+    }
+    tournament
+}
+
+/// A result by the places of the seats, with 10 points less the place.
+pub(crate) fn played(places: &[usize]) -> Ended {
+    let seats = places.iter().map(|&place| SeatPlayed {
+        place,
+        points: 10 - place as u64,
+        decisions: 20,
+        ..SeatPlayed::default()
+    });
+    Ended::Played {
+        shifts: 3,
+        seats: seats.collect(),
+    }
+}
+
+/// A result in which a lower number of the participant is better.
+pub(crate) fn played_by_number(tournament: &Tournament, game: usize) -> Ended {
+    let seats = &tournament.games()[game].seats;
+    let better = |who: usize| seats.iter().filter(|&&other| other < who).count();
+    let places: Vec<usize> = seats.iter().map(|&who| better(who) + 1).collect();
+    played(&places)
+}
+
+/// Folds everything that follows at this time.
+pub(crate) fn follow(tournament: &mut Tournament, now_ms: u64) -> Vec<Change> {
+    let mut changes = Vec::new();
+    while let Some(change) = tournament.next(now_ms) {
+        tournament.fold(&change);
+        changes.push(change);
+    }
+    changes
+}
+
+/// Ends a game that is being played.
+pub(crate) fn end(tournament: &mut Tournament, game: usize, ended: Ended) -> Change {
+    let change = tournament.ended(game, ended).unwrap();
+    tournament.fold(&change);
+    change
+}
+
+/// Plays to the end, nobody absent; the lower number wins. Gives the changes.
+pub(crate) fn play_through(tournament: &mut Tournament) -> Vec<Change> {
+    let mut changes = Vec::new();
+    while tournament.state() == State::Playing {
+        changes.extend(follow(tournament, 0));
+        let playing: Vec<usize> = tournament.playing().collect();
+        assert!(
+            !playing.is_empty() || tournament.state() != State::Playing,
+            "nothing goes on"
+        );
+        for game in playing {
+            let ended = played_by_number(tournament, game);
+            changes.push(end(tournament, game, ended));
+        }
+    }
+    changes
+}
+
+/// A round that was drawn.
+#[derive(Debug, Clone)]
+pub(crate) struct Round {
+    pub(crate) tables: Vec<Vec<usize>>,
+    pub(crate) byes: Vec<usize>,
+}
+
+impl Round {
+    /// Everybody is in it once, at a full table or with a bye; no more byes than there have to be.
+    pub(crate) fn check(&self, participants: usize, players: usize) {
+        assert!(self.tables.iter().all(|table| table.len() == players));
+        assert_eq!(self.byes.len(), participants % players);
+        let mut everybody = [self.tables.concat(), self.byes.clone()].concat();
+        everybody.sort_unstable();
+        assert_eq!(everybody, (0..participants).collect::<Vec<_>>());
+    }
+}
+
+/// The rounds that were drawn.
+pub(crate) fn drawn(changes: &[Change]) -> Vec<Round> {
+    changes
+        .iter()
+        .filter_map(|change| match change {
+            Change::Drawn { tables, byes, .. } => Some(Round {
+                tables: tables.clone(),
+                byes: byes.clone(),
+            }),
+            _ => None,
+        })
+        .collect()
+}
+
+/// How often each two participants met.
+pub(crate) fn meetings<'t>(
+    tables: impl Iterator<Item = &'t Vec<usize>>,
+    participants: usize,
+) -> Vec<u32> {
+    let mut met = vec![vec![0; participants]; participants];
+    for table in tables {
+        for (index, &a) in table.iter().enumerate() {
+            for &b in &table[index + 1..] {
+                met[a.min(b)][a.max(b)] += 1;
+            }
+        }
+    }
+    (0..participants)
+        .flat_map(|a| met[a][a + 1..].to_vec())
+        .collect()
+}
+
+/// Least and most.
+pub(crate) fn range(numbers: impl Iterator<Item = u32> + Clone) -> (u32, u32) {
+    (numbers.clone().min().unwrap(), numbers.max().unwrap())
+}
