@@ -280,7 +280,7 @@ def test_results_need_a_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str
     file.touch()
     for out in (file, file / "within"):
         assert main(["mechanics", "--quick", "--out", str(out), "--address", "127.0.0.1:1"]) == 1
-        assert re.search(rf"--out {out}: .*a folder is wanted", capsys.readouterr().err)
+        assert re.search(rf"--out {out}: .*is a file, not a folder", capsys.readouterr().err)
 
 
 def test_a_server_that_is_not_there_is_an_error(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,6 +1,6 @@
-"""The command line `python -m chefshat.experiments`: its options, and what to do where a package is missing.
+"""The command line `python -m chefshat.experiments`: its options, and the message for a missing package.
 
-Nothing but the standard library is imported before the options are read, so that `--help` always answers.
+Imports only the standard library before parsing the options, so that `--help` always works.
 """
 
 import argparse
@@ -14,9 +14,9 @@ EXAMPLES = """examples:
   python -m chefshat.experiments rules --seeds 5 --out results --address 127.0.0.1:50051
   python -m chefshat.experiments report results
 
-The same seeds give the same results. Without --address a server is started for as long as it is needed.
+The same seeds give the same results. Without --address the command starts a server of its own.
 
-exit code: 0 done, 1 it failed and the last line says why, 2 the arguments are wrong
+exit code: 0 success, 1 failure (the last line gives the reason), 2 wrong arguments
 """
 DEFAULT_SEEDS = 5
 QUICK_SEEDS = 2
@@ -35,39 +35,39 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except ModuleNotFoundError as error:
         return say_what_is_missing(error)
     except KeyboardInterrupt:
-        print("interrupted; results of finished experiments are kept", file=sys.stderr)
+        print("interrupted; the results of finished experiments are saved", file=sys.stderr)
         return 1
 
 
 def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
-    """Reads the options; ends the process with 2 where they are wrong, with 0 after --help."""
+    """Parses the options. Exits with 2 if they are wrong, with 0 after --help."""
     parser = argparse.ArgumentParser(
         prog="python -m chefshat.experiments",
-        description="Makes the experiments of the 2020 paper again and prints their tables, the paper's figures beside ours.",
+        description="Replicates the experiments of the 2020 paper and prints their tables, with the paper's numbers next to ours.",
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     running = argparse.ArgumentParser(add_help=False)
-    running.add_argument("--quick", action="store_true", help="just enough to see that it works; the figures say nothing")
+    running.add_argument("--quick", action="store_true", help="only test that it works; the numbers are meaningless")
     running.add_argument(
         "--seeds",
         type=_positive,
         metavar="N",
         help=f"repetitions of the learning experiments (default: {DEFAULT_SEEDS}, 2 if quick)",
     )
-    running.add_argument("--seed", type=_natural, default=1, metavar="S", help="the first seed; others follow it (default: 1)")
+    running.add_argument("--seed", type=_natural, default=1, metavar="S", help="the first of consecutive seeds (default: 1)")
     running.add_argument(
         "--out",
         type=Path,
         default=Path("experiments-results"),
         metavar="DIR",
-        help="folder for results, plots and networks, made if need be (default: %(default)s)",
+        help="folder for results, plots and networks, created if missing (default: %(default)s)",
     )
-    running.add_argument("--address", metavar="HOST:PORT", help="a server that runs already")
+    running.add_argument("--address", metavar="HOST:PORT", help="a running server")
     running.add_argument("--json", action="store_true", help="print one object of JSON: the results without the plots")
     commands = parser.add_subparsers(dest="what", metavar="WHAT", required=True)
     summaries = {
-        "mechanics": "Experiment 1: what each mechanic does, among random agents",
+        "mechanics": "Experiment 1: the effect of each mechanic, among random agents",
         "rules": "Experiment 2: one agent learns the rules",
         "winning": "Experiment 3: agents learn to win",
         "all": "all three, in this order",
@@ -81,20 +81,20 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
             epilog=EXAMPLES,
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
-    told = "prints results again and draws their plots"
+    summary = "prints saved results and draws their plots"
     reporting = commands.add_parser(
         "report",
-        help=told,
-        description=told,
+        help=summary,
+        description=summary,
         epilog="example:\n  python -m chefshat.experiments report results --page docs/experiments.md",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    reporting.add_argument("folder", type=Path, metavar="DIR", help="where results lie")
+    reporting.add_argument("folder", type=Path, metavar="DIR", help="folder of results")
     reporting.add_argument(
         "--page",
         type=Path,
         metavar="FILE",
-        help="a Markdown file whose places for results are filled; plots go to the folder images beside it",
+        help="a Markdown file to fill the results into; plots go to the folder images next to it",
     )
     reporting.add_argument("--json", action="store_true", help="print one object of JSON: the results without the plots")
     options = parser.parse_args(arguments)
@@ -104,7 +104,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
 
 
 def say_what_is_missing(error: ModuleNotFoundError) -> int:
-    """Says how to install what an import did not find; what is missing of this package itself is an error of ours."""
+    """Prints how to install a missing package. Raises the error for a module of this package, which is a bug."""
     if error.name is None or error.name.partition(".")[0] == "chefshat":
         raise error
     print(f"error: the experiments need {error.name}, which is not installed: pip install 'chefshat[learn]'", file=sys.stderr)

@@ -1,6 +1,6 @@
-"""What the command does: runs experiments against a server, keeps their results, prints and draws them, and shows kept ones again.
+"""The command: runs experiments against a server, saves, prints and draws their results, and shows saved ones again.
 
-The options are read in `__main__`. An experiment's module is imported when it is its turn, since each needs other packages.
+`__main__` parses the options. The modules of experiments are imported on demand, since they need different packages.
 """
 
 import argparse
@@ -23,16 +23,16 @@ from chefshat.files import write_whole
 from chefshat.local_server import LocalServer
 
 EXPERIMENTS = ("mechanics", "rules", "winning")
-# Digits behind the point of the seconds an experiment took.
+# Decimal places of an experiment's duration in seconds.
 SECONDS_DIGITS = 1
 
 
 class Refused(Exception):
-    """Something the user can put right; its text says how."""
+    """An error that the user can fix; the message says how."""
 
 
 def run(options: argparse.Namespace) -> int:
-    """Runs what was asked for, one after another; each result is written as soon as it is there. Returns the exit code."""
+    """Runs the experiments one after another and writes each result at once. Returns the exit code."""
     names = EXPERIMENTS if options.what == "all" else (options.what,)
     made: list[Result] = []
     files: list[Path] = []
@@ -68,10 +68,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def report(options: argparse.Namespace) -> int:
-    """Shows the results in a folder again and draws their plots, beside them or into the page that is to be filled.
-
-    Returns the exit code.
-    """
+    """Shows saved results and draws their plots, next to them or into a page. Returns the exit code."""
     try:
         found = [path for path in sorted(options.folder.glob("*.json")) if path.is_file()]
         if not found:
@@ -96,15 +93,15 @@ def report(options: argparse.Namespace) -> int:
 
 
 def write(result: Result, folder: Path) -> list[Path]:
-    """Writes the results file and the plots; returns their paths."""
+    """Writes the results file and the plots. Returns their paths."""
     path = results_file(folder, result.experiment)
     results.write(result, path)
-    # What is drawn is what the file holds, so that drawing it again gives the same picture.
+    # Draws the file's contents, so that drawing them again gives the same picture.
     return [path, *draw(results.read(path), folder)]
 
 
 def draw(result: Result, folder: Path) -> list[Path]:
-    """Writes the plots of a result; returns their paths."""
+    """Writes the plots of a result. Returns their paths."""
     paths = []
     for figure in result.figures:
         path = folder / page.picture_name(result, figure)
@@ -114,13 +111,13 @@ def draw(result: Result, folder: Path) -> list[Path]:
 
 
 def results_file(folder: Path, experiment: str) -> Path:
-    """Where a result is kept."""
+    """Returns the path of a results file."""
     return folder / f"{experiment}.json"
 
 
 def as_text(result: Result) -> str:
-    """A result for people."""
-    heading = f"{result.title} (quick: the figures say nothing)" if result.quick else result.title
+    """Formats a result as text."""
+    heading = f"{result.title} (quick: the numbers are meaningless)" if result.quick else result.title
     parts = [heading, "═" * len(heading), *(f"{tables.text(table)}\n" for table in result.tables)]
     return "\n".join([*parts, f"{page.provenance(result)}\n"])
 
@@ -134,25 +131,25 @@ def _folder(path: Path) -> Path:
     try:
         path.mkdir(parents=True, exist_ok=True)
     except (FileExistsError, NotADirectoryError) as error:
-        raise Refused(f"--out {path}: a file is in the way ({error.filename}), and a folder is wanted") from error
+        raise Refused(f"--out {path}: {error.filename} is a file, not a folder") from error
     return path
 
 
 def _keep_full_runs(path: Path, *, quick: bool) -> None:
-    """A quick run never takes the place of one that took hours."""
+    """Refuses to replace the result of a full run, which took hours, with that of a quick one."""
     if not (quick and path.exists()):
         return
     try:
-        kept = results.read(path)
+        saved = results.read(path)
     except ValueError as error:
-        raise Refused(f"{path} is in the way ({error}): give another --out") from error
-    if not kept.quick:
-        raise Refused(f"{path} holds a full run, which a quick one would replace: give another --out")
+        raise Refused(f"{path} exists and is not a results file ({error}): give another --out") from error
+    if not saved.quick:
+        raise Refused(f"{path} is the result of a full run, which a quick run would replace: give another --out")
 
 
 @contextlib.contextmanager
 def _server(address: str | None) -> Iterator[str]:
-    """The server that is named, or one of our own for as long as it is needed."""
+    """Yields the given server's address, or that of a new server, which stops at the end."""
     if address is not None:
         yield address
         return
@@ -161,14 +158,14 @@ def _server(address: str | None) -> Iterator[str]:
 
 
 def _command(result: Result) -> str:
-    """The command that makes this result again. Folder and address are left out, which change nothing."""
+    """Returns the command that reproduces this result, without the folder and address, which do not affect it."""
     repetitions = f" --seeds {len(result.seeds)}" if len(result.seeds) > 1 else ""
     quick = " --quick" if result.quick else ""
     return f"python -m chefshat.experiments {result.experiment} --seed {result.seeds[0]}{repetitions}{quick}"
 
 
 def _fill(path: Path, made: list[Result]) -> list[Path]:
-    """Fills the results into the page; returns the paths of what was written."""
+    """Fills the results into the page. Returns the paths of the files written."""
     text = path.read_text(encoding="utf-8")
     try:
         filled = page.fill(text, made)
@@ -186,4 +183,4 @@ def _finish(made: list[Result], files: list[Path], options: argparse.Namespace) 
         shown = [{key: value for key, value in results.as_json(result).items() if key != "figures"} for result in made]
         print(json.dumps({"results": shown, "files": [str(file) for file in files]}))
     else:
-        print("\n  ".join(["written:", *(str(file) for file in files)]))
+        print("\n  ".join(["wrote:", *(str(file) for file in files)]))

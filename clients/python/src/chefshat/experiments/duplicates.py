@@ -1,6 +1,6 @@
-"""What duplicate deals are worth, as a picture: `python -m chefshat.experiments.duplicates FILE --out PNG`.
+"""Draws how duplicate deals reduce the standard error: `python -m chefshat.experiments.duplicates FILE --out PNG`.
 
-The file is what `chefshat experiment duplicates --json` prints; nothing is played or computed here.
+FILE is the output of `chefshat experiment duplicates --json`.
 """
 
 import argparse
@@ -26,13 +26,13 @@ HEADROOM = 1.08
 
 
 def figure(report: str) -> Figure:
-    """The standard error of the difference between two agents over the games of each, a panel for each pair and length of games.
+    """Returns the standard error of the difference between two agents over the games of each, a panel per pair and game length.
 
     Args:
         report: the report, JSON.
 
     Raises:
-        ValueError: it is no such report.
+        ValueError: this is not such a report.
     """
     try:
         rows = json.loads(report)["rows"]
@@ -65,10 +65,10 @@ def _panel(case: tuple[str, str, str], rows: list[dict[str, Any]], highest: floa
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """The command. Returns the exit code."""
+    """Runs the command. Returns the exit code."""
     parser = argparse.ArgumentParser(
         prog="python -m chefshat.experiments.duplicates",
-        description="Draw what duplicate deals are worth.",
+        description="Draw how duplicate deals reduce the standard error.",
         epilog=EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

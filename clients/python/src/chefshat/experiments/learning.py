@@ -1,8 +1,8 @@
-"""What Experiments 2 and 3 have in common: Deep Q agents that learn while they play 250 Shifts, one game for each seed.
+"""The shared part of Experiments 2 and 3: Deep Q agents that learn while they play 250 Shifts, one game for each seed.
 
-The games of all seeds run side by side in one `VectorEnv`. A game's deals, its other seats' chance and its agents' chance follow
-from its seed alone: a seed gives the same whatever other seeds are run beside it, and every condition has the same deals. What is
-shown of it is decided in `rules` and `winning`.
+The games of all seeds run in parallel in one `VectorEnv`. A game's deals and all its random choices follow from its seed: a seed
+gives the same result whatever other seeds run in parallel, and every condition has the same deals. Tables and figures are in
+`rules` and `winning`.
 """
 
 import dataclasses
@@ -25,17 +25,17 @@ from chefshat.learn.mlp import Params
 from chefshat.vector import VectorEnv
 
 QUICK_SHIFTS = 2
-# Random agents choose among all 200 actions, as the paper's do. Who wins does not depend on it: in the end they take every legal
+# Random agents choose among all 200 actions, as the paper's do. It does not affect who wins: in the end they take every legal
 # action as often as `random` does.
 OPPONENTS = "random_unmasked"
-# The game, which has as many Shifts as are learned in.
+# The rule set, with the number of Shifts to learn in.
 RULES = "paper"
-# Shifts that curves are averaged over.
+# Window of the running means of curves, in Shifts.
 SMOOTHED = 10
 # The beginning and the end of the learning, in Shifts.
 WINDOW = 50
 
-Numbers = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -64,15 +64,15 @@ class Learned:
         starters = self.played.of_shifts["starters"][:, :, np.newaxis]
         return [float(share) for share in np.take_along_axis(self.won, starters, axis=2)[:, :, 0].mean(axis=1)]
 
-    def attempts(self) -> Numbers:
+    def attempts(self) -> Floats:
         """(G, S, N): actions at turns, wrong ones included."""
         return np.asarray(self.played.of_seats["valid"] + self.played.of_seats["wrong"], np.float64)
 
-    def rewards(self) -> Numbers:
+    def rewards(self) -> Floats:
         """(G, S, N): the mean reward of an action."""
         return np.asarray(self.played.of_seats["reward_sums"] / np.maximum(self.attempts(), 1))
 
-    def wrong(self) -> Numbers:
+    def wrong(self) -> Floats:
         """(G, S, N): wrong actions."""
         return np.asarray(self.played.of_seats["wrong"], np.float64)
 
@@ -85,7 +85,7 @@ class Learned:
         return [float(mean) for mean in self.wrong()[:, shifts, seat].mean(axis=1)]
 
     def share_of_turns(self, of: str, seat: int, shifts: slice = slice(None)) -> list[float]:
-        """Passes, for instance, as a share of a seat's turns, by seed."""
+        """Returns a count, for example of passes, as a share of a seat's turns, by seed."""
         seats = self.played.of_seats
         return [float(share) for share in seats[of][:, shifts, seat].sum(axis=1) / seats["valid"][:, shifts, seat].sum(axis=1)]
 
@@ -105,13 +105,13 @@ def learn(
 
     Args:
         config: address, seeds, quick or not.
-        progress: told of the Shifts.
-        what: the condition, for the progress.
+        progress: shows the Shifts.
+        what: name of the condition, for the progress.
         agent: the agents' hyper-parameters.
-        rewards: the scheme.
-        seats: where they sit; random agents sit elsewhere.
-        begin_with: a network for each seed that its agents begin with; None: new ones.
-        idle_pass_is_wrong: whether the learners' passing counts as a wrong action where something else is legal.
+        rewards: the reward scheme.
+        seats: their seats; random agents have the others.
+        begin_with: an initial network for each seed; None: new ones.
+        idle_pass_is_wrong: whether the learners' passing counts as illegal where another action is legal.
     """
     shifts = shifts_of(config)
     seeds = [_number(seed, seat) for seed in config.seeds for seat in seats]
@@ -139,65 +139,65 @@ def learn(
 
 
 def shifts_of(config: Config) -> int:
-    """Shifts of a game."""
+    """Returns the Shifts of a game."""
     return QUICK_SHIFTS if config.quick else paper.SHIFTS
 
 
 def first(config: Config) -> slice:
-    """The Shifts at the beginning."""
+    """Returns the Shifts of the first window."""
     return slice(0, min(WINDOW, shifts_of(config) // 2))
 
 
 def last(config: Config) -> slice:
-    """The Shifts at the end."""
+    """Returns the Shifts of the last window."""
     return slice(-min(WINDOW, shifts_of(config) // 2), None)
 
 
 def window(config: Config) -> int:
-    """How many Shifts `first` and `last` are."""
+    """Returns the number of Shifts in `first` and `last`."""
     return int(first(config).stop)
 
 
-def curve(label: str, runs: Numbers) -> Line:
-    """A line over Shifts with a band over seeds: `runs` is (G, S)."""
+def curve(label: str, runs: Floats) -> Line:
+    """Returns a line over Shifts with a band over seeds: `runs` is (G, S)."""
     return stats.band(label, list(range(1, runs.shape[1] + 1)), stats.smooth(runs, SMOOTHED))
 
 
 def settings(config: Config, agent: DeepQConfig) -> dict[str, object]:
-    """How it was done, as plain values."""
+    """Returns the settings as JSON values."""
     return {"shifts": shifts_of(config), "opponents": OPPONENTS, "agent": dataclasses.asdict(agent)}
 
 
 def rules_json(played: Played) -> Mapping[str, object]:
-    """The rule set as plain values."""
+    """Returns the rule set as JSON values."""
     return dict(MessageToDict(played.rules, preserving_proto_field_name=True))
 
 
 def count(config: Config, values: Sequence[float]) -> Estimate:
-    """A count over seeds. The mean of a few small ones needs a digit behind the point."""
+    """Summarises a count over seeds. The mean of a few small ones needs a decimal place."""
     return stats.spread(values, digits=1 if config.quick else 0)
 
 
 def in_words(shifts: int) -> str:
-    """For "the last 50 Shifts", or "the last Shift"."""
+    """Returns "50 Shifts" or "Shift", for use after "the last"."""
     return "Shift" if shifts == 1 else f"{shifts} Shifts"
 
 
 def of_all(config: Config, name: str) -> str:
-    """What the paper's counts are called: where ours are of fewer Shifts, of how many they are."""
+    """Returns the heading of the paper's counts; adds its number of Shifts if ours is smaller."""
     return f"{name}, of {paper.SHIFTS}" if config.quick else name
 
 
 def by_seed(config: Config, values: Sequence[float], digits: int = 4) -> dict[str, float]:
-    """Values by seed, as plain values."""
+    """Returns the values by seed, as JSON values."""
     return {str(seed): round(value, digits) for seed, value in zip(config.seeds, values, strict=True)}
 
 
 def _digest(seed: int, of: str = "the games") -> bytes:
-    """32 bytes from a seed: the same for every condition, so that conditions differ by nothing else."""
+    """Derives 32 bytes from a seed: the same for every condition, so that conditions differ in nothing else."""
     return hashlib.sha256(f"seed {seed} of {of}".encode()).digest()
 
 
 def _number(seed: int, seat: int) -> int:
-    """A seed of an agent's chance."""
+    """Derives the seed of an agent."""
     return int.from_bytes(_digest(seed, f"the agent at seat {seat}")[:4], "little")

@@ -1,12 +1,11 @@
-"""Experiment 1: what each mechanic does to the starter's chance and to the length of a Shift, among random agents.
+"""Experiment 1: the effect of each mechanic on the starter's chance and on the length of a Shift, among random agents.
 
-The paper lets random agents play 250 "games", each a Shift, with all mechanics and without one of them at a time. Here 250 Shifts
+The paper's random agents play 250 "games", each a Shift, with all mechanics and with one of them removed at a time. Here 250 Shifts
 in a row are one game, so that all but the first have roles, exchange and special actions; game i of the batch has seed i of the
 base seed. The client plays seat 0, uniformly among the legal actions; the server's `random` plays the others in the same way.
 
-The program behind the paper does not leave the exchange to its agents: it gives the highest cards for them. So the same is played
-again with the default decisions in place of the agents' for all that is no turn: the highest face is given, special actions are
-declined.
+The program behind the paper does not let its agents choose in the exchange: it gives their highest cards. So everything is played
+a second time with the default actions for all decisions except turns: the highest face is given, special actions are declined.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -23,7 +22,7 @@ from chefshat.experiments.results import Cell, Config, Estimate, Figure, Level, 
 from chefshat.vector import VectorEnv, sample_legal
 
 PRESETS = ("paper", "original2020")
-# What is switched off in each condition.
+# The mechanic that is switched off in each condition.
 CONDITIONS: Mapping[str, pb.RuleSet] = {
     "all": pb.RuleSet(),
     "without_jokers": pb.RuleSet(jokers=0),
@@ -36,35 +35,35 @@ NAMES = {
     "without_exchange": "without exchange",
     "without_special_actions": "without special actions",
 }
-# Shifts that are set beside the paper's: as many as it plays.
+# Shifts compared with the paper's: the same number.
 FEW = paper.SHIFTS
 
 
 @dataclass(frozen=True)
 class Size:
-    """How much is played of a condition: games side by side, Shifts in each."""
+    """How much is played of a condition: parallel games, and Shifts in each."""
 
     games: int
     shifts_per_game: int
 
     @property
     def shifts(self) -> int:
-        """In all."""
+        """Total number of Shifts."""
         return self.games * self.shifts_per_game
 
 
-# Conditions that differ where the default decisions are taken; special actions are never declared then.
+# Conditions that differ under the default actions, which never declare special actions.
 OF_DEFAULTS = ("all", "without_jokers", "without_exchange")
 
-# As many Shifts in a row as the paper plays in all; 100,000 of them.
+# Games as long as the paper's whole run; 100,000 Shifts.
 FULL = Size(games=400, shifts_per_game=paper.SHIFTS)
-# Shorter games, because the time a batch takes is that of its longest one.
+# Shorter games, because the longest game determines the duration of a batch.
 QUICK = Size(games=100, shifts_per_game=4)
 
 
 @dataclass(frozen=True)
 class Counted:
-    """The Shifts of one condition, in the order of games and within them of Shifts: who began, who won, how long they were.
+    """The Shifts of one condition, ordered by game, then by Shift.
 
     Attributes:
         starter_won: (Shifts,) bool.
@@ -81,15 +80,15 @@ class Counted:
     rules: pb.RuleSet
 
     def first(self, shifts: int) -> "Counted":
-        """The first so many of them."""
+        """Returns the first `shifts` Shifts."""
         return Counted(self.starter_won[:shifts], self.laps[:shifts], self.pizzas[:shifts], self.turns[:shifts], self.rules)
 
     def wins(self) -> Estimate:
-        """The share of Shifts that the starter wins."""
+        """Returns the share of Shifts that the starter wins."""
         return stats.share(int(self.starter_won.sum()), len(self.starter_won))
 
     def mean_laps(self) -> Estimate:
-        """Laps per Shift."""
+        """Returns the laps per Shift."""
         return stats.mean(self.laps)
 
 
@@ -104,8 +103,8 @@ def run(config: Config, progress: Progress) -> Result:
             with progress.task(f"mechanics, {preset}, {NAMES[condition]}", total=size.shifts, unit="Shifts") as advance:
                 counted[preset, condition] = play(config.address, preset, condition, size, seed, advance)
         for condition in OF_DEFAULTS:
-            told = f"mechanics, {preset}, {NAMES[condition]}, highest cards given"
-            with progress.task(told, total=size.shifts, unit="Shifts") as advance:
+            task = f"mechanics, {preset}, {NAMES[condition]}, highest cards given"
+            with progress.task(task, total=size.shifts, unit="Shifts") as advance:
                 of_defaults[preset, condition] = play(config.address, preset, condition, size, seed, advance, defaults=True)
     named = {f"{preset}, {NAMES[condition]}": those for (preset, condition), those in counted.items()}
     named |= {f"{preset}, {NAMES[condition]}, highest cards given": those for (preset, condition), those in of_defaults.items()}
@@ -138,16 +137,16 @@ def run(config: Config, progress: Progress) -> Result:
 def play(
     address: str, preset: str, condition: str, size: Size, seed: int, advance: Callable[[int], object], *, defaults: bool = False
 ) -> Counted:
-    """Plays games under a preset without what the condition leaves out.
+    """Plays games under a preset without the mechanic of the condition.
 
     Args:
         address: the server.
         preset: "paper" or "original2020".
         condition: a key of `CONDITIONS`.
-        size: how many games and Shifts, in one stream.
+        size: number of games and Shifts, in one stream.
         seed: of the deals, of the other seats, and of the client's choices.
-        advance: told how many more Shifts have ended.
-        defaults: whether the default decision is taken for all that is no turn.
+        advance: called with the number of Shifts that have ended since the last call.
+        defaults: whether the default action is taken at all decisions except turns.
     """
     rules = pb.RuleSet(preset=preset, target_shifts=size.shifts_per_game)
     rules.MergeFrom(CONDITIONS[condition])
@@ -156,7 +155,7 @@ def play(
     env = VectorEnv(
         address,
         size.games,
-        # Built-in agents would decide for themselves.
+        # Built-in agents would take these decisions themselves.
         client_seats=None if defaults else [0],
         opponents="random",
         decisions="turns" if defaults else "all",
@@ -257,12 +256,12 @@ def _length_table(counted: Mapping[tuple[str, str], Counted]) -> Table:
 
 
 def _reported(condition: str) -> Estimate:
-    """The paper's figure with the interval that its number of Shifts leaves."""
+    """Returns the paper's figure with the interval for its number of Shifts."""
     return stats.share(round(paper.STARTER_WINS[condition] * paper.SHIFTS), paper.SHIFTS, digits=0)
 
 
 def _few_and_many(counted: Mapping[tuple[str, str], Counted], condition: str) -> dict[str, Counted]:
-    """What was played under a condition, by rule set and number of Shifts."""
+    """Returns the Shifts of a condition by rule set and number of Shifts."""
     found: dict[str, Counted] = {}
     for preset in PRESETS:
         many = counted[preset, condition]

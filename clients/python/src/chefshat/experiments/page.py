@@ -1,6 +1,6 @@
-"""Results in a page of Markdown: between the marks of an experiment stand its tables, its plots and how they were made.
+"""Fills results into a page of Markdown: tables, plots and provenance between the marks of an experiment.
 
-What is between the marks is always made from results files, never by hand; what is outside is never touched.
+The text between the marks is generated from results files. The text outside is never changed.
 """
 
 from collections.abc import Iterable
@@ -8,18 +8,16 @@ from collections.abc import Iterable
 from chefshat.experiments import tables
 from chefshat.experiments.results import Figure, Result
 
-# The folder of plots, beside the page.
+# The folder of plots, next to the page.
 PICTURES = "images"
 
 
 def fill(text: str, results: Iterable[Result]) -> str:
-    """The page with these results at their places; ValueError if one has no place. Places without a result stay as they are."""
+    """Returns the page with these results between their marks. Raises ValueError if a result has no marks."""
     for result in results:
         begin, end = marks(result.experiment)
         if text.count(begin) != 1 or text.count(end) != 1 or text.index(begin) > text.index(end):
-            raise ValueError(
-                f"there is no place for {result.experiment}: it needs the lines {begin} and {end}, once and in this order"
-            )
+            raise ValueError(f"there is no place for {result.experiment}: add the lines {begin} and {end}, once and in this order")
         before, _, rest = text.partition(begin)
         _, _, after = rest.partition(end)
         text = f"{before}{begin}\n\n{section(result)}\n\n{end}{after}"
@@ -27,24 +25,24 @@ def fill(text: str, results: Iterable[Result]) -> str:
 
 
 def marks(experiment: str) -> tuple[str, str]:
-    """The lines between which an experiment's results stand."""
+    """Returns the lines around an experiment's results."""
     return f"<!-- results of {experiment} -->", f"<!-- end of {experiment} -->"
 
 
 def section(result: Result) -> str:
-    """What stands between the marks."""
+    """Formats the text between the marks."""
     parts = [tables.markdown(table) for table in result.tables]
     parts += [f"![{figure.title}]({PICTURES}/{picture_name(result, figure)})" for figure in result.figures]
     return "\n\n".join([*parts, provenance(result)])
 
 
 def picture_name(result: Result, figure: Figure) -> str:
-    """The file name of a plot."""
+    """Returns the file name of a plot."""
     return f"experiments-{result.experiment}-{figure.name}.png"
 
 
 def provenance(result: Result) -> str:
-    """Where a result comes from, in a sentence."""
+    """Describes how a result was made, in a sentence."""
     run = result.run
     seeds = f"seed {result.seeds[0]}" if len(result.seeds) == 1 else f"seeds {result.seeds[0]} to {result.seeds[-1]}"
     return (

@@ -1,7 +1,4 @@
-"""The figures that the 2020 paper reports for its experiments, as printed. Its "game" is a Shift, its "round" a lap.
-
-Nothing is computed here: an experiment takes from here what it prints beside its own.
-"""
+"""The numbers that the 2020 paper reports for its experiments, as printed. Its "game" is a Shift, its "round" a lap."""
 
 # "For each of our experiments, we run 250 games" (Metrics).
 SHIFTS = 250

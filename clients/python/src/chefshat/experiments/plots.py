@@ -1,7 +1,4 @@
-"""Figures as PNG: one quiet style, colours that the colour-blind can tell apart, drawn without a screen.
-
-What is shown is a `Figure`, made by an experiment; nothing is computed here.
-"""
+"""Draws a `Figure` as PNG, in one style with a colour-blind-safe palette, without a display."""
 
 import io
 from collections.abc import Sequence
@@ -16,9 +13,9 @@ from matplotlib.transforms import ScaledTranslation
 
 from chefshat.experiments.results import Figure, Panel
 
-# The palette of Okabe and Ito, darkest contrasts first; yellow is left out, which is too pale on white.
+# The palette of Okabe and Ito, strongest contrasts first, without yellow, which is too pale on white.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-# Told apart without colour, too.
+# Distinguishable without colour.
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 GREY = "#555555"
 LEVEL_STYLES = ("--", ":", "-.")
@@ -26,16 +23,16 @@ DOTS_PER_INCH = 110
 # Inches.
 PANEL_SIZE = (4.6, 3.2)
 TITLE_HEIGHT = 0.4
-# How far the points of a category stand apart, in all, where categories are 1 apart.
+# Total width of the points of a category; categories are 1 apart.
 DODGE = 0.5
-# What of a legend fits side by side below two panels or more, and below one.
+# Columns of a legend below two or more panels, and below one.
 LEGEND_COLUMNS = 3
 PANEL_LEGEND_COLUMNS = 2
-# Inches: a line of a legend, and the ticks and the name of x, below which a panel's legend stands.
+# Inches: a line of a legend; ticks and x label, below which a panel's legend is placed.
 LEGEND_LINE = 0.2
 BELOW_TICKS = 0.45
 
-# Of no type, because the stubs of matplotlib want every key spelled out.
+# Any, because the stubs of matplotlib require literal keys.
 STYLE: Any = {
     "font.size": 9,
     "axes.titlesize": 10,
@@ -56,16 +53,16 @@ STYLE: Any = {
 
 
 def png(figure: Figure) -> bytes:
-    """The figure as a PNG; the same figure gives the same bytes (with the same matplotlib)."""
+    """Returns the figure as a PNG; equal figures give equal bytes (with the same matplotlib)."""
     with mpl.rc_context(STYLE):
         out = io.BytesIO()
-        # Without the version of matplotlib, which is all that would differ.
+        # Omits the version of matplotlib, for reproducible bytes.
         drawn(figure).savefig(out, format="png", dpi=DOTS_PER_INCH, metadata={"Software": None})
     return out.getvalue()
 
 
 def drawn(figure: Figure) -> Canvas:
-    """The figure as one of matplotlib's; panels keep their size whatever legends stand below them."""
+    """Returns the figure as matplotlib's. The size of panels does not depend on the legends below them."""
     columns = min(figure.columns, len(figure.panels))
     rows = ceil(len(figure.panels) / columns)
     canvas = Canvas(figsize=(PANEL_SIZE[0] * columns, PANEL_SIZE[1] * rows + TITLE_HEIGHT), layout="constrained")
@@ -100,7 +97,7 @@ def _draw(panel: Panel, axes: Axes) -> None:
 
 
 def _one_legend_serves(figure: Figure) -> bool:
-    """Whether in all panels the same name has the same look, and the same look the same name."""
+    """Whether label and style correspond one to one across all panels."""
     pairs: set[tuple[str, str]] = set()
     for panel in figure.panels:
         pairs |= {(line.label, f"colour {number}") for number, line in enumerate(panel.lines)}
@@ -110,7 +107,7 @@ def _one_legend_serves(figure: Figure) -> bool:
 
 
 def _explain_all(figure: Figure, canvas: Canvas, panels: Sequence[Axes], columns: int) -> int:
-    """Adds one legend below all panels; returns how many lines it has."""
+    """Adds one legend below all panels. Returns its number of lines."""
     handles: dict[str, Any] = {}
     for axes in panels:
         handles |= _handles(axes)
@@ -122,7 +119,7 @@ def _explain_all(figure: Figure, canvas: Canvas, panels: Sequence[Axes], columns
 
 
 def _explain(axes: Axes) -> int:
-    """Adds a legend below one panel, where no line is hidden by it; returns how many lines it has."""
+    """Adds a legend below one panel, where it hides no line. Returns its number of lines."""
     handles = _handles(axes)
     below = ScaledTranslation(0, -BELOW_TICKS, axes.figure.dpi_scale_trans)
     axes.legend(
@@ -137,7 +134,7 @@ def _explain(axes: Axes) -> int:
 
 
 def _handles(axes: Axes) -> dict[str, Any]:
-    """What a legend shows, by name."""
+    """Returns the legend handles by label."""
     handles, labels = axes.get_legend_handles_labels()
     return dict(zip(labels, handles, strict=True))
 

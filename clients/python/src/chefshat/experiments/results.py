@@ -1,7 +1,7 @@
-"""What an experiment is given and what it hands back: settings, tables and figures as data, and the file they are kept in.
+"""The config and the result of an experiment: settings, tables and figures as data, and the results file.
 
-Everything that is printed, drawn or put into a page is made from a `Result`, so that a file can be shown again without running
-anything. How tables and figures look is not decided here but in `tables` and `plots`.
+Everything that is printed, drawn or put into a page comes from a `Result`, so that a file can be shown again without running
+anything. Formatting is in `tables` and `plots`.
 """
 
 import dataclasses
@@ -14,23 +14,22 @@ from typing import Any, TypeAlias
 from chefshat.files import write_whole
 
 FORMAT = "chefshat-experiment-1"
-# Significant digits of the numbers in figures: more cannot be seen.
+# Significant digits of the numbers in figures: more are invisible.
 FIGURE_DIGITS = 4
 
-# What JSON can hold.
+# A JSON object.
 Json: TypeAlias = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
 class Config:
-    """What an experiment is to do.
+    """The settings of a run.
 
     Attributes:
         address: the server, "host:port".
-        seeds: one for each repetition, ascending. Experiments that need no repetition use the first.
-        quick: whether to do just enough to see that everything works, in seconds.
-        out: a folder that exists, for files beside the result: trained networks, checkpoints. Experiment 3 finds those of
-            Experiment 2 there.
+        seeds: one for each repetition, ascending. Experiments without repetitions use the first.
+        quick: whether to only test that everything works, in seconds.
+        out: an existing folder for trained networks. Experiment 3 reads those of Experiment 2 there.
     """
 
     address: str
@@ -41,14 +40,14 @@ class Config:
 
 @dataclass(frozen=True)
 class Estimate:
-    """A figure with its uncertainty: an interval, or the least and the most of several runs.
+    """A number with its uncertainty: an interval, or the minimum and maximum of several runs.
 
     Attributes:
-        value: the figure; a share is 0..=1.
+        value: the number; a share is 0..=1.
         low: lower end; None if there is none.
         high: upper end; None if there is none.
-        percent: whether it is a share, to be shown in percent.
-        digits: digits to show behind the point.
+        percent: whether it is a share, shown in percent.
+        digits: decimal places to show.
     """
 
     value: float
@@ -58,20 +57,20 @@ class Estimate:
     digits: int = 1
 
 
-# What a table's cell may hold; None is shown as a dash.
+# A cell of a table; None is shown as a dash.
 Cell: TypeAlias = str | int | float | Estimate | None
 
 
 @dataclass(frozen=True)
 class Table:
-    """A table: ours and the paper's figures side by side.
+    """A table that compares our numbers with the paper's.
 
     Attributes:
         name: short name in lower case, unique within the result.
-        title: one line, saying what is counted.
+        title: one line.
         columns: headings, with units.
-        rows: as many cells each as there are columns.
-        note: how to read it (which intervals, which spread); may be empty.
+        rows: one cell for each column.
+        note: how to read it (the kind of intervals); may be empty.
     """
 
     name: str
@@ -88,7 +87,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Line:
-    """A line of a figure, with a band around it where `low` and `high` are given. All of one length."""
+    """A line of a figure, with a band if `low` and `high` are given. All have the same length."""
 
     label: str
     x: Sequence[float]
@@ -99,7 +98,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Points:
-    """A point for each category of a panel, with a bar from low to high where given; NaN leaves a category out."""
+    """A point for each category of a panel, with an error bar from low to high if given; NaN omits a category."""
 
     label: str
     y: Sequence[float]
@@ -117,17 +116,17 @@ class Level:
 
 @dataclass(frozen=True)
 class Panel:
-    """One system of axes: lines over numbers, or points over categories.
+    """One pair of axes: lines over numbers, or points over categories.
 
     Attributes:
-        title: what is shown.
+        title: one line.
         x_label: name and unit of x; may be empty over categories.
         y_label: name and unit of y.
-        lines: lines, first to last in the order of the palette.
+        lines: lines, in the order of the palette.
         points: points over `categories`.
         levels: horizontal lines.
         categories: names along x, for `points`.
-        y_range: the least and the most y to show; None: what is needed.
+        y_range: minimum and maximum of y; None: automatic.
     """
 
     title: str
@@ -142,10 +141,10 @@ class Panel:
 
 @dataclass(frozen=True)
 class Figure:
-    """A picture of one or more panels, side by side (`columns` in a row).
+    """A picture of one or more panels.
 
     Attributes:
-        name: short name in lower case, unique within the result: the picture becomes `EXPERIMENT-NAME.png`.
+        name: short name in lower case, unique within the result; part of the picture's file name.
         title: one line.
         panels: at least one.
         columns: panels in a row.
@@ -159,20 +158,19 @@ class Figure:
 
 @dataclass(frozen=True)
 class Result:
-    """What came out of an experiment. Two runs of the same config hand back equal results; what differs from run to run is `run`.
+    """The result of an experiment. Two runs of the same config give equal results, except for `run`.
 
     Attributes:
         experiment: "mechanics", "rules" or "winning".
         title: one line.
-        seeds: those that were used.
-        quick: whether it was a quick run, whose figures say nothing.
-        settings: how it was done, as plain values: numbers of games, parameters of agents.
-        rules: the rule sets that were played, by the name of the condition, each as the JSON of chefshat.v1.RuleSet, every field
-            set.
-        tables: what is printed.
-        figures: what is drawn.
-        values: further numbers a program may want, as plain values: for instance those of every seed.
-        run: filled in by the command: package and server version, command, seconds.
+        seeds: the seeds used.
+        quick: whether it was a quick run, whose numbers are meaningless.
+        settings: numbers of games, parameters of agents and so on, as JSON.
+        rules: the rule set of each condition as the JSON of chefshat.v1.RuleSet, every field set.
+        tables: the tables.
+        figures: the figures.
+        values: further numbers as JSON, for example those of every seed.
+        run: set by the command: package and server version, command, seconds.
     """
 
     experiment: str
@@ -188,20 +186,20 @@ class Result:
 
 
 def as_json(result: Result) -> dict[str, Any]:
-    """The result as plain values that JSON can hold."""
+    """Converts a result to JSON values."""
     plain = dataclasses.asdict(result)
     plain["tables"] = [
         {**table_plain, "rows": [[_cell(cell) for cell in row] for row in table.rows]}
         for table_plain, table in zip(plain["tables"], result.tables, strict=True)
     ]
     plain["figures"] = _rounded(plain["figures"])
-    # Through JSON and back, so that a result is the same whether it was just made or read from its file.
+    # Through JSON and back, so that a new result equals the one read from its file.
     plain = json.loads(json.dumps({"format": FORMAT, **plain}))
     return dict(plain)
 
 
 def from_json(plain: Json) -> Result:
-    """The result out of plain values; ValueError if they are none of ours."""
+    """Converts JSON values to a result. Raises ValueError if they are not one."""
     if plain.get("format") != FORMAT:
         raise ValueError(f"not a results file of this version ({FORMAT})")
     try:
@@ -212,18 +210,18 @@ def from_json(plain: Json) -> Result:
         rest = {key: value for key, value in plain.items() if key not in ("format", "tables", "figures")}
         return Result(tables=tables, figures=figures, **rest)
     except (KeyError, TypeError, AttributeError) as error:
-        raise ValueError(f"a results file with something missing or too much: {error}") from error
+        raise ValueError(f"a results file with missing or unknown fields: {error}") from error
 
 
 def write(result: Result, path: Path) -> None:
-    """Writes the results file, whole or not at all."""
-    # A line for each field: curves have many numbers, and nobody wants a line for each of those.
+    """Writes the results file atomically."""
+    # One line for each field, since curves have many numbers.
     lines = ",\n".join(f"{json.dumps(key)}: {json.dumps(value, ensure_ascii=False)}" for key, value in as_json(result).items())
     write_whole(path, f"{{\n{lines}\n}}\n")
 
 
 def read(path: Path) -> Result:
-    """Reads a results file; OSError if it cannot be read, ValueError if it is none."""
+    """Reads a results file. Raises OSError if it cannot be read, ValueError if it is not one."""
     return from_json(json.loads(path.read_text(encoding="utf-8")))
 
 
@@ -246,7 +244,7 @@ def _panel(plain: Json) -> Panel:
 
 
 def _rounded(plain: Any) -> Any:  # noqa: ANN401 - any plain value
-    """Numbers with the digits that can be seen; NaN, which JSON lacks, as null."""
+    """Rounds numbers to `FIGURE_DIGITS`; NaN, which JSON lacks, becomes null."""
     if isinstance(plain, dict):
         return {key: _rounded(value) for key, value in plain.items()}
     if isinstance(plain, list | tuple):

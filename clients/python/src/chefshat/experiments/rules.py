@@ -1,15 +1,15 @@
-"""Experiment 2: one Deep Q agent learns what is allowed, against three agents that choose among all 200 actions by chance.
+"""Experiment 2: one Deep Q agent learns which actions are legal, against three agents that choose randomly among all 200.
 
-The agent has no mask and the paper's parameters; it is rewarded with 1 for a valid and -1 for a wrong action, and asked again after
-a wrong one without limit. (It always ends: exploring finds a legal action sooner or later, and every wrong one becomes less likely.
-The most attempts that a decision took are among the values.) It is done three times:
+The agent has no mask and the paper's parameters. Its reward is 1 for a legal and -1 for an illegal action, after which it is asked
+again, without limit. (This terminates: exploring finds a legal action eventually, and illegal ones become less likely. The maximum
+number of attempts at a decision is among the values.) There are three conditions:
 
-- with the classic vector, 228 numbers, which tells the agent what is legal. The networks of this one are kept in the folder of the
-  results, where Experiment 3 begins with them;
-- with the hand and the board alone, 28 numbers, which is how the paper's text describes the state;
-- with the classic vector, while a pass counts as a wrong action wherever something else is legal, as it does in an early public
-  version of the paper's environment. Since that alone takes thousands of attempts until it is learned, one of the actions that
-  are not wrong is taken by chance after ten wrong ones at one decision, as a later version of that environment does.
+- the classic vector, 228 numbers, which include the legal actions. The networks of this one are saved with the results, for
+  Experiment 3;
+- only the hand and the board, 28 numbers, as the paper's text describes the state;
+- the classic vector, where a pass counts as illegal if another action is legal, as in an early public version of the paper's
+  environment. Since learning that takes thousands of attempts, a random one of the remaining legal actions is taken after ten
+  illegal ones at one decision, as in a later version of that environment.
 """
 
 import hashlib
@@ -39,7 +39,7 @@ RANDOM = (1, 2, 3)
 
 @dataclass(frozen=True)
 class Condition:
-    """One way of learning the rules: the agent, and whether its passing is wrong where something else is legal."""
+    """A condition: the agent, and whether its passing counts as illegal where another action is legal."""
 
     agent: DeepQConfig
     idle_pass_is_wrong: bool = False
@@ -50,15 +50,15 @@ CONDITIONS: Mapping[str, Condition] = {
     "sees hand and board": Condition(DeepQConfig(see_mask=False)),
     "may not pass idly": Condition(DeepQConfig(wrong_limit=10), idle_pass_is_wrong=True),
 }
-# The one that Experiment 3 goes on with.
+# The condition whose networks Experiment 3 starts with.
 FIRST = "sees what is legal"
 REWARDS = "validity"
-# Characters of the digest of settings: more than enough to tell apart what lies in one folder.
+# Characters of the digest of settings: enough to distinguish the files of one folder.
 DIGEST_LENGTH = 16
 
 
 def run(config: Config, progress: Progress) -> Result:
-    """Lets the agents of all conditions learn, with all seeds."""
+    """Runs all conditions with all seeds."""
     learned = {name: _learn(config, progress, name) for name in CONDITIONS}
     _keep(config, learned[FIRST])
     return Result(
@@ -75,20 +75,20 @@ def run(config: Config, progress: Progress) -> Result:
 
 
 def networks(config: Config, progress: Progress) -> Params:
-    """The networks of this experiment, one for each seed.
+    """Returns the networks of this experiment, one for each seed.
 
-    Those in the folder, if they were learned with these seeds and settings and by this version; else they are learned now.
+    Reads the files in the folder, if they were learned with these seeds and settings and by this version; otherwise learns them.
     """
     digest = _digest(config)
     read = []
     for seed in config.seeds:
         try:
-            kept = network.load(_file(config.out, seed))
+            saved = network.load(_file(config.out, seed))
         except (OSError, NetworkFileError):
             break
-        if kept.info.trained_by != _trained_by(config, seed, digest):
+        if saved.info.trained_by != _trained_by(config, seed, digest):
             break
-        read.append(kept)
+        read.append(saved)
     else:
         return checkpoint.stacked(CONDITIONS[FIRST].agent, read)
     learned = _learn(config, progress, FIRST)
@@ -97,7 +97,7 @@ def networks(config: Config, progress: Progress) -> Params:
 
 
 def _settings(config: Config, name: str) -> dict[str, object]:
-    """How a condition is learned, as plain values."""
+    """Returns the settings of a condition as JSON values."""
     condition = CONDITIONS[name]
     return {**learning.settings(config, condition.agent), "idle_pass_is_wrong": condition.idle_pass_is_wrong}
 
@@ -120,8 +120,8 @@ def _keep(config: Config, learned: Learned) -> None:
     digest = _digest(config)
     for number, seed in enumerate(config.seeds):
         training = Training(CONDITIONS[FIRST].agent, learned.agents, learned.played.rules, _trained_by(config, seed, digest))
-        kept = training.networks(f"deep-q-rules-{seed}")[number]
-        network.save(_file(config.out, seed), kept.layers, kept.info)
+        trained = training.networks(f"deep-q-rules-{seed}")[number]
+        network.save(_file(config.out, seed), trained.layers, trained.info)
 
 
 def _file(folder: Path, seed: int) -> Path:
@@ -129,10 +129,10 @@ def _file(folder: Path, seed: int) -> Path:
 
 
 def _digest(config: Config) -> str:
-    """Of everything but its seed that a kept network follows from: settings and versions. Others make another network."""
+    """Hashes everything but the seed that determines a saved network: settings and versions."""
     with chefshat.Client(config.address) as client:
         server_version = client.server_info().server_version
-    made_by = {
+    causes = {
         **_settings(config, FIRST),
         "rules": learning.RULES,
         "rewards": REWARDS,
@@ -140,11 +140,11 @@ def _digest(config: Config) -> str:
         "package_version": importlib.metadata.version("chefshat"),
         "server_version": server_version,
     }
-    return hashlib.sha256(json.dumps(made_by, sort_keys=True).encode()).hexdigest()[:DIGEST_LENGTH]
+    return hashlib.sha256(json.dumps(causes, sort_keys=True).encode()).hexdigest()[:DIGEST_LENGTH]
 
 
 def _trained_by(config: Config, seed: int, digest: str) -> str:
-    """The command that makes the network of a seed again, and what it was made with."""
+    """Returns the command that reproduces the network of a seed, with the digest of its settings."""
     quick = " --quick" if config.quick else ""
     return f"python -m chefshat.experiments rules --seed {seed} --seeds 1{quick}  # settings {digest}"
 

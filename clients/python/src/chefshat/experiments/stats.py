@@ -1,4 +1,4 @@
-"""Intervals and spreads. Which of them belongs to which figure is decided by the experiments."""
+"""Confidence intervals and ranges for the figures of the experiments."""
 
 from collections.abc import Sequence
 from math import sqrt
@@ -13,7 +13,7 @@ Z_95 = 1.959963984540054
 
 
 def share(hits: int, of: int, *, digits: int = 1) -> Estimate:
-    """A share with its 95% interval after Wilson, which holds for small numbers, too. Of nothing: 0, from 0 to 1."""
+    """Returns a share with Wilson's 95% interval, which is valid for small numbers, too; for `of` 0: 0, from 0 to 1."""
     if not 0 <= hits <= of:
         raise ValueError(f"{hits} of {of}")
     if of == 0:
@@ -22,14 +22,14 @@ def share(hits: int, of: int, *, digits: int = 1) -> Estimate:
     squared = Z_95 * Z_95
     middle = (p + squared / (2 * of)) / (1 + squared / of)
     half = Z_95 * sqrt(p * (1 - p) / of + squared / (4 * of * of)) / (1 + squared / of)
-    # At 0 and 1 the ends are exact, whatever rounding makes of them.
+    # At 0 and 1 the ends are exact, without rounding errors.
     low = 0.0 if hits == 0 else middle - half
     high = 1.0 if hits == of else middle + half
     return Estimate(p, low, high, percent=True, digits=digits)
 
 
 def mean(values: npt.ArrayLike, *, digits: int = 1) -> Estimate:
-    """The mean of independent values with its 95% interval (normal). Of a single value: without an interval."""
+    """Returns the mean of independent values with its 95% interval (normal); without an interval for a single value."""
     array = np.asarray(values, dtype=np.float64)
     if array.size == 0:
         raise ValueError("a mean of nothing")
@@ -41,17 +41,17 @@ def mean(values: npt.ArrayLike, *, digits: int = 1) -> Estimate:
 
 
 def spread(values: Sequence[float], *, percent: bool = False, digits: int = 1) -> Estimate:
-    """The mean over repetitions (seeds), with the least and the most of them."""
+    """Returns the mean over repetitions (seeds), with the minimum and the maximum."""
     if not values:
         raise ValueError("a spread of nothing")
     array = np.asarray(values, dtype=np.float64)
-    # A mean of equal numbers may come out a rounding below them.
+    # Rounding may put the mean of equal numbers below them.
     middle = float(np.clip(array.mean(), array.min(), array.max()))
     return Estimate(middle, float(array.min()), float(array.max()), percent=percent, digits=digits)
 
 
 def band(label: str, x: Sequence[float], runs: npt.ArrayLike) -> Line:
-    """A line over repetitions: `runs` is (repetitions, len(x)); the mean, with a band from the least to the most."""
+    """Returns the mean line of `runs`, (repetitions, len(x)), with a band from minimum to maximum."""
     array = np.asarray(runs, dtype=np.float64)
     if array.ndim != 2 or array.shape[1] != len(x):
         raise ValueError(f"runs have the shape {array.shape}, x has {len(x)} values")
@@ -59,7 +59,7 @@ def band(label: str, x: Sequence[float], runs: npt.ArrayLike) -> Line:
 
 
 def smooth(values: npt.ArrayLike, width: int) -> npt.NDArray[np.float64]:
-    """Running means along the last axis over the `width` latest values, fewer at the beginning. The same shape."""
+    """Returns running means along the last axis over the latest `width` values, fewer at the beginning. Keeps the shape."""
     array = np.asarray(values, dtype=np.float64)
     if width < 1:
         raise ValueError("the width must be at least 1")

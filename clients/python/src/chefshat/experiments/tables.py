@@ -1,4 +1,4 @@
-"""Tables as text for a terminal and as Markdown for a page. Numbers stand to the right, words to the left."""
+"""Formats tables as text and as Markdown. Numbers are right-aligned, words left-aligned."""
 
 import textwrap
 from collections.abc import Sequence
@@ -7,12 +7,12 @@ from chefshat.experiments.results import Cell, Estimate, Table
 
 # An en dash.
 DASH = "\u2013"
-# Width in which notes below a table are broken.
+# Width at which notes below a table are wrapped.
 NOTE_WIDTH = 100
 
 
 def text(table: Table) -> str:
-    """The table as aligned lines, the title first, the note last."""
+    """Formats a table as aligned lines, the title first, the note last."""
     cells = [list(table.columns), *([show(cell) for cell in row] for row in table.rows)]
     words = _word_columns(table)
     widths = [max(len(row[column]) for row in cells) for column in range(len(table.columns))]
@@ -28,7 +28,7 @@ def text(table: Table) -> str:
 
 
 def markdown(table: Table) -> str:
-    """The table in GitHub's Markdown, the title in bold above it, the note below."""
+    """Formats a table as GitHub's Markdown, with the title in bold above and the note below."""
     words = _word_columns(table)
     lines = [
         f"**{_escaped(table.title)}**",
@@ -43,7 +43,7 @@ def markdown(table: Table) -> str:
 
 
 def show(cell: Cell) -> str:
-    """A cell as text: an estimate as "28.4% (27.9 to 28.9)", with a dash between the two."""
+    """Formats a cell: an estimate as "28.4% (27.9-28.9)", with an en dash."""
     if cell is None:
         return DASH
     if isinstance(cell, Estimate):
@@ -59,20 +59,20 @@ def _estimate(estimate: Estimate) -> str:
     factor = 100 if estimate.percent else 1
 
     def number(value: float) -> str:
-        # Without "-0.0", which a small negative number would be rounded to.
+        # Adding 0 turns -0.0, the rounding of a small negative number, into 0.0.
         return f"{round(value * factor, estimate.digits) + 0.0:.{estimate.digits}f}"
 
     unit = "%" if estimate.percent else ""
     shown = number(estimate.value) + unit
     if estimate.low is None or estimate.high is None:
         return shown
-    # Beside a minus sign a dash would be hard to read.
+    # A dash next to a minus sign is hard to read.
     between = " to " if estimate.low < 0 or estimate.high < 0 else DASH
     return f"{shown} ({number(estimate.low)}{between}{number(estimate.high)})"
 
 
 def _word_columns(table: Table) -> set[int]:
-    """The columns that hold words: those with a text in them."""
+    """Returns the columns that contain texts."""
     return {column for column in range(len(table.columns)) if any(isinstance(row[column], str) for row in table.rows)}
 
 

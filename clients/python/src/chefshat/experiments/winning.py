@@ -1,14 +1,13 @@
 """Experiment 3: agents that know the rules learn to win, one against three random agents, and four against each other.
 
-Every agent begins with the network that Experiment 2 left for its seed; all four do where four learn. Memory, optimiser and
-exploration begin anew, because the rewards are other ones. The paper prints a reward for wrong actions in this experiment, too, and
-says in its discussion that the agents could not be kept from them: so its agents choose among all 200 actions, and so do ours at
-first. But under the printed reward such an agent unlearns what is allowed (every state is worth less than the least that tanh can
-say, and so is every wrong action) and would spend thousands of attempts in a Shift: after `WRONG_LIMIT` wrong actions at one
-decision it takes a legal one by chance, as the environment published with the paper does for it. Beside it stands the same agent
-with a mask.
+Every agent starts with the network of Experiment 2 for its seed. Memory, optimiser and exploration are new, because the rewards
+differ. The paper defines a reward for illegal actions in this experiment, too, and its discussion says that the agents could not be
+kept from them: so its agents choose among all 200 actions, and so does our first one. But under the printed reward such an agent
+unlearns the rules (every state is worth less than the lowest tanh output, and so is every illegal action) and would spend thousands
+of attempts in a Shift: after `WRONG_LIMIT` illegal actions at one decision it takes a random legal one, as the environment
+published with the paper does for it. The second agent is the same with a mask.
 
-The printed reward is used as printed (`paper`) and with the share of cards shed, which it seems to mean (`paper_intended`).
+The reward is used as printed (`paper`) and with the share of cards shed, which it seems to mean (`paper_intended`).
 """
 
 from collections.abc import Mapping
@@ -31,13 +30,13 @@ AGENTS: Mapping[str, DeepQConfig] = {
     "mask": DeepQConfig(mask=True),
 }
 REWARDS = ("paper", "paper_intended")
-# Shifts that the curves of victories are averaged over.
+# Window of the running means of victories, in Shifts.
 SMOOTHED = 25
 
 
 @dataclass(frozen=True)
 class Condition:
-    """One way of learning: which agents, by which reward, how many of them."""
+    """A condition: the agent, the reward scheme, and whether four of them learn or one."""
 
     agent: str
     rewards: str
@@ -45,23 +44,23 @@ class Condition:
 
     @property
     def name(self) -> str:
-        """In words, without how many."""
+        """Name, without the number of agents."""
         return f"{self.agent}, {self.rewards}"
 
     @property
     def seats(self) -> tuple[int, ...]:
-        """Where the learning agents sit."""
+        """Seats of the learning agents."""
         return ALL_SEATS if self.four else (LEARNER,)
 
 
 ONE = tuple(Condition(agent, rewards, four=False) for agent in AGENTS for rewards in REWARDS)
-# Four agents without a mask that are paid for every turn, as by `paper_intended`, draw a Shift out to some 800 turns and learn
-# nothing but that: they are left out.
+# Omits four agents without a mask under `paper_intended`, which rewards every turn: they only learn to draw a Shift out, to some
+# 800 turns.
 FOUR = tuple(Condition(*names, four=True) for names in (("no mask", "paper"), ("mask", "paper"), ("mask", "paper_intended")))
 
 
 def run(config: Config, progress: Progress) -> Result:
-    """Lets all conditions learn, with all seeds."""
+    """Runs all conditions with all seeds."""
     begin_with = rules.networks(config, progress)
     learned = {
         condition: learning.learn(
@@ -218,7 +217,7 @@ def _figure_of_four(learned: Mapping[Condition, Learned]) -> Figure:
     panels = []
     for condition in FOUR:
         won = learned[condition].won
-        # For every seed by itself: the seat that wins most first.
+        # By seed: the seat with most victories first.
         order = np.argsort(-won.sum(axis=1), axis=1)
         ranked = np.take_along_axis(won, order[:, np.newaxis, :], axis=2)
         names = ("seat with most victories", "second", "third", "seat with fewest")
@@ -232,7 +231,7 @@ def _figure_of_four(learned: Mapping[Condition, Learned]) -> Figure:
 
 
 def _share_won(label: str, won: npt.NDArray[np.bool_]) -> Line:
-    """A line over Shifts: `won` is (G, S)."""
+    """Returns a line over Shifts: `won` is (G, S)."""
     return stats.band(label, list(range(1, won.shape[1] + 1)), 100 * stats.smooth(won, SMOOTHED))
 
 
