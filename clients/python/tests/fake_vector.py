@@ -109,9 +109,20 @@ class ToyGame:
         if self.decision < self.length:
             return []
         over = self.episode == EPISODES
-        end = pb.EPISODE_END_CUT_SHORT if self.number % 2 else pb.EPISODE_END_FINISHED
+        # Games with odd numbers are cut off without places.
+        cut_off = self.number % 2
+        end = pb.EPISODE_END_CUT_SHORT if cut_off else pb.EPISODE_END_FINISHED
         endings: list[tuple[int, ...]] = [
-            (self.number, seat, int(self.owed[seat] + 100 + seat), end, int(over), seat + 1, self.decision, self.episode)
+            (
+                self.number,
+                seat,
+                int(self.owed[seat] + 100 + seat),
+                end,
+                int(over),
+                0 if cut_off else seat + 1,
+                self.decision,
+                self.episode,
+            )
             for seat in self.seats
         ]
         if over:

@@ -313,3 +313,16 @@ def test_it_is_said_which_extra_is_missing(missing: str, use: str) -> None:
     done = without(missing, use)
     assert done.returncode != 0
     assert "pip install 'chefshat[envs]'" in done.stderr
+
+
+@pytest.mark.server
+def test_a_shift_adjudicated_at_the_turn_limit_terminates(real_address: str) -> None:
+    """It awards places and points by the rules, so it is not truncated."""
+    env = ChefsHatEnv(real_address, rules={"max_turns": 6}, rewards="points")
+    _, info = env.reset(seed=1)
+    terminated = truncated = False
+    while not (terminated or truncated):
+        _, _, terminated, truncated, info = env.step(env.action_space.sample(info["action_mask"]))
+    assert (terminated, truncated) == (True, False)
+    assert info["place"] in range(1, 5)
+    env.close()

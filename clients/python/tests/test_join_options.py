@@ -155,7 +155,7 @@ def test_a_ticket_is_kept_as_long_as_the_place(fake: FakeServer, tmp_path: Path,
         code = new_room(client).join_code
         joining = ["--address", fake.address, "--code", code, "--name", "Ada", "--ticket-file", str(file)]
         assert command.main(joining) == 1
-        assert f"TICKET_UNKNOWN: no seat has this ticket; the ticket is that in {file}" in capsys.readouterr().err
+        assert f"TICKET_UNKNOWN: no seat has this ticket; the ticket comes from {file}" in capsys.readouterr().err
         assert file.read_text() == "nobody's\n"
         file.write_text("")
         assert command.main(joining) == 0
@@ -200,8 +200,8 @@ def test_a_ticket_that_cannot_be_kept_is_printed(
     printed, said = capsys.readouterr()
     assert "<- this agent" in printed
     warning, ticket = said.splitlines()
-    assert warning == f"warning: {file} cannot keep the ticket: [Errno 28] No space left on device"
-    assert re.search(r"another goes on in its seat with --ticket \S+$", ticket)
+    assert warning == f"warning: cannot store the ticket in {file}: [Errno 28] No space left on device"
+    assert re.search(r"if this process ends before the game, resume with --ticket \S+$", ticket)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -219,7 +219,7 @@ def test_a_finished_game_is_no_error_where_the_ticket_cannot_be_removed(
     assert command.main(["--address", fake.address, "--json", "--ticket-file", str(file)]) == 0
     printed, said = capsys.readouterr()
     assert json.loads(printed)["event"] == "finished"
-    assert f"warning: all is over, but its ticket is still kept: [Errno 13] Permission denied: '{file}'; remove {file}" in said
+    assert f"warning: cannot delete the used ticket: [Errno 13] Permission denied: '{file}'; remove {file}" in said
 
 
 def test_two_commands_do_not_share_a_ticket_file(
@@ -233,7 +233,7 @@ def test_two_commands_do_not_share_a_ticket_file(
         wait_until_it_stalls(first)
         ticket = file.read_text()
         assert command.main(joining) == 1
-        assert f"another command plays in the place of {file}" in capsys.readouterr().err
+        assert f"another command uses {file}" in capsys.readouterr().err
         assert file.read_text() == ticket
         # What held it is gone with its process.
         first.kill()
@@ -246,7 +246,7 @@ def test_a_ticket_that_is_no_text_is_told(tmp_path: Path, capsys: pytest.Capture
     file = tmp_path / "ticket"
     file.write_bytes(b"\xff\xfe")
     assert command.main(["--address", "127.0.0.1:1", "--ticket-file", str(file)]) == 1
-    assert f"error: {file} is no text, and so no ticket" in capsys.readouterr().err
+    assert f"error: {file} is not a text file" in capsys.readouterr().err
 
 
 def test_ctrl_c_ends_a_command_with_130_and_says_what_becomes_of_its_place(fake: FakeServer, processes: Processes) -> None:
@@ -257,7 +257,7 @@ def test_ctrl_c_ends_a_command_with_130_and_says_what_becomes_of_its_place(fake:
     process.send_signal(signal.SIGINT)
     printed, said = process.communicate(timeout=LIMIT_S)
     assert (process.returncode, printed) == (130, "")
-    assert said == "interrupted; the place is the server's to fill until its ticket is used again\n"
+    assert said == "interrupted; a substitute plays until the ticket is used again\n"
 
 
 def test_a_seat_s_ticket_is_no_participant_s(address: str) -> None:
@@ -276,21 +276,21 @@ def test_a_seat_s_ticket_is_no_participant_s(address: str) -> None:
         ([], "", "give --code, --tournament, --ticket or --ticket-file"),
         (["--code", "X"], "", "--name"),
         (["--tournament", "X", "--ticket-file", "F"], "", "--name"),
-        (["--code", "X", "--tournament", "Y"], "", "--code and --tournament are several ways in"),
-        (["--code", "X", "--ticket", "T"], "", "--code and --ticket are several ways in"),
-        (["--tournament", "X"], "T", f"--tournament and the environment variable {TICKET} are several ways in"),
-        (["--ticket", "T", "--ticket-file", "F"], "", "--ticket and --ticket-file both say which place it is"),
-        (["--ticket-file", "F"], "T", f"{TICKET} and --ticket-file both say which place it is"),
+        (["--code", "X", "--tournament", "Y"], "", "--code and --tournament exclude each other"),
+        (["--code", "X", "--ticket", "T"], "", "--code and --ticket exclude each other"),
+        (["--tournament", "X"], "T", f"--tournament and the environment variable {TICKET} exclude each other"),
+        (["--ticket", "T", "--ticket-file", "F"], "", "--ticket and --ticket-file both name a place"),
+        (["--ticket-file", "F"], "T", f"{TICKET} and --ticket-file both name a place"),
         (["--code", "X", "--name", "Ada", "--games", "2"], "", "--games and --stateless are for tournaments"),
         (["--code", "X", "--name", "Ada", "--stateless"], "", "--games and --stateless are for tournaments"),
         (["--tournament", "X", "--name", "Ada", "--seat", "1"], "", "--seat is for joining a room"),
         (["--ticket", "T", "--seat", "1"], "", "--seat is for joining a room"),
         (["--tournament", "X", "--name", "Ada", "--games", "0"], "", "1 to 64 games at a time"),
         (["--tournament", "X", "--name", "Ada", "--games", "10000000000"], "", "1 to 64 games at a time"),
-        (["--code", "X", "--name", "Ada", "--seat", "-1"], "", "seats are counted from 0, and no table has more than 6"),
-        (["--code", "X", "--name", "Ada", "--seat", "6"], "", "seats are counted from 0, and no table has more than 6"),
-        (["--ticket", "T", "--stateless"], "", "--stateless is said when joining"),
-        (["--ticket-file", "F", "--stateless"], "", "--stateless is said when joining"),
+        (["--code", "X", "--name", "Ada", "--seat", "-1"], "", "seats are numbered from 0, and a table has at most 6"),
+        (["--code", "X", "--name", "Ada", "--seat", "6"], "", "seats are numbered from 0, and a table has at most 6"),
+        (["--ticket", "T", "--stateless"], "", "--stateless is for joining"),
+        (["--ticket-file", "F", "--stateless"], "", "--stateless is for joining"),
     ],
 )
 def test_ways_in_that_do_not_go_together_are_refused(

@@ -110,7 +110,7 @@ def test_annotations_the_server_drops_are_counted_once(stage: Stage, caplog: pyt
     said = result(1, "ACCEPTED")
     said.result.annotations_dropped = True
     stage.say(said, said)
-    assert ["server has dropped" in record.getMessage() for record in caplog.records] == [True]
+    assert ["server refused them" in record.getMessage() for record in caplog.records] == [True]
     stage.say(ended(1), detached("GAME_OVER"))
     assert stage.session.results()["t"].annotations_dropped == 1
 

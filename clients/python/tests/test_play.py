@@ -324,7 +324,7 @@ def test_how_a_game_begins_reaches_the_server(fake: FakeServer) -> None:
         client.create_room(hands=HANDS, durability=pb.DURABILITY_EPHEMERAL)
         client.create_room(policy=slow, durability=pb.DURABILITY_EPHEMERAL)
         client.create_room(policy=slow)
-        with pytest.raises(ValueError, match="not with both"):
+        with pytest.raises(ValueError, match="not both"):
             client.create_room(branch=POINT, hands=HANDS)
 
     async def run() -> None:

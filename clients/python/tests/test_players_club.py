@@ -212,7 +212,7 @@ def test_a_command_that_is_interrupted_leaves_nobody_behind(
         wait_until(lambda: client.get_room(made.room.room_id).seats[0].connected, "the player is there", process)
     process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=LIMIT_S)
-    assert said.endswith("interrupted; the place is the server's to fill until its ticket is used again\n")
+    assert said.endswith("interrupted; a substitute plays until the ticket is used again\n")
     assert process.returncode == 130
     with pytest.raises(ProcessLookupError):
         os.kill(int((tmp_path / "pid").read_text()), 0)

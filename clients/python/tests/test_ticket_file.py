@@ -8,7 +8,7 @@ import pytest
 
 from chefshat.ticket_file import TicketFile
 
-HELD = "another command plays in the place of"
+HELD = "another command uses"
 
 
 @pytest.fixture

@@ -38,7 +38,7 @@ def test_transitions_pair_each_decision_with_the_seats_next(toy: FakeVector) -> 
                 if follow < length:
                     expected[game, episode, seat, decision] = (follow, decision + 1, 0, 0, 0)
                 else:
-                    ended = (length, decision + 1 + 100 + seat, 1, game % 2, seat + 1)
+                    ended = (length, decision + 1 + 100 + seat, 1, game % 2, 0 if game % 2 else seat + 1)
                     expected[game, episode, seat, decision] = ended
     found = 0
     with VectorEnv(toy.address, games, transitions=True) as env:
@@ -56,7 +56,7 @@ def test_transitions_pair_each_decision_with_the_seats_next(toy: FakeVector) -> 
                     after.hands[row, 2],
                     transitions.rewards[row],
                     transitions.ended[row],
-                    transitions.cut_short[row],
+                    transitions.truncated[row],
                     transitions.places_taken[row],
                 )
                 found += 1
@@ -116,7 +116,7 @@ def test_rewards_of_ones_own_replace_the_servers(toy: FakeVector) -> None:
 
 
 def test_a_reward_function_of_the_wrong_shape_is_told(toy: FakeVector) -> None:
-    with pytest.raises(ValueError, match="one for each row"):
+    with pytest.raises(ValueError, match="one reward for each row"):
         VectorEnv(toy.address, 2, reward_function=lambda transitions: np.zeros(7, np.float32))
 
 
@@ -161,7 +161,7 @@ def test_tables_can_be_cut_and_put_together(toy: FakeVector) -> None:
         *first.after.observations.points.tolist(),
         *second.after.observations.points.tolist(),
     ]
-    with pytest.raises(ValueError, match="not even empty ones"):
+    with pytest.raises(ValueError, match="nothing to concatenate"):
         concatenate([])
     # Both are flattened by name alone.
     assert not Observations.columns().keys() & Endings.columns().keys()

@@ -80,11 +80,11 @@ def test_the_setup_says_what_was_asked(toy: FakeVector) -> None:
         ({"other_decisions": "greedy"}, 'decisions="turns"'),
         ({"seed": -1}, "base seed"),
         ({"seed": [b"short"]}, "seed 0 is not 32 bytes"),
-        ({"seed": []}, "seeds can be given"),
+        ({"seed": []}, "give 1..=16384 seeds, not 0"),
         ({"client_seats": []}, "client_seats"),
         ({"rules": {"face": 3}}, "max_idle_pizzas"),
         ({"rules": {"opening": "joker"}}, "'any_top_face'"),
-        ({"branch": pb.BranchPoint(), "hands": pb.ScriptedShift()}, "not with both"),
+        ({"branch": pb.BranchPoint(), "hands": pb.ScriptedShift()}, "not both"),
         ({"branch": pb.BranchPoint(), "rules": "paper"}, "leave rules out"),
     ],
 )

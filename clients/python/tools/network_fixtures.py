@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from chefshat import pb
-from chefshat.files import write_whole
+from chefshat.files import write_atomically
 from chefshat.learn import network
 from chefshat.learn.network import Layer, Network, NetworkInfo
 
@@ -69,7 +69,7 @@ def main() -> None:
         network.save(OUT / f"{name}.safetensors", net.layers, info, dtype=np.float16 if number == 0 else np.float32)
         case = hand_made(ROWS, seed=number, players=info.players, faces=info.faces, jokers=info.jokers)
         rows = ",\n".join(json.dumps(row(case, net, index)) for index in range(ROWS))
-        write_whole(OUT / f"{name}.json", f"[\n{rows}\n]\n")
+        write_atomically(OUT / f"{name}.json", f"[\n{rows}\n]\n")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
-"""The command `python -m chefshat.agent`: plays one game in a room, or all of its games in a tournament, and prints the standings.
+"""The command `python -m chefshat.agent`: plays a game in a room, or a whole tournament, and prints the standings.
 
-What an agent is stands in `agents`, how the command comes by its place in `join_options`, what it prints in `outcome`.
+Agents are in `agents`, joining in `join_options`, the output in `outcome`.
 """
 
 import argparse
@@ -22,11 +22,10 @@ EXAMPLE = """examples:
   python -m chefshat.agent --address 127.0.0.1:50051 --tournament ABCDEF --games 8 --name Cleo
   CHEFSHAT_TICKET=TICKET python -m chefshat.agent --address 127.0.0.1:50051 --agent my_module:MyAgent
 
-A process that died is started again with the ticket that it printed, or with the same --ticket-file, and goes on in its place.
-Its agent is told the game from the beginning, but knows nothing else of before.
+If the process dies, run it again with the ticket that it printed, or with the same --ticket-file, to resume. The agent receives
+all events of the game again; any other state is lost.
 
-exit code: 0 the game or tournament was finished, 1 it was refused, lost, aborted or closed, 2 the arguments are wrong,
-130 interrupted
+exit code: 0 the game or tournament finished, 1 it was refused, lost, aborted or closed, 2 wrong arguments, 130 interrupted
 """
 
 
@@ -34,19 +33,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the command and returns its exit code."""
     parser = argparse.ArgumentParser(
         prog="python -m chefshat.agent",
-        description="Joins a room of a Chef's Hat server and plays one game, or a tournament to its end; prints the standings.",
+        description="Joins a room or a tournament of a Chef's Hat server, plays it to the end, and prints the standings.",
         epilog=EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--address", required=True, help="the server, HOST:PORT")
     join_options.add_options(parser)
-    parser.add_argument("--name", help="name to show, 1 to 64 characters; not needed with a ticket")
+    parser.add_argument("--name", help="display name, 1 to 64 characters; not needed with a ticket")
     parser.add_argument(
         "--agent",
         default="random",
-        help="'random', or module:Class of an Agent (default: random); every game of a tournament has one of its own",
+        help="'random', or module:Class of an Agent (default: random); every game of a tournament gets a new instance",
     )
-    parser.add_argument("--seed", type=int, help="seed of the agent's chance; a tournament's games count on from it")
+    parser.add_argument("--seed", type=int, help="seed of the agent, increased by one for each further game of a tournament")
     parser.add_argument("--json", action="store_true", help="print one line of JSON instead of a table")
     options = parser.parse_args(arguments)
     (way,) = join_options.ways(parser, options)
@@ -70,12 +69,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def make_agent(name: str, seed: int | None) -> Agent:
-    """Makes the agent called "random" or "module:Class"; a class whose constructor takes `seed` gets it."""
+    """Creates the agent "random" or "module:Class". Passes `seed` to a constructor that takes it."""
     if name == "random":
         return RandomAgent(seed)
     module_name, separator, class_name = name.partition(":")
     if not separator:
-        raise ValueError("neither 'random' nor module:Class")
+        raise ValueError("give 'random' or module:Class")
     if os.getcwd() not in sys.path:
         sys.path.insert(0, os.getcwd())
     found = getattr(importlib.import_module(module_name), class_name)

@@ -99,7 +99,7 @@ class _Run:
 
     def _decide(self, ask: Ask) -> None:
         """Has the agent decide: at once, or in a task if it takes its time."""
-        action = ask.place.agent.decide(ask.decision)
+        action = ask.seat.agent.decide(ask.decision)
         if type(action) is int or not isinstance(action, Awaitable):
             self._session.answer(ask, action)
             return

@@ -1,6 +1,6 @@
-"""What each step of a `VectorEnv` gives: the decisions that wait, what has happened since, and what follows from both.
+"""The batch that each step of a `VectorEnv` returns: open decisions, what happened since the last step, and transitions.
 
-Columns themselves are in `columns`; the stream that batches come over is in `vector`.
+Columns are in `columns`; the stream of batches is in `vector`.
 """
 
 import os
@@ -30,7 +30,7 @@ class GameRecord:
     lines: tuple[pb.RecordLine, ...]
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes it as a file, whole or not at all, in the form that `chefshat verify` and `replay.from_records` read.
+        """Writes the record to a file atomically, for `chefshat verify` and `replay.from_records`.
 
         Raises `OSError` if it cannot be written.
         """
@@ -38,13 +38,13 @@ class GameRecord:
 
 
 class Batch(Situations):
-    """The decisions that wait for the client, a row for each, and what has happened since the batch before.
+    """The open decisions of the client, one row each, and what happened since the last batch.
 
-    A game has one row at most. It has none when it is over and no other follows it, and in the rare case that its other seats took
-    so many decisions that they are left for the next step.
+    A game has at most one row. It has none when it is over and no other follows, and in the rare case that its other seats have so
+    many decisions that some are left for the next step.
 
-    Besides the columns there are tables of their own, `endings` and `beginnings`, and `shifts` and `transitions` if they were asked
-    for; the counts `totals`; and with `records=True` the `records`, a `GameRecord` of each game that has ended since.
+    Besides the columns there are the tables `endings` and `beginnings`, and optionally `shifts` and `transitions`; the counts
+    `totals`; and with `records=True` the `records`, a `GameRecord` of each game that has ended since.
     """
 
     games = Column[np.uint32]("<u4")
@@ -56,11 +56,11 @@ class Batch(Situations):
 
     def __init__(self, rows: int, sizes: Sizes, message: pb.VectorBatch | None = None) -> None:
         super().__init__(rows, sizes, message)
-        self._told = message or pb.VectorBatch()
+        self._message = message or pb.VectorBatch()
         #: Number of the batch, from 1.
-        self.step = self._told.step
-        #: Whether all games are over and no other follows; only a reset with a seed goes on.
-        self.done = self._told.done
+        self.step = self._message.step
+        #: Whether all games are over and no other follows; only a reset with a seed starts new ones.
+        self.done = self._message.done
         #: The records of the games that have ended, if the env was made with `records=True`.
         self.records: tuple[GameRecord, ...] = ()
         self._transitions: Transitions | None = None
@@ -68,46 +68,46 @@ class Batch(Situations):
     @cached_property
     def endings(self) -> Endings:
         """The episodes of the client's seats that have ended."""
-        message = self._told.endings
+        message = self._message.endings
         return Endings(message.rows, self.sizes, message)
 
     @cached_property
     def beginnings(self) -> Beginnings:
         """The games that have begun."""
-        message = self._told.beginnings
+        message = self._message.beginnings
         return Beginnings(message.rows, self.sizes, message)
 
     @cached_property
     def shifts(self) -> ShiftStatistics | None:
         """The Shifts that have ended, if the env was made with `shift_statistics=True`."""
-        if not self._told.HasField("shifts"):
+        if not self._message.HasField("shifts"):
             return None
-        message = self._told.shifts
+        message = self._message.shifts
         return ShiftStatistics(message.rows, self.sizes, message)
 
     @cached_property
     def totals(self) -> Totals:
         """Counts since the stream began."""
-        told = self._told.totals
-        return Totals(told.client_decisions, told.decisions, told.invalid_attempts, told.shifts, told.games)
+        totals = self._message.totals
+        return Totals(totals.client_decisions, totals.decisions, totals.invalid_attempts, totals.shifts, totals.games)
 
     @property
     def transitions(self) -> Transitions:
-        """What has come of earlier decisions of the client, if the env was made with `transitions=True` or a `reward_function`."""
+        """The outcomes of earlier decisions of the client, if the env was made with `transitions=True` or a `reward_function`."""
         if self._transitions is None:
-            raise AttributeError("transitions are not kept: make the VectorEnv with transitions=True")
+            raise AttributeError("there are no transitions: make the VectorEnv with transitions=True")
         return self._transitions
 
     def complete(self, memory: Memory, reward_function: RewardFunction | None) -> None:
-        """Works out the transitions, and the rewards if they are the client's own business. The env calls it, once."""
+        """Computes the transitions, and the rewards of a `reward_function`. The env calls it once."""
         transitions, ended, follow = memory.complete(self.endings, self.games, self, self.rewards)
         if reward_function is not None:
             rewards = np.asarray(reward_function(transitions), np.float32)
             if rewards.shape != (len(transitions),):
                 wanted = f"({len(transitions)},)"
-                raise ValueError(f"the reward function returned {rewards.shape}, and {wanted} is wanted, one for each row")
+                raise ValueError(f"the reward function returned the shape {rewards.shape}, not {wanted}: one reward for each row")
             transitions.__dict__["rewards"] = rewards
-            # Rows that nothing was decided before have no reward.
+            # Rows without an earlier decision have no reward.
             of_endings = np.zeros(len(self.endings), np.float32)
             of_endings[ended] = rewards[: len(ended)]
             self.endings.__dict__["rewards"] = of_endings

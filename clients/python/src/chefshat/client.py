@@ -138,7 +138,7 @@ class _Pump(Iterator[pb.PlayRequest]):
         until = time.monotonic() + FLUSH_AFTER_S
         while asks:
             ask = asks.popleft()
-            action = ask.place.agent.decide(ask.decision)
+            action = ask.seat.agent.decide(ask.decision)
             if type(action) is not int and isinstance(action, Awaitable):
                 if isinstance(action, Coroutine):
                     action.close()  # Or Python warns that nobody awaited it.

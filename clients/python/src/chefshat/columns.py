@@ -1,11 +1,10 @@
-"""Tables in columns: what a batch of a `VectorEnv` holds, as numpy views of the bytes that came over the wire.
+"""Tables in columns: the contents of a `VectorEnv`'s batch, as numpy views of the received bytes.
 
-A table has rows; a column has one value, or one row of values, for each of them. A column is made when it is first asked for,
-without copying, and is read-only. Where tables come from is not here (see `vector`), nor what follows from two of them (see
-`transitions`).
+A table has rows; a column has one value, or one row of values, for each of them. Columns are created on first use, without copying,
+and are read-only. The stream is in `vector`, pairs of decisions are in `transitions`.
 
-R is the number of rows, N of seats, F of faces, A of actions (standard 4, 11, 214). Arrays of cards are F+1 wide: index f-1 counts
-face f, index F the jokers. Arrays of seats are N wide.
+R is the number of rows, N of seats, F of faces, A of actions (by default N=4, F=11, A=214). Arrays of cards are F+1 wide: index
+f-1 counts face f, index F the jokers. Arrays of seats are N wide.
 """
 
 from collections.abc import Callable, Mapping
@@ -26,7 +25,7 @@ Scalar = TypeVar("Scalar", bound=np.generic)
 
 @dataclass(frozen=True, slots=True)
 class Sizes:
-    """The numbers that the widths of columns follow from.
+    """The numbers that determine the widths of columns.
 
     Attributes:
         players: N, the number of seats.
@@ -56,15 +55,15 @@ class Sizes:
 
 
 class Column(Generic[Scalar]):
-    """A column of a table: made when it is first asked for, and kept."""
+    """A column of a table, created on first use and cached."""
 
     def __init__(self, dtype: str, width: int | str = 1, *, field: str = "") -> None:
         """Describes a column.
 
         Args:
-            dtype: numpy's name for the type on the wire.
-            width: values per row, or the attribute of `Sizes` that says it; 1: the column has one dimension.
-            field: the message's field, if it is not called as the column is.
+            dtype: numpy's name of the type in messages.
+            width: values per row, or the name of an attribute of `Sizes`; 1: the column has one dimension.
+            field: the message's field, if its name differs from the column's.
         """
         self.dtype = np.dtype(dtype)
         self._width = width
@@ -76,7 +75,7 @@ class Column(Generic[Scalar]):
         self._field = self._field or name
 
     def shape(self, rows: int, sizes: Sizes) -> tuple[int, ...]:
-        """The shape of so many rows."""
+        """Returns the shape of `rows` rows."""
         width = self._width
         if isinstance(width, str):
             width = int(getattr(sizes, width))
@@ -100,20 +99,20 @@ class Column(Generic[Scalar]):
             try:
                 array = np.frombuffer(column, self.dtype).reshape(shape)
             except ValueError as error:
-                told = f"the column {self._field} has {len(column)} bytes, which is not {shape} of {self.dtype}"
-                raise ChefsHatError("COLUMN_WRONG", f"{told}; are server and client of one version?") from error
-        # Found there before this descriptor from now on.
+                message = f"the column {self._field} has {len(column)} bytes, which is not {shape} of {self.dtype}"
+                raise ChefsHatError("COLUMN_WRONG", f"{message}; do the versions of server and client match?") from error
+        # Shadows this descriptor from now on.
         table.__dict__[self._name] = array
         return array
 
 
 class Table:
-    """Rows in columns. Subclasses name the columns.
+    """Rows in columns. Subclasses define the columns.
 
     Attributes:
-        sizes: the numbers that widths follow from.
-        message: what the columns are read from; None for a table put together from arrays, where a column left out is all zeros.
-        source: makes columns by name instead, if there is no message.
+        sizes: the numbers that determine widths.
+        message: the message with the columns; None for a table made from arrays, where an omitted column is all zeros.
+        source: creates columns by name, if there is no message.
     """
 
     source: Callable[[str], NDArray[Any]] | None = None
@@ -125,14 +124,14 @@ class Table:
 
     @classmethod
     def of(cls, rows: int, sizes: Sizes, columns: Mapping[str, Any]) -> Self:
-        """A table put together from arrays, by the names of the columns."""
+        """Creates a table from arrays, by the names of the columns."""
         table = cls(rows, sizes)
         table.__dict__.update(columns)
         return table
 
     @classmethod
     def columns(cls) -> dict[str, Column[Any]]:
-        """The columns by name."""
+        """Returns the columns by name."""
         found: dict[str, Column[Any]] = {}
         for base in reversed(cls.__mro__):
             found.update({name: value for name, value in vars(base).items() if isinstance(value, Column)})
@@ -145,23 +144,23 @@ class Table:
         return f"{type(self).__name__}({self._rows} rows)"
 
     def as_dict(self) -> dict[str, NDArray[Any]]:
-        """The columns as arrays, by name."""
+        """Returns the columns as arrays, by name."""
         return {name: getattr(self, name) for name in self.columns()}
 
     def take(self, rows: NDArray[Any]) -> Self:
-        """The rows of these numbers (or where this mask is true), as a table of its own."""
+        """Returns a table of the rows with these indices (or where this mask is true)."""
         columns = {name: array[rows] for name, array in self.as_dict().items()}
         count = int(np.count_nonzero(rows)) if rows.dtype == np.bool_ else len(rows)
         return self.of(count, self.sizes, columns)
 
 
 class Observations(Table):
-    """What a seat may know, a row for each time it is told. Own cards are those of the seat that the row is for."""
+    """What a seat may know, one row each. Own cards are those of the row's seat."""
 
     shifts = Column[np.uint32]("<u4")
     """(R,): number of the Shift, from 1."""
     pizzas = Column[np.uint32]("<u4")
-    """(R,): pizza of the Shift being made, from 1; 0 before the Shift's first turn is open."""
+    """(R,): current pizza of the Shift, from 1; 0 before the Shift's first turn."""
     hands = Column[np.uint8]("u1", "card_kinds")
     """(R, F+1): own hand."""
     golden = Column[np.uint8]("u1")
@@ -179,7 +178,7 @@ class Observations(Table):
     points = Column[np.uint32]("<u4", "players")
     """(R, N): points so far in the game."""
     played = Column[np.uint8]("u1", "card_kinds")
-    """(R, F+1): cards played so far in the Shift by anybody."""
+    """(R, F+1): cards played so far in the Shift by all seats."""
     gave = Column[np.uint8]("u1", "card_kinds")
     """(R, F+1): cards this seat gave in the Shift's exchange."""
     received = Column[np.uint8]("u1", "card_kinds")
@@ -187,21 +186,21 @@ class Observations(Table):
 
 
 class Situations(Table):
-    """What seats see, and what they may do: all that an observation for an agent can be made of.
+    """What seats see, and which actions are legal: the input of a custom observation function.
 
-    A custom observation is a function of it: it works on a `Batch`, on its `endings`, and on both sides of `Transitions`.
+    Such a function works on a `Batch`, on its `endings`, and on both sides of `Transitions`.
     """
 
     seats = Column[np.uint8]("u1")
-    """(R,): the seat that sees."""
+    """(R,): the seat."""
     kinds = Column[np.uint8]("u1")
-    """(R,): what it decides, values of `pb.DecisionKind`; 0 if nothing."""
+    """(R,): kind of its decision, values of `pb.DecisionKind`; 0 if it has none."""
     mask_bits = Column[np.uint8]("u1", "mask_bytes", field="action_masks")
-    """(R, ceil(A/8)): legal actions: bit i%8 of byte i//8 is action i; none if it decides nothing."""
+    """(R, ceil(A/8)): legal actions: bit i%8 of byte i//8 is action i; no bits without a decision."""
 
     @cached_property
     def observations(self) -> Observations:
-        """What the seats may know."""
+        """The observations of the seats."""
         message = None if self.message is None else getattr(self.message, "observations")  # noqa: B009 - of several messages.
         return Observations(len(self), self.sizes, message)
 
@@ -211,30 +210,35 @@ class Situations(Table):
         return unpack(self.mask_bits, self.sizes.num_actions)
 
     def take(self, rows: NDArray[Any]) -> Self:
-        """The rows of these numbers (or where this mask is true), observations included."""
+        """Returns the rows with these indices (or where this mask is true), with observations."""
         taken = super().take(rows)
         taken.__dict__["observations"] = self.observations.take(rows)
         return taken
 
 
 class Endings(Situations):
-    """The episodes of the client's seats that have ended since the batch before, what each seat saw at the end included.
+    """The episodes of the client's seats that have ended since the last batch, with the final observation of each.
 
-    By game, then in the order in which they ended, then by seat. Nothing is decided at an end: `kinds` are 0 and the masks empty.
+    Ordered by game, then by end, then by seat. There is no decision at an end: `kinds` are 0 and the masks empty.
     """
 
     games = Column[np.uint32]("<u4")
     """(R,): the game, 0..n-1."""
     indices = Column[np.uint64]("<u8")
-    """(R,): the game's index, as in `Beginnings`: more than one game of a number may end within a step."""
+    """(R,): the game's index, as in `Beginnings`: several games with the same number may end within a step."""
     rewards = Column[np.float32]("<f4")
     """(R,): sum of the seat's rewards since it last decided."""
     ends = Column[np.uint8]("u1")
-    """(R,): values of `pb.EpisodeEnd`: finished, or cut short by the limit of turns."""
+    """(R,): values of `pb.EpisodeEnd`, as the server reports them. See `truncated`."""
     game_over = Column[np.uint8]("u1")
     """(R,): 1 if the game is over, too."""
     places_taken = Column[np.uint8]("u1")
-    """(R,): the seat's place, from 1: in the Shift, or in the game where that is the episode."""
+    """(R,): the seat's place, from 1: in the Shift, or in the game if that is the episode."""
+
+    @property
+    def truncated(self) -> NDArray[np.bool_]:
+        """(R,): whether the episode was cut off without places. An adjudicated Shift has places and terminates."""
+        return np.asarray((self.ends != pb.EPISODE_END_FINISHED) & (self.places_taken == 0))
 
     def __init__(self, rows: int, sizes: Sizes, message: pb.EpisodeEndings | None = None) -> None:
         super().__init__(rows, sizes, message)
@@ -244,7 +248,7 @@ class Endings(Situations):
 
 
 class Beginnings(Table):
-    """The games that have begun since the batch before."""
+    """The games that have begun since the last batch."""
 
     games = Column[np.uint32]("<u4")
     """(R,): the game, 0..n-1, ascending."""
@@ -255,7 +259,7 @@ class Beginnings(Table):
 
 
 class ShiftStatistics(Table):
-    """The Shifts that have ended since the batch before, where they were asked for."""
+    """The Shifts that have ended since the last batch."""
 
     games = Column[np.uint32]("<u4")
     """(R,): the game, 0..n-1."""
@@ -266,17 +270,17 @@ class ShiftStatistics(Table):
     starters = Column[np.uint8]("u1")
     """(R,): seat that took the first turn."""
     pizzas = Column[np.uint32]("<u4")
-    """(R,): pizzas, the one in progress at the end included."""
+    """(R,): pizzas, including the one in progress at the end."""
     laps = Column[np.uint32]("<u4")
-    """(R,): laps, the one in progress at the end included."""
+    """(R,): laps, including the one in progress at the end."""
     turns = Column[np.uint32]("<u4")
     """(R,): turns."""
     special_actions = Column[np.uint8]("u1")
     """(R,): values of `pb.SpecialAction`."""
     adjudicated = Column[np.uint8]("u1")
-    """(R,): 1 if the Shift reached its limit of turns."""
+    """(R,): 1 if the Shift reached its limit of turns and was adjudicated."""
     game_winners = Column[np.uint8]("u1")
-    """(R,): the seat that won the game if this Shift ended it; 255 if the game goes on."""
+    """(R,): the seat that won the game if this Shift ended it; 255 if the game continues."""
     places = Column[np.uint8]("u1", "players")
     """(R, N): place of each seat, from 1."""
     points = Column[np.uint32]("<u4", "players")
@@ -284,11 +288,11 @@ class ShiftStatistics(Table):
     valid = Column[np.uint32]("<u4", "players")
     """(R, N): valid actions at turns."""
     wrong = Column[np.uint32]("<u4", "players")
-    """(R, N): wrong actions, that is invalid attempts at turns."""
+    """(R, N): invalid attempts at turns (the paper's wrong actions)."""
     passes = Column[np.uint32]("<u4", "players")
     """(R, N): passes."""
     reward_sums = Column[np.float32]("<f4", "players")
-    """(R, N): sum of each seat's rewards, built-in agents' included."""
+    """(R, N): sum of each seat's rewards, including built-in agents."""
     performance = Column[np.float32]("<f4", "players")
     """(R, N): performance score, the running mean over the game's Shifts of 10 * points / pizzas."""
 
@@ -298,8 +302,8 @@ class Totals:
     """Counts since the stream began.
 
     Attributes:
-        client_decisions: decisions of the client that were taken.
-        decisions: all decisions that were taken.
+        client_decisions: decisions taken by the client.
+        decisions: decisions taken by all seats.
         invalid_attempts: invalid attempts of the client, at decisions of any kind.
         shifts: Shifts that have ended.
         games: games that have ended.

@@ -1,6 +1,6 @@
-"""What an agent is asked: a typed view of one decision request, and what is known of the seat it is asked for.
+"""A typed view of a decision request, and of the seat it is for.
 
-The view adds names and numpy arrays to the message, no rules: what is legal is for the server to say.
+The view adds names and numpy arrays to the message, but no rules: the server determines which actions are legal.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,7 +15,7 @@ Counts: TypeAlias = NDArray[np.uint8]
 
 
 class SeatInfo:
-    """What is known of the seat an agent plays on.
+    """The seat of an agent.
 
     Attributes:
         room_id: 32 hexadecimal digits.
@@ -37,14 +37,14 @@ class SeatInfo:
 
 
 class Decision:
-    """One decision put to a seat. Answer it with the index of any action in `legal_actions`.
+    """A decision of a seat. Answer it with the index of any action in `legal_actions`.
 
-    F is the number of faces (standard 11), N the number of seats (standard 4). Arrays of cards hold F+1 counts: index f-1 counts
-    face f, index F the jokers. Arrays of seats hold one number a seat. All arrays are read-only views of the message's bytes.
+    F is the number of faces (default 11), N the number of seats (default 4). Arrays of cards have F+1 counts: index f-1 counts
+    face f, index F the jokers. Arrays of seats have one number a seat. All arrays are read-only views of the message's bytes.
 
     Attributes:
-        request: the message itself.
-        seat_info: what is known of the seat.
+        request: the message.
+        seat_info: the seat.
     """
 
     __slots__ = ("_attempts_left", "annotations", "request", "seat_info")
@@ -66,15 +66,16 @@ class Decision:
         action_scores: Sequence[float] = (),
         extra: Mapping[str, str] | None = None,
     ) -> None:
-        """Says why the agent answers as it does: recorded with the answer, shown to nobody before the game has ended.
+        """Annotates the answer. Annotations are recorded with it and hidden until the game has ended.
 
         Args:
-            value_estimate: how good the agent thinks its position is, in its own unit.
+            value_estimate: the agent's estimate of its position, in its own unit.
             action_scores: a score per action in the agent's own unit, index = action.
             extra: free keys and values.
 
-        All together at most 4 KiB encoded for a decision and 256 KiB for a seat in a game, numbers finite. What is not so is not
-        recorded, which costs the answer nothing: it is logged once and counted in the result's `annotations_dropped`.
+        The limits are 4 KiB encoded for a decision and 256 KiB for a seat in a game; numbers must be finite. Annotations beyond
+        them are dropped, which does not affect the answer: the first is logged, and all are counted in the result's
+        `annotations_dropped`.
         """
         self.annotations = pb.Annotations(value_estimate=value_estimate, action_scores=action_scores, extra=extra or {})
 
@@ -85,12 +86,12 @@ class Decision:
 
     @property
     def kind(self) -> pb.DecisionKind.ValueType:
-        """What is to be decided: `pb.DECISION_KIND_TURN`, `..._EXCHANGE` or `..._SPECIAL_ACTION`."""
+        """Kind of the decision: `pb.DECISION_KIND_TURN`, `..._EXCHANGE` or `..._SPECIAL_ACTION`."""
         return self.request.kind
 
     @property
     def time_left_ms(self) -> int:
-        """Milliseconds left before the time bank is touched, when the server wrote the request."""
+        """Milliseconds left before the time bank is used, when the server wrote the request."""
         return self.request.time_left_ms
 
     @property
@@ -107,28 +108,28 @@ class Decision:
 
     @property
     def seat(self) -> int:
-        """The seat that is asked, from 0."""
+        """The deciding seat, from 0."""
         return self.seat_info.seat
 
     @property
     def faces(self) -> int:
-        """F, the number of faces in the deck: 4..=15, standard 11."""
+        """F, the number of faces in the deck: 4..=15, default 11."""
         return len(self.request.observation.hand) - 1
 
     @property
     def size(self) -> int:
-        """Number of actions in all, 3F(F+1)/2 + F + 5: standard 214."""
+        """Number of all actions, 3F(F+1)/2 + F + 5: 214 by default."""
         return self.turn_actions + self.faces + 3
 
     @property
     def turn_actions(self) -> int:
-        """T, the number of actions of a turn, 3F(F+1)/2 + 2: standard 200. They come first, and the last of them is passing."""
+        """T, the number of actions of a turn, 3F(F+1)/2 + 2: 200 by default. They come first, and the last of them is passing."""
         faces = self.faces
         return 3 * faces * (faces + 1) // 2 + 2
 
     @property
     def mask_bytes(self) -> bytes:
-        """The legal actions as they were sent: bit i%8 of byte i/8 is action i."""
+        """The legal actions as sent: bit i%8 of byte i/8 is action i."""
         return self.request.action_mask
 
     @property
@@ -169,7 +170,7 @@ class Decision:
 
     @property
     def pizza(self) -> int:
-        """The pizza of the Shift being made, from 1; 0 before the Shift's first turn is open."""
+        """The current pizza of the Shift, from 1; 0 before the Shift's first turn."""
         return self.request.observation.pizza
 
     @property
@@ -224,28 +225,28 @@ class Decision:
 
     @property
     def played(self) -> Counts:
-        """Cards played so far in this Shift by anybody: F+1 counts."""
+        """Cards played so far in this Shift by all seats: F+1 counts."""
         return np.frombuffer(self.request.observation.played, np.uint8)
 
     @property
     def gave(self) -> Counts:
-        """Cards this seat gave in this Shift's exchange: F+1 counts, or no numbers at all if it gave none."""
+        """Cards this seat gave in this Shift's exchange: F+1 counts; empty if it gave none."""
         return np.frombuffer(self.request.observation.gave, np.uint8)
 
     @property
     def received(self) -> Counts:
-        """Cards this seat received in this Shift's exchange: F+1 counts, or no numbers at all if it received none."""
+        """Cards this seat received in this Shift's exchange: F+1 counts; empty if it received none."""
         return np.frombuffer(self.request.observation.received, np.uint8)
 
     @property
     def hand_size(self) -> int:
-        """H, the number of cards dealt to each seat: standard 17. Known once the game's start has been seen, else ValueError."""
+        """H, the number of cards dealt to each seat: 17 by default. Raises ValueError before the start of the game has arrived."""
         if self.seat_info.game_started is None:
-            raise ValueError("the start of the game has not been seen, so the number of cards dealt is not known")
+            raise ValueError("the number of cards dealt is unknown: the start of the game has not arrived")
         return self.seat_info.game_started.hand_size
 
     def classic_vector(self) -> NDArray[np.float32]:
-        """The observation as the 228 numbers of the 2020 paper (F + H + T in general), each 0..=1.
+        """Computes the 228 numbers of the 2020 paper (F + H + T in general), each 0..=1.
 
         First the board, F slots: the cards of the play ascending with jokers as F+1, cut off after F slots; an empty board is F+2
         in the first slot; unused slots are 0. Then the hand, H slots, ascending, zeros first. Both are divided by F+2. Last the

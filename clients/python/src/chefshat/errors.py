@@ -1,6 +1,6 @@
-"""The one exception this package raises for what a server refuses or a connection suffers: made from gRPC, told by commands.
+"""The exception for refusals by a server and lost connections, its conversion from gRPC, and error output of commands.
 
-Wrong use of the package itself (a bad argument) raises ValueError or TypeError; what an agent raises is passed on untouched.
+Wrong arguments raise ValueError or TypeError; exceptions of agents propagate unchanged.
 """
 
 import json
@@ -13,13 +13,13 @@ from google.rpc import error_details_pb2, status_pb2
 from chefshat import pb
 
 DETAILS_KEY = "grpc-status-details-bin"
-#: Exit code of a command that Ctrl-C ended, as shells have it.
+#: Exit code of a command ended by Ctrl-C, by the convention of shells.
 INTERRUPTED = 130
 
-# The codes by their numbers on the wire.
+# The codes by number.
 _CODES: dict[int, grpc.StatusCode] = {code.value[0]: code for code in grpc.StatusCode}
 
-# Codes after which trying again with the same arguments cannot help.
+# Codes after which a retry with the same arguments is pointless.
 _FINAL_CODES = frozenset(
     {
         grpc.StatusCode.INVALID_ARGUMENT,
@@ -35,15 +35,14 @@ _FINAL_CODES = frozenset(
 
 
 class ChefsHatError(Exception):
-    """Something a server refused, or a connection that is lost for good.
+    """A refusal by a server, or a connection that could not be restored.
 
     Attributes:
-        reason: why, in UPPER_SNAKE, for programs: for instance "ROOM_FULL" or "TICKET_UNKNOWN". Without a reason from the server it
-            is the name of the gRPC code, for instance "UNAVAILABLE".
-        message: the same in words, for people.
+        reason: the reason in UPPER_SNAKE, for programs, for example "ROOM_FULL" or "TICKET_UNKNOWN". Without a reason from the
+            server it is the name of the gRPC code, for example "UNAVAILABLE".
+        message: the reason in words, for people.
         metadata: names the offending field or limit; may be empty.
-        code: the gRPC status code; where the refusal came inside a stream, the one a call of its own would have ended with. None if
-            there is none.
+        code: the gRPC status code; for a refusal inside a stream, the code that a unary call would return. None if there is none.
     """
 
     def __init__(
@@ -66,32 +65,32 @@ class ChefsHatError(Exception):
 
 
 def connection_lost(message: str = "the server ended the stream before the game was over") -> ChefsHatError:
-    """The error of a stream that ended without a status that says why."""
+    """Returns the error for a stream that ended without an error status."""
     return ChefsHatError("CONNECTION_LOST", message, code=grpc.StatusCode.UNAVAILABLE)
 
 
 def from_refused(refused: pb.Refused) -> ChefsHatError:
-    """Reads a refusal that came inside a stream."""
-    # 0 is both "OK" and "not set", and no refusal is OK.
+    """Converts a refusal inside a stream."""
+    # 0 means unset here, since a refusal is never OK.
     code = _CODES.get(refused.code) if refused.code else None
     return ChefsHatError(refused.reason, refused.message, refused.metadata, code)
 
 
 def from_rpc_error(error: grpc.RpcError) -> ChefsHatError:
-    """Reads reason and metadata (google.rpc.ErrorInfo) out of a failed call, blocking or asyncio."""
-    # Every error grpcio raises from a call is a call too, but the common base class does not say so.
+    """Converts the error of a call, blocking or asyncio, with reason and metadata from google.rpc.ErrorInfo."""
+    # Errors of calls have these methods, but their common base class does not declare them.
     code = getattr(error, "code", lambda: None)() or grpc.StatusCode.UNKNOWN
     message = getattr(error, "details", lambda: None)() or ""
     trailers = getattr(error, "trailing_metadata", lambda: None)() or ()
     reason, metadata = _error_info(trailers)
     if code is grpc.StatusCode.UNAVAILABLE and not reason:
-        # These are gRPC's own words, which say where it tried.
-        message = f"no server answers ({message}): see that `chefshat serve` runs there, and give its address as HOST:PORT"
+        # gRPC's message includes the address.
+        message = f"no server answers ({message}): check that `chefshat serve` runs there, and give its address as HOST:PORT"
     return ChefsHatError(reason or code.name, message, metadata, code)
 
 
 def _error_info(trailers: Iterable[tuple[str, str | bytes]]) -> tuple[str, dict[str, str]]:
-    """The reason and metadata in a call's trailers; empty where the server gave none."""
+    """Returns the reason and metadata in a call's trailers; empty if the server gave none."""
     for key, value in trailers:
         if key != DETAILS_KEY or not isinstance(value, bytes):
             continue
@@ -104,20 +103,20 @@ def _error_info(trailers: Iterable[tuple[str, str | bytes]]) -> tuple[str, dict[
 
 
 def exit_code(command: Callable[[], int], *refusals: type[Exception], as_json: bool) -> int:
-    """Runs a command, and tells what it raises.
+    """Runs a command and prints the errors it raises.
 
     Args:
-        command: gives the exit code. A KeyboardInterrupt of its may say in words what is left.
-        refusals: what it may raise besides ChefsHatError and OSError, each with a message that says what to do.
+        command: returns the exit code. The message of its KeyboardInterrupt is printed.
+        refusals: errors besides ChefsHatError and OSError, whose messages say what to do.
         as_json: see `failed`.
 
     Returns:
-        Its exit code; 1 where it raised an error, 130 where Ctrl-C ended it.
+        The exit code of the command; 1 if it raised an error, 130 if Ctrl-C ended it.
     """
-    told: tuple[type[Exception], ...] = (ChefsHatError, OSError, *refusals)
+    expected: tuple[type[Exception], ...] = (ChefsHatError, OSError, *refusals)
     try:
         return command()
-    except told as error:
+    except expected as error:
         return failed(error, as_json=as_json)
     except KeyboardInterrupt as interrupt:
         print("; ".join(["interrupted", *filter(None, [str(interrupt)])]), file=sys.stderr)
@@ -125,16 +124,16 @@ def exit_code(command: Callable[[], int], *refusals: type[Exception], as_json: b
 
 
 def failed(error: Exception, *, as_json: bool) -> int:
-    """What a command says of an error: a line of JSON on standard output, or words on standard error. Returns its exit code.
+    """Prints an error: a line of JSON on standard output, or words on standard error. Returns the exit code.
 
-    The line has `event` ("error"), `reason`, `message` and, of a refusal by the server, `metadata`: those of `ChefsHatError`. The
-    reason of another error is "REFUSED".
+    The line has `event` ("error"), `reason`, `message` and, for a `ChefsHatError`, `metadata`. The reason of another error is
+    "REFUSED".
     """
     if as_json:
-        said: dict[str, object] = {"event": "error", "reason": "REFUSED", "message": str(error)}
+        line: dict[str, object] = {"event": "error", "reason": "REFUSED", "message": str(error)}
         if isinstance(error, ChefsHatError):
-            said.update(reason=error.reason, message=error.message, metadata=error.metadata)
-        print(json.dumps(said), flush=True)
+            line.update(reason=error.reason, message=error.message, metadata=error.metadata)
+        print(json.dumps(line), flush=True)
     else:
         print(f"error: {error}", file=sys.stderr)
     return 1

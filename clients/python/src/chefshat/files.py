@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all. Also what is said of one that cannot be read. A ticket's is in `ticket_file`."""
+"""Atomic writing of files, and messages for files that cannot be read. The file of a ticket is in `ticket_file`."""
 
 import os
 from collections.abc import Iterable
@@ -9,8 +9,8 @@ from google.protobuf import json_format
 from chefshat import pb
 
 
-def write_whole(path: str | os.PathLike[str], data: bytes | str) -> None:
-    """Puts a file in place of what stands at `path`. Whoever reads it meanwhile, or after a crash, sees the old or the new.
+def write_atomically(path: str | os.PathLike[str], data: bytes | str) -> None:
+    """Replaces a file. Readers see the old or the new contents at any time, also after a crash.
 
     Raises `OSError` if it cannot be written.
     """
@@ -28,20 +28,20 @@ def write_whole(path: str | os.PathLike[str], data: bytes | str) -> None:
 
 
 def write_record(path: str | os.PathLike[str], lines: Iterable[pb.RecordLine]) -> None:
-    """Writes the lines of a record, header first, as servers keep them: JSON Lines. Raises `OSError` if it cannot be written."""
-    write_whole(path, "".join(f"{json_format.MessageToJson(line, indent=None)}\n" for line in lines))
+    """Writes a record, header first, as JSON Lines like a server's records. Raises `OSError` if it cannot be written."""
+    write_atomically(path, "".join(f"{json_format.MessageToJson(line, indent=None)}\n" for line in lines))
 
 
 def check_readable(path: str | os.PathLike[str], what: str, origin: str) -> None:
-    """Looks whether a file can be read.
+    """Checks that a file can be read.
 
     Args:
         path: the file.
-        what: what it should be, in a word: for instance "network".
-        origin: where such a file comes from, in words.
+        what: the kind of file, for example "network".
+        origin: what writes such files, as a clause of the message.
 
     Raises:
-        OSError: it cannot be read. The message names it and says what to do.
+        OSError: the file cannot be read. The message names it and says what to do.
     """
     name = os.fspath(path)
     try:

@@ -1,7 +1,7 @@
-"""How a command comes by its place in a room or a tournament, and by the same place again after its process died.
+"""The options by which a command joins a room or a tournament, or resumes its place after its process died; and playing there.
 
-Here are the options that say so, and playing, until there is something to print. The commands are `agent`, `learn.play` and
-`players_club`; what they print is in `outcome`, how a game is played in `session`, the file that keeps a ticket in `ticket_file`.
+The commands are `agent`, `learn.play` and `players_club`; their output is in `outcome`, the protocol of a game in `session`, the
+file of a ticket in `ticket_file`.
 """
 
 import argparse
@@ -22,23 +22,23 @@ from chefshat.outcome import Played
 from chefshat.participant import MakeAgent
 from chefshat.ticket_file import TicketFile
 
-#: Environment variable that a ticket may stand in.
+#: Environment variable that may contain a ticket.
 TICKET = "CHEFSHAT_TICKET"
 
 
 @dataclass(frozen=True)
 class JoinOptions:
-    """How one place is come by: with `code`, `tournament` or `ticket`, or with what is in `ticket_file` and nothing else.
+    """How to get one place: by `code`, `tournament` or `ticket`, or by an existing `ticket_file`.
 
     Attributes:
         code: a room's join code.
         tournament: a tournament's join code.
-        ticket: the ticket of a place that was taken before.
-        ticket_file: keeps the ticket while the place lasts. One that is there already says which place to go on in.
-        name: name to show; used when joining.
-        seat: a certain seat of the room.
+        ticket: the ticket of a place to resume.
+        ticket_file: stores the ticket until the game or tournament is over. An existing one names the place to resume.
+        name: display name, for joining.
+        seat: the seat of the room; None: the first free one.
         games: games of the tournament to play at a time.
-        stateless: says that the agent remembers nothing from one game of the tournament to the next.
+        stateless: declares that the agent remembers nothing from one game of the tournament to the next.
     """
 
     code: str | None = None
@@ -52,35 +52,35 @@ class JoinOptions:
 
 
 def add_options(parser: argparse.ArgumentParser, *, several_codes: bool = False) -> None:
-    """Adds the options that say how a place is come by; all but --name."""
-    more = "; several times: rooms played one after the other" if several_codes else ""
+    """Adds all options of `JoinOptions` except --name."""
+    more = "; repeat it to play rooms one after another" if several_codes else ""
     parser.add_argument("--code", action="append" if several_codes else "store", help=f"a room's join code{more}")
-    parser.add_argument("--tournament", metavar="CODE", help="the join code of a tournament, to play in it until it is over")
+    parser.add_argument("--tournament", metavar="CODE", help="a tournament's join code; plays until the tournament is over")
     parser.add_argument(
         "--ticket",
-        help="the ticket of a place that was taken before, of a room or a tournament, to go on in it; may also stand in the "
-        f"environment variable {TICKET}, which unlike this is in no list of processes",
+        help="the ticket of a place in a room or a tournament, to resume there. The environment variable "
+        f"{TICKET} does the same and, unlike this option, does not show in lists of processes",
     )
     parser.add_argument(
         "--ticket-file",
         type=Path,
         metavar="FILE",
-        help="keep the ticket in this file, readable by you alone, until the game or tournament is over; if it is there already, "
-        "go on in its place, so that the same command goes on after its process died",
+        help="store the ticket in this file, readable only by you, until the game or tournament is over; an existing "
+        "file is resumed from, so run the same command again after its process died",
     )
-    parser.add_argument("--seat", type=int, help="a certain seat of the room, from 0 (the first free one unless given)")
+    parser.add_argument("--seat", type=int, help="the seat of the room, from 0 (default: the first free one)")
     parser.add_argument(
         "--games",
         type=int,
-        help=f"games of a tournament to play at a time, 1 to {MAX_GAMES} (1 unless given); with a ticket it is as many as before",
+        help=f"games of a tournament to play at a time, 1 to {MAX_GAMES} (default: 1; with a ticket: as many as when joining)",
     )
     parser.add_argument(
-        "--stateless", action="store_true", help="say that the agent remembers nothing from game to game (tournaments)"
+        "--stateless", action="store_true", help="declare that the agent remembers nothing from game to game (tournaments)"
     )
 
 
 def ways(parser: argparse.ArgumentParser, options: argparse.Namespace, *, needs_name: bool = True) -> list[JoinOptions]:
-    """The places that the options name. Ends the process with 2, as the parser does, where they do not go together."""
+    """Returns the places that the options name. Exits with 2, as the parser does, if options conflict."""
     codes = options.code if isinstance(options.code, list) else [options.code] if options.code is not None else []
     ticket = options.ticket or os.environ.get(TICKET)
     given = [
@@ -89,9 +89,9 @@ def ways(parser: argparse.ArgumentParser, options: argparse.Namespace, *, needs_
         *(["--ticket" if options.ticket else f"the environment variable {TICKET}"] if ticket else []),
     ]
     if len(given) > 1:
-        parser.error(f"{' and '.join(given)} are several ways in: give one")
+        parser.error(f"{' and '.join(given)} exclude each other: give one")
     if ticket and options.ticket_file is not None:
-        parser.error(f"{given[0]} and --ticket-file both say which place it is: give one")
+        parser.error(f"{given[0]} and --ticket-file both name a place: give one")
     if not given and options.ticket_file is None:
         parser.error("give --code, --tournament, --ticket or --ticket-file")
     if len(codes) > 1 and options.ticket_file is not None:
@@ -99,13 +99,13 @@ def ways(parser: argparse.ArgumentParser, options: argparse.Namespace, *, needs_
     if needs_name and not ticket and given and not options.name:
         parser.error("the following arguments are required: --name")
     if codes and (options.games is not None or options.stateless):
-        parser.error("--games and --stateless are for tournaments: give --tournament CODE in place of --code CODE")
+        parser.error("--games and --stateless are for tournaments: give --tournament CODE instead of --code CODE")
     if options.seat is not None and not codes:
-        parser.error("--seat is for joining a room, give it with --code: in a tournament the seats are drawn, a ticket has its own")
+        parser.error("--seat is for joining a room: give it with --code. A tournament draws the seats, and a ticket has its seat")
     if options.stateless and options.tournament is None:
-        parser.error("--stateless is said when joining: give it with --tournament, the place of a ticket has been taken already")
+        parser.error("--stateless is for joining: give it with --tournament. A ticket is of a place that is already taken")
     if options.seat is not None and not 0 <= options.seat < MAX_SEATS:
-        parser.error(f"--seat: seats are counted from 0, and no table has more than {MAX_SEATS}")
+        parser.error(f"--seat: seats are numbered from 0, and a table has at most {MAX_SEATS}")
     if options.games is not None and not 1 <= options.games <= MAX_GAMES:
         parser.error(f"--games: a participant plays 1 to {MAX_GAMES} games at a time")
     way = JoinOptions(
@@ -128,35 +128,35 @@ def take_part(
     check_rules: Callable[[pb.RuleSet], None] = lambda rules: None,
     prepare: Callable[[int], None] | None = None,
 ) -> Played:
-    """Takes the place, or goes on in it, and plays until its game or tournament is over.
+    """Takes or resumes the place, and plays until its game or tournament is over.
 
     Args:
         client: the connection to the server.
-        way: how the place is come by.
-        make_agent: gives the agent of each game.
-        check_rules: raises ValueError if the agent does not know games by these rules; asked when joining.
-        prepare: told, in a tournament and before its first game here, how many of its games the participant plays at a time. That
-            was said when the place was taken, and may be more than `way.games` where it is gone on in.
+        way: how to get the place.
+        make_agent: creates the agent of each game.
+        check_rules: raises ValueError if the agent cannot play under these rules; called when joining.
+        prepare: called before the first game of a tournament with the number of games the participant plays at a time. For a
+            resumed place this may exceed `way.games`.
 
     Raises:
         ChefsHatError: the place was refused or lost, or the server stayed unreachable.
-        OSError: the file with the ticket cannot be read or begun, or another command plays in its place.
-        ValueError: what `check_rules` raises.
-        KeyboardInterrupt: Ctrl-C. Where a place had been taken it says in words what becomes of that.
+        OSError: the ticket file cannot be read or created, or another command uses it.
+        ValueError: raised by `check_rules`.
+        KeyboardInterrupt: Ctrl-C. Its message says what happens to a place already taken.
     """
     with TicketFile(way.ticket_file) if way.ticket_file is not None else nullcontext() as file:
-        ticket = way.ticket or _kept(way, file) or _join(client, way, file, check_rules)
+        ticket = way.ticket or _stored(way, file) or _join(client, way, file, check_rules)
         played = _play(client, way, ticket, make_agent, prepare)
         if file is not None:
             try:
                 file.forget()
             except OSError as error:
-                print(f"warning: all is over, but its ticket is still kept: {error}; remove {file.path}", file=sys.stderr)
+                print(f"warning: cannot delete the used ticket: {error}; remove {file.path}", file=sys.stderr)
         return played
 
 
 def _play(client: Client, way: JoinOptions, ticket: str, make_agent: MakeAgent, prepare: Callable[[int], None] | None) -> Played:
-    """Plays in the place that the ticket is of, until its game or tournament is over."""
+    """Plays with a ticket until its game or tournament is over."""
     entered: list[pb.Entered] = []
     prepared = prepare is None
     seats = 0
@@ -171,7 +171,7 @@ def _play(client: Client, way: JoinOptions, ticket: str, make_agent: MakeAgent, 
         except ChefsHatError as error:
             if not error.retryable:
                 raise
-            return  # The next connection asks again.
+            return  # The next connection retries.
         prepared = True
         prepare(min(participants[place.participant].max_games, MAX_GAMES))
 
@@ -186,11 +186,11 @@ def _play(client: Client, way: JoinOptions, ticket: str, make_agent: MakeAgent, 
         games = client.play_tournament(ticket, seated, on_entered=enter)
     except ChefsHatError as error:
         if error.reason == "TICKET_UNKNOWN" and way.ticket_file is not None:
-            message = f"{error.message}; the ticket is that in {way.ticket_file}: remove the file to take another place"
+            message = f"{error.message}; the ticket comes from {way.ticket_file}: remove the file to join again"
             raise ChefsHatError(error.reason, message, error.metadata, error.code) from error
         raise
     except KeyboardInterrupt:
-        raise KeyboardInterrupt("the place is the server's to fill until its ticket is used again") from None
+        raise KeyboardInterrupt("a substitute plays until the ticket is used again") from None
     if not entered:
         games[0].raise_for_error()
         return Played(games)
@@ -198,44 +198,44 @@ def _play(client: Client, way: JoinOptions, ticket: str, make_agent: MakeAgent, 
     return Played(games, client.tournament_results(last.tournament_id), last.participant)
 
 
-def _kept(way: JoinOptions, file: TicketFile | None) -> str | None:
-    """The ticket that is kept in the file; None if a place is to be taken first."""
+def _stored(way: JoinOptions, file: TicketFile | None) -> str | None:
+    """Returns the ticket in the file; None if the command has to join first."""
     if file is None:
         return None
     if file.ticket:
-        print(f"goes on in the place whose ticket is in {file.path}", file=sys.stderr)
+        print(f"resuming with the ticket in {file.path}", file=sys.stderr)
         return file.ticket
     if way.code is None and way.tournament is None:
-        raise FileNotFoundError(f"there is no ticket in {file.path}: give --code or --tournament to take a place")
+        raise FileNotFoundError(f"there is no ticket in {file.path}: give --code or --tournament to join")
     return None
 
 
 def _join(client: Client, way: JoinOptions, file: TicketFile | None, check_rules: Callable[[pb.RuleSet], None]) -> str:
-    """Takes the place, and sees to it that the ticket is not lost with this process."""
+    """Joins, and stores or prints the ticket, so that it survives this process."""
     if way.tournament is not None:
         entrant = client.join_tournament(way.tournament, way.name, max_games=way.games, stateless=way.stateless)
         ticket, rules = entrant.ticket, entrant.tournament.settings.rules
-        what, where = "its tournament", "place"
-        left = "its games in the tournament will be played without it"
+        what = "the tournament"
+        left = "the tournament will be played without it"
     else:
         joined = client.join_room(way.code or "", way.name, seat=way.seat)
         ticket, rules = joined.ticket, joined.room.rules
-        what, where = "its game", "seat"
-        # A seat that is not attached starts no game.
-        left = f"its seat {joined.seat} will be free again within two minutes"
+        what = "the game"
+        # An unattached seat does not start a game.
+        left = f"seat {joined.seat} will be free again within two minutes"
     try:
-        # Who has not joined cannot see what a code is of.
+        # The rules are only visible after joining.
         check_rules(rules)
     except ValueError as error:
         raise type(error)(f"{error}; {left}") from error
-    # Whoever has the ticket has the place: it is told to the one who started the agent alone.
-    how = f"another goes on in its {where} with --ticket {ticket}"
+    # The ticket gives access to the place, so it is printed only to the user's standard error.
+    how = f"with --ticket {ticket}"
     if file is not None:
         try:
             file.keep(ticket)
-            how = f"it goes on in its {where} when it is started again: {file.path} has its ticket"
+            how = f"by the same command: the ticket is in {file.path}"
         except OSError as error:
-            # The place is taken, and nobody else knows the ticket.
-            print(f"warning: {file.path} cannot keep the ticket: {error}", file=sys.stderr)
-    print(f"should this agent end before {what}, {how}", file=sys.stderr)
+            # The place is taken, and the ticket exists nowhere else.
+            print(f"warning: cannot store the ticket in {file.path}: {error}", file=sys.stderr)
+    print(f"if this process ends before {what}, resume {how}", file=sys.stderr)
     return ticket

@@ -1,7 +1,4 @@
-"""A server of one's own: `chefshat serve` as a child process that ends with this one.
-
-Finding the program is here, too. What is asked of the server is not (see `client` and `vector`).
-"""
+"""A local server: finds the program, and runs `chefshat serve` as a child process that ends with this one."""
 
 import atexit
 import json
@@ -17,53 +14,52 @@ from typing import Self
 
 from chefshat.errors import ChefsHatError
 
-#: Environment variable that names the program.
+#: Environment variable with the path of the program.
 BINARY = "CHEFSHAT_BIN"
-# Seconds the server has to start listening: generous, for machines under load.
+# Seconds until the server must listen: generous, for machines under load.
 START_S = 60.0
-# Seconds it has to stop by itself.
+# Seconds until the server must have stopped.
 STOP_S = 5.0
-#: Options of a server that keeps nothing, and that nobody waits for.
+#: Options of a server that stores nothing and stops at once.
 IN_MEMORY = ("--no-records", "--grace", "0")
-# What the program is needed for, unless it is something else.
+# The default purpose of `find_binary`.
 SERVING = "start a server"
 _NAME = "chefshat.exe" if os.name == "nt" else "chefshat"
 
 
-def find_binary(purpose: str = SERVING, instead: str = "; or give the address of a server that runs already") -> Path:
-    """Finds the program: `CHEFSHAT_BIN`, else `chefshat` on the PATH, else what cargo built in the repository.
+def find_binary(purpose: str = SERVING, instead: str = "; or give the address of a running server") -> Path:
+    """Finds the program: `CHEFSHAT_BIN`, else `chefshat` on the PATH, else the latest build of the repository.
 
-    The repository is the one this package lies in, else the one the process was started in.
+    The repository is the one that contains this package, else the one that contains the working directory.
 
     Args:
-        purpose: what it is needed for, in words.
-        instead: how to do without it, in words; may be empty.
+        purpose: what the program is needed for, for the error message.
+        instead: an alternative, for the error message; may be empty.
 
     Raises:
-        ChefsHatError: there is none; the message says how to get one.
+        ChefsHatError: the program was not found; the message says how to get it.
     """
     named = os.environ.get(BINARY)
     if named:
         found = shutil.which(named)
         if found is None:
-            raise ChefsHatError("BINARY_MISSING", f"the environment variable {BINARY} names {named}, which is no program")
+            raise ChefsHatError("BINARY_MISSING", f"the environment variable {BINARY} names {named}, which is not a program")
         return Path(found)
     found = shutil.which("chefshat")
     if found is not None:
         return Path(found)
     built = [path for path in _cargo_targets() if path.is_file()]
     if built:
-        # Who builds both wants the one built last.
         return max(built, key=lambda path: path.stat().st_mtime)
     raise ChefsHatError(
         "BINARY_MISSING",
-        f"there is no chefshat program to {purpose}. Build it (in the repository: cargo build --release --bin chefshat), then run "
-        f"this within the repository, put the program on the PATH or name it in the environment variable {BINARY}{instead}",
+        f"the program chefshat is required to {purpose}. Build it (in the repository: cargo build --release --bin chefshat), then "
+        f"run this in the repository, put the program on the PATH or set the environment variable {BINARY}{instead}",
     )
 
 
 def _cargo_targets() -> list[Path]:
-    """Where cargo puts the program, if this file or else the working directory lies in a checkout of the project."""
+    """Returns the paths of cargo's builds, if this file or else the working directory is in a checkout of the project."""
     here = Path.cwd()
     for folder in (*Path(__file__).resolve().parents, here, *here.parents):
         if (folder / "Cargo.toml").is_file() and (folder / "proto" / "chefshat").is_dir():
@@ -74,24 +70,24 @@ def _cargo_targets() -> list[Path]:
 class LocalServer:
     """A server as a child process, on a free port of this machine; a context manager.
 
-    It keeps games in memory alone unless told otherwise, and stops with this process, however that ends.
+    By default it keeps games only in memory. It stops when this process ends in any way.
 
     Attributes:
         address: "127.0.0.1:port", once it has been started.
     """
 
     def __init__(self, binary: Path | str | None = None, *, options: Sequence[str] = IN_MEMORY, host: str = "127.0.0.1") -> None:
-        """Names the server; `start` starts it.
+        """Configures the server; `start` starts it.
 
         Args:
-            binary: the program; None: `find_binary` finds it.
+            binary: the program; None: the result of `find_binary`.
             options: further options of `chefshat serve`.
-            host: the address of this machine to listen on.
+            host: the local address to listen on.
         """
         self._binary = find_binary() if binary is None else Path(binary)
         self._options = list(options)
         self._process: subprocess.Popen[str] | None = None
-        # Closed when this object goes.
+        # Closed with this object.
         self._log = tempfile.TemporaryFile("w+")  # noqa: SIM115
         weakref.finalize(self, self._log.close)
         self.address = f"{host}:0"
@@ -105,12 +101,12 @@ class LocalServer:
 
     @property
     def running(self) -> bool:
-        """Whether the process is there."""
+        """Whether the process is running."""
         return self._process is not None and self._process.poll() is None
 
     @property
     def log(self) -> str:
-        """What the server has written to standard error."""
+        """The server's standard error."""
         self._log.seek(0)
         return self._log.read()
 
@@ -118,14 +114,14 @@ class LocalServer:
         """Starts the server and waits until it listens; on the same port as before, if it ran before.
 
         Raises:
-            ChefsHatError: it did not start; the message has what it said.
+            ChefsHatError: it did not start; the message includes its output.
         """
         if self.running:
             return self
         command = [str(self._binary), "serve", "--listen", self.address, "--until-stdin-closes", "--json", *self._options]
         try:
-            # The server stops when its standard input ends: this process holds the other end, and with it goes the pipe.
-            # A process group of its own: Ctrl-C is for the program that plays, which may still want to save what it has.
+            # The server stops when its standard input ends, which is when this process ends. In a process group of its own it does
+            # not receive Ctrl-C, after which this process may still need it.
             self._process = subprocess.Popen(
                 command,
                 stdin=subprocess.PIPE,
@@ -144,12 +140,12 @@ class LocalServer:
             raise
         if address is None:
             self.stop()
-            raise ChefsHatError("SERVER_DID_NOT_START", f"{' '.join(command)} did not start listening; it said:\n{self.log}")
+            raise ChefsHatError("SERVER_DID_NOT_START", f"{' '.join(command)} did not start listening; its output:\n{self.log}")
         self.address = address
         return self
 
     def stop(self) -> None:
-        """Stops the server. More than once does no harm."""
+        """Stops the server. Does nothing if it is stopped."""
         if self._process is None:
             return
         self._process.terminate()
@@ -160,14 +156,14 @@ class LocalServer:
         self._ended()
 
     def kill(self) -> None:
-        """Ends the process without a warning."""
+        """Kills the process."""
         if self._process is not None:
             self._process.kill()
             self._ended()
 
     def _ended(self) -> None:
-        """Waits for the process and lets go of it."""
-        assert self._process is not None, "called by those who have looked"
+        """Waits for the process and releases it."""
+        assert self._process is not None, "callers check it"
         process, self._process = self._process, None
         process.wait()
         for pipe in (process.stdin, process.stdout):
@@ -175,42 +171,42 @@ class LocalServer:
                 pipe.close()
 
     def _listens(self, process: "subprocess.Popen[str]") -> str | None:
-        """Waits until it says where it listens; None if it ended before."""
-        # A server that hangs is killed, which ends its output and so the wait for its first line.
+        """Waits for the server's address; returns None if the process ended before."""
+        # Killing a server that hangs ends its output, and so the wait for its first line.
         watchdog = threading.Timer(START_S, process.kill)
         watchdog.daemon = True
         watchdog.start()
         try:
-            assert process.stdout is not None, "it was asked for"
+            assert process.stdout is not None, "it is a pipe"
             for line in process.stdout:
                 try:
-                    said = json.loads(line)
+                    message = json.loads(line)
                 except ValueError:
-                    continue  # Another program than was thought.
-                if isinstance(said, dict) and said.get("event") == "listening":
-                    return str(said["address"])
+                    continue  # Not the output of `chefshat`.
+                if isinstance(message, dict) and message.get("event") == "listening":
+                    return str(message["address"])
             return None
         finally:
             watchdog.cancel()
 
 
 def clean_environment() -> dict[str, str]:
-    """The environment without what would configure the user's own server, but for its log."""
-    kept = ("CHEFSHAT_LOG", "CHEFSHAT_LOG_JSON")
-    return {name: value for name, value in os.environ.items() if not name.startswith("CHEFSHAT_") or name in kept}
+    """Returns the environment without the configuration of the user's own server, except for logging."""
+    allowed = ("CHEFSHAT_LOG", "CHEFSHAT_LOG_JSON")
+    return {name: value for name, value in os.environ.items() if not name.startswith("CHEFSHAT_") or name in allowed}
 
 
-# One for the process; the number of the process it belongs to, because a forked one must not use or stop its parent's.
+# The server of this process, and the process id, because a fork must not use or stop its parent's server.
 _shared: LocalServer | None = None
 _shared_by = 0
 _lock = threading.Lock()
 
 
 def shared_address() -> str:
-    """The address of a server that this whole process shares. It is started by the first call, and stopped when the process ends.
+    """Returns the address of the server shared by this process. The first call starts it; it stops when the process ends.
 
     Raises:
-        ChefsHatError: there is no program to start it with, or it did not start.
+        ChefsHatError: the program was not found, or the server did not start.
     """
     global _shared, _shared_by
     with _lock:
@@ -219,7 +215,7 @@ def shared_address() -> str:
             _shared_by = os.getpid()
             atexit.register(_stop_shared, _shared, _shared_by)
         if not _shared.running:
-            # Another port, should it have run before: nobody is left who knows the old one, and somebody else may have it.
+            # Another port than before: it may be in use by now.
             _shared.address = "127.0.0.1:0"
             _shared.start()
         return _shared.address

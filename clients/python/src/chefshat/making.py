@@ -1,4 +1,4 @@
-"""`make`: one door to all environments. What they are is in `vector` and `envs`."""
+"""`make`: creates any of the environments in `vector` and `envs`."""
 
 # ruff: noqa: ANN401 - The options are those of what is made.
 import importlib
@@ -30,16 +30,16 @@ def make(kind: Literal["pettingzoo"], **options: Any) -> "AECEnv[str, Any, Any]"
 @overload
 def make(kind: str, **options: Any) -> Any: ...
 def make(kind: str = "gymnasium", **options: Any) -> Any:
-    """Makes an environment. Without an `address` it plays on a server of this process's own, which is started if need be.
+    """Creates an environment. Without an `address` it plays on the server shared by this process, which is started on demand.
 
     Args:
         kind: "gymnasium": `envs.ChefsHatEnv`, one seat against built-in agents; "gymnasium_vector": `envs.ChefsHatVectorEnv`, the
             same many times; "vector": `VectorEnv`, columns of any seats of many games; "pettingzoo": `envs.chefshat_v1`, all seats.
-        options: what that environment takes, for instance `address`, `opponents`, `rewards`, `observation`, `rules`, `seed`.
+        options: arguments of that environment, for example `address`, `opponents`, `rewards`, `observation`, `rules`, `seed`.
 
     Raises:
         ImportError: the kind needs the extra `envs`.
-        ChefsHatError: there is no server: the message says what to do about it.
+        ChefsHatError: there is no server; the message says what to do.
     """
     if kind == "vector":
         return VectorEnv(**options)

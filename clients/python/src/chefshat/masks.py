@@ -1,9 +1,9 @@
-"""Masks of legal actions, many at a time: bit i%8 of byte i//8 is action i. What the actions are is not here."""
+"""Batches of masks of legal actions: bit i%8 of byte i//8 is action i."""
 
 import numpy as np
 from numpy.typing import NDArray
 
-# Constants of the well-known parallel count of bits in 64-bit words, by pairs, by fours, by bytes; and one in every byte.
+# Constants of the parallel bit count in 64-bit words, by pairs, by fours, by bytes; and one in every byte.
 _PAIRS = np.uint64(0x5555555555555555)
 _FOURS = np.uint64(0x3333333333333333)
 _BYTES = np.uint64(0x0F0F0F0F0F0F0F0F)
@@ -12,7 +12,7 @@ _TOPS = np.uint64(0x8080808080808080)
 
 
 def _positions() -> NDArray[np.uint16]:
-    """For a byte b and a number k, at b * 8 + k: the position of the k-th of its set bits, from 0; 0 if it has not so many."""
+    """Returns at b * 8 + k the position of the k-th set bit of byte b, from 0; 0 if it has fewer set bits."""
     table = np.zeros((256, 8), np.uint16)
     for byte in range(256):
         bits = [bit for bit in range(8) if byte >> bit & 1]
@@ -24,7 +24,7 @@ _POSITIONS = _positions()
 
 
 def unpack(mask_bits: NDArray[np.uint8], num_actions: int) -> NDArray[np.bool_]:
-    """The masks as booleans.
+    """Unpacks masks to booleans.
 
     Args:
         mask_bits: (R, ceil(A/8)).
@@ -39,17 +39,17 @@ def unpack(mask_bits: NDArray[np.uint8], num_actions: int) -> NDArray[np.bool_]:
 
 
 def is_legal(mask_bits: NDArray[np.uint8], actions: NDArray[np.integer]) -> NDArray[np.bool_]:
-    """Whether each row's action is legal by its mask: (R,)."""
+    """Returns whether each row's action is legal by its mask, (R,)."""
     rows = np.arange(len(mask_bits))
     return np.asarray(mask_bits[rows, actions >> 3] >> (actions & 7).astype(np.uint8) & 1, np.bool_)
 
 
 def sample_legal(mask_bits: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.uint16]:
-    """Draws one legal action for each row, all of a row's alike likely.
+    """Draws one legal action for each row, uniformly.
 
     Args:
         mask_bits: (R, ceil(A/8)), at least one bit set in every row, no bit from A on.
-        rng: where chance comes from; one draw for each row.
+        rng: the random generator; one draw for each row.
 
     Returns:
         (R,): the actions.
@@ -65,14 +65,14 @@ def sample_legal(mask_bits: NDArray[np.uint8], rng: np.random.Generator) -> NDAr
     padded[:, :width] = mask_bits
     words = padded.view("<u8")
     counts = np.bitwise_count(words).astype(np.uint64)
-    # Set bits up to each word, its own included.
+    # Set bits up to and including each word.
     upto = counts.copy()
     for word in range(1, words_wide):
         upto[:, word] += upto[:, word - 1]
     total = upto[:, -1]
     if not total.all():
-        raise ValueError(f"row {int(total.argmin())} has no legal action: nothing is decided there")
-    # The number of the bit to take, from 0; then the word it is in, and its number within that word.
+        raise ValueError(f"row {int(total.argmin())} has no legal action")
+    # The rank of the drawn bit, from 0; then the word it is in, and its rank within that word.
     rank = (rng.random(rows) * total).astype(np.uint64)
     wanted = np.zeros(rows, np.intp)
     for before in range(words_wide - 1):
@@ -84,7 +84,7 @@ def sample_legal(mask_bits: NDArray[np.uint8], rng: np.random.Generator) -> NDAr
     sums = chosen - (chosen >> np.uint64(1) & _PAIRS)
     sums = (sums & _FOURS) + (sums >> np.uint64(2) & _FOURS)
     sums = (sums + (sums >> np.uint64(4)) & _BYTES) * _ONES
-    # Byte b of `full` has its top bit set where no more than `rank` bits are in the bytes up to b: those before the one wanted.
+    # Byte b of `full` has its top bit set if at most `rank` bits are in the bytes up to b, that is before the byte wanted.
     full = ((rank * _ONES | _TOPS) - sums) & _TOPS
     shift = np.bitwise_count(full).astype(np.uint64) << np.uint64(3)
     rank -= (sums << np.uint64(8)) >> shift & np.uint64(0xFF)

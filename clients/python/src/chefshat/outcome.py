@@ -1,6 +1,6 @@
-"""What came of a place, as commands print it: for people as a table, for programs as plain values.
+"""The result of a game or a tournament as commands print it: as a table or as JSON.
 
-How the place was come by is in `join_options`; what is left of a single seat's game is in `result`.
+Joining is in `join_options`; the result of a single seat is in `result`.
 """
 
 import json
@@ -13,11 +13,11 @@ from chefshat.result import SeatResult
 
 @dataclass(frozen=True)
 class Played:
-    """What came of a place in a room or a tournament.
+    """The result of a place in a room or a tournament.
 
     Attributes:
-        games: the games that were played here, in the order in which they were begun; that of a room alone.
-        tournament: how the tournament stood when it was over; None for a room.
+        games: the games played here, in order; only one for a room.
+        tournament: the final results of the tournament; None for a room.
         participant: number of the participant in the tournament; 0 for a room.
     """
 
@@ -34,16 +34,16 @@ class Played:
 
 
 def report(played: Played, *, as_json: bool, own: Mapping[str, object] | None = None, own_words: str = "") -> int:
-    """Prints what came of a place, as a line of JSON or a table.
+    """Prints a result, as a line of JSON or a table.
 
     Args:
-        played: what came of it.
-        as_json: whether a line of JSON is wanted.
-        own: what the line says besides, of the command's own.
-        own_words: the same as a line below the table.
+        played: the result.
+        as_json: whether to print JSON.
+        own: further fields of the JSON.
+        own_words: a further line below the table.
 
     Returns:
-        The exit code of a command whose only place it was: 0 if it was finished, else 1.
+        The exit code: 0 if the game or tournament was finished, else 1.
     """
     if as_json:
         print(json.dumps({**plain(played), **(own or {})}), flush=True)
@@ -53,7 +53,7 @@ def report(played: Played, *, as_json: bool, own: Mapping[str, object] | None = 
 
 
 def plain(played: Played) -> dict[str, object]:
-    """What came of a place as plain values."""
+    """Converts a result to JSON values."""
     if played.tournament is None:
         return _game_plain(played.games[0])
     games = [
@@ -75,7 +75,7 @@ def plain(played: Played) -> dict[str, object]:
 
 
 def as_table(played: Played) -> str:
-    """What came of a place for people."""
+    """Formats a result as a table."""
     if played.tournament is None:
         return _game_as_table(played.games[0])
     return _tournament_as_table(played.tournament, played.participant)
@@ -112,7 +112,7 @@ def _game_as_table(result: SeatResult) -> str:
 
 
 def _tournament_as_table(results: pb.GetTournamentResultsResponse, participant: int) -> str:
-    """Scores and points are means of a game, by which the order goes. Before a game has counted nobody has a place."""
+    """Formats standings. Scores and points are means per game, which determine the order. Places need at least one counted game."""
     lines = ["place  score  points  games  name"]
     names = [entrant.name for entrant in results.tournament.participants]
     for line in results.standings:

@@ -1,6 +1,6 @@
-"""What a session remembers of a participant of a tournament, who is given a seat in each of its games.
+"""The state of a tournament participant in a session. The server gives it a seat in each of its games.
 
-What it remembers of a seat is in `seat_session`; what changes either, and why, in `session`.
+The state of a seat is in `seat_session`; `session` changes both.
 """
 
 from collections.abc import Callable
@@ -16,34 +16,34 @@ from chefshat.requests import attach
 REQUEST_ID = 2**32 - 1
 
 MakeAgent: TypeAlias = Callable[[SeatInfo], Agent]
-"""Gives the agent of a game that the participant is seated in. A subclass of `Agent` whose constructor takes the seat is one."""
+"""Creates the agent of a game from its seat, for example a subclass of `Agent` whose constructor takes the seat."""
 
 OnEntered: TypeAlias = Callable[[pb.Entered], None]
-"""Is told, on each connection, of the tournament that a participant takes part in, and of its number there."""
+"""Called on each connection with the tournament and the participant's number in it."""
 
 
 class Participant:
-    """One participant's part of a session; it outlives connections."""
+    """One participant of a session. It outlives connections."""
 
     def __init__(self, ticket: str, make_agent: MakeAgent, entropy: bytes, on_entered: OnEntered | None = None) -> None:
         self.ticket = ticket
         self.make_agent = make_agent
         self._on_entered = on_entered
-        # One for all games of the participant, as the protocol has it.
+        # The protocol has one for all games of the participant.
         self.entropy = entropy
-        # Handle on the present connection; None while not attached.
+        # Handle on the current connection; None while not attached.
         self.handle: int | None = None
-        # Whether it will be seated no more, and why if not because the tournament is over.
+        # Whether no further seats follow, and the error if the tournament is not over.
         self.over = False
         self.error: ChefsHatError | None = None
 
     def attach(self, delivery: pb.EventDelivery.ValueType) -> pb.SeatCommand:
-        """The command that attaches a new connection to it."""
+        """Returns the command that attaches it on a new connection."""
         self.handle = None
         return attach(self.ticket, REQUEST_ID, 0, self.entropy, delivery)
 
-    def told(self, update: pb.SeatUpdate) -> None:
-        """What the server says on a handle that is no seat's."""
+    def receive(self, update: pb.SeatUpdate) -> None:
+        """Processes an update on a handle that is not a seat's."""
         if update.HasField("entered"):
             self.handle = update.handle
             if self._on_entered is not None:
@@ -52,16 +52,16 @@ class Participant:
             self._detached(update.detached.reason)
 
     def end(self, error: ChefsHatError | None = None) -> None:
-        """It will be seated no more."""
+        """Ends the participation."""
         self.handle = None
         if not self.over:
             self.over, self.error = True, error
 
     def _detached(self, reason: pb.DetachReason.ValueType) -> None:
-        """The server has dismissed it."""
+        """Ends the participation at the server's request."""
         if reason == pb.DETACH_REASON_TOURNAMENT_OVER:
             self.end()
         elif reason == pb.DETACH_REASON_SUPERSEDED:
-            self.end(ChefsHatError("SUPERSEDED", "a newer connection takes part in the tournament in its place"))
+            self.end(ChefsHatError("SUPERSEDED", "a newer connection has replaced the participant"))
         else:
             self.end(ChefsHatError("DETACHED", "the participant has left the stream"))

@@ -28,37 +28,36 @@ AskedPage = TypeVar("AskedPage", bound=PageRequest)
 AnsweredPage = TypeVar("AnsweredPage", bound=Page)
 Item = TypeVar("Item")
 
-# Times in milliseconds. Waits between attempts to connect are `Backoff`'s business, so the channel's own are kept short. (But not
-# "grpc.min_reconnect_backoff_ms", which despite its name bounds how long one attempt may take.) Pings notice a peer that is gone
-# without having said so.
+# Times in milliseconds. The channel's own delays between connection attempts are short, because `Backoff` adds its own. (Except for
+# "grpc.min_reconnect_backoff_ms", which despite its name limits the duration of one attempt.) Pings detect a dead peer.
 CHANNEL_OPTIONS: list[tuple[str, int]] = [
     ("grpc.initial_reconnect_backoff_ms", 100),
     ("grpc.max_reconnect_backoff_ms", 1000),
     ("grpc.keepalive_time_ms", 30_000),
     ("grpc.keepalive_timeout_ms", 10_000),
-    # Two clients of one process are two agents, and one connection each is how they would run apart.
+    # Gives every client of a process its own connection.
     ("grpc.use_local_subchannel_pool", 1),
 ]
 
 SeatSpec: TypeAlias = "pb.SeatConfig | pb.RecordedPlayer | pb.ParticipantKind.ValueType | str | None"
-"""How to fill a seat: a built-in agent's name, a recorded player to play as, a kind it is reserved for, None (open to everybody),
-or the message itself."""
+"""How to fill a seat: a built-in agent's name, a recorded player to imitate, the kind it is reserved for, None (open to all), or
+the message itself."""
 
 
 class Target(NamedTuple):
-    """Where a server is: what gRPC connects to, and whether by TLS."""
+    """The address of a server: gRPC's authority, and whether to use TLS."""
 
     authority: str
     tls: bool
 
 
 def target(address: str) -> Target:
-    """Reads "host:port", "http://host:port" (the same) or "https://host:port" (TLS)."""
+    """Parses "host:port", "http://host:port" (the same) or "https://host:port" (TLS)."""
     scheme, separator, rest = address.partition("://")
     if not separator:
         return Target(address, tls=False)
     if scheme not in ("http", "https"):
-        raise ValueError(f"the address {address!r} begins with neither http:// nor https://")
+        raise ValueError(f"the address {address!r} must begin with http:// or https://")
     return Target(rest.rstrip("/"), tls=scheme == "https")
 
 
@@ -89,13 +88,13 @@ def create_room(
     hands: pb.ScriptedShift | None,
     durability: pb.Durability.ValueType | None,
 ) -> pb.CreateRoomRequest:
-    """The request for a room."""
+    """Builds the request to create a room."""
     if branch is not None and hands is not None:
-        raise ValueError("a game begins from a record (branch) or with given hands (hands), not with both")
+        raise ValueError("a game begins from a record (branch) or with given hands (hands), not both")
     if isinstance(rules, str):
         rules = pb.RuleSet(preset=rules)
     if durability is not None:
-        # A copy: the caller may use its policy for other rooms.
+        # Copies the policy, which the caller may use for other rooms.
         asked = pb.RoomPolicy()
         asked.MergeFrom(policy or asked)
         asked.durability = durability
@@ -123,7 +122,7 @@ def join_tournament(
 
 
 def seat_config(seat: SeatSpec) -> pb.SeatConfig:
-    """The message for one seat."""
+    """Builds the message for one seat."""
     if isinstance(seat, pb.SeatConfig):
         return seat
     if isinstance(seat, pb.RecordedPlayer):
@@ -134,14 +133,14 @@ def seat_config(seat: SeatSpec) -> pb.SeatConfig:
 
 
 def watch_request(room_id: str, last_sequence: int) -> pb.SpectatorServiceWatchRequest:
-    """The request for a room's events after `last_sequence`; all of them if that is 0."""
+    """Builds the request for a room's events after `last_sequence`; all of them if that is 0."""
     return pb.SpectatorServiceWatchRequest(room_id=room_id, from_sequence=last_sequence + 1 if last_sequence else 0)
 
 
 def attach(
     ticket: str, request_id: int, last_sequence: int, entropy: bytes, delivery: pb.EventDelivery.ValueType
 ) -> pb.SeatCommand:
-    """The command that attaches a seat, from the event after `last_sequence` (0: from the first), or a tournament's participant."""
+    """Builds the command to attach a seat, from the event after `last_sequence` (0: from the first), or a participant."""
     command = pb.SeatCommand()
     command.attach.ticket = ticket
     command.attach.request_id = request_id

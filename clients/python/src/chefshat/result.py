@@ -1,4 +1,4 @@
-"""What is left of a seat's game when it is over."""
+"""The result of a seat's game."""
 
 from dataclasses import dataclass
 
@@ -17,24 +17,24 @@ class Standing:
 
 @dataclass(frozen=True)
 class SeatResult:
-    """How the game ended for one seat: finished (it has standings), aborted (it has none), or with an error of the seat's own.
+    """The result of a game for one seat: finished (with standings), aborted (without), or an error of the seat.
 
     Attributes:
         room_id: the room; empty if the seat was never attached.
         game_id: the game; empty if the seat was never attached.
         seat: number of the seat, from 0; -1 if the seat was never attached.
         standings: the final table, best first; empty unless the game finished.
-        reveal: what makes the deals checkable, if the server revealed it: `reveal.seat_entropy[seat]` is then this seat's `entropy`
-            (where the game's seed was not fixed).
-        abort_reason: why the game was aborted, for instance "SHUTDOWN"; empty unless it was.
-        decisions: answers the server said it accepted.
-        invalid: answers that were not legal.
-        late: answers that came when the decision was closed already.
-        annotations_dropped: annotations that were not recorded, being too large or not finite.
-        reconnects: how often the seat was attached anew after its connection was lost.
-        entropy: the seat's own part of the game seed, as it was sent. Where the game had begun before this session, what another
-            sent then counts.
-        error: why the seat left before its game was over (reason "SUPERSEDED": a newer connection took it); None otherwise.
+        reveal: proves the deals, if the server revealed it: `reveal.seat_entropy[seat]` is then this seat's `entropy` (unless the
+            game's seed was fixed).
+        abort_reason: why the game was aborted, for example "SHUTDOWN"; empty unless it was.
+        decisions: accepted answers.
+        invalid: illegal answers.
+        late: answers to decisions that were already closed.
+        annotations_dropped: annotations that were not recorded, because they were too large or not finite.
+        reconnects: attachments after a lost connection.
+        entropy: the seat's contribution to the game seed, as sent by this session. If the game had begun before, an earlier one
+            counts.
+        error: why the seat was lost before its game was over (reason "SUPERSEDED": a newer connection took it); None otherwise.
     """
 
     room_id: str
@@ -73,13 +73,13 @@ class SeatResult:
 
 
 def standings_of(ended: pb.GameEnded) -> tuple[Standing, ...]:
-    """The final table of a finished game."""
+    """Returns the final table of a finished game."""
     return tuple(Standing(line.seat, line.points, line.place) for line in ended.standings)
 
 
 def abort_reason_of(aborted: pb.GameAborted) -> str:
-    """The name of the reason, without its prefix."""
+    """Returns the name of the reason, without its prefix."""
     values = pb.AbortReason.values()
     if aborted.reason not in values:
-        return str(int(aborted.reason))  # A server newer than this package.
+        return str(int(aborted.reason))  # The server is newer than this package.
     return pb.AbortReason.Name(aborted.reason).removeprefix("ABORT_REASON_")

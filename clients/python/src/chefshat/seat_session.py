@@ -1,4 +1,4 @@
-"""What a session remembers of one seat from its ticket to its result. What changes it, and why, is in `session`."""
+"""The state of one seat in a session, from its ticket to its result. `session` changes it."""
 
 from typing import NamedTuple
 
@@ -10,38 +10,38 @@ from chefshat.result import SeatResult, Standing
 
 
 class Ask(NamedTuple):
-    """A decision to be put to an agent."""
+    """A decision for an agent."""
 
-    place: "SeatSession"
+    seat: "SeatSession"
     decision: Decision
 
     @property
     def agent(self) -> Agent:
-        """Who is asked."""
-        return self.place.agent
+        """The agent that decides."""
+        return self.seat.agent
 
 
 class SeatSession:
-    """One seat's part of a session; it outlives connections."""
+    """One seat of a session. It outlives connections."""
 
     def __init__(self, ticket: str, request_id: int, agent: Agent, entropy: bytes) -> None:
         self.ticket = ticket
         self.request_id = request_id
         self.agent = agent
-        # The same on every connection: what counts is what the server had when the game began.
+        # The same on every connection: the server uses the one it had when the game began.
         self.entropy = entropy
         self.info: SeatInfo | None = None
-        # Handle on the present connection; None while not attached.
+        # Handle on the current connection; None while not attached.
         self.handle: int | None = None
-        # Number of the last event seen; 0 before any.
+        # Number of the last event seen; 0 before the first.
         self.last_sequence = 0
-        # Events below this number happened before the seat was attached last.
+        # Events below this number happened before the latest attachment.
         self.live_from = 0
-        # A substitute plays for the seat although its agent is here, and the server has not been told so yet.
+        # A substitute plays for the connected seat, which has not resumed yet.
         self.substituted = False
-        # The decision the agent has been asked and has not answered yet.
+        # The decision that the agent is making.
         self.asked: Decision | None = None
-        # The answer the server has not acknowledged yet, and the decision it answers.
+        # The unacknowledged answer, and the decision it answers.
         self.unacknowledged: pb.Answer | None = None
         self.answered: Decision | None = None
         self.standings: tuple[Standing, ...] = ()
@@ -52,7 +52,7 @@ class SeatSession:
         self.invalid = 0
         self.late = 0
         self.annotations_dropped = 0
-        # Agents that do not listen cost no call per event.
+        # Skips calls of hooks that the agent does not override.
         self.hears_events = type(agent).on_event is not Agent.on_event
         self.hears_results = type(agent).on_result is not Agent.on_result
 
@@ -62,7 +62,7 @@ class SeatSession:
         return bool(self.standings or self.abort_reason)
 
     def finish(self, error: ChefsHatError | None) -> SeatResult:
-        """Nothing more will come: what is left of the game, with why it was lost if it was."""
+        """Ends the seat. Returns its result, with the error if it was lost."""
         self.asked = None
         self.unacknowledged = None
         self.answered = None
@@ -84,5 +84,5 @@ class SeatSession:
         )
 
     def is_seat(self, seat: int) -> bool:
-        """Whether that is the number of this seat; it is not known before the seat has been attached."""
+        """Whether this seat has the number `seat`; False before the first attachment."""
         return self.info is not None and self.info.seat == seat

@@ -1,6 +1,6 @@
-"""The file that keeps the ticket of a command's place: held by one command at a time, for as long as it has the place.
+"""The file that stores the ticket of a command's place. One command at a time locks it, for as long as it has the place.
 
-What a place is and how it is come by is in `join_options`.
+Joining is in `join_options`.
 """
 
 import contextlib
@@ -14,28 +14,28 @@ if sys.platform != "win32":
 
 
 class TicketFile:
-    """A ticket in a file that its owner alone may read; a context manager, which holds the file.
+    """A ticket in a file that only its owner may read; a context manager that locks the file.
 
-    What is held is the file itself or, before there is one, the beginning of one beside it, which becomes the file when the ticket
-    is there. The system lets go of it when the process ends, however that ends. On Windows nothing is held.
+    Locks the file or, before it exists, a temporary file next to it, which becomes the file when the ticket is known. The system
+    releases the lock when the process ends in any way. On Windows there is no lock.
 
     Attributes:
         path: the file.
-        ticket: what the file says; empty if there is no file, or nothing in it.
+        ticket: the contents; empty if there is no file or it is empty.
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self.path = Path(path)
         self.ticket = ""
-        # The same name for every process: what one that was killed left behind, the next one takes.
+        # The same name for every process, which takes over the file of a killed one.
         self._begun = self.path.with_name(f".{self.path.name}.new")
         self._descriptor = -1
 
     def __enter__(self) -> Self:
-        """Holds the file if there is a ticket in it, and else begins one.
+        """Locks the file if it has a ticket, otherwise creates a temporary one.
 
         Raises:
-            OSError: it can be neither read nor begun, it is no text, or another command holds it.
+            OSError: the file cannot be read or created, is not a text, or another command has locked it.
         """
         if self.path.is_dir():
             raise IsADirectoryError(f"{self.path} is a folder: name a file in it")
@@ -48,21 +48,21 @@ class TicketFile:
                         self._let_go()
                 if self.ticket:
                     return self
-            # Not through a link, which somebody else may have put there.
+            # Does not follow a link, which somebody else may have put there.
             if self._hold(self._begun, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0)):
                 if not _read(self.path):
                     return self
-                self._let_go()  # Another command has put its file there in between.
+                self._let_go()  # Another command has put its file there meanwhile.
 
     def __exit__(self, *_: object) -> None:
-        """Lets go. Nothing is left of a file that got no ticket."""
+        """Releases the lock. Deletes a temporary file without a ticket."""
         self._let_go()
 
     def keep(self, ticket: str) -> None:
-        """Writes the ticket, and puts the file in place of what stands there.
+        """Stores the ticket, replacing the file.
 
         Raises:
-            OSError: it cannot be written. What stood there stands there still.
+            OSError: the file cannot be written. An existing one is unchanged.
         """
         if hasattr(os, "fchmod"):
             os.fchmod(self._descriptor, 0o600)
@@ -75,17 +75,17 @@ class TicketFile:
         self.ticket = ticket
 
     def forget(self) -> None:
-        """Removes the file, unless another ticket is in it by now.
+        """Deletes the file, unless it has another ticket by now.
 
         Raises:
-            OSError: it cannot be removed.
+            OSError: the file cannot be deleted.
         """
-        # What is no file (a pipe, say) is read once.
+        # A pipe, for example, can only be read once.
         if self.ticket and self.path.is_file() and _read(self.path) == self.ticket:
             self.path.unlink()
 
     def _hold(self, path: Path, flags: int) -> bool:
-        """Opens a file and holds it; False if there is none, or not this one any more."""
+        """Opens and locks a file. Returns False if it does not exist or was replaced meanwhile."""
         try:
             descriptor = os.open(path, flags, 0o600)
         except FileNotFoundError:
@@ -94,8 +94,8 @@ class TicketFile:
             return False
         try:
             if not _locked(descriptor):
-                raise BlockingIOError(f"another command plays in the place of {self.path}: name another file for another place")
-            # Who held it before may have renamed or removed it.
+                raise BlockingIOError(f"another command uses {self.path}: give another file for another place")
+            # The previous owner of the lock may have renamed or deleted it.
             still_there = _is(descriptor, path)
         except BaseException:
             os.close(descriptor)
@@ -119,17 +119,17 @@ class TicketFile:
 
 
 def _read(path: Path) -> str:
-    """The ticket in a file; empty if there is none."""
+    """Returns the ticket in a file; empty if there is none."""
     try:
         return path.read_text(encoding="utf-8").strip()
     except FileNotFoundError:
         return ""
     except UnicodeDecodeError as error:
-        raise OSError(f"{path} is no text, and so no ticket: name another file") from error
+        raise OSError(f"{path} is not a text file: give another file for the ticket") from error
 
 
 def _is(descriptor: int, path: Path) -> bool:
-    """Whether the open file is the one of that name."""
+    """Whether the open file is the one at `path`."""
     try:
         return os.path.samestat(os.fstat(descriptor), path.stat())
     except FileNotFoundError:
@@ -137,12 +137,12 @@ def _is(descriptor: int, path: Path) -> bool:
 
 
 def _locked(descriptor: int) -> bool:
-    """Locks an open file until it is closed; False if it is locked already."""
+    """Locks an open file until it is closed. Returns False if it is already locked."""
     if sys.platform != "win32":
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             return False
         except OSError:
-            pass  # A file system that has no locks, or none for a file that is only read: better no lock than no game.
+            pass  # The file system does not support this lock: plays without it.
     return True

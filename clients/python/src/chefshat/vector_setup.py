@@ -1,21 +1,18 @@
-"""The setup of a `VectorEnv`: how its arguments become the first request of the stream.
-
-The stream itself is not here (see `vector`).
-"""
+"""The options of a `VectorEnv`, and the first request of its stream. The stream is in `vector`."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol, TypeAlias
+from typing import Any, Protocol, TypeAlias, TypedDict
 
 import numpy as np
 
 from chefshat import pb
 
 Rules: TypeAlias = "pb.RuleSet | str | Mapping[str, Any] | None"
-"""A rule set: the message, the name of a preset, or the message's fields. Short names of values will do: `opening="golden"`."""
+"""A rule set: the message, the name of a preset, or the message's fields. Enum values have short names: `opening="golden"`."""
 
 Seed: TypeAlias = "int | Sequence[bytes] | None"
-"""Where deals come from: a base seed, 0..2**64-1, from which every game's seed is drawn; or the games' own seeds, 32 bytes each,
-taken in turn; None: chance."""
+"""The seed of the deals: a base seed, 0..2**64-1, from which every game's seed is derived; or the games' seeds, 32 bytes each, used
+in turn; None: random."""
 
 _SEED_BYTES = 32
 _MAX_SEEDS = 16384
@@ -29,64 +26,91 @@ class Seeded(Protocol):
 
     @property
     def game_seeds(self) -> pb.GameSeeds:
-        """The games' own seeds."""
+        """The games' seeds."""
 
 
-def vector_setup(
-    *,
-    games: int,
-    client_seats: Sequence[int] | None,
-    opponents: str | Sequence[str],
-    rewards: str | None,
-    episode: str,
-    decisions: str,
-    other_decisions: str | None,
-    skip_forced: bool,
-    invalid: str,
-    max_invalid_attempts: int,
-    total_games: int,
-    seed: Seed,
-    rules: Rules,
-    hands: pb.ScriptedShift | None,
-    branch: pb.BranchPoint | None,
-    shift_statistics: bool,
-    records: bool,
-) -> pb.VectorSetup:
-    """The request. Raises ValueError or TypeError for what cannot be said in one; the rest is for the server to judge."""
+class VectorOptions(TypedDict, total=False):
+    """The options of a `VectorEnv`, all optional.
+
+    Attributes:
+        client_seats: the seats played by the client; default: all.
+        opponents: built-in agents of the other seats: one for each, in the order of the seats, or one for all; default: "random".
+        rewards: "validity", "paper", "paper_intended", "winning" or "points"; default: all rewards are 0.
+        episode: "shift" (default) or "game".
+        decisions: "all" (default), or "turns": only the first T actions.
+        other_decisions: with "turns": the built-in agent that takes the other decisions; default: the default action is taken.
+        skip_forced: whether decisions with one legal action are taken without asking.
+        invalid: effect of an illegal action: "error" (default) ends the stream; "ask_again" counts it, rewards it and asks again.
+        max_invalid_attempts: with "ask_again": invalid attempts after which the default action is taken; 0 (default): unlimited.
+        total_games: total number of games; 0 (default): unlimited.
+        seed: a base seed, the games' seeds, or None (default) for random ones. See `Seed`.
+        rules: the rule set; see `Rules`.
+        hands: the hands each game begins with, instead of a deal.
+        branch: the point of a recorded game that each game continues from.
+        shift_statistics: whether batches have `shifts`.
+        records: whether batches have the `records` of games that have ended.
+    """
+
+    client_seats: Sequence[int] | None
+    opponents: str | Sequence[str]
+    rewards: str | None
+    episode: str
+    decisions: str
+    other_decisions: str | None
+    skip_forced: bool
+    invalid: str
+    max_invalid_attempts: int
+    total_games: int
+    seed: Seed
+    rules: Rules
+    hands: pb.ScriptedShift | None
+    branch: pb.BranchPoint | None
+    shift_statistics: bool
+    records: bool
+
+
+def vector_setup(games: int, options: VectorOptions) -> pb.VectorSetup:
+    """Builds the request. Raises ValueError or TypeError for options it cannot express; the server checks the rest."""
+    unknown = options.keys() - VectorOptions.__annotations__.keys()
+    if unknown:
+        raise TypeError(f"unknown options: {', '.join(sorted(unknown))}; known are {', '.join(VectorOptions.__annotations__)}")
+    branch, hands, rules = options.get("branch"), options.get("hands"), options.get("rules")
+    client_seats, opponents = options.get("client_seats"), options.get("opponents", "random")
+    decisions, rewards = options.get("decisions", "all"), options.get("rewards")
     if branch is not None and hands is not None:
-        raise ValueError("a game begins from a record (branch) or with given hands (hands), not with both")
+        raise ValueError("a game begins from a record (branch) or with given hands (hands), not both")
     if branch is not None and rules is not None:
-        raise ValueError("a game that goes on from a record (branch) is played by the record's rules: leave rules out")
-    if other_decisions is not None and decisions != "turns":
-        raise ValueError('other_decisions names who decides what is no turn: it needs decisions="turns"')
+        raise ValueError("a game that continues a record (branch) has the record's rules: leave rules out")
+    if options.get("other_decisions") is not None and decisions != "turns":
+        raise ValueError('other_decisions is the agent for decisions other than turns: it needs decisions="turns"')
     setup = pb.VectorSetup(
         games=games,
         client_seats=() if client_seats is None else client_seats,
         opponents=[opponents] if isinstance(opponents, str) else opponents,
-        episode=choice("episode", episode, pb.EpisodeScope, "EPISODE_SCOPE_"),
+        episode=choice("episode", options.get("episode", "shift"), pb.EpisodeScope, "EPISODE_SCOPE_"),
         decisions=choice("decisions", decisions, pb.DecisionScope, "DECISION_SCOPE_"),
-        other_decisions=other_decisions or "",
-        skip_forced=skip_forced,
-        invalid_actions=choice("invalid", invalid, pb.InvalidActionRule, "INVALID_ACTION_RULE_"),
-        max_invalid_attempts=max_invalid_attempts,
-        total_games=total_games,
+        other_decisions=options.get("other_decisions") or "",
+        skip_forced=options.get("skip_forced", False),
+        invalid_actions=choice("invalid", options.get("invalid", "error"), pb.InvalidActionRule, "INVALID_ACTION_RULE_"),
+        max_invalid_attempts=options.get("max_invalid_attempts", 0),
+        total_games=options.get("total_games", 0),
         scripted=hands,
         branch=branch,
-        shift_statistics=shift_statistics,
-        records=records,
-        # With a record's rules none may be named.
+        shift_statistics=options.get("shift_statistics", False),
+        records=options.get("records", False),
+        # A branch has the record's rules.
         rules=None if branch is not None else rule_set(rules),
     )
     if client_seats is not None and len(client_seats) == 0:
         raise ValueError("client_seats is empty: name at least one seat, or leave it out to play all")
     if rewards is not None:
         setup.reward_scheme = choice("rewards", rewards, pb.RewardScheme, "REWARD_SCHEME_")
-    put_seed(setup, seed)
+    put_seed(setup, options.get("seed"))
     return setup
 
 
 def rule_set(rules: Rules) -> pb.RuleSet:
-    """The message for a rule set."""
+    """Converts a rule set to a message."""
     if rules is None:
         return pb.RuleSet()
     if isinstance(rules, str):
@@ -105,7 +129,7 @@ def rule_set(rules: Rules) -> pb.RuleSet:
 
 
 def put_seed(request: Seeded, seed: Seed) -> None:
-    """Sets a request's seed; none if it is None."""
+    """Sets a request's seed, unless it is None."""
     if seed is None:
         return
     if isinstance(seed, (int, np.integer)) and not isinstance(seed, bool):
@@ -116,7 +140,7 @@ def put_seed(request: Seeded, seed: Seed) -> None:
     if isinstance(seed, (str, bytes, bool)) or not isinstance(seed, Sequence):
         raise TypeError("a seed is a number, or a list of the games' seeds of 32 bytes each")
     if not 1 <= len(seed) <= _MAX_SEEDS:
-        raise ValueError(f"1..={_MAX_SEEDS} seeds can be given, not {len(seed)}; later games use them again from the first on")
+        raise ValueError(f"give 1..={_MAX_SEEDS} seeds, not {len(seed)}; later games reuse them in turn")
     for number, one in enumerate(seed):
         if not isinstance(one, bytes) or len(one) != _SEED_BYTES:
             raise ValueError(f"seed {number} is not {_SEED_BYTES} bytes")
@@ -124,7 +148,7 @@ def put_seed(request: Seeded, seed: Seed) -> None:
 
 
 def choice(argument: str, name: str, enum: Any, prefix: str) -> Any:  # noqa: ANN401 - Enums have no type in common.
-    """The value of an enum by its short name, "ask_again" for INVALID_ACTION_RULE_ASK_AGAIN."""
+    """Returns the value of an enum by its short name, for example "ask_again" for INVALID_ACTION_RULE_ASK_AGAIN."""
     known = {full.removeprefix(prefix).lower(): value for full, value in enum.items() if value}
     if name not in known:
         raise ValueError(f"{argument}={name!r}: choose one of {', '.join(map(repr, known))}")

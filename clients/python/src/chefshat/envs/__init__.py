@@ -1,10 +1,10 @@
-"""Environments with the interfaces of Gymnasium and PettingZoo, over `VectorEnv`. They need the package's extra `envs`.
+"""Environments with the interfaces of Gymnasium and PettingZoo, based on `VectorEnv`. They need the package's extra `envs`.
 
 - `ChefsHatEnv`, a `gymnasium.Env`: one seat against built-in agents, registered as "chefshat/ChefsHat-v1".
-- `ChefsHatVectorEnv`, a `gymnasium.vector.VectorEnv`: the same many times, stepped together.
-- `chefshat_v1`, a module for PettingZoo: `chefshat_v1.env()` has all seats, one deciding at a time.
+- `ChefsHatVectorEnv`, a `gymnasium.vector.VectorEnv`: many such games, stepped together.
+- `chefshat_v1`, a module for PettingZoo: `chefshat_v1.env()` has all seats, which decide one at a time.
 
-What an agent sees is chosen in `seeing`. For more than Gymnasium can say there is `chefshat.VectorEnv` itself.
+The forms of observations are in `observing`.
 """
 
 from typing import TYPE_CHECKING, Any
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 __all__ = ["ENV_ID", "ChefsHatEnv", "ChefsHatVectorEnv", "chefshat_v1"]
 
-#: The name in Gymnasium's registry. `gymnasium.make("chefshat.envs:chefshat/ChefsHat-v1")` needs no import before.
+#: The id in Gymnasium's registry. `gymnasium.make("chefshat.envs:chefshat/ChefsHat-v1")` works without an import.
 ENV_ID = "chefshat/ChefsHat-v1"
 
 if ENV_ID not in gymnasium.registry:
@@ -34,7 +34,7 @@ if ENV_ID not in gymnasium.registry:
 
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401 - A module.
-    # PettingZoo is loaded only where it is used.
+    # Loads PettingZoo on demand.
     if name == "chefshat_v1":
         import importlib
 

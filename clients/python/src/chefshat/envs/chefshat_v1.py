@@ -1,7 +1,6 @@
 """All seats of one game for PettingZoo (AEC: one agent decides at a time): `chefshat_v1.env()`.
 
-One seat against built-in agents is in `gymnasium_env`. Seats decide one after the other by the rules of the game, so there is no
-parallel form.
+One seat against built-in agents is in `gymnasium_env`. Seats decide in turn, so there is no parallel form.
 """
 
 from typing import Any, ClassVar
@@ -15,33 +14,32 @@ try:
 except ImportError as error:
     raise ImportError("chefshat_v1 needs PettingZoo: pip install 'chefshat[envs]'") from error
 
-from chefshat import pb
 from chefshat.columns import Situations
 from chefshat.envs.gymnasium_env import check_open, wait_for_a_row
-from chefshat.envs.seeing import Form, ObservationFunction, mask_space
-from chefshat.envs.showing import RENDER_MODES, action_texts, as_text, check_render_mode
+from chefshat.envs.observing import Form, ObservationFunction, mask_space
+from chefshat.envs.rendering import RENDER_MODES, action_texts, as_text, check_render_mode
 from chefshat.vector import Batch, VectorEnv
 
 __all__ = ["env", "raw_env"]
 
 
 def env(address: str | None = None, **options: Any) -> "AECEnv[str, Any, Any]":  # noqa: ANN401 - Those of `raw_env`.
-    """The environment with PettingZoo's checks around it: of the order of calls, and of actions. Arguments: see `raw_env`."""
+    """Creates the environment with PettingZoo's checks of the order of calls and of actions. Arguments: see `raw_env`."""
     checked: AECEnv[str, Any, Any] = wrappers.AssertOutOfBoundsWrapper(raw_env(address, **options))
     return wrappers.OrderEnforcingWrapper(checked)
 
 
 class raw_env(AECEnv[str, Any, Any]):  # type: ignore[misc]  # PettingZoo has no types.
-    """The environment itself. The agents are "player_0" to "player_{N-1}", by seat.
+    """The environment without checks. The agents are "player_0" to "player_{N-1}", by seat.
 
-    An observation is a dictionary: "observation", of the form chosen, and "action_mask", A numbers of 0 or 1 (standard 214), all 0
-    unless the agent is to decide. An agent that is not to decide sees what it saw at its last decision. `infos` have "kind" (a
-    value of `pb.DecisionKind`), "invalid_attempts", and at the end "place", from 1.
+    An observation is a dictionary: "observation", of the form chosen, and "action_mask", A numbers of 0 or 1 (default 214), all 0
+    unless it is the agent's turn. The observation of another agent is that of its last decision. `infos` have "kind" (a value of
+    `pb.DecisionKind`), "invalid_attempts", and at the end "place", from 1.
 
-    An illegal action is an invalid attempt: it is rewarded as the scheme has it, and the same agent decides again. An agent is
-    given its reward when it decides next, or at the end of the episode: all that came since it last decided. The agents that are
-    left at the end of an episode are done; `reset()` then begins the next Shift of the same game, or the next game where that is
-    the episode. In the middle of an episode, or with a seed, it begins a new game.
+    An illegal action is an invalid attempt: it gets the reward of the scheme, and the same agent decides again. An agent gets the
+    rewards since its last decision at its next decision, or at the end of the episode. Then all agents are done; `reset()` starts
+    the next Shift of the same game, or the next game if that is the episode. In the middle of an episode, or with a seed, it starts
+    a new game.
     """
 
     metadata: ClassVar[dict[str, Any]] = {
@@ -61,20 +59,11 @@ class raw_env(AECEnv[str, Any, Any]):  # type: ignore[misc]  # PettingZoo has no
         render_mode: str | None = None,
         **options: Any,  # noqa: ANN401 - Those of `VectorEnv`.
     ) -> None:
-        """Begins a game.
-
-        Args:
-            address: the server; None: one of this process's own, which is started if need be.
-            observation: "classic", "table", "columns", or a function of one's own. See `Form`.
-            rewards: the scheme; see `VectorEnv`.
-            invalid: what an illegal action does; see `VectorEnv`.
-            render_mode: "ansi": `render()` returns a text; "human": it is printed with each step.
-            options: what else `VectorEnv` takes: `episode`, `decisions`, `rules`, `reward_function` and so on.
-        """
+        """Starts a game. For the arguments see `ChefsHatEnv`; this environment has all seats."""
         super().__init__()
         check_render_mode(render_mode)
         if "client_seats" in options or "games" in options:
-            raise ValueError("this environment has one game and all seats; for other ways use chefshat.VectorEnv")
+            raise ValueError("this environment has one game and all seats; otherwise use chefshat.VectorEnv")
         self.render_mode = render_mode
         self.vector = VectorEnv(address, 1, rewards=rewards, invalid=invalid, **options)
         sizes = self.vector.sizes
@@ -82,7 +71,7 @@ class raw_env(AECEnv[str, Any, Any]):  # type: ignore[misc]  # PettingZoo has no
         self.agents: list[str] = []
         self._form = Form(observation, sizes, self.vector.batch)
         seen = spaces.Dict({"observation": self._form.space, "action_mask": mask_space(sizes)})
-        # Spaces of their own, because each is seeded for itself.
+        # Separate spaces, because each has its own seed.
         self._observation_spaces: dict[str, spaces.Space[Any]] = {
             agent: spaces.Dict(dict(seen.spaces)) for agent in self.possible_agents
         }
@@ -94,22 +83,22 @@ class raw_env(AECEnv[str, Any, Any]):  # type: ignore[misc]  # PettingZoo has no
         self._stepped = False
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
-        """The space of an agent's observations."""
+        """Returns the space of an agent's observations."""
         return self._observation_spaces[agent]
 
     def action_space(self, agent: str) -> spaces.Space[Any]:
-        """The space of an agent's actions."""
+        """Returns the space of an agent's actions."""
         return self._action_spaces[agent]
 
     def observe(self, agent: str) -> dict[str, Any]:
-        """What an agent sees: at its decision if it is to decide, else what it saw at its last; zeros if it has not decided yet."""
+        """Returns the observation at an agent's current or last decision; zeros before its first."""
         deciding = agent == self.agent_selection and not self.terminations.get(agent) and not self.truncations.get(agent)
         mask = self.vector.batch.masks[0].astype(np.int8) if deciding else np.zeros(self.vector.num_actions, np.int8)
         seen = self._seen.get(agent)
         return {"observation": self._form.row(self._nothing, 0) if seen is None else seen, "action_mask": mask}
 
     def reset(self, seed: int | None = None, options: dict[str, Any] | None = None) -> None:
-        """Begins the next episode; games follow from the last seed that was given."""
+        """Starts the next episode. The last seed given determines the games."""
         check_open(self.vector)
         if seed is not None:
             self.vector.reset(seed)
@@ -128,7 +117,7 @@ class raw_env(AECEnv[str, Any, Any]):  # type: ignore[misc]  # PettingZoo has no
         self._take_turn(self.vector.batch)
 
     def step(self, action: Any) -> None:  # noqa: ANN401 - As PettingZoo has it.
-        """Takes the decision of `agent_selection`; None where that agent is done."""
+        """Takes the decision of `agent_selection`; None if that agent is done."""
         agent = self.agent_selection
         if self.terminations[agent] or self.truncations[agent]:
             self._was_dead_step(action)
@@ -149,7 +138,7 @@ class raw_env(AECEnv[str, Any, Any]):  # type: ignore[misc]  # PettingZoo has no
             self.render()
 
     def render(self) -> str | None:
-        """What the agent that is to decide sees, as text: returned with "ansi", printed with "human"."""
+        """Formats the situation of the deciding agent as text: returned with "ansi", printed with "human"."""
         situations: Situations = self.vector.batch
         if self.agents and (any(self.terminations.values()) or any(self.truncations.values())):
             situations = self.vector.batch.endings
@@ -164,7 +153,7 @@ class raw_env(AECEnv[str, Any, Any]):  # type: ignore[misc]  # PettingZoo has no
         self.vector.close()
 
     def _take_turn(self, batch: Batch) -> None:
-        """Gives the turn to the seat that is to decide."""
+        """Selects the deciding agent."""
         agent = self.possible_agents[int(batch.seats[0])]
         self.agent_selection = agent
         self._seen[agent] = self._form.row(self._form.of(batch), 0)
@@ -175,11 +164,11 @@ class raw_env(AECEnv[str, Any, Any]):  # type: ignore[misc]  # PettingZoo has no
         self._stepped = False
         endings = batch.endings
         observed = self._form.of(endings)
-        # In further episodes that ended with the same step nobody had anything to decide.
+        # There was no decision in further episodes that ended in the same step.
         for row, seat in enumerate(endings.seats[: self.vector.players].tolist()):
             agent = self.possible_agents[seat]
             self.rewards[agent] = float(endings.rewards[row])
-            self.terminations[agent] = bool(endings.ends[row] == pb.EPISODE_END_FINISHED)
-            self.truncations[agent] = bool(endings.ends[row] == pb.EPISODE_END_CUT_SHORT)
+            self.truncations[agent] = bool(endings.truncated[row])
+            self.terminations[agent] = not self.truncations[agent]
             self.infos[agent] = {"kind": 0, "invalid_attempts": 0, "place": int(endings.places_taken[row])}
             self._seen[agent] = self._form.row(observed, row)

@@ -10,44 +10,42 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from chefshat import pb
 from chefshat.columns import Situations
-from chefshat.envs.seeing import Form, ObservationFunction
-from chefshat.envs.showing import RENDER_MODES, action_texts, as_text, check_render_mode
+from chefshat.envs.observing import Form, ObservationFunction
+from chefshat.envs.rendering import RENDER_MODES, action_texts, as_text, check_render_mode
 from chefshat.errors import ChefsHatError
 from chefshat.vector import VectorEnv
 
 
 def wait_for_a_row(vector: VectorEnv, *, or_an_end: bool = False) -> None:
-    """Steps until the only game has a decision, or if wanted an ending: its other seats may have left decisions for later.
+    """Steps until the only game has a decision, or optionally an ending: a batch may be empty.
 
     Raises:
-        ChefsHatError: there is none because the games are over.
+        ChefsHatError: the games are over.
     """
     while len(vector.batch) == 0 and not (or_an_end and len(vector.batch.endings) > 0):
         if vector.batch.done:
-            raise ChefsHatError("GAMES_OVER", "total_games have been played; leave it out, or reset with a seed")
+            raise ChefsHatError("GAMES_OVER", "all total_games games are over; leave total_games out, or reset with a seed")
         vector.step(np.zeros(0, np.uint16))
 
 
 def check_open(vector: VectorEnv) -> None:
     """Raises Gymnasium's error if the games have been closed."""
     if vector.closed:
-        raise gymnasium.error.ClosedEnvironmentError("the environment has been closed: make a new one")
+        raise gymnasium.error.ClosedEnvironmentError("the environment is closed: make a new one")
 
 
 class ChefsHatEnv(gymnasium.Env[Any, Any]):
     """One seat of a game; the other seats are built-in agents of the server.
 
-    An action is the index of one of A actions (standard 214). Which are legal is in `info["action_mask"]`, A numbers of 0 or 1,
-    and, where an observation is a dictionary, in it as well; `action_space.sample(info["action_mask"])` draws a legal one. An
-    illegal action is an invalid attempt: it is rewarded as the scheme has it (-1 by "validity" and the paper's), and the decision
-    is asked again.
+    An action is the index of one of A actions (default 214). `info["action_mask"]` has A numbers, 1 where an action is legal;
+    dictionary observations have it, too. `action_space.sample(info["action_mask"])` draws a legal action. An illegal action is an
+    invalid attempt: it gets the reward of the scheme (-1 by "validity" and the paper's), and the decision is asked again.
 
-    An episode is a Shift, or a game. After a Shift has ended `reset()` goes on with the next Shift of the same game; in the middle
-    of an episode, or with a seed, it begins a new game. `terminated` says that the episode ended by the rules, `truncated` that it
-    reached the limit of turns and was adjudicated. `info` also has: "kind" (a value of `pb.DecisionKind`), "invalid_attempts" (at
-    this decision), and at the end of an episode "place", from 1.
+    An episode is a Shift, or a game. After the end of a Shift `reset()` continues with the next Shift of the same game; in the
+    middle of an episode, or with a seed, it starts a new game. `terminated` means that the episode has ended with places, also if
+    its last Shift was adjudicated at the turn limit; `truncated` that it was cut off without. `info` also has: "kind" (a value of
+    `pb.DecisionKind`), "invalid_attempts" (at this decision), and at the end of an episode "place", from 1.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": list(RENDER_MODES), "render_fps": 4}  # type: ignore[misc]
@@ -63,34 +61,34 @@ class ChefsHatEnv(gymnasium.Env[Any, Any]):
         render_mode: str | None = None,
         **options: Any,  # noqa: ANN401 - Those of `VectorEnv`.
     ) -> None:
-        """Begins a game.
+        """Starts a game.
 
         Args:
-            address: the server; None: one of this process's own, which is started if need be.
-            seat: the seat that is played here.
-            observation: "classic", "table", "columns", or a function of one's own. See `Form`.
-            rewards: the scheme; see `VectorEnv`. With "winning", 1 for finishing first, else -0.001 for each turn.
-            invalid: what an illegal action does; see `VectorEnv`.
-            render_mode: "ansi": `render()` returns a text; "human": it is printed with each step.
-            options: what else `VectorEnv` takes: `opponents`, `episode`, `decisions`, `rules`, `reward_function` and so on.
+            address: the server; None: the server shared by this process, which is started on demand.
+            seat: the seat of the agent.
+            observation: "classic", "table", "columns", or a function. See `Form`.
+            rewards: the scheme; see `VectorOptions`. With "winning", 1 for finishing first, else -0.001 for each turn.
+            invalid: effect of an illegal action; see `VectorOptions`.
+            render_mode: "ansi": `render()` returns a text; "human": each step prints it.
+            options: further arguments of `VectorEnv`: `opponents`, `episode`, `decisions`, `rules`, `reward_function` and so on.
         """
         check_render_mode(render_mode)
         if "client_seats" in options or "games" in options:
-            raise ValueError("this environment has one game and one seat: name the seat with seat=, or use chefshat.VectorEnv")
+            raise ValueError("this environment has one game and one seat: choose it with seat=, or use chefshat.VectorEnv")
         self.render_mode = render_mode
         self.vector = VectorEnv(address, 1, client_seats=[seat], rewards=rewards, invalid=invalid, **options)
         sizes = self.vector.sizes
         self.action_space = spaces.Discrete(sizes.num_actions)
         self._form = Form(observation, sizes, self.vector.batch)
         self.observation_space = self._form.space_with_mask
-        #: What the seat sees now, in row 0.
+        #: The seat's current situation, in row 0.
         self._now: Situations = self.vector.batch
         # Whether an episode has begun, and whether a step has been taken in it.
         self._running = False
         self._stepped = False
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
-        """Begins the next episode. Games and their opponents' chance follow from the last seed that was given."""
+        """Starts the next episode. The last seed given determines the games and the opponents' random choices."""
         check_open(self.vector)
         super().reset(seed=seed)
         if seed is not None:
@@ -106,35 +104,34 @@ class ChefsHatEnv(gymnasium.Env[Any, Any]):
         return self._observation(), self._info()
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:  # noqa: ANN401 - As Gymnasium has it.
-        """Takes the open decision; returns what the seat sees when it decides next, or at the end of the episode."""
+        """Takes the open decision. Returns the observation at the seat's next decision, or at the end of the episode."""
         check_open(self.vector)
         if not self._running:
-            raise gymnasium.error.ResetNeeded("the episode is over, or none has begun: call reset()")
+            raise gymnasium.error.ResetNeeded("there is no running episode: call reset()")
         self.vector.step(np.asarray([action]))
         self._stepped = True
         wait_for_a_row(self.vector, or_an_end=True)
         batch = self.vector.batch
         ended = len(batch.endings) > 0
         if ended:
-            # In a further one the seat had nothing to decide.
+            # The seat had no decision in further ones.
             self._now = batch.endings
-            reward, end = batch.endings.rewards[0], batch.endings.ends[0]
             self._running = False
         else:
             self._now = batch
-            reward, end = batch.rewards[0], pb.EPISODE_END_UNSPECIFIED
+        truncated = ended and bool(batch.endings.truncated[0])
+        reward = float(batch.endings.rewards[0] if ended else batch.rewards[0])
         info = self._info()
         if ended:
             info["place"] = int(batch.endings.places_taken[0])
         if self.render_mode == "human":
             self.render()
-        terminated, truncated = bool(end == pb.EPISODE_END_FINISHED), bool(end == pb.EPISODE_END_CUT_SHORT)
-        return self._observation(), float(reward), terminated, truncated, info
+        return self._observation(), reward, ended and not truncated, truncated, info
 
     def render(self) -> str | None:
-        """What the seat sees, as text: returned with "ansi", printed with "human"."""
+        """Formats the seat's situation as text: returned with "ansi", printed with "human"."""
         if self.render_mode is None:
-            gymnasium.logger.warn('there is nothing to render: make the environment with render_mode="ansi" or "human"')
+            gymnasium.logger.warn('render needs an environment made with render_mode="ansi" or "human"')
             return None
         text = as_text(self._now, 0, action_texts(self.vector.address, self.vector.faces))
         if self.render_mode == "ansi":

@@ -10,27 +10,25 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from chefshat import pb
 from chefshat.columns import Endings
 from chefshat.envs.gymnasium_env import check_open
-from chefshat.envs.seeing import Form, ObservationFunction, Observed
+from chefshat.envs.observing import Form, ObservationFunction, Observed
 from chefshat.vector import Batch, VectorEnv
 
 
 class ChefsHatVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
-    """Games stepped together; the same seat is played here in all of them, the others are built-in agents of the server.
+    """Many games stepped together; the agent has the same seat in all of them, the others are built-in agents of the server.
 
-    Observations, actions, rewards and episodes are those of `ChefsHatEnv`, a row for each game. An episode that ends is followed by
-    another in the same step (`AutoresetMode.SAME_STEP`): the observation returned is the first of the next episode, and the last
-    one of the old is in `infos["final_obs"]`, an array of objects, None where none has ended; `infos["final_info"]` has what goes
-    with it. `infos["action_mask"]` is an array of n rows of A numbers, 0 or 1. As in Gymnasium's own, `infos["_key"]` says which
-    rows of `infos["key"]` count.
+    Observations, actions, rewards and episodes are those of `ChefsHatEnv`, one row a game. When an episode ends, the next one
+    starts in the same step (`AutoresetMode.SAME_STEP`): the observation returned is the first of the next episode; the last one of
+    the old is in `infos["final_obs"]`, an array of objects, None where no episode has ended, and its info in
+    `infos["final_info"]`. `infos["action_mask"]` is an array of n rows of A numbers, 0 or 1. As in Gymnasium, `infos["_key"]` marks
+    the valid rows of `infos["key"]`.
 
-    There is no other mode: the games play on together, so none can stand still for a step as `NEXT_STEP` has it. Gymnasium's
-    `NormalizeObservation` asks for that mode and refuses this environment; most other wrappers know both. The forms "classic" and
-    "table" need no normalizing.
+    `AutoresetMode.NEXT_STEP` is not available, since no game can pause for a step. Gymnasium's `NormalizeObservation` requires it
+    and refuses this environment; most other wrappers support both. The forms "classic" and "table" are normalised.
 
-    In the rare case that a game's other seats take so many decisions that some are left for the next step, its row stays as it was,
+    In the rare case that a game's other seats have so many decisions that some are left for the next step, its row stays unchanged,
     and its next action is ignored.
     """
 
@@ -51,22 +49,22 @@ class ChefsHatVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         render_mode: str | None = None,
         **options: Any,  # noqa: ANN401 - Those of `VectorEnv`.
     ) -> None:
-        """Begins the games.
+        """Starts the games.
 
         Args:
-            address: the server; None: one of this process's own, which is started if need be.
             num_envs: n, the number of games.
-            seat: the seat that is played here.
-            observation: "classic", "table", "columns", or a function of one's own. See `Form`.
-            rewards: the scheme; see `VectorEnv`.
-            invalid: what an illegal action does; see `VectorEnv`.
-            render_mode: None; nothing can be rendered.
-            options: what else `VectorEnv` takes, but for `total_games`: games follow each other without end.
+            address: see `ChefsHatEnv`, as for `seat`, `observation`, `rewards` and `invalid`.
+            seat: the seat of the agent.
+            observation: the form of observations.
+            rewards: the scheme.
+            invalid: effect of an illegal action.
+            render_mode: only None: there is no rendering.
+            options: further arguments of `VectorEnv`, except for `total_games`: new games follow without limit.
         """
         if render_mode is not None:
             raise ValueError("many games cannot be rendered: leave render_mode out, or use ChefsHatEnv")
         if {"client_seats", "games", "total_games"} & options.keys():
-            raise ValueError("client_seats, games and total_games: give seat= and num_envs= instead, or use chefshat.VectorEnv")
+            raise ValueError("give seat= and num_envs= instead of client_seats, games and total_games, or use chefshat.VectorEnv")
         self.num_envs = num_envs
         self.vector = VectorEnv(address, num_envs, client_seats=[seat], rewards=rewards, invalid=invalid, **options)
         sizes = self.vector.sizes
@@ -75,7 +73,7 @@ class ChefsHatVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         self._form = Form(observation, sizes, self.vector.batch)
         self.single_observation_space = self._form.space_with_mask
         self.observation_space = batch_space(self.single_observation_space, num_envs)
-        # What each game was last seen like, for those that have no row in a batch.
+        # The last observation of each game, for games without a row in a batch.
         self._seen: Observed | None = None
         self._masks = np.zeros((num_envs, sizes.num_actions), np.int8)
 
@@ -85,22 +83,21 @@ class ChefsHatVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         seed: int | Sequence[int | None] | None = None,
         options: dict[str, Any] | None = None,
     ) -> tuple[Any, dict[str, Any]]:
-        """Begins new games.
+        """Starts new games.
 
         Args:
-            seed: the base seed that all games follow from; None: the next games of the last.
-            options: `{"reset_mask": mask}`: only the games where the (n,) booleans are true begin anew, the others stay as they
-            are.
+            seed: the base seed of all games; None: the next games of the last base seed.
+            options: `{"reset_mask": mask}`: resets only the games where the (n,) booleans are true.
         """
         if seed is not None and not isinstance(seed, (int, np.integer)):
-            raise TypeError("all games follow from one seed: give a number")
+            raise TypeError("one seed determines all games: give a number")
         check_open(self.vector)
         super().reset(seed=seed)
         chosen = None if options is None else options.get("reset_mask")
         if chosen is not None:
             mask = np.asarray(chosen)
             if mask.shape != (self.num_envs,) or mask.dtype != np.bool_ or seed is not None:
-                raise ValueError(f"a reset_mask is an array of {self.num_envs} booleans, and goes without a seed")
+                raise ValueError(f"a reset_mask is an array of {self.num_envs} booleans, and excludes a seed")
             batch = self.vector.reset(games=np.flatnonzero(mask))
         else:
             batch = self.vector.reset(seed)
@@ -110,7 +107,7 @@ class ChefsHatVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         """Takes the open decision of each game; `actions` are n integers."""
         check_open(self.vector)
         if self._seen is None:
-            raise gymnasium.error.ResetNeeded("no episode has begun: call reset()")
+            raise gymnasium.error.ResetNeeded("there is no running episode: call reset()")
         chosen = np.asarray(actions)
         waiting = self.vector.batch
         if len(waiting) < self.num_envs and chosen.shape == (self.num_envs,):
@@ -124,8 +121,8 @@ class ChefsHatVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         if len(batch.endings):
             endings = _first_of_each(batch.endings)
             rewards[endings.games] = endings.rewards
-            terminations[endings.games] = endings.ends == pb.EPISODE_END_FINISHED
-            truncations[endings.games] = endings.ends == pb.EPISODE_END_CUT_SHORT
+            terminations[endings.games] = ~endings.truncated
+            truncations[endings.games] = endings.truncated
             self._add_endings(infos, endings)
         return observed, rewards, terminations, truncations, infos
 
@@ -134,7 +131,7 @@ class ChefsHatVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         self.vector.close()
 
     def _observe(self, batch: Batch) -> Any:  # noqa: ANN401 - Of the space's kind.
-        """The observations of all games. Those a batch has no row for are seen as before."""
+        """Returns the observations of all games; the last one for games without a row in the batch."""
         observed = self._form.of(batch)
         masks = batch.masks.view(np.int8)
         if len(batch) < self.num_envs:
@@ -160,7 +157,7 @@ class ChefsHatVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         return infos
 
     def _add_endings(self, infos: dict[str, Any], endings: Endings) -> None:
-        """Adds what was seen at the end of episodes."""
+        """Adds the final observations."""
         ended = np.zeros(self.num_envs, np.bool_)
         ended[endings.games] = True
         observed = self._form.of(endings)
@@ -176,13 +173,13 @@ class ChefsHatVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
 
 
 def _first_of_each(endings: Endings) -> Endings:
-    """The first ending of each game: in a further one the seat had nothing to decide."""
+    """Returns the first ending of each game: the seat had no decision in further ones."""
     first = np.unique(endings.games, return_index=True)[1]
     return endings if len(first) == len(endings) else endings.take(first)
 
 
 def _put(before: NDArray[Any] | None, games: NDArray[np.uint32], rows: NDArray[Any], count: int = 0) -> NDArray[Any]:
-    """Rows put into a copy of what was there before, or into zeros."""
+    """Puts rows into a copy of the old array, or into zeros."""
     array = np.zeros((count, *rows.shape[1:]), rows.dtype) if before is None else before.copy()
     array[games] = rows
     return array

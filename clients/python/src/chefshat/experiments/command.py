@@ -19,7 +19,7 @@ from chefshat.errors import ChefsHatError, failed
 from chefshat.experiments import page, plots, results, tables
 from chefshat.experiments.progress import Progress
 from chefshat.experiments.results import Config, Result
-from chefshat.files import write_whole
+from chefshat.files import write_atomically
 from chefshat.local_server import LocalServer
 
 EXPERIMENTS = ("mechanics", "rules", "winning")
@@ -105,7 +105,7 @@ def draw(result: Result, folder: Path) -> list[Path]:
     paths = []
     for figure in result.figures:
         path = folder / page.picture_name(result, figure)
-        write_whole(path, plots.png(figure))
+        write_atomically(path, plots.png(figure))
         paths.append(path)
     return paths
 
@@ -174,7 +174,7 @@ def _fill(path: Path, made: list[Result]) -> list[Path]:
     pictures = path.parent / page.PICTURES
     pictures.mkdir(exist_ok=True)
     files = [file for result in made for file in draw(result, pictures)]
-    write_whole(path, filled)
+    write_atomically(path, filled)
     return [*files, path]
 
 

@@ -13,7 +13,7 @@ from typing import Any
 from chefshat.errors import failed
 from chefshat.experiments import plots
 from chefshat.experiments.results import Figure, Line, Panel
-from chefshat.files import check_readable, write_whole
+from chefshat.files import check_readable, write_atomically
 
 EXAMPLE = """\
 example:
@@ -78,7 +78,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     try:
         check_readable(options.report, "report", f"{PRINTED}")
-        write_whole(options.out, plots.png(figure(options.report.read_text(encoding="utf-8"))))
+        write_atomically(options.out, plots.png(figure(options.report.read_text(encoding="utf-8"))))
     except OSError as error:
         return failed(error, as_json=options.json)
     except ValueError as error:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from chefshat.files import write_whole
+from chefshat.files import write_atomically
 
 FORMAT = "chefshat-experiment-1"
 # Significant digits of the numbers in figures: more are invisible.
@@ -217,7 +217,7 @@ def write(result: Result, path: Path) -> None:
     """Writes the results file atomically."""
     # One line for each field, since curves have many numbers.
     lines = ",\n".join(f"{json.dumps(key)}: {json.dumps(value, ensure_ascii=False)}" for key, value in as_json(result).items())
-    write_whole(path, f"{{\n{lines}\n}}\n")
+    write_atomically(path, f"{{\n{lines}\n}}\n")
 
 
 def read(path: Path) -> Result:

@@ -6,7 +6,7 @@ import json
 from chefshat.errors import failed
 from chefshat.experiments import plots
 from chefshat.experiments.results import Figure, Level, Line, Panel
-from chefshat.files import check_readable, write_whole
+from chefshat.files import check_readable, write_atomically
 
 # Half the width of a 95% interval, in standard errors.
 WIDTH_95 = 1.96
@@ -58,7 +58,7 @@ def run(options: argparse.Namespace) -> int:
     try:
         check_readable(options.log, "log", "`python -m chefshat.learn ppo` writes next to its network, as .jsonl")
         drawn = figure(options.log.read_text(encoding="utf-8"))
-        write_whole(options.out, plots.png(drawn))
+        write_atomically(options.out, plots.png(drawn))
     except OSError as error:
         return failed(error, as_json=options.json)
     except ValueError as error:

@@ -17,7 +17,7 @@ import safetensors
 import safetensors.numpy
 
 from chefshat import pb
-from chefshat.files import check_readable, write_whole
+from chefshat.files import check_readable, write_atomically
 from chefshat.learn import features
 
 FORMAT = "chefshat-network-1"
@@ -251,7 +251,7 @@ def save(
             tensors[f"layer{number}.weight"], tensors[f"layer{number}.bias"] = weight.astype(dtype), bias.astype(dtype)
     if not all(np.isfinite(tensor).all() for tensor in tensors.values()):
         raise ValueError(f"its weights are too large for {dtype.__name__}")
-    write_whole(path, safetensors.numpy.save(tensors, metadata=info.metadata()))
+    write_atomically(path, safetensors.numpy.save(tensors, metadata=info.metadata()))
 
 
 def load(path: str | os.PathLike[str]) -> Network:

@@ -18,7 +18,7 @@ import safetensors.numpy
 from google.protobuf import json_format
 
 from chefshat import pb
-from chefshat.files import check_readable, write_whole
+from chefshat.files import check_readable, write_atomically
 from chefshat.learn.network import NetworkInfo
 
 State = TypeVar("State")
@@ -87,7 +87,7 @@ def save(path: str | os.PathLike[str], form: str, state: object, rules: pb.RuleS
     """
     metadata = {"format": form, "rules": rules_text(rules), **texts}
     tensors = {name: np.asarray(leaf) for name, leaf in _named(_plain(state))}
-    write_whole(path, safetensors.numpy.save(tensors, metadata=metadata))
+    write_atomically(path, safetensors.numpy.save(tensors, metadata=metadata))
 
 
 @contextmanager

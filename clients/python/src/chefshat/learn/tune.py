@@ -20,7 +20,7 @@ import optuna
 from tqdm import tqdm
 
 from chefshat.errors import ChefsHatError, failed
-from chefshat.files import write_whole
+from chefshat.files import write_atomically
 from chefshat.learn import deep_q, deep_q_training, runs
 from chefshat.learn.deep_q import DeepQConfig
 from chefshat.learn.deep_q_training import Played
@@ -179,7 +179,7 @@ def _searched(config: DeepQConfig) -> dict[str, Any]:
 
 
 def _write(options: argparse.Namespace, trials: list[Trial], again: list[Trial]) -> None:
-    write_whole(options.out, json.dumps(_as_json(options, trials, again), indent=1) + "\n")
+    write_atomically(options.out, json.dumps(_as_json(options, trials, again), indent=1) + "\n")
 
 
 def _as_json(options: argparse.Namespace, trials: list[Trial], again: list[Trial]) -> dict[str, Any]:

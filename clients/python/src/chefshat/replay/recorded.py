@@ -45,7 +45,7 @@ def from_dataset(
 ) -> Transitions:
     """The transitions of a dataset's games, as a `VectorEnv` would have given them, by game and seat.
 
-    What a seat saw at the end of an episode is not in a dataset: `after` is all zeros there. `cut_short` is not known, and false.
+    What a seat saw at the end of an episode is not in a dataset: `after` is all zeros there. `truncated` is not known, and false.
     The number of a game counts the games of the dataset. Decisions whose hand nobody knows (imported games) are left out, and the
     last of each seat in an episode that was not played to its end.
 
@@ -215,7 +215,7 @@ def _columns(table: Decisions, sizes: Sizes, steps: _Steps, scheme: str, *, by_g
     columns["invalid"] = np.zeros(len(before), np.bool_)
     columns["rewards"] = table.numbers(f"reward_{scheme}", np.float32)[before] if scheme else np.zeros(len(before), np.float32)
     columns["ended"] = ended
-    columns["cut_short"] = np.zeros(len(before), np.bool_)
+    columns["truncated"] = np.zeros(len(before), np.bool_)
     columns["game_over"] = ended & in_last & table.numbers("finished", np.bool_)[before]
     places = table.numbers("game_place" if by_game else "shift_place", np.uint8)[before]
     columns["places_taken"] = np.where(ended, places, 0).astype(np.uint8)

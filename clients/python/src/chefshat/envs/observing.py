@@ -1,7 +1,7 @@
-"""What the agents of environments see: named forms of observations, or a function of one's own, and the spaces they lie in.
+"""The observations of environments: named forms or a custom function, and their spaces.
 
-Each form turns all rows of `Situations` into observations at once. The mask of legal actions is no part of a form: each environment
-hands it out where its interface wants it.
+A form converts all rows of `Situations` at once. The mask of legal actions is not part of it: each environment adds it according to
+its interface.
 """
 
 from collections.abc import Callable
@@ -15,13 +15,13 @@ from chefshat.columns import Column, Observations, Situations, Sizes
 from chefshat.learn import features
 
 ObservationFunction: TypeAlias = Callable[[Situations], NDArray[Any]]
-"""Observations of one's own: (R, ...) numbers from the columns of R situations, a row for each. Rows depend on no other."""
+"""Computes custom observations: (R, ...) numbers from the columns of R situations, each row from one situation."""
 
 Observed: TypeAlias = "NDArray[Any] | dict[str, NDArray[Any]]"
-"""Observations of R situations: an array of R rows, or a dictionary of such."""
+"""Observations of R situations: an array of R rows, or a dictionary of such arrays."""
 
 FORMS = ("classic", "table", "columns")
-# Columns of `Situations` that the form "columns" has besides those of `Observations`.
+# Columns of `Situations` in the form "columns", besides those of `Observations`.
 _DECISION = ("seats", "kinds")
 
 
@@ -30,7 +30,7 @@ class Form:
 
     Attributes:
         space: the space of one observation.
-        space_with_mask: the same, with "action_mask" in it if observations are dictionaries: that of Gymnasium's environments.
+        space_with_mask: the same, with "action_mask" if observations are dictionaries, for Gymnasium.
         has_parts: whether an observation is a dictionary.
     """
 
@@ -41,11 +41,11 @@ class Form:
         """Chooses a form.
 
         Args:
-            observation: "classic" (the paper's vector: F + H + T numbers of 0..=1, standard 228), "table" (all that a seat may know
-                as numbers, standard 334; see `chefshat.learn.features.table`), "columns" (a dictionary of the columns as they are),
-                or a function of one's own.
-            sizes: the numbers that shapes follow from.
-            sample: some situations, to see what a function of one's own makes of them.
+            observation: "classic" (the paper's vector: F + H + T numbers of 0..=1, default 228), "table" (everything a seat may
+                know as numbers, default 334; see `chefshat.learn.features.table`), "columns" (a dictionary of the columns), or a
+                function.
+            sizes: the numbers that determine shapes.
+            sample: some situations, to determine the space of a function.
         """
         self._sizes = sizes
         self._function: ObservationFunction | None = None
@@ -59,19 +59,19 @@ class Form:
             self.space = spaces.Box(0.0, 1.0, (width,), np.float32)
         elif observation == "table":
             self._function = self._table
-            # A play of all F cards of face F with both jokers is more than one F-th for each.
+            # A play of all F cards of face F with both jokers exceeds 1.
             self.space = spaces.Box(0.0, 2.0, (features.table_width(sizes.players, sizes.faces),), np.float32)
         elif observation == "columns":
             self.space = spaces.Dict({name: _column_space(column, sizes) for name, column in _columns().items()})
         else:
             known = ", ".join(map(repr, FORMS))
-            raise ValueError(f"observation={observation!r}: choose one of {known}, or give a function of the situations")
+            raise ValueError(f"observation={observation!r}: choose one of {known}, or give a function")
         self.space_with_mask = self.space
         if isinstance(self.space, spaces.Dict):
             self.space_with_mask = spaces.Dict({**self.space, "action_mask": mask_space(sizes)})
 
     def of(self, situations: Situations) -> Observed:
-        """The observations of all rows."""
+        """Returns the observations of all rows."""
         if self._function is not None:
             return np.asarray(self._function(situations))
         seen = situations.observations
@@ -79,7 +79,7 @@ class Form:
         return {name: array.reshape(len(situations), -1) for name, array in found.items()}
 
     def row(self, observed: Observed, row: int) -> Any:  # noqa: ANN401 - An array or a dictionary of them.
-        """One observation, as a copy."""
+        """Returns a copy of one observation."""
         if isinstance(observed, dict):
             return {name: array[row].copy() for name, array in observed.items()}
         return observed[row].copy()
@@ -102,7 +102,7 @@ class Form:
 
 
 def mask_space(sizes: Sizes) -> spaces.Box:
-    """The space of a mask as Gymnasium's `Discrete.sample` wants it: A numbers, 1 where an action is legal."""
+    """Returns the space of a mask for Gymnasium's `Discrete.sample`: A numbers, 1 where an action is legal."""
     return spaces.Box(0, 1, (sizes.num_actions,), np.int8)
 
 
@@ -112,19 +112,19 @@ def _columns() -> dict[str, Column[Any]]:
 
 
 def _column_space(column: Column[Any], sizes: Sizes) -> spaces.Box:
-    """The space of a column's row; a single number is an array of one."""
+    """Returns the space of a column's row; a single number is an array of one."""
     shape = column.shape(1, sizes)[1:] or (1,)
     limits = np.iinfo(column.dtype)
     return spaces.Box(limits.min, limits.max, shape, column.dtype.type)
 
 
 def _space_of(made: NDArray[Any], rows: int) -> spaces.Box:
-    """The space of what a function of one's own makes, as wide as its type."""
+    """Returns the space of a custom function's rows, with the range of its type."""
     if made.ndim == 0 or len(made) != rows:
-        raise ValueError(f"the observation function made the shape {made.shape} of {rows} situations: one row for each is wanted")
+        raise ValueError(f"the observation function returned the shape {made.shape} for {rows} situations: return one row for each")
     if made.dtype.kind == "f":
         return spaces.Box(-np.inf, np.inf, made.shape[1:], made.dtype.type)
     if made.dtype.kind == "b":
-        raise ValueError("the observation function made booleans: make numbers of them, for instance with .astype(numpy.int8)")
+        raise ValueError("the observation function returned booleans: convert them to numbers, for example by .astype(numpy.int8)")
     limits = np.iinfo(made.dtype)
     return spaces.Box(limits.min, limits.max, made.shape[1:], made.dtype.type)

@@ -1,4 +1,4 @@
-"""A seat's situation as text, for people: what `render` of the environments shows."""
+"""Formats a seat's situation as text, for `render` of the environments."""
 
 import functools
 
@@ -9,7 +9,7 @@ from chefshat.client import Client
 from chefshat.columns import Situations
 
 RENDER_MODES = ("ansi", "human")
-# Legal actions that are listed; the others are counted.
+# Maximum number of legal actions listed; further ones are counted.
 MAX_LISTED = 12
 
 
@@ -21,13 +21,13 @@ def check_render_mode(render_mode: str | None) -> None:
 
 @functools.cache
 def action_texts(address: str, faces: int) -> tuple[str, ...]:
-    """The texts of all actions, from the server."""
+    """Fetches the texts of all actions."""
     with Client(address) as client:
         return tuple(client.action_table(faces).texts)
 
 
 def as_text(situations: Situations, row: int, texts: tuple[str, ...]) -> str:
-    """The situation of one row, in some lines."""
+    """Formats the situation of one row."""
     seen = situations.observations
     faces = situations.sizes.faces
     seat = int(situations.seats[row])
@@ -66,7 +66,7 @@ def _asked(situations: Situations, row: int) -> str:
 
 
 def _role(role: int) -> str:
-    """The name of a role; empty for none."""
+    """Returns the name of a role; empty for none."""
     names = {pb.ROLE_CHEF: "Chef", pb.ROLE_SOUS_CHEF: "Sous-Chef", pb.ROLE_COOK: "Cook"}
     names |= {pb.ROLE_WAITER: "Waiter", pb.ROLE_DISHWASHER: "Dishwasher"}
     return names.get(role, "")  # type: ignore[call-overload, no-any-return]
