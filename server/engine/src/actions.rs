@@ -1,5 +1,5 @@
-//! The numbering of actions: what each index means, and its text. The numbering depends on the
-//! number of faces alone; what is legal is the game's affair.
+//! Actions, their indices and their texts (`docs/rules.md` §8.1). The numbering depends on the number
+//! of faces alone. `game::legal` decides what is legal.
 
 use std::fmt;
 

@@ -3,7 +3,7 @@
 
 use std::fmt;
 
-use crate::{Face, MAX_FACES};
+use crate::{Action, Face, MAX_FACES};
 
 /// Bits of one count.
 const BITS: u32 = 4;
@@ -150,6 +150,22 @@ impl Cards {
             && (1..=MAX_FACES).all(|number| self.count_of(number) >= other.count_of(number))
     }
 
+    /// Whether a hand of these cards has those that an action plays or gives. True of actions that
+    /// need no cards.
+    #[inline]
+    pub fn holds(self, action: Action) -> bool {
+        match action {
+            Action::Play {
+                face,
+                quantity,
+                jokers,
+            } => self.count(face) >= quantity && self.jokers() >= jokers,
+            Action::LoneJoker | Action::GiveJoker => self.jokers() > 0,
+            Action::Give(face) => self.count(face) > 0,
+            Action::Pass | Action::Decline | Action::Declare => true,
+        }
+    }
+
     /// These cards without `n` of a face; the Golden card goes last of its face. `None` if there
     /// are not so many.
     pub fn without_face(self, face: Face, n: u8) -> Option<Cards> {
@@ -233,10 +249,12 @@ impl Cards {
         taken
     }
 
-    /// The cards whose bits are in a set of bits of faces; no jokers, and the Golden card is not
-    /// told apart.
-    pub(crate) const fn among_faces(self, bits: u64) -> Cards {
-        Cards(self.0 & bits & FACE_BITS)
+    /// The cards of the faces from `lowest` to `highest`, 1..=15; none if `highest` is 0. Without
+    /// jokers and without the Golden card's flag.
+    pub(crate) const fn between_faces(self, lowest: u8, highest: u8) -> Cards {
+        let up_to = (1u64 << (BITS * highest as u32)) - 1;
+        let below = (1u64 << (BITS * (lowest as u32 - 1))) - 1;
+        Cards(self.0 & up_to & !below)
     }
 
     /// Whether any face has at least `need` cards (`need` >= 1). Only for cards without jokers.

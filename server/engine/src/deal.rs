@@ -1,6 +1,6 @@
-//! The deal: which cards each seat gets in a Shift, a function of rule set, seed and number of the
-//! Shift. The shuffle is spelled out here word for word, because records must replay to the same
-//! cards on any machine for ever; no library's shuffle may replace it.
+//! The deal: which cards each seat gets in a Shift, as a function of rule set, seed and Shift number
+//! (`docs/rules.md` §3.1, §8.5). The shuffle is written out here, because records must replay to
+//! the same cards on every machine; no library's shuffle may replace it.
 
 use std::fmt;
 
@@ -115,8 +115,8 @@ impl Deal {
     }
 }
 
-/// Who takes a Shift's first turn: the holder of the Golden card, or the first seat from the drawn
-/// one that holds the top face.
+/// The seat that takes a Shift's first turn (§3.5): the holder of the Golden card, or with
+/// [`Opening::AnyTopFace`] (§7.3) the first seat from the drawn one that holds the top face.
 pub(crate) fn opening_leader(rules: &RuleSet, hands: &BySeat<Cards>, drawn: Option<Seat>) -> Seat {
     let (first, players) = (drawn.map_or(0, Seat::index), rules.players());
     (0..players)

@@ -27,6 +27,7 @@ mod by_seat;
 mod cards;
 mod deal;
 mod event;
+mod exchange;
 mod game;
 mod ids;
 mod mask;
@@ -36,7 +37,6 @@ mod order;
 mod patterns;
 mod played;
 mod presets;
-mod requirement;
 mod rewards;
 mod roles;
 mod rules;
@@ -47,14 +47,17 @@ pub use by_seat::BySeat;
 pub use cards::Cards;
 pub use deal::{Card, Deal, Seed};
 pub use event::{Event, Viewer};
-pub use game::{ActionError, Decision, DecisionKind, Game, Refusal, Script, ScriptError};
+pub use exchange::ExchangePair;
+pub use game::{
+    ActionError, Decision, DecisionKind, Game, GiftRequirement, PlayRequirement, Refusal,
+    Requirement, Script, ScriptError,
+};
 pub use ids::{ActionId, Face, Seat};
 pub use mask::Mask;
 pub use metrics::{MetricsRecorder, SeatMetrics, ShiftMetrics};
 pub use observation::{Board, Observation};
 pub use order::{SeatOrder, Standings};
 pub use played::{PlayedDecision, RecordedDecision, TakenOver};
-pub use requirement::{GiftRequirement, PlayRequirement, Requirement};
 pub use rewards::RewardScheme;
 pub use roles::{Role, SpecialAction};
 pub use rules::{Opening, PassScope, RuleSet, RuleSetError, RuleSetSpec, Stop};

@@ -1,5 +1,5 @@
-//! What the paper and this project count in each Shift, gathered from events. How games are
-//! averaged and printed is not decided here.
+//! Metrics of each Shift (`docs/rules.md` §8.7), collected from events. Averaging over games and
+//! printing are left to others.
 
 use crate::{BySeat, Event, Game, RewardScheme, RuleSet, Seat, SeatOrder, SpecialAction, Viewer};
 

@@ -1,5 +1,5 @@
-//! What a seat may know of a game, as one value, and the paper's classic vector of it. How a game
-//! fills it in is in `game::view`; the mask of legal actions is not part of it
+//! What a seat may know of a game (`docs/rules.md` §8.4) as one value, and the paper's classic vector.
+//! `game::view` fills it in. The mask of legal actions is separate
 //! ([`crate::Game::legal_actions`]).
 
 use crate::game::default_gift;
@@ -56,8 +56,8 @@ pub struct Observation {
 }
 
 impl Observation {
-    /// The default decision ([`crate::Game::default_action`]) as it follows from what the seat sees
-    /// and from its legal actions. `None` if no decision is open for the seat, or nothing is legal.
+    /// The default decision ([`crate::Game::default_action`], §8.3), from what the seat sees
+    /// and its legal actions. `None` if no decision is open for the seat, or nothing is legal.
     pub fn default_action(&self, legal: &Mask) -> Option<ActionId> {
         let space = ActionSpace::of(self.faces);
         let default = match self.kind? {

@@ -57,7 +57,8 @@ impl SeatOrder {
         self.len += 1;
     }
 
-    pub(crate) fn reverse(&mut self) {
+    /// Reverses the order: the last seat becomes the first.
+    pub fn reverse(&mut self) {
         self.seats[..usize::from(self.len)].reverse();
     }
 

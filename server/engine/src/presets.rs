@@ -1,5 +1,5 @@
-//! The named presets. A preset is a starting point: any field can be overridden before the rule set
-//! is validated.
+//! The named presets (`docs/rules.md` §7.4). A preset is a starting point: any field can be changed
+//! before validation.
 
 use crate::{Opening, PassScope, RuleSetSpec, Stop};
 

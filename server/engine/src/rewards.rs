@@ -1,5 +1,5 @@
-//! Rewards by named schemes, worked out from events. Agents that want others can define their own
-//! from the same events.
+//! Rewards by named schemes (`docs/rules.md` §8.6), computed from events. Agents can compute their
+//! own from the same events.
 
 use crate::{Event, RuleSet, Seat};
 

@@ -1,9 +1,9 @@
-//! Roles and special actions. Who gets which role is decided by the places of the last Shift.
+//! Roles (`docs/rules.md` §3.2) and special actions (§3.3).
 
-use crate::{BySeat, SeatOrder};
+use crate::{BySeat, Seat, SeatOrder};
 
-/// A seat's standing in a Shift, by its place in the Shift before. There are none in the first
-/// Shift.
+/// The role of a seat in a Shift, given by its place in the last Shift. The first Shift has no
+/// roles.
 #[derive(Copy, Clone, Eq, PartialEq, Ord, PartialOrd, Hash, Debug)]
 pub enum Role {
     /// Finished the last Shift first.
@@ -70,6 +70,15 @@ pub enum SpecialAction {
 }
 
 impl SpecialAction {
+    /// The special action that a seat may declare, given the seats from Chef to Dishwasher.
+    pub fn of_seat(seat: Seat, ranking: &SeatOrder) -> SpecialAction {
+        if ranking.as_slice().last() == Some(&seat) {
+            SpecialAction::FoodFight
+        } else {
+            SpecialAction::DinnerIsServed
+        }
+    }
+
     /// The special action's name as the rulebook prints it.
     pub const fn name(self) -> &'static str {
         match self {

@@ -1,5 +1,5 @@
-//! Rule sets: what may be varied, as somebody asks for it ([`RuleSetSpec`]) and as the engine plays
-//! it ([`RuleSet`], validated once). The named presets live in `presets`.
+//! Rule sets (`docs/rules.md` §7): unvalidated ([`RuleSetSpec`]), and validated once ([`RuleSet`]). The
+//! named presets are in `presets`.
 
 use std::ops::RangeInclusive;
 

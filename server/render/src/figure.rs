@@ -1,11 +1,12 @@
 //! The look-up table of a decision, as in the paper's figure of possible actions: every action of a turn by face, quantity and jokers,
 //! and what is to be said of it for one hand at one moment. A value; how it is drawn is in `figure_svg`.
 
-use chefshat_engine::{Action, ActionId, Cards, Face, Game, Mask, Seat};
+use chefshat_engine::{
+    Action, ActionSpace, BySeat, Cards, DecisionKind, Face, Game, Mask, Requirement, Seat, Viewer,
+};
 
 use super::chronicle::{Chronicle, Participant};
-use super::scene::{Card, Demand, Now, Scene};
-use chefshat_engine::{BySeat, DecisionKind, Viewer};
+use super::scene::{Card, Scene};
 
 /// What is to be said of an action: whether the rules allow it now, whatever the hand is, and whether the hand holds its cards, whatever
 /// lies on the board.
@@ -42,8 +43,8 @@ pub struct Figure {
     pub hand: Vec<Card>,
     /// The cards on the board.
     pub board: Vec<Card>,
-    /// What a play must be; `None` if the decision is no turn.
-    pub demand: Option<Demand>,
+    /// What the rules require of the decision.
+    pub requirement: Requirement,
     /// The plays of each face, from face 1: of each quantity, from 1 to the face: without a joker, with one, and so on.
     pub plays: Vec<Vec<Vec<State>>>,
     /// A joker alone, where the deck has jokers.
@@ -67,18 +68,11 @@ impl Figure {
         let (faces, jokers) = (rules.faces(), rules.jokers());
         let known = BySeat::filled(rules.players(), true);
         let scene = Scene::of(game, chronicle, Viewer::Seat(seat), &known);
-        let (demand, may_pass) = match scene.now {
-            Now::Turn {
-                demand, may_pass, ..
-            } => (Some(demand), may_pass),
-            _ => (None, false),
-        };
-        let table = Table {
+        let table = LookUp {
             space: rules.actions(),
             hand: game.hands()[seat],
             legal: game.legal_actions(),
-            demand,
-            may_pass,
+            requirement: game.requirement()?,
         };
         let plays = (1..=faces)
             .filter_map(Face::new)
@@ -86,7 +80,13 @@ impl Figure {
                 (1..=face.get())
                     .map(|quantity| {
                         (0..=jokers)
-                            .map(|jokers| table.play(face, quantity, jokers))
+                            .map(|jokers| {
+                                table.state(Action::Play {
+                                    face,
+                                    quantity,
+                                    jokers,
+                                })
+                            })
                             .collect()
                     })
                     .collect()
@@ -108,7 +108,7 @@ impl Figure {
             jokers,
             hand: super::scene::cards(table.hand, faces),
             board: scene.board,
-            demand,
+            requirement: table.requirement,
             plays,
             lone_joker: (jokers > 0).then(|| table.state(Action::LoneJoker)),
             pass: table.state(Action::Pass),
@@ -128,67 +128,34 @@ impl Figure {
 }
 
 /// What the states follow from.
-struct Table {
-    space: chefshat_engine::ActionSpace,
+struct LookUp {
+    space: ActionSpace,
     hand: Cards,
     legal: Mask,
-    demand: Option<Demand>,
-    may_pass: bool,
+    requirement: Requirement,
 }
 
-impl Table {
-    fn play(&self, face: Face, quantity: u8, jokers: u8) -> State {
-        self.state(Action::Play {
-            face,
-            quantity,
-            jokers,
-        })
-    }
-
-    fn state(&self, meaning: Action) -> State {
-        let action: Option<ActionId> = self.space.encode(meaning);
-        let in_hand = match meaning {
-            Action::Play {
-                face,
-                quantity,
-                jokers,
-            } => self.hand.count(face) >= quantity && self.hand.jokers() >= jokers,
-            Action::LoneJoker | Action::GiveJoker => self.hand.jokers() > 0,
-            Action::Give(face) => self.hand.count(face) > 0,
-            Action::Pass | Action::Decline | Action::Declare => true,
-        };
-        if action.is_some_and(|action| self.legal.contains(action)) {
-            State::Legal
-        } else {
-            match (in_hand, self.allowed(meaning)) {
-                (true, _) => State::NotAllowed,
-                (false, true) => State::NotInHand,
-                (false, false) => State::Impossible,
-            }
+impl LookUp {
+    fn state(&self, action: Action) -> State {
+        let legal = self
+            .space
+            .encode(action)
+            .is_some_and(|id| self.legal.contains(id));
+        match (legal, self.hand.holds(action), self.allows(action)) {
+            (true, _, _) => State::Legal,
+            (false, true, _) => State::NotAllowed,
+            (false, false, true) => State::NotInHand,
+            (false, false, false) => State::Impossible,
         }
     }
 
-    /// Whether the rules allow a move now to a hand that holds its cards.
-    fn allowed(&self, meaning: Action) -> bool {
-        match (meaning, self.demand) {
-            (Action::Pass, _) => self.may_pass,
-            (Action::LoneJoker, demand) => demand == Some(Demand::Anything),
-            (Action::Play { .. }, None) => false,
-            (
-                Action::Play {
-                    face,
-                    quantity,
-                    jokers,
-                },
-                Some(demand),
-            ) => match demand {
-                Demand::Anything => true,
-                Demand::Golden(only) | Demand::Face(only) => face.get() == only,
-                Demand::Beat { face: most, size } => {
-                    face.get() <= most && quantity + jokers >= size
-                }
-            },
-            (Action::Give(_) | Action::GiveJoker | Action::Decline | Action::Declare, _) => true,
+    /// Whether the rules allow an action now to a hand that holds its cards.
+    fn allows(&self, action: Action) -> bool {
+        match (self.requirement, action) {
+            (Requirement::Play(play), _) => play.allows(action),
+            (Requirement::Gift(_), Action::Give(_) | Action::GiveJoker) => true,
+            (Requirement::SpecialAction(_), Action::Declare | Action::Decline) => true,
+            _ => false,
         }
     }
 }

@@ -2,12 +2,13 @@
 
 use std::collections::BTreeSet;
 
+use chefshat_engine::Requirement;
 use serde::Serialize;
 
 use super::chronicle::Sort;
 use super::figure::{Figure, State};
 use super::paint::Painter;
-use super::scene::{Demand, Hand};
+use super::scene::Hand;
 use super::table::hand::{Drawing, Drawn, Label, Placed, lay_out};
 
 /// Width of the picture in its own units.
@@ -196,22 +197,23 @@ fn subtitle(figure: &Figure) -> String {
     } else {
         format!("Shift {}, pizza {}", figure.shift, figure.pizza)
     };
-    let demand = match figure.demand {
-        None if figure.special.is_empty() => "one card is to be given".to_owned(),
-        None => "a special action may be declared".to_owned(),
-        Some(Demand::Anything) => "the board is empty, any play opens the pizza".to_owned(),
-        Some(Demand::Golden(face)) => {
-            format!("face {face} with the Golden card opens the Shift")
-        }
-        Some(Demand::Face(face)) => format!("face {face} opens the Shift"),
-        Some(Demand::Beat { face: 0, .. }) => "nothing is rarer than what lies there".to_owned(),
-        Some(Demand::Beat { face, size }) => {
-            format!("face {face} or rarer beats the board, {size} or more cards")
-        }
+    let required = match figure.requirement {
+        Requirement::Gift(_) => "one card is to be given".to_owned(),
+        Requirement::SpecialAction(_) => "a special action may be declared".to_owned(),
+        Requirement::Play(play) => match play.highest_face {
+            _ if play.lone_joker => "the board is empty, any play opens the pizza".to_owned(),
+            face if play.golden_card => format!("face {face} with the Golden card opens the Shift"),
+            face if play.is_opening() => format!("face {face} opens the Shift"),
+            0 => "nothing is rarer than what lies there".to_owned(),
+            face => format!(
+                "face {face} or rarer beats the board, {} or more cards",
+                play.fewest_cards
+            ),
+        },
     };
     let legal = match figure.legal {
         1 => "1 action is legal".to_owned(),
         legal => format!("{legal} actions are legal"),
     };
-    format!("{moment}: {demand}; {legal}.")
+    format!("{moment}: {required}; {legal}.")
 }

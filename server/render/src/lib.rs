@@ -18,4 +18,4 @@ pub use figure::{Figure, State};
 pub use film::{Eyes, Film, FilmError, Frame, When, figure_at};
 pub use gif::{GifError, GifWriter, Palette};
 pub use paint::{MAX_WIDTH, MIN_WIDTH, PaintError, Painter, Pixels};
-pub use scene::{Card, Demand, Hand, Now, Scene, SeatScene};
+pub use scene::{Card, Hand, Now, Scene, SeatScene};

@@ -3,7 +3,8 @@
 //! a record becomes a row of scenes, in `film`.
 
 use chefshat_engine::{
-    BySeat, Cards, DecisionKind, Event, Game, Opening, Role, Seat, Standings, Viewer,
+    BySeat, Cards, DecisionKind, Event, Game, Opening, PlayRequirement, Requirement, Role, Seat,
+    SpecialAction, Standings, Viewer,
 };
 
 use super::chronicle::{Chronicle, Happening, Participant};
@@ -102,18 +103,16 @@ impl Card {
 pub enum Now {
     /// The cards have been dealt; the viewer may not know what is decided.
     Dealt,
-    /// This seat may declare a special action.
-    Special(Seat),
-    /// This seat gives a card.
-    Exchange(Seat),
+    /// This seat may declare this special action.
+    Special(Seat, SpecialAction),
+    /// The first seat gives a card to the second.
+    Exchange(Seat, Seat),
     /// This seat plays or passes.
     Turn {
         /// The seat.
         seat: Seat,
-        /// What a play must be.
-        demand: Demand,
-        /// Whether it may pass.
-        may_pass: bool,
+        /// What a play must be, and whether passing is legal.
+        requirement: PlayRequirement,
     },
     /// The Shift has just ended.
     ShiftOver {
@@ -126,24 +125,6 @@ pub enum Now {
     GameOver(Standings),
     /// The game ended without a result.
     Aborted,
-}
-
-/// What a play must be.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Demand {
-    /// Any play opens the pizza.
-    Anything,
-    /// Cards of this face, the Golden one among them.
-    Golden(u8),
-    /// Cards of this face.
-    Face(u8),
-    /// So many cards at least, of this face or a lower one.
-    Beat {
-        /// The highest face allowed; 0 if none is.
-        face: u8,
-        /// The fewest cards allowed.
-        size: u8,
-    },
 }
 
 impl Scene {
@@ -275,27 +256,11 @@ fn now(game: &Game, viewer: Viewer) -> Now {
         return Now::Dealt;
     };
     let seat = decision.seat;
-    match decision.kind {
-        DecisionKind::SpecialAction if !sees(viewer, seat) => Now::Dealt,
-        DecisionKind::SpecialAction => Now::Special(seat),
-        DecisionKind::Exchange => Now::Exchange(seat),
-        DecisionKind::Turn => Now::Turn {
-            seat,
-            demand: demand(game),
-            may_pass: game.legal_actions().contains(game.rules().actions().pass()),
-        },
-    }
-}
-
-fn demand(game: &Game) -> Demand {
-    let (rules, board) = (game.rules(), game.observe(Viewer::Spectator).board);
-    match (game.shift_turns(), rules.opening()) {
-        (0, Opening::Golden) => Demand::Golden(rules.faces()),
-        (0, Opening::AnyTopFace) => Demand::Face(rules.faces()),
-        _ if board.size == 0 => Demand::Anything,
-        _ => Demand::Beat {
-            face: board.face - 1,
-            size: board.size,
-        },
+    match game.requirement() {
+        None => Now::Dealt,
+        Some(Requirement::SpecialAction(_)) if !sees(viewer, seat) => Now::Dealt,
+        Some(Requirement::SpecialAction(special)) => Now::Special(seat, special),
+        Some(Requirement::Gift(gift)) => Now::Exchange(seat, gift.receiver),
+        Some(Requirement::Play(requirement)) => Now::Turn { seat, requirement },
     }
 }

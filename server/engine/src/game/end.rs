@@ -1,50 +1,50 @@
-//! How a Shift and a game end: places, points, the final table.
+//! The end of a Shift and of a game (`docs/rules.md` §5): places, points, final table.
 
-use super::table::bit;
+use super::shift_state::bit;
 use super::{Game, Stage};
 use crate::{BySeat, Deal, Event, Seat, SeatOrder, Standings, Stop};
 
 impl Game {
-    /// Orders the seats that still hold cards when a Shift reaches its limit of turns: fewest cards
-    /// first, ties by their distance to the left of the seat that acted last. They get their places
-    /// in [`Game::end_shift`].
+    /// Orders the seats that still hold cards when a Shift reaches its limit of turns (§5.4): fewest
+    /// cards first, ties by distance to the left of the seat that acted last. [`Game::end_shift`]
+    /// gives them their places.
     pub(super) fn adjudicate(&mut self, acted_last: Seat) {
-        let table = &self.table;
+        let state = &self.state;
         let mut waiting = SeatOrder::EMPTY;
         for seat in self
             .hands
             .seats()
-            .filter(|&seat| table.holding & bit(seat) != 0)
+            .filter(|&seat| state.holding & bit(seat) != 0)
         {
             waiting.push(seat);
         }
         waiting.sort_by_key(|&seat| {
             (
                 self.cards_left[seat],
-                table.distance_left(acted_last, bit(seat)),
+                state.distance_left(acted_last, bit(seat)),
             )
         });
         for &seat in waiting.as_slice() {
-            self.table.order.push(seat);
+            self.state.order.push(seat);
         }
     }
 
     /// Gives the points of the Shift and starts the next one, or ends the game.
     pub(super) fn end_shift(&mut self, adjudicated: bool, on_event: &mut impl FnMut(Event)) {
         let finished = self
-            .table
+            .state
             .places
             .values()
             .filter(|&&place| place > 0)
             .count() as u8;
         if !adjudicated {
-            let last = Seat::new(self.table.holding.trailing_zeros() as usize);
-            self.table.order.push(last);
+            let last = Seat::new(self.state.holding.trailing_zeros() as usize);
+            self.state.order.push(last);
         }
-        let order = self.table.order;
+        let order = self.state.order;
         let mut points = BySeat::filled(order.len(), 0);
         for (&seat, place) in order.as_slice().iter().zip(1u8..) {
-            self.table.places[seat] = place;
+            self.state.places[seat] = place;
             points[seat] = self.rules.points(place);
             // Fewer than 2^32 Shifts of less than 2^32 points each cannot exceed 64 bits.
             self.scores[seat] += u64::from(points[seat]);
@@ -56,10 +56,10 @@ impl Game {
             finished,
             points,
             scores: self.scores,
-            starter: self.table.starter,
-            pizzas: self.table.pizza,
-            laps: self.table.laps,
-            turns: self.table.turns,
+            starter: self.state.starter,
+            pizzas: self.state.pizza,
+            laps: self.state.laps,
+            turns: self.state.turns,
             special: self.special,
             adjudicated,
         });
@@ -87,7 +87,7 @@ impl Game {
             }
     }
 
-    /// Most points first, ties broken by the better place in the last Shift.
+    /// Most points first, ties broken by the better place in the last Shift (§5.3).
     pub(super) fn final_table(&self) -> Standings {
         let mut order = self.last_order;
         // The sort is stable, so seats with equal points keep the order of the last Shift.

@@ -1,46 +1,85 @@
-//! What is legal: as a mask of all legal actions, as the reason why a single one is not, and the
-//! default decision. Mask and reason are written apart, for speed; a property test holds them
-//! together.
+//! What is legal. This file states the rules of a decision once: [`PlayRequirement`] says what the
+//! board and the rule set ask of a turn, and a turn is legal if it meets that and the hand holds
+//! its cards. `crate::patterns` lists all legal turns by table look-up; a test compares its masks
+//! with [`PlayRequirement::allows`] in random games, and with a second implementation of the rules.
 
-use super::start::{CHEF_GIFTS, SOUS_CHEF_GIFTS};
-use super::{Game, Refusal, Stage};
-use crate::patterns::{PATTERNS, turn_mask};
+use super::{ActionError, Game, Refusal, Stage};
+use crate::patterns::turn_mask;
 use crate::{
-    Action, ActionId, Cards, Face, GiftRequirement, Mask, Opening, PlayRequirement, Requirement,
-    Seat,
+    Action, ActionId, ActionSpace, Cards, ExchangePair, Face, Mask, Opening, Seat, SpecialAction,
 };
 
-impl Game {
-    /// The legal actions of the open decision; none if the game has ended.
+/// What the rules require of the open decision. It follows from public facts alone, so it reveals
+/// no hidden card, and a client that has it needs no rules of its own.
+#[derive(Copy, Clone, Eq, PartialEq, Hash, Debug)]
+pub enum Requirement {
+    /// A turn: what a play must be, and whether passing is legal.
+    Play(PlayRequirement),
+    /// A gift in the exchange.
+    Gift(GiftRequirement),
+    /// The special action that may be declared or declined.
+    SpecialAction(SpecialAction),
+}
+
+/// What a turn must be (`docs/rules.md` §4.2 to §4.5). A play is legal if it meets this and the hand
+/// holds its cards.
+#[derive(Copy, Clone, Eq, PartialEq, Hash, Debug)]
+pub struct PlayRequirement {
+    /// The lowest face allowed: F on the Shift's first turn, 1 on all others.
+    pub lowest_face: u8,
+    /// The highest face allowed, 0..=F; 0 if no play beats the board.
+    pub highest_face: u8,
+    /// The fewest cards allowed, jokers included, at least 1.
+    pub fewest_cards: u8,
+    /// The play includes the Golden card. On the turn that requires it, the Golden card is played
+    /// before all others of its face, so every play of that face includes it.
+    pub golden_card: bool,
+    /// Whether one joker may be played alone.
+    pub lone_joker: bool,
+    /// Whether passing is legal.
+    pub may_pass: bool,
+}
+
+impl PlayRequirement {
+    /// Whether the rules allow an action at this turn to a hand that holds its cards. Only plays
+    /// and passes are turns.
     #[inline]
-    pub fn legal_actions(&self) -> Mask {
-        match self.stage {
-            Stage::Turn(seat) => self.legal_turns(seat),
-            Stage::Exchange { giver, .. } => self.legal_gifts(giver),
-            Stage::Special(_) => {
-                let space = self.rules.actions();
-                Mask::from_actions([space.decline(), space.declare()])
+    pub fn allows(&self, action: Action) -> bool {
+        match action {
+            Action::Play {
+                face,
+                quantity,
+                jokers,
+            } => {
+                (self.lowest_face..=self.highest_face).contains(&face.get())
+                    && quantity + jokers >= self.fewest_cards
             }
-            Stage::Over => Mask::EMPTY,
+            Action::LoneJoker => self.lone_joker,
+            Action::Pass => self.may_pass,
+            Action::Give(_) | Action::GiveJoker | Action::Decline | Action::Declare => false,
         }
     }
 
-    /// The decision that is taken for a seat that takes none: pass if that is legal, else the
-    /// lowest legal turn; give the highest plain face, else the Golden card, else a joker; decline.
-    /// `None` if the game has ended.
-    pub fn default_action(&self) -> Option<ActionId> {
-        let space = self.rules.actions();
-        match self.stage {
-            Stage::Turn(seat) if self.check_pass().is_err() => self.legal_turns(seat).nth(0),
-            Stage::Turn(_) => Some(space.pass()),
-            Stage::Exchange { giver, .. } => Some(default_gift(self.hands[giver], space)),
-            Stage::Special(_) => Some(space.decline()),
-            Stage::Over => None,
-        }
+    /// Whether this is the Shift's first turn.
+    pub fn is_opening(&self) -> bool {
+        self.lowest_face > 1
     }
+}
 
-    /// What the rules require of the open decision; `None` if the game has ended. It tells no card
-    /// of any hand, so everyone who may know of the decision may see it.
+/// Which gift of the exchange is due (`docs/rules.md` §3.4). Any card of the hand may be given.
+#[derive(Copy, Clone, Eq, PartialEq, Hash, Debug)]
+pub struct GiftRequirement {
+    /// Which of the seat's gifts this is, from 1.
+    pub number: u8,
+    /// How many cards the seat gives in all, 1 or 2. `None` while the seat may not know: with very
+    /// small hands its partner may hold too few ingredient cards, and both give the same number.
+    pub total: Option<u8>,
+    /// The seat that receives the card.
+    pub receiver: Seat,
+}
+
+impl Game {
+    /// What the rules require of the open decision; `None` if the game has ended.
     pub fn requirement(&self) -> Option<Requirement> {
         match self.stage {
             Stage::Turn(_) => Some(Requirement::Play(self.play_requirement())),
@@ -52,158 +91,147 @@ impl Game {
         }
     }
 
+    #[inline]
     fn play_requirement(&self) -> PlayRequirement {
-        let (top, board) = (self.rules.faces(), self.table.board);
-        let (opens, empty) = (self.table.is_first_turn(), board.face == 0);
+        let (top, board) = (self.rules.faces(), self.state.board);
+        let (opening, empty) = (self.state.is_first_turn(), board.face == 0);
         PlayRequirement {
-            lowest_face: if opens { top } else { 1 },
+            // §4.4: the first turn plays the top face, under the default rules the Golden card.
+            lowest_face: if opening { top } else { 1 },
+            // §4.3: a lower face than the board's, and at least as many cards. A lone joker counts
+            // as face F+1.
             highest_face: if empty { top } else { board.face - 1 },
             fewest_cards: board.size.max(1),
-            golden_card: opens && self.rules.opening() == Opening::Golden,
-            lone_joker: empty && !opens,
-            may_pass: self.check_pass().is_ok(),
+            golden_card: opening && self.rules.opening() == Opening::Golden,
+            // §4.2, §4.3: a joker alone only starts a pizza.
+            lone_joker: empty && !opening,
+            may_pass: self.pass_refusal().is_none(),
+        }
+    }
+
+    /// Why the open turn may not be a pass (§4.4, §5.4); `None` if it may.
+    #[inline]
+    fn pass_refusal(&self) -> Option<Refusal> {
+        let state = &self.state;
+        if state.is_first_turn() && !self.rules.opening_pass() {
+            Some(Refusal::MayNotPassFirst)
+        } else if state.idle >= self.rules.max_idle_pizzas() {
+            // The leader must play, which resets the count: no other seat meets this.
+            Some(Refusal::MayNotPassIdle(state.idle))
+        } else {
+            None
         }
     }
 
     fn gift_requirement(&self, giver: Seat, chef_left: u8) -> GiftRequirement {
-        let (rank, most) = if chef_left > 0 {
-            (0, CHEF_GIFTS)
-        } else {
-            (1, SOUS_CHEF_GIFTS)
-        };
+        let rank = usize::from(chef_left == 0);
+        let pair = ExchangePair::of_rank(&self.ranking, rank).expect("the exchange is open");
         let number = self.gave[giver].len() + 1;
-        // The partner's hand decides how many cards are given. It can fall short only if all jokers
-        // of the deck leave too little room in it; that a last gift is due tells that it does not.
-        let certain = number == most || self.rules.hand_size() >= most + self.rules.jokers();
+        // The hidden hand of the partner decides how many cards are given. The giver knows the
+        // number if no hand can fall short of it, or if it is asked for the last gift there can be.
+        let known = number == pair.size || pair.least_gifts(&self.rules) == pair.size;
         GiftRequirement {
             number,
-            total: certain.then_some(most),
-            receiver: self.ranked_from_last(rank),
+            total: known.then_some(pair.size),
+            receiver: pair.forced,
         }
     }
 
-    fn legal_turns(&self, seat: Seat) -> Mask {
-        let (hand, table, faces) = (self.hands[seat], &self.table, self.rules.faces());
-        let (jokers, size) = (hand.jokers(), table.board.size);
-        // A face on the board, F+1 included, leaves the faces below it; an empty board all.
-        let below = if table.board.face == 0 {
-            faces + 1
+    /// Checks a turn of a seat.
+    #[inline]
+    pub(super) fn check_turn(&self, seat: Seat, action: Action) -> Result<(), ActionError> {
+        let required = self.play_requirement();
+        if !self.hands[seat].holds(action) {
+            Err(ActionError::not_legal(action, Refusal::NotInHand))
+        } else if !required.allows(action) {
+            Err(ActionError::not_legal(
+                action,
+                self.refusal(&required, action),
+            ))
         } else {
-            table.board.face
-        };
-        let mut allowed = (1u64 << (4 * (below - 1))) - 1;
-        if table.is_first_turn() {
-            allowed = 0xF << (4 * (faces - 1));
+            Ok(())
         }
-        let playable = hand.among_faces(allowed);
-        let possible = playable.has_face_with_at_least(size.saturating_sub(jokers).max(1));
-        let patterns = &PATTERNS[usize::from(jokers)][usize::from(size)];
-        let lone_joker = size == 0 && jokers > 0 && !table.is_first_turn();
+    }
+
+    /// Checks a gift of a seat: it holds the card.
+    pub(super) fn check_gift(&self, giver: Seat, gift: Action) -> Result<(), ActionError> {
+        if self.hands[giver].holds(gift) {
+            Ok(())
+        } else {
+            Err(ActionError::not_legal(gift, Refusal::NotInHand))
+        }
+    }
+
+    /// Why a turn does not meet its requirement.
+    #[cold]
+    fn refusal(&self, required: &PlayRequirement, action: Action) -> Refusal {
+        let board = self.state.board;
+        match action {
+            Action::Pass => self.pass_refusal().expect("a pass is refused for a reason"),
+            _ if required.is_opening() => {
+                let face = Face::of(self.rules.faces());
+                match self.rules.opening() {
+                    Opening::Golden => Refusal::MustPlayGolden(face),
+                    Opening::AnyTopFace => Refusal::MustPlayTopFace(face),
+                }
+            }
+            Action::Play { face, .. } if face.get() <= required.highest_face => {
+                Refusal::TooFewCards { board: board.size }
+            }
+            Action::Play { .. } => Refusal::FaceNotLower { board: board.face },
+            _ => Refusal::JokerOnlyOpens,
+        }
+    }
+
+    /// The legal actions of the open decision; none if the game has ended.
+    #[inline]
+    pub fn legal_actions(&self) -> Mask {
+        match self.stage {
+            Stage::Turn(seat) => self.legal_turns(seat),
+            Stage::Exchange { giver, .. } => legal_gifts(self.hands[giver], self.rules.actions()),
+            Stage::Special(_) => {
+                let space = self.rules.actions();
+                Mask::from_actions([space.decline(), space.declare()])
+            }
+            Stage::Over => Mask::EMPTY,
+        }
+    }
+
+    #[inline]
+    fn legal_turns(&self, seat: Seat) -> Mask {
         turn_mask(
-            faces,
-            patterns,
-            if possible { playable } else { Cards::EMPTY },
-            lone_joker,
-            self.check_pass().is_ok(),
+            self.rules.faces(),
+            &self.play_requirement(),
+            self.hands[seat],
         )
     }
 
-    fn legal_gifts(&self, giver: Seat) -> Mask {
-        let (hand, space) = (self.hands[giver], self.rules.actions());
-        let mut mask = Mask::EMPTY;
-        for face in (1..=self.rules.faces())
-            .filter_map(Face::new)
-            .filter(|&face| hand.count(face) > 0)
-        {
-            mask.insert(space.give(face).expect("a face of the deck"));
-        }
-        if hand.jokers() > 0 {
-            mask.insert(space.give_joker());
-        }
-        mask
-    }
-
-    #[inline]
-    pub(super) fn check_play(
-        &self,
-        seat: Seat,
-        face: Face,
-        quantity: u8,
-        jokers: u8,
-    ) -> Result<(), Refusal> {
-        let (hand, table) = (self.hands[seat], &self.table);
-        if hand.count(face) < quantity || hand.jokers() < jokers {
-            return Err(Refusal::NotInHand);
-        }
-        if table.board.face != 0 {
-            if face.get() >= table.board.face {
-                return Err(Refusal::FaceNotLower {
-                    board: table.board.face,
-                });
-            }
-            if quantity + jokers < table.board.size {
-                return Err(Refusal::TooFewCards {
-                    board: table.board.size,
-                });
-            }
-        }
-        if table.is_first_turn() && face.get() != self.rules.faces() {
-            Err(self.opening_refusal())
-        } else {
-            Ok(())
-        }
-    }
-
-    pub(super) fn check_lone_joker(&self, seat: Seat) -> Result<(), Refusal> {
-        if self.hands[seat].jokers() == 0 {
-            Err(Refusal::NotInHand)
-        } else if self.table.board.face != 0 {
-            Err(Refusal::JokerOnlyOpens)
-        } else if self.table.is_first_turn() {
-            Err(self.opening_refusal())
-        } else {
-            Ok(())
-        }
-    }
-
-    #[inline]
-    pub(super) fn check_pass(&self) -> Result<(), Refusal> {
-        let table = &self.table;
-        if table.is_first_turn() && !self.rules.opening_pass() {
-            Err(Refusal::MayNotPassFirst)
-        } else if table.idle >= self.rules.max_idle_pizzas() {
-            // The leader of a pizza after so many idle ones plays, which begins the count anew:
-            // nobody else meets it.
-            Err(Refusal::MayNotPassIdle(table.idle))
-        } else {
-            Ok(())
-        }
-    }
-
-    pub(super) fn check_gift(&self, giver: Seat, gift: Action) -> Result<(), Refusal> {
-        let hand = self.hands[giver];
-        let held = match gift {
-            Action::Give(face) => hand.count(face),
-            _ => hand.jokers(),
-        };
-        if held > 0 {
-            Ok(())
-        } else {
-            Err(Refusal::NotInHand)
-        }
-    }
-
-    fn opening_refusal(&self) -> Refusal {
-        let face = Face::of(self.rules.faces());
-        match self.rules.opening() {
-            Opening::Golden => Refusal::MustPlayGolden(face),
-            Opening::AnyTopFace => Refusal::MustPlayTopFace(face),
+    /// The decision taken for a seat that does not answer (`docs/rules.md` §8.3): pass if that is
+    /// legal, else the legal turn with the lowest index; give the highest plain face, else the
+    /// Golden card, else a joker; decline. `None` if the game has ended.
+    pub fn default_action(&self) -> Option<ActionId> {
+        let space = self.rules.actions();
+        match self.stage {
+            Stage::Turn(_) if self.pass_refusal().is_none() => Some(space.pass()),
+            Stage::Turn(seat) => self.legal_turns(seat).nth(0),
+            Stage::Exchange { giver, .. } => Some(default_gift(self.hands[giver], space)),
+            Stage::Special(_) => Some(space.decline()),
+            Stage::Over => None,
         }
     }
 }
 
-/// Gives the highest plain face, else the Golden card, else a joker.
-pub(crate) fn default_gift(hand: Cards, space: crate::ActionSpace) -> ActionId {
+fn legal_gifts(hand: Cards, space: ActionSpace) -> Mask {
+    let gifts = (1..=space.faces()).map(|number| Action::Give(Face::of(number)));
+    gifts
+        .chain([Action::GiveJoker])
+        .filter(|&gift| hand.holds(gift))
+        .map(|gift| space.encode(gift).expect("a card of the deck"))
+        .collect()
+}
+
+/// The highest plain face, else the Golden card, else a joker.
+pub(crate) fn default_gift(hand: Cards, space: ActionSpace) -> ActionId {
     let mut plain = hand;
     if hand.has_golden() {
         plain.remove_counts(space.faces(), 1, 0);

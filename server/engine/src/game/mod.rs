@@ -7,20 +7,21 @@ mod end;
 mod error;
 mod legal;
 mod script;
+mod shift_state;
 mod start;
-mod table;
 mod turn;
 mod view;
 
 pub use error::{ActionError, Refusal};
 pub(crate) use legal::default_gift;
+pub use legal::{GiftRequirement, PlayRequirement, Requirement};
 pub use script::{Script, ScriptError};
 
 use crate::{
     Action, ActionId, BySeat, Cards, Deal, Event, Role, RuleSet, Seat, SeatOrder, Seed,
     SpecialAction, Standings, Stop,
 };
-use table::Table;
+use shift_state::ShiftState;
 
 /// What kind of decision is open.
 #[derive(Copy, Clone, Eq, PartialEq, Hash, Debug)]
@@ -68,7 +69,7 @@ pub struct Game {
     seed: Seed,
     shift: u32,
     stage: Stage,
-    table: Table,
+    state: ShiftState,
     hands: BySeat<Cards>,
     cards_left: BySeat<u8>,
     /// By face: the Golden card is not told apart.
@@ -108,7 +109,7 @@ impl Game {
             seed,
             shift: 0,
             stage: Stage::Over,
-            table: Table::new(players),
+            state: ShiftState::new(players),
             hands: BySeat::filled(players, Cards::EMPTY),
             cards_left: BySeat::filled(players, 0),
             played: Cards::EMPTY,
@@ -151,20 +152,20 @@ impl Game {
     #[inline]
     pub fn apply(
         &mut self,
-        action: ActionId,
+        id: ActionId,
         mut on_event: impl FnMut(Event),
     ) -> Result<(), ActionError> {
         let Some(decision) = self.decision() else {
             return Err(ActionError::GameOver);
         };
         let space = self.rules.actions();
-        let Some(meaning) = space.decode(action) else {
+        let Some(action) = space.decode(id) else {
             return Err(ActionError::OutOfRange {
-                action,
+                action: id,
                 size: space.size(),
             });
         };
-        match (self.stage, meaning) {
+        match (self.stage, action) {
             (
                 Stage::Turn(seat),
                 Action::Play {
@@ -173,18 +174,15 @@ impl Game {
                     jokers,
                 },
             ) => {
-                self.check_play(seat, face, quantity, jokers)
-                    .map_err(|reason| ActionError::not_legal(meaning, reason))?;
-                self.play_face(seat, action, face, quantity, jokers, &mut on_event);
+                self.check_turn(seat, action)?;
+                self.play_face(seat, id, face, quantity, jokers, &mut on_event);
             }
             (Stage::Turn(seat), Action::LoneJoker) => {
-                self.check_lone_joker(seat)
-                    .map_err(|reason| ActionError::not_legal(meaning, reason))?;
-                self.play_lone_joker(seat, action, &mut on_event);
+                self.check_turn(seat, action)?;
+                self.play_lone_joker(seat, id, &mut on_event);
             }
             (Stage::Turn(seat), Action::Pass) => {
-                self.check_pass()
-                    .map_err(|reason| ActionError::not_legal(meaning, reason))?;
+                self.check_turn(seat, action)?;
                 self.pass(seat, &mut on_event);
             }
             (
@@ -195,15 +193,14 @@ impl Game {
                 },
                 Action::Give(_) | Action::GiveJoker,
             ) => {
-                self.check_gift(giver, meaning)
-                    .map_err(|reason| ActionError::not_legal(meaning, reason))?;
-                self.give(giver, meaning, chef_left, sous_chef_left, &mut on_event);
+                self.check_gift(giver, action)?;
+                self.give(giver, action, chef_left, sous_chef_left, &mut on_event);
             }
             (Stage::Special(_), Action::Decline) => self.start_exchange(&mut on_event),
             (Stage::Special(seat), Action::Declare) => self.declare(seat, &mut on_event),
             _ => {
                 return Err(ActionError::WrongKind {
-                    attempted: meaning,
+                    attempted: action,
                     kind: decision.kind,
                 });
             }
@@ -244,7 +241,7 @@ impl Game {
 
     /// Turns taken in this Shift.
     pub fn shift_turns(&self) -> u32 {
-        self.table.turns
+        self.state.turns
     }
 
     /// All hands, which no seat may see. A card given in the exchange is in nobody's hand until the

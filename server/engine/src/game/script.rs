@@ -150,7 +150,7 @@ impl Game {
             self.played,
             golden_held,
         )?;
-        let first_turn = self.table.is_first_turn();
+        let first_turn = self.state.is_first_turn();
         if first_turn && self.stage != Stage::Turn(opening_leader(&self.rules, &hands, self.drawn))
         {
             return Err(ScriptError::Leader);

@@ -1,16 +1,9 @@
-//! How a Shift begins: deal, roles, special action, exchange, first turn.
+//! The start of a Shift (`docs/rules.md` §3): deal, roles, special action, exchange, first turn.
 
-use super::table::Table;
+use super::shift_state::ShiftState;
 use super::{Game, Stage};
 use crate::deal::opening_leader;
-use crate::{Action, BySeat, Cards, Event, Role, Seat, SeatOrder, SpecialAction};
-
-/// Cards that the Dishwasher gives to the Chef, and the Chef to the Dishwasher.
-pub(super) const CHEF_GIFTS: u8 = 2;
-/// Cards that the Waiter gives to the Sous-Chef, and the Sous-Chef to the Waiter.
-pub(super) const SOUS_CHEF_GIFTS: u8 = 1;
-/// With fewer players there is neither Sous-Chef nor Waiter.
-const SOUS_CHEF_PLAYERS: usize = 4;
+use crate::{Action, BySeat, Cards, Event, ExchangePair, Role, Seat, SeatOrder, SpecialAction};
 
 impl Game {
     /// Starts a Shift with these hands. `ranking` is the order of the last Shift, empty in the
@@ -34,7 +27,7 @@ impl Game {
         self.gave = BySeat::filled(players, Cards::EMPTY);
         self.received = BySeat::filled(players, Cards::EMPTY);
         self.special = None;
-        self.table = Table::new(players);
+        self.state = ShiftState::new(players);
         on_event(Event::ShiftStarted {
             shift,
             hands: hands.map(Some),
@@ -55,12 +48,9 @@ impl Game {
         on_event(Event::RolesAssigned { roles: self.roles });
     }
 
-    /// The special action that a seat may declare, by its role.
+    /// The special action that a seat may declare.
     pub(super) fn special_of(&self, seat: Seat) -> SpecialAction {
-        match self.roles[seat] {
-            Some(Role::Dishwasher) => SpecialAction::FoodFight,
-            _ => SpecialAction::DinnerIsServed,
-        }
+        SpecialAction::of_seat(seat, &self.ranking)
     }
 
     pub(super) fn declare(&mut self, seat: Seat, on_event: &mut impl FnMut(Event)) {
@@ -77,18 +67,16 @@ impl Game {
         }
     }
 
-    /// Asks for the first gift. A giver without a choice is short if its hand holds too few
-    /// ingredient cards; its partner then gives as many as it receives.
+    /// Asks for the first gift.
     pub(super) fn start_exchange(&mut self, on_event: &mut impl FnMut(Event)) {
         if !self.rules.exchange() {
             return self.open_first_turn();
         }
-        let chef_left = CHEF_GIFTS.min(self.hands[self.ranked_from_last(0)].faces_len());
-        let sous_chef_left = if self.rules.players() < SOUS_CHEF_PLAYERS {
-            0
-        } else {
-            SOUS_CHEF_GIFTS.min(self.hands[self.ranked_from_last(1)].faces_len())
+        let gifts = |rank| {
+            ExchangePair::of_rank(&self.ranking, rank)
+                .map_or(0, |pair| pair.gifts(self.hands[pair.forced]))
         };
+        let (chef_left, sous_chef_left) = (gifts(0), gifts(1));
         self.ask_for_gift(chef_left, sous_chef_left, on_event);
     }
 
@@ -136,21 +124,11 @@ impl Game {
 
     /// Hands over all gifts at once: nobody has seen what it receives before.
     fn complete_exchange(&mut self, on_event: &mut impl FnMut(Event)) {
-        let pairs = if self.rules.players() < SOUS_CHEF_PLAYERS {
-            1
-        } else {
-            2
-        };
-        for rank in 0..pairs {
-            let (chooser, forced) = (self.ranking.as_slice()[rank], self.ranked_from_last(rank));
-            let limit = if rank == 0 {
-                CHEF_GIFTS
-            } else {
-                SOUS_CHEF_GIFTS
-            };
-            self.gave[forced] = self.hands[forced].take_rarest(limit);
-            self.hand_over(forced, chooser, on_event);
-            self.hand_over(chooser, forced, on_event);
+        let ranking = self.ranking;
+        for pair in ExchangePair::all(&ranking) {
+            self.gave[pair.forced] = self.hands[pair.forced].take_rarest(pair.size);
+            self.hand_over(pair.forced, pair.chooser, on_event);
+            self.hand_over(pair.chooser, pair.forced, on_event);
         }
         self.cards_left = self.hands.map(Cards::len);
         self.open_first_turn();
@@ -170,14 +148,9 @@ impl Game {
         }
     }
 
-    /// The seat so far from the Dishwasher upwards.
-    pub(super) fn ranked_from_last(&self, rank: usize) -> Seat {
-        self.ranking.as_slice()[self.ranking.len() - 1 - rank]
-    }
-
     fn open_first_turn(&mut self) {
         let starter = opening_leader(&self.rules, &self.hands, self.drawn);
-        self.table.open(starter);
+        self.state.open(starter);
         self.stage = Stage::Turn(starter);
     }
 }

@@ -1,7 +1,7 @@
-//! Taking a turn that has been found legal: the cards move, and the turn goes on, to the next pizza
-//! or to the Shift's end.
+//! Applies a legal turn: moves the cards, then gives the turn to the next seat, or ends the pizza
+//! (`docs/rules.md` §4.6) or the Shift (§4.7).
 
-use super::table::bit;
+use super::shift_state::bit;
 use super::{Game, Stage};
 use crate::observation::Board;
 use crate::{ActionId, Event, Face, Opening, PassScope, Seat};
@@ -21,14 +21,14 @@ impl Game {
         hand.remove_counts(number, quantity, jokers);
         if hand.has_golden() && number == self.rules.faces() {
             // The opening plays the Golden card first of all, any later turn last.
-            let opens = self.table.is_first_turn() && self.rules.opening() == Opening::Golden;
+            let opens = self.state.is_first_turn() && self.rules.opening() == Opening::Golden;
             if opens || hand.count(face) == 0 {
                 hand.set_golden(false);
             }
         }
         self.played.add_counts(number, quantity, jokers);
         let size = quantity + jokers;
-        self.table.board = Board {
+        self.state.board = Board {
             face: number,
             size,
             jokers,
@@ -55,7 +55,7 @@ impl Game {
         let joker = self.hands[seat].take_joker();
         self.played.add(joker);
         let face = self.rules.faces() + 1;
-        self.table.board = Board {
+        self.state.board = Board {
             face,
             size: 1,
             jokers: 1,
@@ -74,7 +74,7 @@ impl Game {
     }
 
     pub(super) fn pass(&mut self, seat: Seat, on_event: &mut impl FnMut(Event)) {
-        self.table.passed |= bit(seat);
+        self.state.passed |= bit(seat);
         on_event(Event::Passed {
             seat,
             cards_left: self.cards_left[seat],
@@ -84,14 +84,14 @@ impl Game {
 
     #[inline]
     fn after_play(&mut self, seat: Seat, cards_left: u8, on_event: &mut impl FnMut(Event)) {
-        let table = &mut self.table;
-        table.idle = 0;
-        table.last_to_play = Some(seat);
+        let state = &mut self.state;
+        state.idle = 0;
+        state.last_to_play = Some(seat);
         if self.rules.pass_scope() == PassScope::Turn {
-            table.passed = 0;
+            state.passed = 0;
         }
         if cards_left == 0 {
-            let place = table.finish(seat);
+            let place = state.finish(seat);
             on_event(Event::SeatFinished { seat, place });
         }
         self.end_turn(seat, on_event);
@@ -100,28 +100,28 @@ impl Game {
     /// The turn goes left, to the next pizza, or to the Shift's end.
     #[inline]
     fn end_turn(&mut self, seat: Seat, on_event: &mut impl FnMut(Event)) {
-        let table = &mut self.table;
-        table.turns += 1;
-        if table.holding & (table.holding - 1) == 0 {
+        let state = &mut self.state;
+        state.turns += 1;
+        if state.holding & (state.holding - 1) == 0 {
             return self.end_shift(false, on_event);
         }
-        if table.turns >= self.rules.max_turns() {
+        if state.turns >= self.rules.max_turns() {
             self.adjudicate(seat);
             return self.end_shift(true, on_event);
         }
-        let next = if table.others_in_pizza() == 0 {
-            let (pizza, last_to_play) = (table.pizza, table.last_to_play);
-            let next_leader = table.next_pizza();
+        let next = if state.others_in_pizza() == 0 {
+            let (pizza, last_to_play) = (state.pizza, state.last_to_play);
+            let next_leader = state.next_pizza();
             on_event(Event::PizzaDone {
                 pizza,
                 last_to_play,
                 next_leader,
             });
-            table.move_turn(seat, table.distance_left(seat, bit(next_leader)))
+            state.move_turn(seat, state.distance_left(seat, bit(next_leader)))
         } else {
-            table.move_turn(
+            state.move_turn(
                 seat,
-                table.distance_left(seat, table.holding & !table.passed),
+                state.distance_left(seat, state.holding & !state.passed),
             )
         };
         self.stage = Stage::Turn(next);

@@ -1,7 +1,7 @@
 //! Filling in what a seat may know. Nothing that is not written here reaches an agent's
 //! observation.
 
-use super::table::bit;
+use super::shift_state::bit;
 use super::{Game, Stage};
 use crate::{BySeat, Cards, Observation, Viewer};
 
@@ -20,7 +20,7 @@ impl Game {
         let own = |cards: &BySeat<Cards>| {
             seat.map_or(Cards::EMPTY, |seat| cards.as_slice()[seat.index()])
         };
-        let table = &self.table;
+        let state = &self.state;
         Observation {
             seat,
             kind: self
@@ -30,12 +30,12 @@ impl Game {
             faces: self.rules.faces(),
             hand_size: self.rules.hand_size(),
             shift: self.shift,
-            pizza: table.pizza,
+            pizza: state.pizza,
             hand: own(&self.hands),
-            board: table.board,
+            board: state.board,
             cards_left: self.cards_left,
-            passed: BySeat::from_fn(self.rules.players(), |seat| table.passed & bit(seat) != 0),
-            places: table.places,
+            passed: BySeat::from_fn(self.rules.players(), |seat| state.passed & bit(seat) != 0),
+            places: state.places,
             roles: self.roles,
             points: self.scores,
             played: self.played,

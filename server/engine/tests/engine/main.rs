@@ -20,6 +20,7 @@ mod properties;
 mod requirement;
 mod rewards;
 mod rules;
+mod rules_page;
 mod scripts;
 mod secrecy;
 mod start;

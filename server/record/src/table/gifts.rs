@@ -2,27 +2,9 @@
 //! cannot be are passed over. Who gives to whom is a matter of rank, as the rules have it; the engine has the last word when the completed
 //! Shift is played.
 
-use chefshat_engine::{RuleSet, Seat, SeatOrder};
+use chefshat_engine::{ExchangePair, RuleSet, Seat, SeatOrder, SpecialAction};
 
 use super::facts::{Counts, JOKER, Tally, contains, counts_of};
-
-/// Two seats that exchange cards.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Pair {
-    /// Gives what it chooses.
-    pub(super) chooser: Seat,
-    /// Gives its rarest ingredient cards.
-    pub(super) forced: Seat,
-    /// How many cards each gives.
-    pub(super) size: u8,
-}
-
-impl Pair {
-    /// Whether a seat is one of them.
-    pub(super) fn has(&self, seat: Seat) -> bool {
-        seat == self.chooser || seat == self.forced
-    }
-}
 
 /// What the seats of a pair gave each other.
 #[derive(Debug, Clone, Copy)]
@@ -34,26 +16,17 @@ pub(super) struct Gifts {
 }
 
 /// Who exchanges cards in a Shift, given the order of the Shift before.
-pub(super) fn pairs(rules: &RuleSet, order: Option<SeatOrder>, tally: &Tally) -> Vec<Pair> {
-    let Some(order) = order.filter(|_| rules.exchange()) else {
+pub(super) fn pairs(rules: &RuleSet, order: Option<SeatOrder>, tally: &Tally) -> Vec<ExchangePair> {
+    let Some(mut ranking) = order.filter(|_| rules.exchange()) else {
         return Vec::new();
     };
-    let mut ranking = order.as_slice().to_vec();
-    match tally.special {
-        Some((seat, true)) if ranking.last() == Some(&seat) => ranking.reverse(),
-        Some((_, true)) => return Vec::new(),
-        _ => {}
+    if let Some((seat, true)) = tally.special {
+        match SpecialAction::of_seat(seat, &ranking) {
+            SpecialAction::FoodFight => ranking.reverse(),
+            SpecialAction::DinnerIsServed => return Vec::new(),
+        }
     }
-    let last = ranking.len() - 1;
-    [(0, 2), (1, 1)]
-        .into_iter()
-        .take(if ranking.len() < 4 { 1 } else { 2 })
-        .map(|(rank, size)| Pair {
-            chooser: ranking[rank],
-            forced: ranking[last - rank],
-            size,
-        })
-        .collect()
+    ExchangePair::all(&ranking).collect()
 }
 
 /// Every pair of gifts that what is told of the pair leaves open, in the order in which they leave the forced giver the widest choice of
@@ -61,7 +34,7 @@ pub(super) fn pairs(rules: &RuleSet, order: Option<SeatOrder>, tally: &Tally) ->
 pub(super) fn candidates(
     rules: &RuleSet,
     tally: &Tally,
-    pair: &Pair,
+    pair: &ExchangePair,
     room: &Counts,
 ) -> impl Iterator<Item = Gifts> + use<> {
     let faces = rules.faces();
@@ -77,10 +50,7 @@ pub(super) fn candidates(
         gifts
     };
     // A hand may hold fewer ingredient cards than its seat has to give: all others are then jokers.
-    let least = rules
-        .hand_size()
-        .saturating_sub(rules.jokers())
-        .min(pair.size);
+    let least = pair.least_gifts(rules);
     let mut sizes = Vec::new();
     for size in (least.max(1)..=pair.size).rev() {
         let mut forced = gifts_of(pair.forced, size, &kinds(faces, false));

@@ -1,10 +1,9 @@
 //! Where the Golden card of a real table is: who may have been dealt it, and whether it is known who holds it. A hand, a gift or the opening
 //! tells it; a play does not, because it counts as any other of its face.
 
-use chefshat_engine::{BySeat, Cards, Face, Opening, RuleSet, Seat};
+use chefshat_engine::{BySeat, Cards, ExchangePair, Face, Opening, RuleSet, Seat};
 
 use super::facts::{Counts, Tally, counts_of};
-use super::gifts::Pair;
 use super::known::Follows;
 use super::puzzle::{Kept, Puzzle};
 
@@ -12,7 +11,7 @@ use super::puzzle::{Kept, Puzzle};
 pub(super) fn golden_seats(
     rules: &RuleSet,
     tally: &Tally,
-    pairs: &[Pair],
+    pairs: &[ExchangePair],
     top: usize,
 ) -> BySeat<bool> {
     let faces = rules.faces();
@@ -38,7 +37,7 @@ pub(super) fn golden_seats(
             None => true,
             Some(opener) if opener == seat => given != Some(true),
             Some(opener) => {
-                let with_opener = |pair: &Pair| pair.has(seat) && pair.has(opener);
+                let with_opener = |pair: &ExchangePair| pair.has(seat) && pair.has(opener);
                 pairs.iter().any(with_opener) && given != Some(false)
             }
         };

@@ -2,8 +2,10 @@
 //! Choices are listed one by one, because mostly the first ones fit, and those of two pairs are compared at the cost of a few additions,
 //! because sometimes none does.
 
+use chefshat_engine::ExchangePair;
+
 use super::facts::{Counts, JOKER, add};
-use super::gifts::{Gifts, Pair, candidates};
+use super::gifts::{Gifts, candidates};
 use super::puzzle::{Kept, Puzzle, Top};
 
 /// Counts of all kinds in one number, a byte for each: sums and comparisons are made for all kinds at once. No count is above 127.
@@ -74,7 +76,13 @@ impl Need {
 
 impl Offer {
     /// The cards of a pair, if these are left for it.
-    fn new(puzzle: &Puzzle<'_>, pair: &Pair, gifts: Gifts, top: Top, room: Packed) -> Option<Self> {
+    fn new(
+        puzzle: &Puzzle<'_>,
+        pair: &ExchangePair,
+        gifts: Gifts,
+        top: Top,
+        room: Packed,
+    ) -> Option<Self> {
         let (chooser, forced) = puzzle.kept_by_pair(pair, &gifts, top)?;
         let mut sure = gifts.chosen;
         for counts in [&gifts.forced, &chooser.counts, &forced.counts] {
@@ -148,7 +156,7 @@ impl Tries {
 /// The offers of a pair, found one after the other.
 pub(super) struct Offers<'a> {
     puzzle: &'a Puzzle<'a>,
-    pair: Pair,
+    pair: ExchangePair,
     room: Packed,
     open: Box<dyn Iterator<Item = (Gifts, Top)>>,
     found: Vec<Offer>,
@@ -156,7 +164,7 @@ pub(super) struct Offers<'a> {
 
 impl<'a> Offers<'a> {
     /// The offers of a pair. `room` holds the cards that seats outside it do not hold for certain.
-    pub(super) fn new(puzzle: &'a Puzzle<'a>, pair: Pair, room: &Counts) -> Self {
+    pub(super) fn new(puzzle: &'a Puzzle<'a>, pair: ExchangePair, room: &Counts) -> Self {
         let opens = [pair.chooser, pair.forced]
             .into_iter()
             .any(|seat| puzzle.tally.opener == Some(seat));

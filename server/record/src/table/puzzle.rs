@@ -2,11 +2,11 @@
 //! chosen among the offers of the pairs that exchange cards (`offers`); what is then still missing in the hands is filled up with any cards that may be
 //! there. What a seat may have kept and given is worked out here, who holds the Golden card in `golden`.
 
-use chefshat_engine::{BySeat, Cards, Opening, RuleSet, Seat, SeatOrder};
+use chefshat_engine::{BySeat, Cards, ExchangePair, Opening, RuleSet, Seat, SeatOrder};
 
 use super::complete::Plan;
 use super::facts::{Counts, JOKER, Tally, add, at_least, contains, counts_of, take};
-use super::gifts::{Gifts, Pair, highest, pairs, size_of};
+use super::gifts::{Gifts, highest, pairs, size_of};
 use super::golden::golden_seats;
 use super::offers::{Offer, Offers, Tries};
 
@@ -19,7 +19,7 @@ const NOTHING: Counts = [0; JOKER + 1];
 pub(super) struct Puzzle<'a> {
     pub(super) rules: &'a RuleSet,
     pub(super) tally: Tally,
-    pub(super) pairs: Vec<Pair>,
+    pub(super) pairs: Vec<ExchangePair>,
     pub(super) deck: Counts,
     /// Where cards of the top face are counted.
     pub(super) top: usize,
@@ -133,7 +133,7 @@ impl<'a> Puzzle<'a> {
     }
 
     /// Cards that the seats of a pair hold together for certain, before and after they exchange some.
-    pub(super) fn sure_of(&self, pair: &Pair) -> Counts {
+    pub(super) fn sure_of(&self, pair: &ExchangePair) -> Counts {
         let tally = &self.tally;
         let (mut dealt, mut held) = (NOTHING, NOTHING);
         for seat in [pair.chooser, pair.forced] {
@@ -157,7 +157,7 @@ impl<'a> Puzzle<'a> {
     /// What the seats of a pair keep; `None` if that cannot be.
     pub(super) fn kept_by_pair(
         &self,
-        pair: &Pair,
+        pair: &ExchangePair,
         gifts: &Gifts,
         top: Top,
     ) -> Option<(Kept, Kept)> {

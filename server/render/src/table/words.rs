@@ -1,11 +1,11 @@
 //! What the picture of the table says in words: the title, what the game waits for, what happened.
 
-use chefshat_engine::{Role, Seat, Viewer};
+use chefshat_engine::{PlayRequirement, Seat, SpecialAction, Viewer};
 use serde::Serialize;
 
 use super::super::chronicle::Happening;
 use super::super::paint::Painter;
-use super::super::scene::{Card, Demand, Hand, Now, Scene};
+use super::super::scene::{Card, Hand, Now, Scene};
 use super::{COLUMN, SPACE, is_end};
 
 /// Width of a name within what happened.
@@ -21,7 +21,7 @@ pub(super) struct Notice {
     pub(super) rows: Vec<Row>,
 }
 
-/// One demand on a play, to be read from afar.
+/// One part of what a play must be, to be read from afar.
 #[derive(Serialize)]
 pub(super) struct Tile {
     pub(super) sign: &'static str,
@@ -125,8 +125,8 @@ pub(super) fn ordinal(place: u8) -> String {
 /// What the seat whose decision is open has to do.
 pub(super) fn to_decide(now: &Now) -> &'static str {
     match now {
-        Now::Special(_) => "to declare?",
-        Now::Exchange(_) => "to give",
+        Now::Special(..) => "to declare?",
+        Now::Exchange(..) => "to give",
         _ => "to play",
     }
 }
@@ -218,30 +218,28 @@ pub(super) fn notice(painter: &Painter, scene: &Scene) -> Notice {
             lines.push("The cards have been dealt.".to_owned());
             "Before the first pizza".to_owned()
         }
-        Now::Special(special) => {
-            let role = scene.seats.get(special.index()).and_then(|seat| seat.role);
+        Now::Special(_, special) => {
             lines.extend(
-                if role == Some(Role::Dishwasher) {
-                    ["Both jokers: Food Fight", "would turn all roles around."]
-                } else {
-                    ["Both jokers: Dinner is Served", "would skip the exchange."]
+                match special {
+                    SpecialAction::FoodFight => {
+                        ["Both jokers: Food Fight", "would turn all roles around."]
+                    }
+                    SpecialAction::DinnerIsServed => {
+                        ["Both jokers: Dinner is Served", "would skip the exchange."]
+                    }
                 }
                 .map(str::to_owned),
             );
             format!("{who} may declare")
         }
-        Now::Exchange(giver) => {
-            if let Some(receiver) = receiver(scene, *giver) {
-                let receiver = told(painter, scene, receiver, (18.0, false), COLUMN - 160.0);
-                lines.push(format!("The exchange, to {receiver}."));
-            }
+        Now::Exchange(_, receiver) => {
+            let receiver = told(painter, scene, *receiver, (18.0, false), COLUMN - 160.0);
+            lines.push(format!("The exchange, to {receiver}."));
             format!("{who} gives a card")
         }
-        Now::Turn {
-            demand, may_pass, ..
-        } => {
-            tiles = demands(*demand);
-            lines.push(turn_line(*demand, *may_pass));
+        Now::Turn { requirement, .. } => {
+            tiles = requirement_tiles(requirement);
+            lines.push(turn_line(requirement).to_owned());
             format!("{who} to play")
         }
         Now::ShiftOver { adjudicated, .. } => {
@@ -265,47 +263,37 @@ pub(super) fn notice(painter: &Painter, scene: &Scene) -> Notice {
     }
 }
 
-/// Who receives what a seat gives of its own choice.
-fn receiver(scene: &Scene, giver: Seat) -> Option<Seat> {
-    let other = match scene.seats.get(giver.index())?.role? {
-        Role::Chef => Role::Dishwasher,
-        Role::SousChef => Role::Waiter,
-        Role::Cook | Role::Waiter | Role::Dishwasher => return None,
-    };
-    let mut seats = scene.seats.iter();
-    seats
-        .position(|seat| seat.role == Some(other))
-        .map(Seat::new)
-}
-
-fn demands(demand: Demand) -> Vec<Tile> {
+fn requirement_tiles(play: &PlayRequirement) -> Vec<Tile> {
     let tile = |sign, number: u8, text| Tile {
         sign,
         number: number.to_string(),
         text,
     };
-    match demand {
-        Demand::Anything | Demand::Beat { face: 0, .. } => Vec::new(),
-        Demand::Golden(face) => vec![tile("", face, "and the Golden one")],
-        Demand::Face(face) => vec![tile("", face, "and no other face")],
-        Demand::Beat { face, size } => vec![
+    let (face, size) = (play.highest_face, play.fewest_cards);
+    if play.golden_card {
+        vec![tile("", face, "and the Golden one")]
+    } else if play.is_opening() {
+        vec![tile("", face, "and no other face")]
+    } else if play.lone_joker || face == 0 {
+        Vec::new()
+    } else {
+        vec![
             tile("≤", face, if face == 1 { "face 1" } else { "face" }),
             tile("≥", size, if size == 1 { "card" } else { "cards" }),
-        ],
+        ]
     }
 }
 
-fn turn_line(demand: Demand, may_pass: bool) -> String {
-    match (demand, may_pass) {
-        (Demand::Golden(_) | Demand::Face(_), false) => "Opens the Shift and may not pass.",
-        (Demand::Golden(_) | Demand::Face(_), true) => "Opens the Shift.",
-        (Demand::Anything, true) => "The board is empty: any play.",
-        (Demand::Anything, false) => "The board is empty: must play.",
-        (Demand::Beat { face: 0, .. }, _) => "Nothing is rarer: only a pass.",
-        (Demand::Beat { .. }, true) => "A rarer face, no fewer cards.",
-        (Demand::Beat { .. }, false) => "May not pass.",
+fn turn_line(play: &PlayRequirement) -> &'static str {
+    match play.may_pass {
+        false if play.is_opening() => "Opens the Shift and may not pass.",
+        true if play.is_opening() => "Opens the Shift.",
+        true if play.lone_joker => "The board is empty: any play.",
+        false if play.lone_joker => "The board is empty: must play.",
+        _ if play.highest_face == 0 => "Nothing is rarer: only a pass.",
+        true => "A rarer face, no fewer cards.",
+        false => "May not pass.",
     }
-    .to_owned()
 }
 
 /// The lines of a result, best first.

@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use chefshat_engine::TakenOver;
 use chefshat_engine::{
-    Action, BySeat, Cards, DecisionKind, Game, RuleSetSpec, Script, Seat, SeatOrder, Seed, Stop,
-    Viewer,
+    Action, BySeat, Cards, DecisionKind, Game, RuleSetSpec, Script, Seat, SeatOrder, Seed,
+    SpecialAction, Stop, Viewer,
 };
 use chefshat_proto::v1::{self, record_line::Line};
 use chefshat_record::branch::Branch;
@@ -155,9 +155,9 @@ fn with_other_hidden_cards(game: &Game) -> Option<Game> {
 }
 
 /// The decisions that only a seat itself and all-seeing eyes know of, and whose they are.
-fn specials(all: &Film) -> Vec<(u64, Seat)> {
+fn specials(all: &Film) -> Vec<(u64, Seat, SpecialAction)> {
     let special = |frame: &Frame| match (frame.when, &frame.scene.now) {
-        (When::Decision(number), Now::Special(seat)) => Some((number, *seat)),
+        (When::Decision(number), Now::Special(seat, special)) => Some((number, *seat, *special)),
         _ => None,
     };
     all.frames().iter().filter_map(special).collect()
@@ -171,13 +171,13 @@ fn own(seat: Seat) -> Eyes {
 fn that_a_special_action_may_be_declared_is_for_the_seat_alone() {
     let lines = fixture("fixed.jsonl");
     let all = Film::new(&lines, Eyes::All).unwrap();
-    let [(number, seat)] = specials(&all)[..] else {
+    let [(number, seat, special)] = specials(&all)[..] else {
         panic!("one such decision: {:?}", specials(&all))
     };
     let moment = When::Decision(number);
     let film = Film::new(&lines, own(seat)).unwrap();
     let scene = &film.at(moment).unwrap().scene;
-    assert_eq!(scene.now, Now::Special(seat));
+    assert_eq!(scene.now, Now::Special(seat, special));
     assert!(scene.seats[seat.index()].deciding);
     assert_eq!(film.frames().len(), all.frames().len());
 
@@ -301,7 +301,7 @@ fn with_and_without_special_actions(players: u8, seed: u8) -> [Vec<v1::RecordLin
 fn shown(film: &Film) -> Vec<(&Scene, Duration)> {
     let frames = film.frames().iter();
     frames
-        .filter(|frame| !matches!(frame.scene.now, Now::Special(_)))
+        .filter(|frame| !matches!(frame.scene.now, Now::Special(..)))
         .map(|frame| (&frame.scene, frame.decision_time))
         .collect()
 }
@@ -318,8 +318,8 @@ fn games_that_differ_in_a_silent_decline_give_the_same_film() {
             let films = [&offered, &not_offered].map(|lines| Film::new(lines, eyes).unwrap());
             let [with, without] = films.each_ref().map(shown);
             assert_eq!(with, without);
-            let of_others = declines.iter().filter(|(_, seat)| own(*seat) != eyes);
-            for &(number, _) in of_others {
+            let of_others = declines.iter().filter(|(_, seat, _)| own(*seat) != eyes);
+            for &(number, _, _) in of_others {
                 compared += 1;
                 // Whoever asks for the decision gets the moment before, and nothing in its picture says that there was more.
                 let [film, _] = &films;

@@ -1,7 +1,7 @@
 //! The look-up table of a decision: it agrees with the mask and is for the seat that decides.
 
-use chefshat_engine::{Action, ActionId, DecisionKind, Game, Seed, Viewer};
-use chefshat_render::{Demand, Eyes, Figure, FilmError, State, figure_at};
+use chefshat_engine::{Action, ActionId, DecisionKind, Game, Requirement, Seed, Viewer};
+use chefshat_render::{Eyes, Figure, FilmError, State, figure_at};
 
 use super::{chronicle, fixture, rules};
 
@@ -46,13 +46,12 @@ fn check(game: &Game, figure: &Figure) {
                     jokers,
                 };
                 let held = hand.count(face) >= quantity && hand.jokers() >= jokers;
-                let allowed = match figure.demand {
-                    None => false,
-                    Some(Demand::Anything) => true,
-                    Some(Demand::Golden(only) | Demand::Face(only)) => face.get() == only,
-                    Some(Demand::Beat { face: most, size }) => {
-                        face.get() <= most && quantity + jokers >= size
+                let allowed = match figure.requirement {
+                    Requirement::Play(required) => {
+                        (required.lowest_face..=required.highest_face).contains(&face.get())
+                            && quantity + jokers >= required.fewest_cards
                     }
+                    Requirement::Gift(_) | Requirement::SpecialAction(_) => false,
                 };
                 let expected = match (held, allowed) {
                     (true, true) => State::Legal,
@@ -82,7 +81,10 @@ fn check(game: &Game, figure: &Figure) {
     assert_eq!(legal, mask.iter().collect::<Vec<_>>());
     assert_eq!(figure.legal, legal.len());
     let kind = game.decision().unwrap().kind;
-    assert_eq!(figure.demand.is_some(), kind == DecisionKind::Turn);
+    assert_eq!(
+        matches!(figure.requirement, Requirement::Play(_)),
+        kind == DecisionKind::Turn
+    );
 }
 
 #[test]

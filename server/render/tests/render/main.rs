@@ -13,13 +13,12 @@ mod made;
 
 use std::path::Path;
 
-use chefshat_engine::{BySeat, Game, RuleSet, RuleSetSpec, Stop, Viewer};
+use chefshat_engine::{BySeat, Game, PlayRequirement, RuleSet, RuleSetSpec, Stop, Viewer};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 use chefshat_record::jsonl;
 use chefshat_record::table::import;
 use chefshat_render::{
-    Card, Chronicle, Demand, Eyes, Film, FilmError, Hand, Happening, Now, Painter, Scene, Sort,
-    When,
+    Card, Chronicle, Eyes, Film, FilmError, Hand, Happening, Now, Painter, Scene, Sort, When,
 };
 
 fn fixture(file: &str) -> Vec<v1::RecordLine> {
@@ -74,15 +73,20 @@ fn a_film_has_a_frame_for_every_moment() {
     );
 
     let first = &film.at(When::Decision(1)).unwrap().scene;
-    let Now::Turn {
-        seat,
-        demand,
-        may_pass,
-    } = first.now
-    else {
+    let Now::Turn { seat, requirement } = first.now else {
         panic!("{:?}", first.now)
     };
-    assert_eq!((demand, may_pass), (Demand::Golden(11), false));
+    assert_eq!(
+        requirement,
+        PlayRequirement {
+            lowest_face: 11,
+            highest_face: 11,
+            fewest_cards: 1,
+            golden_card: true,
+            lone_joker: false,
+            may_pass: false,
+        }
+    );
     let Hand::Open(hand) = &first.seats[seat.index()].hand else {
         panic!("all hands are open")
     };
@@ -100,11 +104,21 @@ fn a_film_has_a_frame_for_every_moment() {
         (second.board[0], second.board_by),
         (Card::Golden(11), Some(seat))
     );
-    let Now::Turn { demand, .. } = second.now else {
+    let Now::Turn { requirement, .. } = second.now else {
         panic!("{:?}", second.now)
     };
     let size = u8::try_from(second.board.len()).unwrap();
-    assert_eq!(demand, Demand::Beat { face: 10, size });
+    assert_eq!(
+        requirement,
+        PlayRequirement {
+            lowest_face: 1,
+            highest_face: 10,
+            fewest_cards: size,
+            golden_card: false,
+            lone_joker: false,
+            may_pass: true,
+        }
+    );
 
     for shift in [1, 2] {
         let over = &film.at(When::ShiftEnd(shift)).unwrap().scene;

@@ -1,5 +1,5 @@
-//! The pizzas of one Shift: board, turn order, laps and places. Knows nothing of cards in hands,
-//! points or events.
+//! The pizzas of one Shift (`docs/rules.md` §4): board, turn order, laps and places. Knows nothing of
+//! hands, points or events.
 
 use crate::observation::Board;
 use crate::{BySeat, Seat, SeatOrder};
@@ -9,9 +9,9 @@ pub(super) const fn bit(seat: Seat) -> u8 {
     1 << seat.index()
 }
 
-/// What happened on the table since the Shift began.
+/// The public state of a Shift.
 #[derive(Clone, Eq, PartialEq, Debug)]
-pub(super) struct Table {
+pub(super) struct ShiftState {
     pub(super) board: Board,
     /// Plays and passes so far.
     pub(super) turns: u32,
@@ -39,10 +39,10 @@ pub(super) struct Table {
     players: u8,
 }
 
-impl Table {
-    /// A table at which nobody has been asked yet.
-    pub(super) fn new(players: usize) -> Table {
-        Table {
+impl ShiftState {
+    /// The state before the first turn.
+    pub(super) fn new(players: usize) -> ShiftState {
+        ShiftState {
             board: Board::default(),
             turns: 0,
             laps: 0,
@@ -112,7 +112,7 @@ impl Table {
         self.left_of(from, distance)
     }
 
-    /// Clears the board for the next pizza and says who leads it.
+    /// Clears the board for the next pizza and returns its leader (§4.6).
     pub(super) fn next_pizza(&mut self) -> Seat {
         let leader = match self.last_to_play {
             Some(seat) if self.holding & bit(seat) != 0 => seat,
