@@ -1,15 +1,15 @@
-// The first thing that runs: it takes the language and the look that were chosen, then draws the page. Nothing else.
+// The entry point: applies the stored theme and language, then renders the page.
 
 import { render } from "preact";
 import "@fontsource-variable/atkinson-hyperlegible-next/wght.css";
 import "./theme.css";
 import { App } from "./app";
 import { startLanguage } from "./i18n";
-import { startLook } from "./look";
+import { startTheme } from "./theme";
 
 const root = document.getElementById("app");
 if (root) {
-  startLook();
+  startTheme();
   await startLanguage();
   render(<App />, root);
 }

@@ -4,7 +4,6 @@ import { t } from "../i18n";
 import { Notice } from "../parts/Notice";
 import { QuestionnaireLink } from "./QuestionnaireLink";
 import { type Blanks, finishedIn, hostOf } from "./study";
-import "./experiment.css";
 
 interface AfterStudyProps {
   /** Address of the questionnaire; empty: there is none. */

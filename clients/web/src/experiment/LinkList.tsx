@@ -3,6 +3,7 @@
 import { t } from "../i18n";
 import { CopyLine, useCopying } from "../lobby/Invite";
 import { Button } from "../parts/Button";
+import css from "./Experiment.module.css";
 
 /** The link of one participant. */
 export interface StudyLink {
@@ -21,12 +22,12 @@ export function LinkList({ links }: { links: readonly StudyLink[] }) {
   return (
     <>
       {links.length > 1 && (
-        <p class="study-ways">
+        <p class={css.ways}>
           {copy && <Button onClick={copy}>{copied ? `✓ ${t().common.copied}` : words.copyAll}</Button>}
           <Button onClick={() => download(tableOf(links), "links.csv")}>{words.download}</Button>
         </p>
       )}
-      <div class="study-list">
+      <div class={css.list}>
         {links.map(({ name, address }) => (
           <CopyLine key={name} label={name || words.everybody} text={address} />
         ))}

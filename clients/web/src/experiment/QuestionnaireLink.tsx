@@ -1,6 +1,7 @@
 // The way to a questionnaire, in a window of its own which learns nothing of this one.
 
 import { t } from "../i18n";
+import css from "../parts/Button.module.css";
 import { type Blanks, filledIn } from "./study";
 
 interface QuestionnaireLinkProps {
@@ -11,7 +12,14 @@ interface QuestionnaireLinkProps {
 /** The link. */
 export function QuestionnaireLink({ address, blanks }: QuestionnaireLinkProps) {
   return (
-    <a class="button button-main" href={filledIn(address, blanks)} target="_blank" rel="noopener noreferrer external">
+    <a
+      class={css.button}
+      data-look="main"
+      data-part="button"
+      href={filledIn(address, blanks)}
+      target="_blank"
+      rel="noopener noreferrer external"
+    >
       {t().experiment.join.open}
     </a>
   );

@@ -2,17 +2,17 @@
 // name. How the seat or place is taken is for the page of the invitation.
 
 import { useState } from "preact/hooks";
-import { inWords } from "../api/faults";
 import { t } from "../i18n";
 import { MAX_NAME } from "../lobby/room-form";
 import { lastName } from "../lobby/seat";
+import { useAttempt } from "../parts/attempt";
 import { Button } from "../parts/Button";
 import { TextField } from "../parts/Field";
 import { Notice } from "../parts/Notice";
 import { remember } from "../store";
+import css from "./Experiment.module.css";
 import { QuestionnaireLink } from "./QuestionnaireLink";
 import { hostOf, rememberStudy, type Study } from "./study";
-import "./experiment.css";
 
 interface StudyJoinProps {
   study: Study;
@@ -36,7 +36,7 @@ export function StudyJoin(props: StudyJoinProps) {
   const [step, setStep] = useState<Step>(study.consent ? "consent" : afterConsent);
   if (step === "declined") {
     return (
-      <section class="sheet study">
+      <section class={`sheet ${css.study}`}>
         <p>{words.declined}</p>
         <Button look="quiet" onClick={() => setStep("consent")}>
           {words.reconsider}
@@ -45,16 +45,16 @@ export function StudyJoin(props: StudyJoinProps) {
     );
   }
   return (
-    <section class="sheet study">
+    <section class={`sheet ${css.study}`}>
       <h1>{words.title}</h1>
       {study.name && <p>{words.as(study.name)}</p>}
       {study.seat !== undefined && <p>{words.atSeat(study.seat)}</p>}
       {step === "consent" && (
         <>
           <h2>{words.consent}</h2>
-          <blockquote class="study-consent">{study.consent}</blockquote>
+          <blockquote class={css.consent}>{study.consent}</blockquote>
           <p class="soft small">{words.fromHost}</p>
-          <p class="study-ways">
+          <p class={css.ways}>
             <Button look="main" onClick={() => setStep(afterConsent)}>
               {words.agree}
             </Button>
@@ -66,7 +66,7 @@ export function StudyJoin(props: StudyJoinProps) {
         <>
           <h2>{words.before}</h2>
           <p>{words.beforeText(hostOf(study.before))}</p>
-          <p class="study-ways">
+          <p class={css.ways}>
             <QuestionnaireLink address={study.before} blanks={{ name: study.name }} />
             <Button onClick={() => setStep("seat")}>{words.done}</Button>
           </p>
@@ -81,30 +81,25 @@ function Come({ study, what, take, isTaken, arrive }: StudyJoinProps) {
   const words = t().experiment.join;
   const [name, setName] = useState(study.name);
   const [missing, setMissing] = useState(false);
-  const [busy, setBusy] = useState(false);
-  const [fault, setFault] = useState("");
+  const { busy, fault, run } = useAttempt();
   const taken = study.name === "" && (isTaken?.(name) ?? false);
-  const come = async (event: Event) => {
+  const come = (event: Event) => {
     event.preventDefault();
     setMissing(name.trim() === "");
     if (name.trim() === "" || taken) return;
-    setBusy(true);
-    setFault("");
-    const before = lastName();
-    try {
+    run(async () => {
+      const before = lastName();
       const id = await take(name);
-      if (id === null) return setBusy(false);
-      // The next one at this device is somebody else.
+      if (id === null) return false;
+      // The next person at this device is someone else.
       remember("name", before === "" ? null : before);
       rememberStudy(id, { ...study, name: name.trim() });
       arrive(id);
-    } catch (thrown) {
-      setFault(inWords(thrown));
-      setBusy(false);
-    }
+      return true;
+    });
   };
   return (
-    <form class="study" onSubmit={come}>
+    <form class={css.study} onSubmit={come}>
       {study.name === "" && (
         <TextField
           label={t().lobby.join.name}

@@ -10,13 +10,13 @@ import { MAX_NAME } from "../lobby/room-form";
 import { hostedRoom, invitation } from "../lobby/seat";
 import { CheckField, Field, SelectField, TextField } from "../parts/Field";
 import { Notice } from "../parts/Notice";
+import css from "./Experiment.module.css";
 import { LinkList } from "./LinkList";
 import { OwnLinks, OwnRooms } from "./OwnRooms";
 import { ownRooms } from "./own-rooms";
 import { isTooLong, MAX_PARTICIPANTS, participantsIn } from "./participants";
 import { freeForPeople, type Place, placed } from "./places";
 import { HIDEABLE, type Hideable, questionnaire, searchOf } from "./study";
-import "./experiment.css";
 
 /** How often the seats are asked for, milliseconds. */
 const EVERY_MS = 5_000;
@@ -30,7 +30,7 @@ interface StudyLinksProps {
 export function StudyLinks({ address, roomId }: StudyLinksProps & { roomId?: string }) {
   const [opened, setOpened] = useState(false);
   return (
-    <details class="study-links" onToggle={() => setOpened(true)}>
+    <details class={css.links} data-part="study-links" onToggle={() => setOpened(true)}>
       <summary>{t().experiment.links.title}</summary>
       {opened && (roomId ? <RoomStudyForm roomId={roomId} address={address} /> : <StudyForm address={address} />)}
     </details>
@@ -50,7 +50,7 @@ export function KeptLinks({ roomId }: { roomId: string }) {
   const hosted = hostedRoom(roomId);
   if (!hosted || ownRooms(roomId).length === 0) return null;
   return (
-    <section class="sheet kept-links">
+    <section class={`sheet ${css.keptLinks}`}>
       <StudyLinks roomId={roomId} address={invitation(hosted.joinCode)} />
     </section>
   );
@@ -100,7 +100,7 @@ function StudyForm({ address, room }: StudyLinksProps & { room?: Room }) {
   const addressFault = (address: string) =>
     address !== "" && questionnaire(address) === "" ? words.notAnAddress : undefined;
   return (
-    <div class="study">
+    <div class={css.study}>
       <p class="soft">{seats ? words.text : words.tournamentText}</p>
       {room && (
         <SelectField
@@ -122,7 +122,7 @@ function StudyForm({ address, room }: StudyLinksProps & { room?: Room }) {
           <textarea {...joined} rows={3} value={names} onInput={(event) => setNames(event.currentTarget.value)} />
         )}
       </Field>
-      <div class="study-two">
+      <div class={css.two}>
         {free && (
           <SelectField
             label={where === "own" ? words.own.seat : words.seat}
@@ -144,7 +144,7 @@ function StudyForm({ address, room }: StudyLinksProps & { room?: Room }) {
           onPick={setLang}
         />
       </div>
-      <fieldset class="study-hide" aria-labelledby={group}>
+      <fieldset class={css.hide} aria-labelledby={group}>
         <legend id={group}>{words.hide}</legend>
         {HIDEABLE.map((part) => (
           <CheckField

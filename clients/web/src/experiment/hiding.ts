@@ -4,6 +4,7 @@
 import { signal } from "@preact/signals";
 import { useLayoutEffect } from "preact/hooks";
 import type { Hideable, Study } from "./study";
+import "./hiding.css";
 
 /** What is left out; nothing outside a study. */
 export const hidden = signal<readonly Hideable[]>([]);

@@ -1,8 +1,7 @@
 // "Play again" after a game that this device has made, for one who played against nobody but agents of the server.
 
-import { useState } from "preact/hooks";
-import { inWords } from "../api/faults";
 import { t } from "../i18n";
+import { useAttempt } from "../parts/attempt";
 import { Button } from "../parts/Button";
 import { Notice } from "../parts/Notice";
 import { playAgain } from "./room-like";
@@ -10,23 +9,12 @@ import { heldSeat, hostedRoom } from "./seat";
 
 /** The button; nothing for those to whom it does not apply. */
 export function Again({ roomId }: { roomId: string }) {
-  const [busy, setBusy] = useState(false);
-  const [fault, setFault] = useState("");
+  const { busy, fault, run } = useAttempt();
   const held = heldSeat(roomId);
   if (!held || !hostedRoom(roomId)) return null;
-  const play = async () => {
-    setBusy(true);
-    setFault("");
-    try {
-      await playAgain(roomId, held.name, held.seat);
-    } catch (thrown) {
-      setFault(inWords(thrown));
-      setBusy(false);
-    }
-  };
   return (
     <>
-      <Button look="main" busy={busy} onClick={() => void play()}>
+      <Button look="main" busy={busy} onClick={() => run(() => playAgain(roomId, held.name, held.seat))}>
         {t().lobby.quick.again}
       </Button>
       {fault && <Notice kind="fault">{fault}</Notice>}

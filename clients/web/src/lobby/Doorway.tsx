@@ -12,6 +12,7 @@ import { t } from "../i18n";
 import { ButtonLink } from "../parts/Button";
 import { Notice } from "../parts/Notice";
 import { pathOf } from "../router";
+import css from "./Doorway.module.css";
 import { HostInvite } from "./Invite";
 import { NameForm } from "./Join";
 import { JoinForm } from "./JoinForm";
@@ -20,7 +21,6 @@ import { isForAgents, isOpen } from "./rooms";
 import { Seats } from "./Seats";
 import { Sure } from "./Sure";
 import { closeRoom, hostedRoom } from "./seat";
-import "./doorway.css";
 
 /** How often the room is asked for, milliseconds. */
 const EVERY_MS = 2000;
@@ -34,7 +34,7 @@ export function Doorway({ roomId }: { roomId: string }) {
   if (!room) {
     if (!fault) return <p class="soft">{t().common.loading}</p>;
     return (
-      <div class="doorway">
+      <div class={css.doorway}>
         <section class="sheet">
           <Notice kind="fault">{wordsOf(fault)}</Notice>
           {!hidden.value.includes("pages") && (
@@ -49,9 +49,9 @@ export function Doorway({ roomId }: { roomId: string }) {
   }
   const waiting = room.state === RoomState.WAITING && room.tournamentId === "";
   return (
-    <div class="doorway">
-      <section class="sheet doorway-room">
-        <header class="doorway-head">
+    <div class={css.doorway}>
+      <section class={`sheet ${css.room}`}>
+        <header class={css.head}>
           <h1>{room.name || t().lobby.rooms.unnamed}</h1>
           <RoomStateChip room={room} />
         </header>
@@ -79,7 +79,7 @@ function WayIn({ room }: { room: Room }) {
   return (
     <>
       {seatForPeople && (
-        <section class="sheet doorway-part">
+        <section class={`sheet ${css.part}`}>
           <h2>{words.sitDown}</h2>
           {hosted ? <NameForm code={hosted.joinCode} room={room} /> : <JoinForm />}
         </section>

@@ -5,6 +5,7 @@ import type { ComponentChildren } from "preact";
 import type { RuleSet } from "../gen/chefshat/v1/rules_pb";
 import { t } from "../i18n";
 import { CheckField, SelectField, TextField } from "../parts/Field";
+import css from "./FormPage.module.css";
 import type { FieldFaults } from "./filling";
 import { type GameField, type GameForm, withPreset } from "./game-form";
 import { LARGEST, type NumberProblem } from "./problems";
@@ -39,7 +40,7 @@ export function ClockFields(props: GameProps) {
   const words = t().lobby.make.clocks;
   const choices = ["noHurry", "relaxed", "brisk", "own"] as const;
   return (
-    <div class="fields">
+    <div class={css.fields}>
       <SelectField
         label={words.label}
         hint={form.clock === "own" ? undefined : words.hints[form.clock]}
@@ -65,7 +66,7 @@ export function RuleFields(props: GameProps & { players: number; presets: RuleSe
   const names: Record<string, string> = words.presets;
   return (
     <>
-      <div class="fields">
+      <div class={css.fields}>
         <SelectField
           label={words.preset}
           hint={words.presetHint}
@@ -110,7 +111,7 @@ export function RuleFields(props: GameProps & { players: number; presets: RuleSe
         <Typed {...props} name="maxIdlePizzas" label={words.maxIdlePizzas} hint={words.maxIdlePizzasHint} />
         <Typed {...props} name="maxTurns" label={words.maxTurns} hint={words.maxTurnsHint} />
       </div>
-      <div class="fields">
+      <div class={css.fields}>
         <CheckField label={words.exchange} checked={form.exchange} onCheck={(exchange) => change({ exchange })} />
         <CheckField
           label={words.specialActions}
@@ -132,7 +133,7 @@ export function FaultFields(props: GameProps & { agents: string[]; children?: Co
   const { form, change, agents, children } = props;
   const words = t().lobby.make.fault;
   return (
-    <div class="fields">
+    <div class={css.fields}>
       <Typed {...props} name="maxInvalidAttempts" label={words.invalid} hint={words.invalidHint} />
       <Typed {...props} name="maxTimeouts" label={words.timeouts} hint={words.timeoutsHint} />
       <SelectField
@@ -151,7 +152,7 @@ export function WatchFields(props: GameProps) {
   const { form, change } = props;
   const words = t().lobby.make.watch;
   return (
-    <div class="fields">
+    <div class={css.fields}>
       <CheckField label={words.allowed} checked={form.spectators} onCheck={(spectators) => change({ spectators })} />
       {form.spectators && (
         <>

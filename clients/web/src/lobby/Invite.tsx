@@ -7,8 +7,8 @@ import { t } from "../i18n";
 import { announce } from "../parts/Announcer";
 import { Button } from "../parts/Button";
 import { Notice } from "../parts/Notice";
+import css from "./Invite.module.css";
 import { hostedRoom, invitation } from "./seat";
-import "./invite.css";
 
 /** White around the picture, in its squares: readers need four. */
 const QR_MARGIN = 4;
@@ -26,8 +26,8 @@ interface InviteProps {
 export function Invite({ title, code, address, agent }: InviteProps) {
   const words = t().lobby.invite;
   return (
-    <section class="invite">
-      <div class="invite-words">
+    <section class={css.invite}>
+      <div class={css.words}>
         <h2>{title}</h2>
         <p>{words.text}</p>
         <CopyLine label={words.code} text={code} large />
@@ -36,7 +36,7 @@ export function Invite({ title, code, address, agent }: InviteProps) {
       </div>
       <QrCode text={address} label={words.qr} />
       {isThisMachine(location.hostname) && (
-        <div class="invite-here">
+        <div class={css.here}>
           <Notice kind="hint">
             <span>
               {words.thisMachine} <code>chefshat serve --listen 0.0.0.0:{location.port || "80"}</code>
@@ -62,7 +62,7 @@ export function HostInvite({ roomId, forAgents }: { roomId: string; forAgents: b
   const words = t().lobby.invite;
   const command = `chefshat agent greedy --server ${location.origin} --code ${code}`;
   return (
-    <section class="sheet host-invite">
+    <section class={`sheet ${css.hostInvite}`}>
       <Invite
         title={words.title}
         code={code}
@@ -80,17 +80,19 @@ export function CopyLine(props: { label: string; text: string; large?: boolean; 
   const words = t().common;
   const { copied, copy } = useCopying(text);
   return (
-    <div class="invite-line">
+    <div class={css.line}>
       <span class="soft small">{label}</span>
       {mono ? (
-        <code class="invite-link">{text}</code>
+        <code class={css.link}>{text}</code>
       ) : (
-        <span class={large ? "invite-code" : "invite-link"}>{text}</span>
+        <span class={large ? css.code : css.link} data-part={large ? "invite-code" : "invite-link"}>
+          {text}
+        </span>
       )}
       {copy && (
         <Button onClick={copy}>
           {copied ? `✓ ${words.copied}` : words.copy}
-          <span class="only-heard"> {label}</span>
+          <span class="visually-hidden"> {label}</span>
         </Button>
       )}
     </div>
@@ -116,7 +118,7 @@ export function useCopying(text: string): { copied: boolean; copy: (() => void) 
 export function QrCode({ text, label }: { text: string; label: string }) {
   const { path, size } = useMemo(() => qrPath(text), [text]);
   return (
-    <svg class="qr" viewBox={`0 0 ${size} ${size}`} role="img" aria-label={label} shape-rendering="crispEdges">
+    <svg class={css.qr} viewBox={`0 0 ${size} ${size}`} role="img" aria-label={label} shape-rendering="crispEdges">
       <rect width={size} height={size} fill="#ffffff" />
       <path d={path} fill="#000000" />
     </svg>

@@ -1,7 +1,7 @@
 // The page of an invitation: say a name and take a seat. Who has a seat in the room already goes to it.
 
 import { useEffect, useState } from "preact/hooks";
-import { faultOf, inWords } from "../api/faults";
+import { faultOf } from "../api/faults";
 import { usePolled } from "../api/poll";
 import type { PageProps } from "../app";
 import { AfterStudy } from "../experiment/AfterStudy";
@@ -10,19 +10,20 @@ import { StudyJoin } from "../experiment/StudyJoin";
 import { finishedBy, holderOf, languageOf, type Study, studyOf } from "../experiment/study";
 import { ParticipantKind, type Room, RoomState } from "../gen/chefshat/v1/room_pb";
 import { t } from "../i18n";
+import { useAttempt } from "../parts/attempt";
 import { Button } from "../parts/Button";
 import { TextField } from "../parts/Field";
 import { Notice } from "../parts/Notice";
 import { navigate, type Route } from "../router";
 import { heldPlace, takePlace } from "../tournaments/place";
 import { lookUp } from "./code";
+import css from "./Join.module.css";
 import { JoinForm } from "./JoinForm";
 import { rulesInShort } from "./RoomCard";
 import { MAX_NAME } from "./room-form";
 import { nameOf } from "./rooms";
 import { Seats } from "./Seats";
 import { canonical, giveBackSeat, heldSeat, lastName, roomOfCode, takeSeat } from "./seat";
-import "./join.css";
 
 /** How often it is asked what has the code, and who sits there, milliseconds. */
 const EVERY_MS = 4_000;
@@ -45,7 +46,7 @@ export function Join({ route }: PageProps<"join">) {
   const finished = study ? finishedBy(code, study.name) : [];
   if ((held === null || study?.name !== "") && finished.length > 0) {
     return (
-      <section class="sheet join-page">
+      <section class={`sheet ${css.page}`}>
         <h1>{t().experiment.join.over}</h1>
         {finished.map(({ name, roomId, after }) => (
           <AfterStudy key={name} after={after} blanks={{ name, room: roomId }} named />
@@ -55,7 +56,7 @@ export function Join({ route }: PageProps<"join">) {
   }
   if (study && code !== "") return <StudyWay study={study} code={code} arrive={goOn} />;
   return (
-    <section class="sheet join-page">
+    <section class={`sheet ${css.page}`}>
       <h1>{words.title}</h1>
       {code === "" ? <JoinForm /> : <WayIn code={code} />}
     </section>
@@ -126,7 +127,7 @@ function Holder({ name, study, onSame, onOther }: HolderProps) {
   // Another page of this device has sat down by the same link in the meantime.
   const same = study.name === name;
   return (
-    <section class="sheet join-page">
+    <section class={`sheet ${css.page}`}>
       <h1>{words.title}</h1>
       <p>{study.name === "" || same ? words.taken(name) : words.held(name)}</p>
       {!same && <p class="soft">{onOther ? words.oneSeat(name) : words.begun(name)}</p>}
@@ -142,7 +143,7 @@ function Holder({ name, study, onSame, onOther }: HolderProps) {
 
 function StudyNotice({ kind, children }: { kind: "fault" | "hint"; children: string }) {
   return (
-    <section class="sheet join-page">
+    <section class={`sheet ${css.page}`}>
       <h1>{t().experiment.join.title}</h1>
       <Notice kind={kind}>{children}</Notice>
     </section>
@@ -158,7 +159,7 @@ function WayIn({ code }: { code: string }) {
     return (
       <>
         <p>
-          {words.codeIs} <span class="join-code">{code}</span>
+          {words.codeIs} <span class={css.code}>{code}</span>
         </p>
         <Notice kind="fault">{t().faults.byReason.JOIN_CODE_WRONG}</Notice>
         <JoinForm />
@@ -170,7 +171,7 @@ function WayIn({ code }: { code: string }) {
   return (
     <>
       {room && (
-        <section class="join-room">
+        <section class={css.room} data-part="join-room">
           <h2>{room.name || t().lobby.rooms.unnamed}</h2>
           <p class="soft small">{rulesInShort(room)}</p>
           <Seats room={room} />
@@ -201,27 +202,19 @@ interface NameFormProps {
 export function NameForm({ code, room }: NameFormProps) {
   const words = t().lobby.join;
   const [name, setName] = useState(lastName());
-  const [busy, setBusy] = useState(false);
-  const [fault, setFault] = useState<string | null>(null);
+  const { busy, fault, run } = useAttempt();
   const [missing, setMissing] = useState(false);
   const taken = room?.seats.some((seat) => sameName(nameOf(seat), name)) ?? false;
-  const join = async (event: Event) => {
+  const join = (event: Event) => {
     event.preventDefault();
     setMissing(name.trim() === "");
     if (name.trim() === "" || taken) return;
-    setBusy(true);
-    setFault(null);
-    try {
-      navigate(await comeIn(code, name));
-    } catch (error) {
-      setFault(inWords(error));
-      setBusy(false);
-    }
+    run(async () => navigate(await comeIn(code, name)));
   };
   return (
-    <form class="join-form" onSubmit={join}>
+    <form class={css.form} onSubmit={join}>
       <p>
-        {words.codeIs} <span class="join-code">{code}</span>
+        {words.codeIs} <span class={css.code}>{code}</span>
       </p>
       <TextField
         label={words.name}

@@ -5,8 +5,8 @@ import { t } from "../i18n";
 import { Button } from "../parts/Button";
 import { TextField } from "../parts/Field";
 import { navigate } from "../router";
+import css from "./Join.module.css";
 import { canonical } from "./seat";
-import "./join.css";
 
 /** The form. */
 export function JoinForm() {
@@ -22,7 +22,7 @@ export function JoinForm() {
     if (typed.code !== "") navigate({ page: "join", code: typed.code }, { search: typed.search });
   };
   return (
-    <form class="join-form" onSubmit={go}>
+    <form class={css.form} onSubmit={go}>
       <TextField
         label={words.code}
         value={code}

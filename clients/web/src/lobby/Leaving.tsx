@@ -1,16 +1,17 @@
 // Leaving a room in which this device has a seat, said before it is done: what becomes of the seat, and how to come back. Before the game begins
 // the seat is given back; afterwards it stays this device's. Whoever made the room can close it here as well.
 
-import { useState } from "preact/hooks";
-import { inWords } from "../api/faults";
 import { AbortPolicy, type RoomPolicy } from "../gen/chefshat/v1/room_pb";
 import { t } from "../i18n";
+import { useAttempt } from "../parts/attempt";
 import { Button } from "../parts/Button";
 import { Dialog } from "../parts/Dialog";
+import { Icon } from "../parts/Icon";
 import { Notice } from "../parts/Notice";
 import { navigate } from "../router";
+import toolsCss from "../table/view/Tools.module.css";
+import css from "./Leaving.module.css";
 import { closeRoom, giveBackSeat, hostedRoom } from "./seat";
-import "./leaving.css";
 
 interface LeaveButtonProps {
   roomId: string;
@@ -23,11 +24,18 @@ interface LeaveButtonProps {
 export function LeaveButton({ roomId, look, onClick }: LeaveButtonProps) {
   const words = t().lobby.leaving;
   return look === "tool" ? (
-    <button type="button" class="tool tool-leave" aria-label={words.leave} title={words.leave} onClick={onClick}>
+    <button
+      type="button"
+      class={toolsCss.tool}
+      data-part="tool tool-leave"
+      aria-label={words.leave}
+      title={words.leave}
+      onClick={onClick}
+    >
       <DoorSign />
     </button>
   ) : (
-    <p class="leaving">
+    <p class={css.leaving} data-part="leaving">
       <Button look="quiet" onClick={onClick}>
         {hostedRoom(roomId) ? words.leaveOrClose : words.leave}
       </Button>
@@ -48,17 +56,7 @@ interface LeaveDialogProps {
 /** The dialog. */
 export function LeaveDialog({ roomId, playing, others, policy, onClose }: LeaveDialogProps) {
   const words = t().lobby.leaving;
-  const [busy, setBusy] = useState(false);
-  const [fault, setFault] = useState("");
-  const doing = async (what: () => Promise<void>) => {
-    setBusy(true);
-    try {
-      await what();
-    } catch (thrown) {
-      setFault(inWords(thrown));
-      setBusy(false);
-    }
-  };
+  const { busy, fault, run } = useAttempt();
   const close = async () => {
     await closeRoom(roomId);
     onClose();
@@ -72,7 +70,7 @@ export function LeaveDialog({ roomId, playing, others, policy, onClose }: LeaveD
   const timeouts = policy?.maxTimeouts ?? 1;
   return (
     <Dialog title={words.title} onClose={onClose}>
-      <div class="leaving-question">
+      <div class={css.question}>
         {playing ? (
           <>
             <p>{givenUp ? words.givenUp(timeouts) : words.substituted(timeouts, policy?.substitute ?? "")}</p>
@@ -83,15 +81,15 @@ export function LeaveDialog({ roomId, playing, others, policy, onClose }: LeaveD
         )}
         {hostedRoom(roomId) && <p>{playing ? words.closePlaying : words.closeWaiting}</p>}
         {fault && <Notice kind="fault">{fault}</Notice>}
-        <p class="leaving-ways">
+        <p class={css.ways}>
           <Button look="main" onClick={onClose}>
             {words.stay}
           </Button>
-          <Button busy={busy} onClick={() => void doing(leave)}>
+          <Button busy={busy} onClick={() => run(leave)}>
             {words.doIt}
           </Button>
           {hostedRoom(roomId) && (
-            <Button busy={busy} onClick={() => void doing(close)}>
+            <Button busy={busy} onClick={() => run(close)}>
               {playing ? words.end : words.close}
             </Button>
           )}
@@ -104,16 +102,8 @@ export function LeaveDialog({ roomId, playing, others, policy, onClose }: LeaveD
 /** A door, and an arrow out of it. */
 function DoorSign() {
   return (
-    <svg
-      viewBox="0 0 24 24"
-      aria-hidden="true"
-      fill="none"
-      stroke="currentColor"
-      stroke-width="2"
-      stroke-linecap="round"
-      stroke-linejoin="round"
-    >
+    <Icon>
       <path d="M13 4H5v16h8M10 12h10M16.500 8.500l3.500 3.500l-3.500 3.500" />
-    </svg>
+    </Icon>
   );
 }

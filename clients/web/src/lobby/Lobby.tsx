@@ -9,11 +9,11 @@ import { ButtonLink } from "../parts/Button";
 import { MoreButton } from "../parts/MoreButton";
 import { Notice } from "../parts/Notice";
 import { JoinForm } from "./JoinForm";
+import css from "./Lobby.module.css";
 import { QuickGame } from "./QuickGame";
 import { RoomCard } from "./RoomCard";
 import { roomsIn } from "./rooms";
 import { TournamentStrip } from "./TournamentStrip";
-import "./lobby.css";
 
 /** How often the lists are asked for, milliseconds. */
 const EVERY_MS = 3000;
@@ -30,15 +30,15 @@ export function Lobby() {
   const over = useShown(roomsIn(RoomState.FINISHED), AT_A_TIME, OVER_EVERY_MS, "over");
   const fault = waiting.fault ?? playing.fault;
   return (
-    <div class="lobby">
-      <h1 class="only-heard">{words.title}</h1>
-      <div class="lobby-start">
+    <div class={css.lobby}>
+      <h1 class="visually-hidden">{words.title}</h1>
+      <div class={css.start}>
         <QuickGame />
-        <section class="sheet lobby-tile">
+        <section class={`sheet ${css.tile}`}>
           <h2>{words.join.title}</h2>
           <JoinForm />
         </section>
-        <section class="sheet lobby-tile">
+        <section class={`sheet ${css.tile}`}>
           <h2>{words.make.title}</h2>
           <p>{words.make.text}</p>
           <ButtonLink href="/new">{words.make.link}</ButtonLink>
@@ -63,12 +63,12 @@ function RoomSection(props: { title: string; shown: Shown<Room>; children?: Comp
   const { list } = shown;
   if (list === null) return null;
   return (
-    <section class="lobby-section">
+    <section class={css.section} data-part="lobby-section">
       <h2>
         {title} {list.items.length > 0 && <span class="soft number">{countWords(list.items.length, list.more)}</span>}
       </h2>
       {list.items.length === 0 && <p class="soft">{children}</p>}
-      <ul class="lobby-rooms">
+      <ul class={css.rooms} data-part="lobby-rooms">
         {list.items.map((room) => (
           <RoomCard key={room.roomId} room={room} />
         ))}

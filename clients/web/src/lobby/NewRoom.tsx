@@ -1,21 +1,19 @@
-// Making a room: who plays, by which rules, how fast, what happens to those who are late, who may watch. What most people never
-// change is folded away. What the form holds and asks for is in room-form.ts.
+// The page that creates a room: who plays, by which rules, how fast, what happens to late answers, who may watch. The form's fields are in
+// room-form.ts.
 
-import { type Offered, useOffered } from "../api/server";
+import type { Offered } from "../api/server";
 import { t } from "../i18n";
-import { Button } from "../parts/Button";
-import { SelectField, TextField } from "../parts/Field";
-import { Notice } from "../parts/Notice";
+import { SelectField } from "../parts/Field";
 import { navigate } from "../router";
+import { FormFrame, FormPage, FormPart } from "./FormPage";
 import { type FieldFaults, useFilling } from "./filling";
 import { ClockFields, FaultFields, RuleFields, WatchFields, wordsOfProblems } from "./GameFields";
 import { gameProblems } from "./game-form";
-import { type FieldName, MAX_NAME, newForm, ROOM_FIELDS, type RoomForm, requestOf } from "./room-form";
+import { type FieldName, newForm, ROOM_FIELDS, type RoomForm, requestOf } from "./room-form";
 import { SeatFields } from "./SeatFields";
 import { makeRoom } from "./seat";
-import "./new-room.css";
 
-/** What a part of the form gets: the form, the faults of its fields, and how to change it. */
+/** The props of each part of the form. */
 export interface FormProps {
   form: RoomForm;
   faults: FieldFaults<FieldName>;
@@ -24,14 +22,7 @@ export interface FormProps {
 
 /** The page. */
 export function NewRoom() {
-  const { offered, fault } = useOffered();
-  return (
-    <section class="new-room">
-      <h1>{t().lobby.make.title}</h1>
-      {fault && <Notice kind="fault">{fault}</Notice>}
-      {offered && <RoomFormView offered={offered} />}
-    </section>
-  );
+  return <FormPage title={t().lobby.make.title}>{(offered) => <RoomFormView offered={offered} />}</FormPage>;
 }
 
 function RoomFormView({ offered }: { offered: Offered }) {
@@ -47,52 +38,33 @@ function RoomFormView({ offered }: { offered: Offered }) {
   const { form, faults, change } = filling;
   const parts = { form, faults, change };
   const aborts = ["allLost", "anyLost", "never"] as const;
-  return (
-    <form class="new-room-form" onSubmit={filling.submit} noValidate>
-      <section class="sheet new-room-part">
-        <TextField
-          label={words.name}
-          value={form.name}
-          onText={(name) => change({ name })}
-          fault={faults.name}
-          maxLength={MAX_NAME}
-          autoComplete="off"
-          placeholder={words.namePlaceholder}
+  const folded = (
+    <>
+      <h3>{words.rules}</h3>
+      <RuleFields {...parts} players={form.seats.length} presets={offered.presets} />
+      <h3>{words.faults}</h3>
+      <FaultFields {...parts} agents={offered.agents}>
+        <SelectField
+          label={words.fault.abort}
+          value={form.abort}
+          options={aborts.map((value) => ({ value, label: words.fault.aborts[value] }))}
+          onPick={(abort) => change({ abort })}
         />
-        <SeatFields {...parts} agents={offered.agents} />
-      </section>
-      <section class="sheet new-room-part">
-        <h2>{words.clock}</h2>
+      </FaultFields>
+      <h3>{words.watching}</h3>
+      <WatchFields {...parts} />
+    </>
+  );
+  return (
+    <FormFrame
+      filling={filling}
+      words={words}
+      first={<SeatFields {...parts} agents={offered.agents} />}
+      folded={folded}
+    >
+      <FormPart title={words.clock}>
         <ClockFields {...parts} />
-      </section>
-      <details
-        class="sheet new-room-part"
-        open={filling.unfolded}
-        onToggle={(event) => filling.unfold(event.currentTarget.open)}
-      >
-        <summary>
-          <h2>{words.more}</h2>
-        </summary>
-        <h3>{words.rules}</h3>
-        <RuleFields {...parts} players={form.seats.length} presets={offered.presets} />
-        <h3>{words.faults}</h3>
-        <FaultFields {...parts} agents={offered.agents}>
-          <SelectField
-            label={words.fault.abort}
-            value={form.abort}
-            options={aborts.map((value) => ({ value, label: words.fault.aborts[value] }))}
-            onPick={(abort) => change({ abort })}
-          />
-        </FaultFields>
-        <h3>{words.watching}</h3>
-        <WatchFields {...parts} />
-      </details>
-      {filling.refusal && <Notice kind="fault">{filling.refusal}</Notice>}
-      <div>
-        <Button look="main" type="submit" busy={filling.busy}>
-          {words.submit}
-        </Button>
-      </div>
-    </form>
+      </FormPart>
+    </FormFrame>
   );
 }

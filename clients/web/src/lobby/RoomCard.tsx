@@ -3,25 +3,26 @@
 import { ParticipantKind, type Room, RoomState } from "../gen/chefshat/v1/room_pb";
 import { t } from "../i18n";
 import { ButtonLink } from "../parts/Button";
+import { StateChip } from "../parts/StateChip";
 import { pathOf } from "../router";
+import css from "./RoomCard.module.css";
 import { clockOfPeople, isOpen } from "./rooms";
 import { Seats } from "./Seats";
 import { heldSeat, hostedRoom } from "./seat";
-import "./room-card.css";
 
 /** A room in a list. */
 export function RoomCard({ room }: { room: Room }) {
   const words = t().lobby.rooms;
   const held = heldSeat(room.roomId);
   return (
-    <li class="room-card sheet">
-      <header class="room-card-head">
+    <li class={`${css.roomCard} sheet`} data-part="room-card">
+      <header class={css.head}>
         <h3>{room.name || words.unnamed}</h3>
         <RoomStateChip room={room} />
       </header>
       <p class="soft small">{rulesInShort(room)}</p>
       <Seats room={room} mine={held?.seat} />
-      <div class="room-card-actions">
+      <div class={css.actions}>
         <RoomActions room={room} />
       </div>
     </li>
@@ -34,7 +35,7 @@ function RoomActions({ room }: { room: Room }) {
   const link = (href: string, label: string, main = false) => (
     <ButtonLink href={href} look={main ? "main" : "plain"}>
       {label}
-      <span class="only-heard"> {room.name || words.unnamed}</span>
+      <span class="visually-hidden"> {room.name || words.unnamed}</span>
     </ButtonLink>
   );
   if (room.state === RoomState.FINISHED) return link(pathOf({ page: "replay", gameId }), words.replay);
@@ -49,26 +50,19 @@ function RoomActions({ room }: { room: Room }) {
   );
 }
 
-/** Where a room stands, by sign and word. */
+/** The state of a room. */
 export function RoomStateChip({ room }: { room: Room }) {
   const words = t().lobby.rooms.states;
-  const [sign, word] = ((): [string, string] => {
-    switch (room.state) {
-      case RoomState.WAITING:
-        return ["◔", words.waiting];
-      case RoomState.PLAYING:
-        return ["▶", words.playing];
-      case RoomState.FINISHED:
-        return ["✓", words.finished];
-      default:
-        return ["×", words.aborted];
-    }
-  })();
-  return (
-    <span class={`room-state room-state-${room.state}`}>
-      <span aria-hidden="true">{sign}</span> {word}
-    </span>
-  );
+  switch (room.state) {
+    case RoomState.WAITING:
+      return <StateChip state="open" word={words.waiting} />;
+    case RoomState.PLAYING:
+      return <StateChip state="playing" word={words.playing} />;
+    case RoomState.FINISHED:
+      return <StateChip state="finished" word={words.finished} />;
+    default:
+      return <StateChip state="ended" word={words.aborted} />;
+  }
 }
 
 /** How long a game lasts and how long a decision may take, in a line. */

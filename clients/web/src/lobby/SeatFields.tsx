@@ -3,6 +3,7 @@
 import { t } from "../i18n";
 import { SelectField } from "../parts/Field";
 import { SeatNumber } from "../parts/SeatNumber";
+import css from "./FormPage.module.css";
 import type { FormProps } from "./NewRoom";
 import { type SeatChoice, withPlayers } from "./room-form";
 
@@ -29,7 +30,7 @@ export function SeatFields({ form, change, agents }: FormProps & { agents: strin
         options={PLAYERS.map((value) => ({ value, label: value }))}
         onPick={(count) => change(withPlayers(form, Number(count)))}
       />
-      <ol class="seat-fields" aria-label={words.seats}>
+      <ol class={css.seatFields} aria-label={words.seats}>
         {form.seats.map((choice, seat) => (
           <li key={seat}>
             <SeatNumber seat={seat} />

@@ -5,31 +5,31 @@ import { t } from "../i18n";
 import { KindBadge, kindWord } from "../parts/KindBadge";
 import { SeatNumber } from "../parts/SeatNumber";
 import { isFree, nameOf } from "./rooms";
-import "./seats.css";
+import css from "./Seats.module.css";
 
 /** The seats of a room. */
 export function Seats({ room, mine }: { room: Room; mine?: number | undefined }) {
   const words = t().lobby.seats;
   return (
-    <ul class="seat-list">
+    <ul class={css.seatList}>
       {room.seats.map((participant) => (
-        <li key={participant.seat} class="seat-list-line">
+        <li key={participant.seat} class={css.line}>
           <SeatNumber seat={participant.seat} />
-          <span class="only-heard">{t().common.seat(participant.seat)}:</span>
+          <span class="visually-hidden">{t().common.seat(participant.seat)}:</span>
           {isFree(participant) ? (
-            <span class="seat-list-free">
+            <span class={css.free}>
               {participant.reservedFor === ParticipantKind.UNSPECIFIED
                 ? words.free
                 : words.reservedFor(kindWord(participant.reservedFor))}
             </span>
           ) : (
             <>
-              <span class="seat-list-name">
+              <span class={css.name}>
                 {nameOf(participant)}
                 {participant.seat === mine && <span class="soft"> {words.you}</span>}
               </span>
               <KindBadge kind={participant.kind} builtIn={participant.builtInAgent} />
-              {!participant.connected && <span class="seat-list-away">{words.away}</span>}
+              {!participant.connected && <span class={css.away}>{words.away}</span>}
             </>
           )}
         </li>

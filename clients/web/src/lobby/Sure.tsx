@@ -3,11 +3,11 @@
 
 import type { ComponentChildren } from "preact";
 import { useEffect, useRef, useState } from "preact/hooks";
-import { inWords } from "../api/faults";
 import { t } from "../i18n";
+import { useAttempt } from "../parts/attempt";
 import { Button } from "../parts/Button";
 import { Notice } from "../parts/Notice";
-import "./sure.css";
+import css from "./Sure.module.css";
 
 interface SureProps {
   /** What the button says at first. */
@@ -22,38 +22,26 @@ interface SureProps {
 /** The button. */
 export function Sure({ label, confirm = label, act, children }: SureProps) {
   const [asked, setAsked] = useState(false);
-  const [busy, setBusy] = useState(false);
-  const [fault, setFault] = useState<string | null>(null);
+  const { busy, fault, run, reset } = useAttempt();
   const whole = useRef<HTMLDivElement>(null);
   const before = useRef(asked);
   useEffect(() => {
     if (before.current === asked) return;
     before.current = asked;
-    whole.current?.querySelector<HTMLElement>(asked ? ".sure-question" : "button")?.focus();
+    whole.current?.querySelector<HTMLElement>(asked ? '[data-part="question"]' : "button")?.focus();
   }, [asked]);
-  const doIt = async () => {
-    setBusy(true);
-    setFault(null);
-    try {
-      // When it is done the page has no more use for the button: until it knows, it is not to be pressed again.
-      await act();
-    } catch (thrown) {
-      setFault(inWords(thrown));
-      setBusy(false);
-    }
-  };
   const cancel = () => {
     setAsked(false);
-    setFault(null);
+    reset();
   };
   return (
-    <div class="sure" ref={whole}>
+    <div class={css.sure} ref={whole}>
       {asked ? (
         <>
-          <span class="sure-question" tabIndex={-1}>
+          <span data-part="question" tabIndex={-1}>
             {children}
           </span>
-          <Button busy={busy} onClick={() => void doIt()}>
+          <Button busy={busy} onClick={() => run(act)}>
             {confirm}
           </Button>
           <Button look="quiet" disabled={busy} onClick={cancel}>

@@ -8,7 +8,8 @@ import { ButtonLink } from "../parts/Button";
 import { pathOf } from "../router";
 import { tournamentsIn } from "../tournaments/list";
 import { formatWord, madeWords } from "../tournaments/words";
-import "./tournament-strip.css";
+import lobbyCss from "./Lobby.module.css";
+import css from "./TournamentStrip.module.css";
 
 /** How often the list is asked for, milliseconds. */
 const EVERY_MS = 6000;
@@ -21,10 +22,10 @@ export function TournamentStrip() {
   const { value: found } = usePolled(listCurrent, EVERY_MS, "tournaments");
   if (!found) return null;
   return (
-    <section class="lobby-section">
+    <section class={lobbyCss.section} data-part="lobby-section">
       <h2>{words.title}</h2>
       {found.length === 0 && <p class="soft">{words.none}</p>}
-      <ul class="tournament-strip">
+      <ul class={css.tournamentStrip}>
         {found.map((tournament) => (
           <li key={tournament.tournamentId}>
             <a class="sheet" href={pathOf({ page: "tournament", tournamentId: tournament.tournamentId })}>
@@ -41,7 +42,7 @@ export function TournamentStrip() {
           </li>
         ))}
       </ul>
-      <div class="tournament-strip-ways">
+      <div class={css.ways}>
         <ButtonLink href={pathOf({ page: "newTournament" })}>{t().organise.link}</ButtonLink>
         <ButtonLink href={pathOf({ page: "tournaments" })} look="quiet">
           {words.all}

@@ -26,7 +26,7 @@ export function announce(text: string): void {
 /** The region itself; drawn once, by the layout. */
 export function Announcer() {
   return (
-    <div class="only-heard" role="status" aria-live="polite" data-testid="announcer">
+    <div class="visually-hidden" role="status" aria-live="polite" data-testid="announcer">
       {spoken.value}
     </div>
   );

@@ -2,7 +2,7 @@
 // edge, dangerous ones say so in words.
 
 import type { ButtonHTMLAttributes, ComponentChildren } from "preact";
-import "./button.css";
+import css from "./Button.module.css";
 
 /** How much a button stands out. */
 export type ButtonLook = "main" | "plain" | "quiet";
@@ -17,7 +17,15 @@ interface ButtonProps extends Omit<ButtonHTMLAttributes<HTMLButtonElement>, "loa
 /** A button. */
 export function Button({ look = "plain", busy = false, disabled, type = "button", children, ...rest }: ButtonProps) {
   return (
-    <button {...rest} type={type} class={`button button-${look}`} disabled={busy || disabled} aria-busy={busy}>
+    <button
+      {...rest}
+      type={type}
+      class={css.button}
+      data-part="button"
+      data-look={look}
+      disabled={busy || disabled}
+      aria-busy={busy}
+    >
       {children}
     </button>
   );
@@ -26,7 +34,7 @@ export function Button({ look = "plain", busy = false, disabled, type = "button"
 /** A link that looks like a button. */
 export function ButtonLink(props: { href: string; look?: ButtonLook; children: ComponentChildren }) {
   return (
-    <a class={`button button-${props.look ?? "plain"}`} href={props.href}>
+    <a class={css.button} data-part="button" data-look={props.look ?? "plain"} href={props.href}>
       {props.children}
     </a>
   );

@@ -4,7 +4,7 @@
 import { useEffect, useState } from "preact/hooks";
 import { t } from "../i18n";
 import { announce } from "./Announcer";
-import "./clock.css";
+import css from "./Clock.module.css";
 
 interface ClockProps {
   /** Milliseconds left of the decision's own time at `sinceMs`. */
@@ -40,14 +40,15 @@ export function Clock({ timeLeftMs, bankLeftMs, sinceMs, wholeMs }: ClockProps) 
   const share = onBank ? (bankLeftMs > 0 ? bankMs / bankLeftMs : 0) : ownMs / Math.max(1, wholeMs, timeLeftMs);
   return (
     <div
-      class={`clock ${onBank ? "clock-bank" : ""} ${hurry ? "clock-hurry" : ""}`}
+      class={`${css.clock} ${onBank ? css.bank : ""} ${hurry ? css.hurry : ""}`}
+      data-part="clock"
       role="timer"
       aria-label={words.label}
     >
-      <span class="clock-bar" aria-hidden="true">
+      <span class={css.bar} aria-hidden="true">
         <span style={{ transform: `scaleX(${Math.min(1, share).toFixed(3)})` }} />
       </span>
-      <span class="clock-words number">
+      <span class={`${css.words} number`}>
         <strong>{clockTime(onBank ? bankMs : ownMs)}</strong>{" "}
         <span class="soft">{onBank ? words.onBank : bankMs > 0 ? words.bank(clockTime(bankMs)) : ""}</span>
       </span>

@@ -3,7 +3,7 @@
 import type { ComponentChildren } from "preact";
 import { useEffect, useId, useRef } from "preact/hooks";
 import { t } from "../i18n";
-import "./dialog.css";
+import css from "./Dialog.module.css";
 
 interface DialogProps {
   title: string;
@@ -22,14 +22,14 @@ export function Dialog({ title, onClose, children }: DialogProps) {
     return () => opened?.close();
   }, []);
   return (
-    <dialog ref={dialog} class="dialog" aria-labelledby={heading} onClose={onClose}>
-      <header class="dialog-head">
+    <dialog ref={dialog} class={css.dialog} data-part="dialog" aria-labelledby={heading} onClose={onClose}>
+      <header class={css.head}>
         <h2 id={heading}>{title}</h2>
-        <button type="button" class="dialog-close" aria-label={t().common.close} onClick={onClose}>
+        <button type="button" class={css.close} aria-label={t().common.close} onClick={onClose}>
           <span aria-hidden="true">×</span>
         </button>
       </header>
-      <div class="dialog-body">{children}</div>
+      <div class={css.body}>{children}</div>
     </dialog>
   );
 }

@@ -1,7 +1,7 @@
 // The drawings of the server's pictures (ingredients, hats, kinds, roles), taken from there so that a table looks the same on paper and in
 // a browser, and drawn inline so that a part may colour their lines. They are decoration: what they mean is said in words beside them.
 
-import "./drawing.css";
+import css from "./Drawing.module.css";
 
 const files = import.meta.glob<string>("../../../../server/assets/symbols/*.svg", {
   query: "?raw",
@@ -18,10 +18,11 @@ const drawings: ReadonlyMap<string, string> = new Map(
 );
 
 /** A drawing by the name of its file, such as "face-3-anchovy" or "role-chef"; as high as a line of text unless styled. */
-export function Drawing(props: { name: string; class?: string }) {
+export function Drawing(props: { name: string; class?: string | undefined }) {
   return (
     <svg
-      class={`drawing ${props.class ?? ""}`}
+      class={`${css.drawing} ${props.class ?? ""}`}
+      data-part="drawing"
       viewBox="0 0 48 48"
       aria-hidden="true"
       fill="none"

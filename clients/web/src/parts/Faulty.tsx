@@ -4,12 +4,12 @@ import { hidden } from "../experiment/hiding";
 import { t } from "../i18n";
 import { ButtonLink } from "./Button";
 import { Notice } from "./Notice";
-import "./notice.css";
+import css from "./Notice.module.css";
 
 /** The page in place of one that failed. */
 export function Faulty({ title, words }: { title: string; words: string }) {
   return (
-    <section class="faulty">
+    <section class={css.faulty} data-part="faulty">
       <h1>{title}</h1>
       <Notice kind="fault">{words}</Notice>
       {!hidden.value.includes("pages") && (

@@ -2,7 +2,7 @@
 
 import type { ComponentChildren } from "preact";
 import { useId } from "preact/hooks";
-import "./field.css";
+import css from "./Field.module.css";
 
 interface FieldFrame {
   label: string;
@@ -19,26 +19,39 @@ interface Joined {
   "aria-invalid": boolean;
 }
 
+function joinedTo(id: string, { hint, fault, faultId }: Omit<FieldFrame, "label">): Joined {
+  const described = [hint && `${id}-hint`, fault && `${id}-fault`, faultId].filter(Boolean).join(" ");
+  return { id, "aria-describedby": described || undefined, "aria-invalid": Boolean(fault || faultId) };
+}
+
 /** A frame around any field; `children` gets the attributes to put on it. */
 export function Field(props: FieldFrame & { children: (joined: Joined) => ComponentChildren }) {
   const id = useId();
-  const { label, hint, fault, faultId } = props;
-  const described = [hint && `${id}-hint`, fault && `${id}-fault`, faultId].filter(Boolean).join(" ");
+  const { label, hint, fault } = props;
   return (
-    <div class="field">
+    <div class={css.field} data-part="field">
       <label for={id}>{label}</label>
-      {props.children({ id, "aria-describedby": described || undefined, "aria-invalid": Boolean(fault || faultId) })}
+      {props.children(joinedTo(id, props))}
+      <Remarks id={id} hint={hint} fault={fault} />
+    </div>
+  );
+}
+
+/** The hint and the fault below a field. */
+function Remarks({ id, hint, fault }: { id: string } & Pick<FieldFrame, "hint" | "fault">) {
+  return (
+    <>
       {hint && (
-        <p id={`${id}-hint`} class="field-hint">
+        <p id={`${id}-hint`} class={css.hint}>
           {hint}
         </p>
       )}
       {fault && (
-        <p id={`${id}-fault`} class="field-fault" role="alert">
+        <p id={`${id}-fault`} class={css.fault} role="alert">
           {fault}
         </p>
       )}
-    </div>
+    </>
   );
 }
 
@@ -106,29 +119,17 @@ interface CheckProps extends FieldFrame {
 /** Yes or no. */
 export function CheckField({ label, hint, fault, faultId, checked, disabled = false, onCheck }: CheckProps) {
   const id = useId();
-  const described = [hint && `${id}-hint`, fault && `${id}-fault`, faultId].filter(Boolean).join(" ");
   return (
-    <div class="field field-check">
+    <div class={`${css.field} ${css.check}`} data-part="field">
       <input
-        id={id}
+        {...joinedTo(id, { hint, fault, faultId })}
         type="checkbox"
         checked={checked}
         disabled={disabled}
-        aria-describedby={described || undefined}
-        aria-invalid={Boolean(fault || faultId)}
         onChange={(event) => onCheck(event.currentTarget.checked)}
       />
       <label for={id}>{label}</label>
-      {hint && (
-        <p id={`${id}-hint`} class="field-hint">
-          {hint}
-        </p>
-      )}
-      {fault && (
-        <p id={`${id}-fault`} class="field-fault" role="alert">
-          {fault}
-        </p>
-      )}
+      <Remarks id={id} hint={hint} fault={fault} />
     </div>
   );
 }

@@ -4,7 +4,7 @@
 import { ParticipantKind } from "../gen/chefshat/v1/room_pb";
 import { t } from "../i18n";
 import { Drawing } from "./Drawing";
-import "./kind-badge.css";
+import css from "./KindBadge.module.css";
 
 interface KindBadgeProps {
   kind: ParticipantKind;
@@ -15,7 +15,7 @@ interface KindBadgeProps {
 /** The badge of a participant. */
 export function KindBadge({ kind, builtIn = "" }: KindBadgeProps) {
   return (
-    <span class="kind-badge" title={builtIn === "" ? undefined : t().common.kinds.builtIn}>
+    <span class={css.kindBadge} data-part="kind-badge" title={builtIn === "" ? undefined : t().common.kinds.builtIn}>
       <Drawing name={builtIn === "" ? symbols[kind] : "kind-built-in"} />
       <span>{builtIn === "" ? kindWord(kind) : t().common.kinds.agent}</span>
     </span>

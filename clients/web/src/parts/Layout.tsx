@@ -7,8 +7,8 @@ import { t } from "../i18n";
 import type { Route } from "../router";
 import { Announcer } from "./Announcer";
 import { Drawing } from "./Drawing";
+import css from "./Layout.module.css";
 import { Settings } from "./Settings";
-import "./layout.css";
 
 interface LayoutProps {
   here: Route;
@@ -37,30 +37,38 @@ export function Layout({ here, children }: LayoutProps) {
     document.title = title;
   }, [title]);
   return (
-    <div class={`layout layout-${here.page}`}>
-      <a class="skip" href="#content">
+    <div class={css.layout} data-part="layout" data-page={here.page}>
+      <a class={css.skip} href="#content">
         {words.skipToContent}
       </a>
-      <header class="header">
+      <header class={css.header} data-part="header">
         {hidden.value.includes("pages") ? (
-          <span class="header-name">{home}</span>
+          <span class={css.headerName} data-part="header-name">
+            {home}
+          </span>
         ) : (
-          <a class="header-name" href="/">
+          <a class={css.headerName} data-part="header-name" href="/">
             {home}
           </a>
         )}
-        <nav class="header-nav" aria-label={words.nav.label}>
+        <nav class={css.headerNav} data-part="header-nav" aria-label={words.nav.label}>
           {links().map(({ href, label, pages }) => (
             <a key={href} href={href} aria-current={pages.includes(here.page) ? "page" : undefined}>
               {label}
             </a>
           ))}
         </nav>
-        <button type="button" class="header-settings" aria-label={words.settings.title} onClick={() => setOpen(true)}>
+        <button
+          type="button"
+          class={css.headerSettings}
+          data-part="header-settings"
+          aria-label={words.settings.title}
+          onClick={() => setOpen(true)}
+        >
           <GearSign />
         </button>
       </header>
-      <main id="content" ref={content} tabIndex={-1} class="content">
+      <main id="content" ref={content} tabIndex={-1} class={css.content} data-part="content">
         {children}
       </main>
       <Announcer />

@@ -11,7 +11,7 @@ export function MoreButton({ shown, what }: { shown: Shown<unknown>; what: strin
     <div>
       <Button onClick={shown.showMore}>
         {t().common.showMore}
-        <span class="only-heard">: {what}</span>
+        <span class="visually-hidden">: {what}</span>
       </Button>
     </div>
   );

@@ -2,12 +2,13 @@
 
 import { t } from "../i18n";
 import { ButtonLink } from "./Button";
+import css from "./Layout.module.css";
 
 /** Says so, and leads back. */
 export function NotFound() {
   const words = t().common.notFound;
   return (
-    <section class="sheet not-found">
+    <section class={`sheet ${css.notFound}`}>
       <h1>{words.title}</h1>
       <p>{words.text}</p>
       <p>

@@ -1,7 +1,7 @@
 // A short word to the reader in a page: something went wrong, something is good to know, nothing is here yet.
 
 import type { ComponentChildren } from "preact";
-import "./notice.css";
+import css from "./Notice.module.css";
 
 interface NoticeProps {
   kind: "fault" | "hint" | "good";
@@ -13,8 +13,8 @@ const signs = { fault: "!", hint: "i", good: "✓" };
 /** A notice; a fault is read out at once. */
 export function Notice({ kind, children }: NoticeProps) {
   return (
-    <div class={`notice notice-${kind}`} role={kind === "fault" ? "alert" : undefined}>
-      <span class="notice-sign" aria-hidden="true">
+    <div class={`${css.notice} ${css[kind]}`} role={kind === "fault" ? "alert" : undefined}>
+      <span class={css.sign} aria-hidden="true">
         {signs[kind]}
       </span>
       <div>{children}</div>

@@ -1,20 +1,22 @@
-// Language and look, chosen on this device, and forgetting what it remembers. What belongs to one page alone (sounds, speed of a replay) is set on that page.
+// The settings of this device: language, theme, and deleting what is stored. Settings of a single page (sound, replay speed) are on that page.
 
 import { useState } from "preact/hooks";
 import { type Language, language, languages, setLanguage, t } from "../i18n";
-import { type Look, look, setLook } from "../look";
+
 import { forgetAll } from "../store";
+import { setTheme, type Theme, theme } from "../theme";
 import { Button } from "./Button";
 import { Dialog } from "./Dialog";
 import { SelectField } from "./Field";
+import css from "./Layout.module.css";
 
 /** The dialog of settings. */
 export function Settings({ onClose }: { onClose: () => void }) {
   const words = t().common.settings;
-  const looks: Look[] = ["system", "light", "dark"];
+  const themes: Theme[] = ["system", "light", "dark"];
   return (
     <Dialog title={words.title} onClose={onClose}>
-      <div class="settings">
+      <div class={css.settings}>
         <SelectField
           label={words.language}
           value={language.value}
@@ -22,10 +24,10 @@ export function Settings({ onClose }: { onClose: () => void }) {
           onPick={(picked) => void setLanguage(picked)}
         />
         <SelectField
-          label={words.look}
-          value={look.value}
-          options={looks.map((value) => ({ value, label: words.looks[value] }))}
-          onPick={setLook}
+          label={words.theme}
+          value={theme.value}
+          options={themes.map((value) => ({ value, label: words.themes[value] }))}
+          onPick={setTheme}
         />
         <Forget />
       </div>

@@ -12,9 +12,9 @@ import { SelectField } from "../parts/Field";
 import { KindBadge } from "../parts/KindBadge";
 import { Notice } from "../parts/Notice";
 import { PersonName } from "../tournaments/PersonName";
+import css from "./People.module.css";
 import { ratingRange, ratingWords } from "./rating";
 import { WhichAreRated } from "./WhichAreRated";
-import "./people.css";
 
 /** How often it is asked for, milliseconds. */
 const EVERY_MS = 15_000;
@@ -42,10 +42,10 @@ export function LeaderboardPage() {
   const { value, fault } = usePolled(ask, EVERY_MS, `${kind} ${minGames}`);
   const kinds = Object.keys(KINDS) as (keyof typeof KINDS)[];
   return (
-    <div class="people">
+    <div class={css.people}>
       <h1>{words.title}</h1>
       <p class="soft">{words.text}</p>
-      <div class="people-filter">
+      <div class={css.filter}>
         <SelectField
           label={words.kinds.label}
           value={kind}
@@ -58,7 +58,7 @@ export function LeaderboardPage() {
           options={MIN_GAMES.map((value) => ({ value, label: words.minGames.games(Number(value)) }))}
           onPick={setMinGames}
         />
-        {value && <p class="soft people-games">{words.ratedGames(Number(value.games))}</p>}
+        {value && <p class={`soft ${css.games}`}>{words.ratedGames(Number(value.games))}</p>}
       </div>
       {fault && <Notice kind="fault">{wordsOf(fault)}</Notice>}
       {value?.rated.length === 0 && <Nobody anybody={Number(value.games) > 0} />}
@@ -77,7 +77,7 @@ function Nobody({ anybody }: { anybody: boolean }) {
   const words = t().people;
   if (anybody) return <p class="sheet">{words.noneOfThese}</p>;
   return (
-    <section class="sheet people-none">
+    <section class={`sheet ${css.none}`}>
       <p>{words.none}</p>
       <WhichAreRated open />
       <ButtonLink href="/">{words.toLobby}</ButtonLink>
@@ -94,22 +94,22 @@ function Lines({ board }: { board: GetLeaderboardResponse }) {
   const share = (value: number) => `${((100 * (value - lowest)) / Math.max(1e-9, highest - lowest)).toFixed(1)}%`;
   return (
     <section class="sheet">
-      <table class="leaderboard">
+      <table class={css.leaderboard}>
         <caption class="soft small">{t().people.order}</caption>
         <thead>
           <tr>
             <th scope="col">{words.place}</th>
-            <th scope="col" class="leaderboard-name">
+            <th scope="col" class={css.leaderboardName}>
               {words.name}
             </th>
             <th scope="col" title={words.ratingHint}>
               {words.rating}
             </th>
-            <td class="leaderboard-range" />
-            <th scope="col" class="leaderboard-minor">
+            <td class={css.leaderboardRange} />
+            <th scope="col" class={css.leaderboardMinor}>
               {words.games}
             </th>
-            <th scope="col" class="leaderboard-minor">
+            <th scope="col" class={css.leaderboardMinor}>
               {words.places}
             </th>
           </tr>
@@ -119,21 +119,21 @@ function Lines({ board }: { board: GetLeaderboardResponse }) {
             const range = line.rating && ratingRange(line.rating);
             return (
               <tr key={`${line.kind} ${line.builtIn} ${line.name}`}>
-                <td class="number leaderboard-place">{line.place}</td>
-                <th scope="row" class="leaderboard-name">
+                <td class="number">{line.place}</td>
+                <th scope="row" class={css.leaderboardName}>
                   <PersonName name={line.name} /> <KindBadge kind={line.kind} builtIn={line.builtIn ? line.name : ""} />
                 </th>
-                <td class="number leaderboard-rating">{line.rating && ratingWords(line.rating)}</td>
-                <td class="leaderboard-range" aria-hidden="true">
+                <td class={`number ${css.leaderboardRating}`}>{line.rating && ratingWords(line.rating)}</td>
+                <td class={css.leaderboardRange} aria-hidden="true">
                   {range && (
-                    <span class="leaderboard-bar">
+                    <span class={css.leaderboardBar}>
                       <span style={{ left: share(range.from), right: `calc(100% - ${share(range.to)})` }} />
                       <b style={{ left: share((range.from + range.to) / 2) }} />
                     </span>
                   )}
                 </td>
-                <td class="number leaderboard-minor">{line.rating?.games}</td>
-                <td class="number leaderboard-minor">
+                <td class={`number ${css.leaderboardMinor}`}>{line.rating?.games}</td>
+                <td class={`number ${css.leaderboardMinor}`}>
                   {Array.from({ length: places }, (_, index) => line.places[index] ?? 0).join(" · ")}
                 </td>
               </tr>

@@ -14,9 +14,9 @@ import { Notice } from "../parts/Notice";
 import { pathOf } from "../router";
 import { PersonName } from "../tournaments/PersonName";
 import { gamesOf, type OwnGame, ratedAs, sum, unratedBecause } from "./games";
+import css from "./People.module.css";
 import { ratingRange, ratingWords } from "./rating";
 import { WhichAreRated } from "./WhichAreRated";
-import "./people.css";
 
 /** How often it is asked for, milliseconds. */
 const EVERY_MS = 60_000;
@@ -34,8 +34,8 @@ export function PersonPage({ route }: PageProps<"person">) {
   const last = list?.items[0];
   const self = last?.record.seats[last.seat];
   return (
-    <div class="people">
-      <header class="person-head">
+    <div class={css.people}>
+      <header class={css.personHead}>
         <h1>{name}</h1>
         {self && <KindBadge kind={self.kind} builtIn={self.builtInAgent} />}
       </header>
@@ -45,7 +45,7 @@ export function PersonPage({ route }: PageProps<"person">) {
       {list && list.items.length > 0 && (
         <>
           <Facts rated={rated.value} games={list} />
-          <section class="sheet person-played">
+          <section class={`sheet ${css.personPlayed}`}>
             <h2>{words.played}</h2>
             <WhichAreRated />
             <Games games={list.items} />
@@ -67,7 +67,7 @@ function Facts({ rated, games }: { rated: readonly Rated[] | null; games: Beginn
   const all = sum(games.items);
   const of = games.more ? words.ofNewest(games.items.length) : "";
   return (
-    <dl class="person-facts">
+    <dl class={css.personFacts}>
       {rated?.map((line) => (
         <Rating key={`${line.kind} ${line.builtIn}`} line={line} />
       ))}
@@ -90,7 +90,7 @@ function Rating({ line }: { line: Rated }) {
 function Fact(props: { label: string; value: string; text?: string; wide?: boolean }) {
   const { label, value, text = "", wide = false } = props;
   return (
-    <div class={`sheet ${wide ? "person-fact-wide" : ""}`}>
+    <div class={`sheet ${wide ? css.personFactWide : ""}`}>
       <dt class="soft">{label}</dt>
       <dd>
         <b class="number">{value}</b>
@@ -110,18 +110,18 @@ function Games({ games }: { games: readonly OwnGame[] }) {
   const words = t().people.person;
   const dates = new Intl.DateTimeFormat(dateLocale(), { dateStyle: "medium", timeStyle: "short" });
   return (
-    <table class="person-games">
+    <table class={css.personGames}>
       <thead>
         <tr>
           <th scope="col">{words.columns.date}</th>
           <th scope="col">{words.columns.place}</th>
-          <th scope="col" class="leaderboard-minor">
+          <th scope="col" class={css.leaderboardMinor}>
             {words.columns.points}
           </th>
-          <th scope="col" class="leaderboard-minor person-others">
+          <th scope="col" class={`${css.leaderboardMinor} ${css.personOthers}`}>
             {words.columns.others}
           </th>
-          <th scope="col" class="person-others">
+          <th scope="col" class={css.personOthers}>
             {words.columns.game}
           </th>
         </tr>
@@ -133,8 +133,8 @@ function Games({ games }: { games: readonly OwnGame[] }) {
             <tr key={record.gameId}>
               <td class="number">{date}</td>
               <td>{place === undefined ? <span class="soft">{words.aborted}</span> : t().common.place(place)}</td>
-              <td class="number leaderboard-minor">{points ?? "–"}</td>
-              <td class="leaderboard-minor person-others">
+              <td class={`number ${css.leaderboardMinor}`}>{points ?? "–"}</td>
+              <td class={`${css.leaderboardMinor} ${css.personOthers}`}>
                 {others.map((other, index) => (
                   <span key={other.seat}>
                     {index > 0 && ", "}
@@ -142,10 +142,10 @@ function Games({ games }: { games: readonly OwnGame[] }) {
                   </span>
                 ))}
               </td>
-              <td class="person-others">
+              <td class={css.personOthers}>
                 <a href={pathOf({ page: "replay", gameId: record.gameId })}>
                   {words.replay}
-                  <span class="only-heard"> {words.of(record.roomName, date)}</span>
+                  <span class="visually-hidden"> {words.of(record.roomName, date)}</span>
                 </a>{" "}
                 <span class="soft small">
                   {record.roomName}

@@ -1,12 +1,13 @@
 // Which games count for ratings, as docs/ratings.md says, folded away.
 
 import { t } from "../i18n";
+import css from "./People.module.css";
 
 /** The words. */
 export function WhichAreRated({ open = false }: { open?: boolean }) {
   const words = t().people.which;
   return (
-    <details class="people-which small" open={open}>
+    <details class={`${css.which} small`} open={open}>
       <summary>{words.title}</summary>
       <p>{words.text}</p>
       <ul>

@@ -2,9 +2,12 @@
 
 import { t } from "../i18n";
 import { SelectField } from "../parts/Field";
+import { Icon } from "../parts/Icon";
+import toolsCss from "../table/view/Tools.module.css";
 import { nameOf } from "../table/words";
 import type { Eyes } from "./eyes";
 import type { Film, Frame } from "./frames";
+import replayCss from "./Replay.module.css";
 
 /** Moments a second at a speed of 1. */
 export const SPEEDS = [0.5, 1, 2, 4, 8] as const;
@@ -31,9 +34,9 @@ export function Controls({ film, frame, at, playing, speed, eyes, onGo, onPlayin
   const last = film.length - 1;
   const shift = film.shifts.findLast((start) => start.frame <= at);
   return (
-    <section class="replay" aria-label={words.controls}>
-      <div class="replay-bar sheet">
-        <div class="replay-buttons">
+    <section class={replayCss.replay} data-part="replay" aria-label={words.controls}>
+      <div class={`${replayCss.bar} sheet`} data-part="replay-bar">
+        <div class={replayCss.buttons}>
           <Step label={words.first} path="M18 5v14l-9-7ZM6 5v14" disabled={at === 0} onClick={() => onGo(0)} />
           <Step label={words.before} path="M15 5v14l-9-7Z" disabled={at === 0} onClick={() => onGo(at - 1)} />
           <Step
@@ -45,8 +48,8 @@ export function Controls({ film, frame, at, playing, speed, eyes, onGo, onPlayin
           <Step label={words.after} path="M9 5v14l9-7Z" disabled={at === last} onClick={() => onGo(at + 1)} />
           <Step label={words.last} path="M6 5v14l9-7ZM18 5v14" disabled={at === last} onClick={() => onGo(last)} />
         </div>
-        <label class="replay-slider">
-          <span class="only-heard">{words.moment}</span>
+        <label class={replayCss.slider} data-part="replay-slider">
+          <span class="visually-hidden">{words.moment}</span>
           <input
             type="range"
             min={0}
@@ -55,7 +58,7 @@ export function Controls({ film, frame, at, playing, speed, eyes, onGo, onPlayin
             aria-valuetext={words.decisionOf(frame.decisions, film.decisions)}
             onInput={(event) => onGo(Number(event.currentTarget.value))}
           />
-          <span class="replay-marks" aria-hidden="true">
+          <span class={replayCss.marks} aria-hidden="true">
             {film.shifts.slice(0, film.shifts.length > MOST_MARKS ? 0 : undefined).map((start) => (
               <i
                 key={start.shift}
@@ -66,7 +69,7 @@ export function Controls({ film, frame, at, playing, speed, eyes, onGo, onPlayin
           <span class="small soft number">{words.decisionOf(frame.decisions, film.decisions)}</span>
         </label>
       </div>
-      <div class="replay-choices sheet">
+      <div class={`${replayCss.choices} sheet`}>
         <SelectField
           label={words.shift}
           value={String(shift?.frame ?? 0)}
@@ -113,23 +116,16 @@ function Step({ label, path, main = false, disabled = false, onClick }: StepProp
   return (
     <button
       type="button"
-      class={`tool ${main ? "replay-main" : ""}`}
+      class={`${toolsCss.tool} ${main ? replayCss.main : ""}`}
+      data-part="tool"
       aria-label={label}
       title={label}
       aria-disabled={disabled}
       onClick={() => !disabled && onClick()}
     >
-      <svg
-        viewBox="0 0 24 24"
-        aria-hidden="true"
-        fill="currentColor"
-        stroke="currentColor"
-        stroke-width="2.5"
-        stroke-linecap="round"
-        stroke-linejoin="round"
-      >
+      <Icon filled>
         <path d={path} />
-      </svg>
+      </Icon>
     </button>
   );
 }

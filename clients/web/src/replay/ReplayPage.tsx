@@ -18,7 +18,7 @@ import { distinctName, moveWords } from "../table/words";
 import { Controls, type Speed } from "./Controls";
 import { decidingFor, type Eyes, seenWith } from "./eyes";
 import { type Film, filmOf } from "./frames";
-import "./replay.css";
+import css from "./Replay.module.css";
 
 /** How long a moment is seen at a speed of 1. */
 const MOMENT_MS = 1000;
@@ -113,7 +113,7 @@ function Decision({ table, open }: { table: TableState; open: DecisionRecord }) 
   const seconds = Number(open.decisionTimeUs) / 1e6;
   const estimate = open.annotations?.valueEstimate;
   return (
-    <details class="replay-decision sheet">
+    <details class={`${css.decision} sheet`} data-part="replay-decision">
       <summary>
         <strong>{words.possible}</strong>{" "}
         <span class="soft">

@@ -3,9 +3,9 @@
 
 import type { Tournament, TournamentGame } from "../gen/chefshat/v1/tournament_pb";
 import { t } from "../i18n";
+import css from "./Bracket.module.css";
 import { type BracketRound, type BracketSeat, type BracketTable, bracket, isOver, nameOf } from "./course";
 import { GameLink } from "./GameLink";
-import "./bracket.css";
 
 interface BracketProps {
   tournament: Tournament;
@@ -23,13 +23,17 @@ export function Bracket({ tournament, games, mine, large = false, from = 1 }: Br
   const rounds = bracket(tournament, games);
   if (rounds.length === 0) return <p class="soft">{words.games.none}</p>;
   return (
-    <ol class={`bracket ${large ? "bracket-large" : ""}`} style={{ "--rounds": rounds.length - from + 1 }}>
+    <ol
+      class={`${css.bracket} ${large ? css.large : ""}`}
+      data-part="bracket"
+      style={{ "--rounds": rounds.length - from + 1 }}
+    >
       {rounds.slice(from - 1).map((round) => (
-        <li key={round.round} class="bracket-round">
+        <li key={round.round} class={css.round} data-part="bracket-round">
           <h3>{isFinal(rounds, round) ? words.final : words.round(round.round)}</h3>
-          <ol class="bracket-tables">
+          <ol class={css.tables} data-part="bracket-tables">
             {round.tables.map((table) => (
-              <li key={table.table} class={round.round < rounds.length ? "bracket-leads" : ""}>
+              <li key={table.table} class={round.round < rounds.length ? css.leads : ""}>
                 <Box
                   {...{ tournament, table, mine, large }}
                   final={isFinal(rounds, round)}
@@ -62,11 +66,14 @@ function Box({ tournament, table, mine, final, large }: BoxProps) {
   const over = table.games.length > 0 && table.games.every(isOver);
   const playing = table.games.length > 0 && !over;
   return (
-    <div class={`bracket-table ${playing ? "bracket-playing" : ""} ${table.seats.length === 0 ? "bracket-empty" : ""}`}>
+    <div
+      class={`${css.table} ${playing ? css.playing : ""} ${table.seats.length === 0 ? css.empty : ""}`}
+      data-part="bracket-table"
+    >
       <header>
         <span>{final ? "" : words.table(table.table)}</span>
         {!large && (
-          <span class="bracket-links">
+          <span class={css.links}>
             {table.games.map((game) => (
               <GameLink key={game.game} tournament={tournament} game={game} several={table.games.length > 1} />
             ))}
@@ -103,12 +110,12 @@ interface SeatProps {
 function Seat({ tournament, seat, mine, final, over }: SeatProps) {
   const words = t().tournaments.games;
   return (
-    <li class={`bracket-seat ${seat.wentOn ? "bracket-on" : ""} ${mine ? "bracket-mine" : ""}`}>
-      <span class="bracket-name">{nameOf(tournament, seat.participant)}</span>
+    <li class={`${css.seat} ${seat.wentOn ? css.on : ""} ${mine ? css.mine : ""}`}>
+      <span class={css.name}>{nameOf(tournament, seat.participant)}</span>
       {seat.wentOn && (
-        <span class="bracket-sign">
+        <span>
           <span aria-hidden="true">{final ? "★" : "→"}</span>
-          <span class="only-heard">{final ? words.champion : words.advances}</span>
+          <span class="visually-hidden">{final ? words.champion : words.advances}</span>
         </span>
       )}
       {over && <span class="number">{seat.score}</span>}

@@ -1,7 +1,8 @@
 // One of a few, each with a line that says what it is: for choices whose names alone say too little.
 
 import { useId } from "preact/hooks";
-import "./choices.css";
+import fieldCss from "../parts/Field.module.css";
+import css from "./Choices.module.css";
 
 interface ChoicesProps<Value extends string> {
   label: string;
@@ -15,11 +16,11 @@ interface ChoicesProps<Value extends string> {
 export function Choices<Value extends string>({ label, value, options, fault, onPick }: ChoicesProps<Value>) {
   const id = useId();
   return (
-    <fieldset class="choices" aria-describedby={fault && `${id}-fault`}>
+    <fieldset class={css.choices} aria-describedby={fault && `${id}-fault`}>
       <legend>{label}</legend>
-      <div class="choices-options">
+      <div class={css.options}>
         {options.map((option) => (
-          <label key={option.value} class="choice">
+          <label key={option.value} class={css.choice}>
             <input
               type="radio"
               name={id}
@@ -38,7 +39,7 @@ export function Choices<Value extends string>({ label, value, options, fault, on
         ))}
       </div>
       {fault && (
-        <p id={`${id}-fault`} class="field-fault" role="alert">
+        <p id={`${id}-fault`} class={fieldCss.fault} role="alert">
           {fault}
         </p>
       )}

@@ -5,8 +5,8 @@ import type { Tournament } from "../gen/chefshat/v1/tournament_pb";
 import { t } from "../i18n";
 import { KindBadge } from "../parts/KindBadge";
 import { nameOf } from "./course";
+import css from "./Entrants.module.css";
 import { PersonName } from "./PersonName";
-import "./entrants.css";
 
 interface EntrantsProps {
   tournament: Tournament;
@@ -27,9 +27,9 @@ export function Entrants({ tournament, mine, large = false }: EntrantsProps) {
   // On a wall those are of interest who have just come.
   const shown = large ? participants.slice(-ON_WALL) : participants;
   return (
-    <ul class={`entrants ${large ? "entrants-large" : ""}`}>
+    <ul class={css.entrants} data-part="entrants">
       {shown.map(({ participant, kind, builtInAgent, connected }) => (
-        <li key={participant} class={participant === mine ? "entrants-mine" : ""}>
+        <li key={participant} aria-current={participant === mine || undefined}>
           <PersonName name={nameOf(tournament, participant)} builtIn={builtInAgent} linked={!large} />
           <KindBadge kind={kind} builtIn={builtInAgent} />
           {!connected && <span class="soft small">{words.away}</span>}

@@ -17,7 +17,7 @@ export function GameLink({ tournament, game, several }: GameLinkProps) {
   const words = t().tournaments;
   const number = several ? ` ${game.number}` : "";
   const which = words.games.of(`${words.round(game.round)}, ${words.table(game.table)}`, game.number);
-  const heard = <span class="only-heard"> {which}</span>;
+  const heard = <span class="visually-hidden"> {which}</span>;
   // A study may leave out the ways to other pages.
   const linked = !hidden.value.includes("pages");
   switch (game.state) {

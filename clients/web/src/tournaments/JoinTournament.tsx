@@ -1,16 +1,17 @@
 // The form that takes a place in a tournament: its join code (which a link may bring, ?code=) and a name.
 
 import { useState } from "preact/hooks";
-import { inWords } from "../api/faults";
 import type { Tournament } from "../gen/chefshat/v1/tournament_pb";
 import { t } from "../i18n";
 import { MAX_NAME } from "../lobby/room-form";
 import { lastName } from "../lobby/seat";
+import { useAttempt } from "../parts/attempt";
 import { Button } from "../parts/Button";
 import { TextField } from "../parts/Field";
 import { Notice } from "../parts/Notice";
 import { hostedTournament } from "./hosting";
 import { takePlace } from "./place";
+import css from "./Tournaments.module.css";
 import { isForPeople } from "./words";
 
 interface JoinTournamentProps {
@@ -24,25 +25,19 @@ export function JoinTournament({ tournament, onJoined }: JoinTournamentProps) {
   const [code, setCode] = useState(() => codeOf(tournament));
   const [name, setName] = useState(lastName());
   const [tried, setTried] = useState(false);
-  const [busy, setBusy] = useState(false);
-  const [fault, setFault] = useState("");
+  const { busy, fault, run } = useAttempt();
   if (!isForPeople(tournament)) return <p class="soft">{words.notForPeople}</p>;
-  const join = async (event: Event) => {
+  const join = (event: Event) => {
     event.preventDefault();
     setTried(true);
     if (code.trim() === "" || name.trim() === "") return;
-    setBusy(true);
-    setFault("");
-    try {
+    run(async () => {
       await takePlace(tournament.tournamentId, code, name);
       onJoined();
-    } catch (thrown) {
-      setFault(inWords(thrown));
-      setBusy(false);
-    }
+    });
   };
   return (
-    <form class="sheet tournament-join" onSubmit={join}>
+    <form class={`sheet ${css.join}`} onSubmit={join}>
       <h2>{words.title}</h2>
       <p>{words.text}</p>
       <TextField

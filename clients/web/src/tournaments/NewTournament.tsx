@@ -1,15 +1,14 @@
 // Making a tournament: its form, who takes part, when it begins, how fast it is played; what most people never change is folded away. What the
 // form holds and asks for is in tournament-form.ts; the fields of every game are those of a new room (lobby/GameFields.tsx).
 
-import { type Offered, useOffered } from "../api/server";
+import type { Offered } from "../api/server";
 import { t } from "../i18n";
+import { FormFrame, FormPage, FormPart } from "../lobby/FormPage";
+import formCss from "../lobby/FormPage.module.css";
 import { useFilling } from "../lobby/filling";
 import { ClockFields, FaultFields, RuleFields, Typed, WatchFields, wordsOfProblem } from "../lobby/GameFields";
 import type { NumberProblem } from "../lobby/problems";
-import { MAX_NAME } from "../lobby/room-form";
-import { Button } from "../parts/Button";
-import { CheckField, SelectField, TextField } from "../parts/Field";
-import { Notice } from "../parts/Notice";
+import { CheckField, SelectField } from "../parts/Field";
 import { navigate } from "../router";
 import { Choices } from "./Choices";
 import { makeTournament } from "./hosting";
@@ -22,19 +21,10 @@ import {
   TOURNAMENT_FIELDS,
   type TournamentForm,
 } from "./tournament-form";
-import "../lobby/new-room.css";
-import "./tournaments.css";
 
 /** The page. */
 export function NewTournament() {
-  const { offered, fault } = useOffered();
-  return (
-    <section class="new-room new-tournament">
-      <h1>{t().organise.title}</h1>
-      {fault && <Notice kind="fault">{fault}</Notice>}
-      {offered && <TournamentFormView offered={offered} />}
-    </section>
-  );
+  return <FormPage title={t().organise.title}>{(offered) => <TournamentFormView offered={offered} />}</FormPage>;
 }
 
 function problemWords(problem: Problem): string {
@@ -56,48 +46,22 @@ function TournamentFormView({ offered }: { offered: Offered }) {
   const { form, faults, change } = filling;
   const parts: FormProps = { form, faults, change };
   return (
-    <form class="new-room-form" onSubmit={filling.submit} noValidate>
-      <section class="sheet new-room-part">
-        <TextField
-          label={words.name}
-          value={form.name}
-          onText={(name) => change({ name })}
-          fault={faults.name}
-          maxLength={MAX_NAME}
-          autoComplete="off"
-          placeholder={words.namePlaceholder}
-        />
-        <FormatFields {...parts} />
-      </section>
-      <section class="sheet new-room-part">
-        <h2>{words.who}</h2>
+    <FormFrame
+      filling={filling}
+      words={words}
+      first={<FormatFields {...parts} />}
+      folded={<Folded {...parts} offered={offered} />}
+    >
+      <FormPart title={words.who}>
         <WhoFields {...parts} agents={offered.agents} />
-      </section>
-      <section class="sheet new-room-part">
-        <h2>{words.when}</h2>
+      </FormPart>
+      <FormPart title={words.when}>
         <StartFields {...parts} />
-      </section>
-      <section class="sheet new-room-part">
-        <h2>{t().lobby.make.clock}</h2>
+      </FormPart>
+      <FormPart title={t().lobby.make.clock}>
         <Clocks {...parts} />
-      </section>
-      <details
-        class="sheet new-room-part"
-        open={filling.unfolded}
-        onToggle={(event) => filling.unfold(event.currentTarget.open)}
-      >
-        <summary>
-          <h2>{words.more}</h2>
-        </summary>
-        <Folded {...parts} offered={offered} />
-      </details>
-      {filling.refusal && <Notice kind="fault">{filling.refusal}</Notice>}
-      <div>
-        <Button look="main" type="submit" busy={filling.busy}>
-          {words.submit}
-        </Button>
-      </div>
-    </form>
+      </FormPart>
+    </FormFrame>
   );
 }
 
@@ -108,7 +72,7 @@ function Clocks(props: FormProps) {
   return (
     <>
       <ClockFields {...props} />
-      <div class="fields">
+      <div class={formCss.fields}>
         <CheckField
           label={words.otherClocks}
           hint={words.otherClocksHint}
@@ -158,7 +122,7 @@ function Folded(props: FormProps & { offered: Offered }) {
       <h3>{rooms.watching}</h3>
       {form.deals === "independent" ? <WatchFields {...props} /> : <p class="soft">{words.notWatched}</p>}
       <h3>{words.experiment}</h3>
-      <div class="fields">
+      <div class={formCss.fields}>
         <Typed {...props} name="drawSeed" label={words.drawSeed} hint={words.drawSeedHint} />
         <Typed {...props} name="dealSeed" label={words.dealSeed} hint={words.dealSeedHint} />
       </div>

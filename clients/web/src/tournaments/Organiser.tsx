@@ -1,16 +1,16 @@
 // A tournament's page for whoever made it on this device: how to invite others, how to begin it, how to close it.
 
-import { useState } from "preact/hooks";
-import { inWords } from "../api/faults";
 import { StudyLinks } from "../experiment/StudyLinks";
 import { type Tournament, TournamentFormat, TournamentState } from "../gen/chefshat/v1/tournament_pb";
 import { t } from "../i18n";
 import { Invite } from "../lobby/Invite";
 import { Sure } from "../lobby/Sure";
+import { useAttempt } from "../parts/attempt";
 import { Button } from "../parts/Button";
 import { Notice } from "../parts/Notice";
 import { isEnded } from "./course";
 import { closeTournament, hostedTournament, invitationTo, startTournament } from "./hosting";
+import css from "./Tournaments.module.css";
 import { isForAgents, isForPeople } from "./words";
 
 /** The organiser's part of the page; nothing for all others, and once it is over. */
@@ -23,7 +23,7 @@ export function Organiser({ tournament }: { tournament: Tournament }) {
   const address = invitationTo(tournamentId, hosted.joinCode);
   const command = `chefshat tournament join --agent greedy --name Gustav --server ${location.origin} --code ${hosted.joinCode}`;
   return (
-    <section class="sheet organiser">
+    <section class={`sheet ${css.organiser}`} data-part="organiser">
       <header>
         <h2>{words.title}</h2>
         <p class="soft small">{words.text}</p>
@@ -51,29 +51,18 @@ export function Organiser({ tournament }: { tournament: Tournament }) {
 function Begin({ tournament }: { tournament: Tournament }) {
   const { tournamentId, participants, settings } = tournament;
   const words = t().organise.own;
-  const [busy, setBusy] = useState(false);
-  const [fault, setFault] = useState("");
-  const begin = async () => {
-    setBusy(true);
-    setFault("");
-    try {
-      await startTournament(tournamentId);
-    } catch (thrown) {
-      setFault(inWords(thrown));
-      setBusy(false);
-    }
-  };
+  const { busy, fault, run } = useAttempt();
   const joined = participants.length;
   const field = fieldFor(tournament);
   return (
-    <div class="organiser-begin">
+    <div class={css.organiserBegin}>
       <p>
         <b>{words.joined(joined)}</b> {settings?.startWhenJoined ? words.startsAt(settings.startWhenJoined) : null}{" "}
         {field > joined && joined > 1 && words.filledUp(field, settings?.filler ?? "", field - joined)}
       </p>
       <p class="soft small">{words.startText}</p>
       {fault && <Notice kind="fault">{fault}</Notice>}
-      <Button look="main" busy={busy} onClick={() => void begin()}>
+      <Button look="main" busy={busy} onClick={() => run(() => startTournament(tournamentId))}>
         {words.start}
       </Button>
     </div>

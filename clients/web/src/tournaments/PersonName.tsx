@@ -14,9 +14,9 @@ interface PersonNameProps {
 /** The name. */
 export function PersonName({ name, builtIn = "", linked = true }: PersonNameProps) {
   // A study may leave out the ways to other pages.
-  if (!linked || hidden.value.includes("pages")) return <b class="person-name">{name}</b>;
+  if (!linked || hidden.value.includes("pages")) return <b data-part="person-name">{name}</b>;
   return (
-    <a class="person-name" href={pathOf({ page: "person", name: builtIn || name })}>
+    <a data-part="person-name" href={pathOf({ page: "person", name: builtIn || name })}>
       {name}
     </a>
   );

@@ -9,7 +9,8 @@ import {
 import { t } from "../i18n";
 import { nameOf, type PlayedTable, playedRounds } from "./course";
 import { GameLink } from "./GameLink";
-import "./rounds.css";
+import css from "./Rounds.module.css";
+import wallCss from "./Wall.module.css";
 
 interface RoundsProps {
   tournament: Tournament;
@@ -24,9 +25,9 @@ export function Rounds({ tournament, games, mine }: RoundsProps) {
   const newest = rounds.find(({ round }) => round === tournament.round) ?? rounds[0];
   if (!newest) return <p class="soft">{words.games.none}</p>;
   return (
-    <div class="rounds">
+    <div class={css.rounds}>
       {rounds.map(({ round, tables }) => (
-        <details key={round} class="sheet rounds-one" open={round === newest.round}>
+        <details key={round} class={`sheet ${css.one}`} open={round === newest.round}>
           <summary>{words.round(round)}</summary>
           <Tables {...{ tournament, tables, mine }} />
         </details>
@@ -44,14 +45,14 @@ interface TablesProps {
 function Tables({ tournament, tables, mine }: TablesProps) {
   const words = t().tournaments;
   return (
-    <ul class="rounds-tables">
+    <ul class={css.tables}>
       {tables.map(({ table, games }) => (
-        <li key={table} class="rounds-table">
+        <li key={table} class={css.table}>
           <h3>{words.table(table)}</h3>
           <ul>
             {games.map((game) => (
-              <li key={game.game} class="rounds-game">
-                <ol class="rounds-seats">
+              <li key={game.game} class={css.game}>
+                <ol>
                   {byPlace(game).map((seat) => (
                     <Seat key={seat.participant} {...{ tournament, game, seat }} mine={seat.participant === mine} />
                   ))}
@@ -70,20 +71,20 @@ function Tables({ tournament, tables, mine }: TablesProps) {
 export function TablesOnWall({ tournament, tables }: Omit<TablesProps, "mine">) {
   const words = t().tournaments;
   return (
-    <ol class="wall-tables">
+    <ol class={wallCss.tables}>
       {tables.map(({ table, games }) => {
         const game = ofTheMoment(games);
         if (!game) return null;
         const playing = game.state === TournamentGameState.PLAYING;
         return (
-          <li key={table} class={playing ? "wall-playing" : ""}>
+          <li key={table} class={playing ? wallCss.playing : ""}>
             <h3>
               {words.table(table)}
               {games.length > 1 && ` · ${words.game(game.number)}`}
               {playing && (
                 <>
                   <span aria-hidden="true"> ▶</span>
-                  <span class="only-heard"> {words.games.playing}</span>
+                  <span class="visually-hidden"> {words.games.playing}</span>
                 </>
               )}
             </h3>
@@ -118,9 +119,12 @@ interface SeatProps {
 function Seat({ tournament, game, seat, mine }: SeatProps) {
   const counted = game.state === TournamentGameState.COUNTED;
   return (
-    <li class={`rounds-seat ${mine ? "rounds-mine" : ""} ${counted && seat.place === 1 ? "rounds-first" : ""}`}>
+    <li
+      class={`${css.seat} ${mine ? css.mine : ""} ${counted && seat.place === 1 ? css.first : ""}`}
+      data-part="rounds-seat"
+    >
       {counted && <span class="number soft">{t().common.place(seat.place)}</span>}
-      <span class="rounds-name">{nameOf(tournament, seat.participant)}</span>
+      <span class={css.name}>{nameOf(tournament, seat.participant)}</span>
       {counted &&
         (seat.forfeited ? (
           <span class="soft small">{t().tournaments.games.forfeited}</span>

@@ -12,7 +12,7 @@ import { KindBadge } from "../parts/KindBadge";
 import { ratingWords } from "../people/rating";
 import { gradeOf, isEnded, meanScore, nameOf, participantOf } from "./course";
 import { PersonName } from "./PersonName";
-import "./standings.css";
+import css from "./Standings.module.css";
 
 /** Lines that leave room for two rows each, on a wall. */
 const FEW = 5;
@@ -33,16 +33,16 @@ export function Standings({ tournament, standings, mine, large = false }: Standi
   const players = tournament.settings?.rules?.players ?? 4;
   const caption = tournament.state === TournamentState.FINISHED ? words.final : words.title;
   return (
-    <table class={`standings ${standings.length > FEW ? "standings-long" : ""}`}>
-      <caption class="only-heard">{caption}</caption>
+    <table class={css.standings} data-part="standings" data-long={standings.length > FEW ? "" : undefined}>
+      <caption class="visually-hidden">{caption}</caption>
       <thead>
         <tr>
           <th scope="col">{words.place}</th>
-          <th scope="col" class="standings-name">
+          <th scope="col" class={css.name} data-part="standings-name">
             {words.name}
           </th>
           {knockout && <th scope="col">{words.round}</th>}
-          <th scope="col" class="standings-minor">
+          <th scope="col" class={css.minor}>
             {words.games}
           </th>
           <th scope="col" title={words.scoreHint}>
@@ -50,13 +50,13 @@ export function Standings({ tournament, standings, mine, large = false }: Standi
           </th>
           {!large && (
             <>
-              <th scope="col" class="standings-minor">
+              <th scope="col" class={css.minor}>
                 {words.points}
               </th>
-              <th scope="col" class="standings-minor">
+              <th scope="col" class={css.minor}>
                 {words.places}
               </th>
-              <th scope="col" class="standings-minor" title={words.ratingHint}>
+              <th scope="col" class={css.minor} title={words.ratingHint}>
                 {words.rating}
               </th>
             </>
@@ -65,25 +65,25 @@ export function Standings({ tournament, standings, mine, large = false }: Standi
       </thead>
       <tbody>
         {standings.map((standing) => (
-          <tr key={standing.participant} class={standing.participant === mine ? "standings-mine" : ""}>
-            <td class={`number standings-place ${standing.place === 1 && standing.games > 0 ? "standings-first" : ""}`}>
+          <tr key={standing.participant} aria-current={standing.participant === mine || undefined}>
+            <td class={`number ${css.place} ${standing.place === 1 && standing.games > 0 ? css.first : ""}`}>
               {standing.place || "–"}
             </td>
-            <th scope="row" class="standings-name">
+            <th scope="row" class={css.name} data-part="standings-name">
               <Who tournament={tournament} standing={standing} large={large} />
             </th>
             {knockout && <td class="number">{standing.lastRound || "–"}</td>}
-            <td class="number standings-minor">{standing.games}</td>
+            <td class={`number ${css.minor}`}>{standing.games}</td>
             <td class="number">
               <b>{standing.games > 0 ? decimal(meanScore(standing), 2) : "–"}</b>
             </td>
             {!large && (
               <>
-                <td class="number standings-minor">{String(standing.points)}</td>
-                <td class="number standings-minor">
+                <td class={`number ${css.minor}`}>{String(standing.points)}</td>
+                <td class={`number ${css.minor}`}>
                   <Places places={standing.places} count={players} />
                 </td>
-                <td class="number standings-minor">
+                <td class={`number ${css.minor}`}>
                   {standing.rating && standing.rating.games > 0 ? ratingWords(standing.rating) : "–"}
                 </td>
               </>
@@ -110,7 +110,7 @@ function Who(props: { tournament: Tournament; standing: TournamentStanding; larg
     <>
       <PersonName name={nameOf(tournament, standing.participant)} builtIn={participant.builtInAgent} linked={!large} />{" "}
       <KindBadge kind={participant.kind} builtIn={participant.builtInAgent} />
-      {!large && remarks.length > 0 && <span class="soft small standings-remarks">{remarks.join(" · ")}</span>}
+      {!large && remarks.length > 0 && <span class={`soft small ${css.remarks}`}>{remarks.join(" · ")}</span>}
     </>
   );
 }
@@ -121,7 +121,7 @@ function Places({ places, count }: { places: readonly number[]; count: number })
   return (
     <>
       <span aria-hidden="true">{all.join(" · ")}</span>
-      <span class="only-heard">{t().tournaments.standings.placesWords(all)}</span>
+      <span class="visually-hidden">{t().tournaments.standings.placesWords(all)}</span>
     </>
   );
 }
@@ -132,7 +132,7 @@ export function Confidence(props: { tournament: Tournament; confidence: readonly
   const words = t().tournaments.confidence;
   if (confidence.length === 0) return null;
   return (
-    <details class="sheet confidence">
+    <details class={`sheet ${css.confidence}`}>
       <summary>{words.title}</summary>
       <p class="soft">{words.text}</p>
       <ul>

@@ -2,10 +2,13 @@
 
 import { useId } from "preact/hooks";
 import { t } from "../i18n";
+import formCss from "../lobby/FormPage.module.css";
 import type { FieldFaults } from "../lobby/filling";
 import { Typed } from "../lobby/GameFields";
 import { CheckField, SelectField, TextField } from "../parts/Field";
+import fieldCss from "../parts/Field.module.css";
 import { Choices } from "./Choices";
+import tournamentsCss from "./Tournaments.module.css";
 import {
   builtIns,
   isNoCount,
@@ -43,7 +46,7 @@ export function FormatFields(props: FormProps) {
         fault={faults.format}
         onPick={(format) => change(withFormat(form, format))}
       />
-      <div class="fields">
+      <div class={formCss.fields}>
         <SelectField
           label={words.players}
           hint={knockout ? words.playersKnockout : undefined}
@@ -74,10 +77,10 @@ export function WhoFields(props: FormProps & { agents: string[] }) {
   const atFault = (count: string) => Boolean(faults.builtIn) && (isNoCount(count) || !counts.some(isNoCount));
   return (
     <>
-      <fieldset class="new-tournament-group">
+      <fieldset class={tournamentsCss.newTournamentGroup}>
         <legend>{words.builtIn}</legend>
         <p class="soft small">{words.builtInHint}</p>
-        <div class="new-tournament-counts">
+        <div class={tournamentsCss.newTournamentCounts}>
           {agents.map((agent) => (
             <TextField
               key={agent}
@@ -91,14 +94,14 @@ export function WhoFields(props: FormProps & { agents: string[] }) {
         </div>
         {builtIns(form) > 0 && <p class="small">{words.builtInSum(builtIns(form))}</p>}
         {faults.builtIn && (
-          <p id={`${id}-built-in`} class="field-fault" role="alert">
+          <p id={`${id}-built-in`} class={fieldCss.fault} role="alert">
             {faults.builtIn}
           </p>
         )}
       </fieldset>
-      <fieldset class="new-tournament-group">
+      <fieldset class={tournamentsCss.newTournamentGroup}>
         <legend>{words.kinds}</legend>
-        <div class="new-tournament-kinds">
+        <div class={tournamentsCss.newTournamentKinds}>
           {(["people", "agents", "robots"] as const).map((kind) => (
             <CheckField
               key={kind}
@@ -111,12 +114,12 @@ export function WhoFields(props: FormProps & { agents: string[] }) {
           ))}
         </div>
         {faults.people && (
-          <p id={`${id}-kinds`} class="field-fault" role="alert">
+          <p id={`${id}-kinds`} class={fieldCss.fault} role="alert">
             {faults.people}
           </p>
         )}
       </fieldset>
-      <div class="fields">
+      <div class={formCss.fields}>
         <Typed {...props} name="maxParticipants" label={words.maxParticipants} hint={words.maxParticipantsHint} />
       </div>
     </>
@@ -128,7 +131,7 @@ export function StartFields(props: FormProps) {
   const { form, change } = props;
   const words = t().organise;
   return (
-    <div class="fields">
+    <div class={formCss.fields}>
       <SelectField
         label={words.start.label}
         hint={form.start === "byHand" ? words.start.byHandHint : words.start.joinedHint}

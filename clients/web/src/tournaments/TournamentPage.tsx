@@ -10,6 +10,7 @@ import { StudyJoin } from "../experiment/StudyJoin";
 import { holderOf, languageOf, type Study, studyOf } from "../experiment/study";
 import { TournamentFormat, TournamentState } from "../gen/chefshat/v1/tournament_pb";
 import { t } from "../i18n";
+import joinCss from "../lobby/Join.module.css";
 import { Button, ButtonLink } from "../parts/Button";
 import { Notice } from "../parts/Notice";
 import { pathOf } from "../router";
@@ -23,10 +24,9 @@ import { Participation } from "./Participation";
 import { type HeldPlace, heldPlace, takePlace } from "./place";
 import { Rounds } from "./Rounds";
 import { Confidence, Standings } from "./Standings";
+import tournamentsCss from "./Tournaments.module.css";
 import { Wall } from "./Wall";
-import { dealsWords, inShort, playWords, StateChip } from "./words";
-import "../lobby/join.css";
-import "./tournaments.css";
+import { dealsWords, inShort, playWords, TournamentStateChip } from "./words";
 
 /** The page. */
 export function TournamentPage({ route }: PageProps<"tournament">) {
@@ -49,7 +49,7 @@ function Followed({ followed }: { followed: FollowedTournament }) {
     );
   }
   return (
-    <div class="tournament">
+    <div class={tournamentsCss.tournament}>
       {lost}
       <Visited heard={heard.value} />
     </div>
@@ -120,7 +120,7 @@ interface WhoseProps {
 function Whose({ name, as, onSame, onOther }: WhoseProps) {
   const words = t().experiment.join;
   return (
-    <section class="sheet join-page">
+    <section class={`sheet ${joinCss.page}`}>
       <h1>{words.title}</h1>
       <p>{as === "" ? words.takenPlace(name) : words.heldPlace(name)}</p>
       {onOther && <p class="soft">{words.onePlace(name)}</p>}
@@ -149,14 +149,14 @@ function Course({ heard, mine, children }: CourseProps) {
   const deals = dealsWords(tournament);
   return (
     <>
-      <header class="tournament-head">
+      <header class={tournamentsCss.head}>
         <div>
           <h1>{tournament.settings?.name}</h1>
           <p>
-            <StateChip tournament={tournament} /> <span class="soft">{inShort(tournament)}</span>
+            <TournamentStateChip tournament={tournament} /> <span class="soft">{inShort(tournament)}</span>
           </p>
           {tournament.round === 0 && !isEnded(tournament) && (
-            <ul class="tournament-play">
+            <ul class={tournamentsCss.play}>
               {playWords(tournament).map((words) => (
                 <li key={words}>{words}</li>
               ))}
@@ -171,7 +171,7 @@ function Course({ heard, mine, children }: CourseProps) {
         )}
       </header>
       {children}
-      <section class="sheet tournament-part">
+      <section class={`sheet ${tournamentsCss.part}`}>
         <h2>{standingsTitle(heard)}</h2>
         {tournament.round === 0 ? (
           <Entrants tournament={tournament} mine={mine} />
@@ -181,7 +181,7 @@ function Course({ heard, mine, children }: CourseProps) {
       </section>
       <Confidence tournament={tournament} confidence={confidence} />
       {tournament.round > 0 && (
-        <section class="tournament-part">
+        <section class={tournamentsCss.part}>
           <h2>{knockout ? words.games.bracket : words.games.title}</h2>
           {knockout ? (
             <Bracket tournament={tournament} games={games} mine={mine} />

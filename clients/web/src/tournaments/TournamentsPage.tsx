@@ -9,8 +9,8 @@ import { MoreButton } from "../parts/MoreButton";
 import { Notice } from "../parts/Notice";
 import { pathOf } from "../router";
 import { tournamentsIn } from "./list";
-import { inShort, madeWords, StateChip } from "./words";
-import "./tournaments.css";
+import css from "./Tournaments.module.css";
+import { inShort, madeWords, TournamentStateChip } from "./words";
 
 /** How often the lists are asked for, milliseconds. */
 const EVERY_MS = 4_000;
@@ -32,8 +32,8 @@ export function TournamentsPage() {
   const known = all.every(({ list }) => list !== null);
   const none = known && all.every(({ list }) => list?.items.length === 0);
   return (
-    <div class="tournaments">
-      <header class="tournaments-head">
+    <div class={css.tournaments}>
+      <header class={css.listHead}>
         <h1>{words.title}</h1>
         <ButtonLink href={pathOf({ page: "newTournament" })} look={none ? "main" : "plain"}>
           {t().organise.link}
@@ -54,19 +54,19 @@ function Section({ title, shown }: { title: string; shown: Shown<Tournament> }) 
   const { list } = shown;
   if (list === null || list.items.length === 0) return null;
   return (
-    <section class="tournaments-section">
+    <section class={css.listSection}>
       <h2>
         {title} <span class="soft number">{countWords(list.items.length, list.more)}</span>
       </h2>
-      <ul class="tournaments-list">
+      <ul class={css.listList}>
         {list.items.map((tournament) => (
           <li key={tournament.tournamentId}>
             <a
-              class="sheet tournaments-card"
+              class={`sheet ${css.listCard}`}
               href={pathOf({ page: "tournament", tournamentId: tournament.tournamentId })}
             >
               <b>{tournament.settings?.name}</b>
-              <StateChip tournament={tournament} />
+              <TournamentStateChip tournament={tournament} />
               <span class="soft small">
                 {inShort(tournament)} · {madeWords(tournament)}
               </span>

@@ -14,8 +14,8 @@ import { useFit } from "./fit";
 import { type Heard, useGames } from "./following";
 import { TablesOnWall } from "./Rounds";
 import { Standings } from "./Standings";
-import { inShort, playWords, StateChip } from "./words";
-import "./wall.css";
+import css from "./Wall.module.css";
+import { inShort, playWords, TournamentStateChip } from "./words";
 
 /** Lines of the standings that are read at a time. */
 const LINES = 10;
@@ -32,24 +32,24 @@ export function Wall({ heard }: { heard: Heard }) {
   const words = t().tournaments;
   useWithoutFrame();
   return (
-    <div class="wall">
-      <header class="wall-head">
+    <div class={css.wall}>
+      <header class={css.head}>
         <Drawing name="joker" />
         <h1>{tournament.settings?.name}</h1>
-        <StateChip tournament={tournament} />
-        <span class="wall-course">{inShort(tournament)}</span>
-        <a class="wall-leave" href={pathOf({ page: "tournament", tournamentId: tournament.tournamentId })}>
+        <TournamentStateChip tournament={tournament} />
+        <span class={css.course}>{inShort(tournament)}</span>
+        <a class={css.leave} href={pathOf({ page: "tournament", tournamentId: tournament.tournamentId })}>
           <span aria-hidden="true">×</span>
-          <span class="only-heard">{words.wall.close}</span>
+          <span class="visually-hidden">{words.wall.close}</span>
         </a>
       </header>
       {tournament.round === 0 ? (
-        <section class="wall-part wall-field">
+        <section class={`${css.part} ${css.field}`}>
           <h2>{words.standings.field}</h2>
           <Fitted>
             <Entrants tournament={tournament} large />
           </Fitted>
-          <p class="wall-play">{playWords(tournament).join(" · ")}</p>
+          <p class={css.play}>{playWords(tournament).join(" · ")}</p>
         </section>
       ) : (
         <Played heard={heard} />
@@ -65,7 +65,7 @@ function Played({ heard }: { heard: Heard }) {
   const lines = useParts(standings, LINES);
   return (
     <>
-      <section class="wall-part wall-standings">
+      <section class={css.part}>
         <h2>
           {words.standings.title}
           {lines.several && <span class="soft number"> {words.wall.more(lines.from, lines.to)}</span>}
@@ -91,7 +91,7 @@ function Tables({ heard }: { heard: Heard }) {
   if (knockout && newest && newest.tables.length <= BRACKET_TABLES) {
     const first = bracket(tournament, games).find((round) => round.tables.length <= BRACKET_TABLES)?.round ?? 1;
     return (
-      <section class="wall-part">
+      <section class={css.part}>
         <h2>{words.games.bracket}</h2>
         <Fitted>
           <Bracket tournament={tournament} games={games} from={first} large />
@@ -100,7 +100,7 @@ function Tables({ heard }: { heard: Heard }) {
     );
   }
   return (
-    <section class="wall-part">
+    <section class={css.part}>
       <h2>
         {newest && words.round(newest.round)}
         {tables.several && <span class="soft number"> · {words.wall.tables(tables.from, tables.to)}</span>}
@@ -116,7 +116,7 @@ function Tables({ heard }: { heard: Heard }) {
 function Fitted({ children }: { children: ComponentChildren }) {
   const box = useFit<HTMLDivElement>();
   return (
-    <div ref={box} class="wall-fitted">
+    <div ref={box} class={css.fitted} data-part="wall-fitted">
       {children}
     </div>
   );

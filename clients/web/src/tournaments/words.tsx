@@ -4,27 +4,21 @@ import { ParticipantKind } from "../gen/chefshat/v1/room_pb";
 import { type Tournament, TournamentDeals, TournamentFormat, TournamentState } from "../gen/chefshat/v1/tournament_pb";
 import { dateLocale, t } from "../i18n";
 import { clockOfPeople } from "../lobby/rooms";
+import { StateChip } from "../parts/StateChip";
 
-/** Where a tournament stands, by sign and word. */
-export function StateChip({ tournament }: { tournament: Tournament }) {
+/** The state of a tournament. */
+export function TournamentStateChip({ tournament }: { tournament: Tournament }) {
   const words = t().tournaments.states;
-  const [sign, word] = ((): [string, string] => {
-    switch (tournament.state) {
-      case TournamentState.OPEN:
-        return ["◔", words.open];
-      case TournamentState.PLAYING:
-        return ["▶", words.playing];
-      case TournamentState.FINISHED:
-        return ["✓", words.finished];
-      default:
-        return ["×", words.closed];
-    }
-  })();
-  return (
-    <span class={`tournament-state tournament-state-${tournament.state}`}>
-      <span aria-hidden="true">{sign}</span> {word}
-    </span>
-  );
+  switch (tournament.state) {
+    case TournamentState.OPEN:
+      return <StateChip state="open" word={words.open} />;
+    case TournamentState.PLAYING:
+      return <StateChip state="playing" word={words.playing} />;
+    case TournamentState.FINISHED:
+      return <StateChip state="finished" word={words.finished} />;
+    default:
+      return <StateChip state="ended" word={words.closed} />;
+  }
 }
 
 /** Form, size and how far it has come, in a line. */

@@ -1,11 +1,11 @@
 // A short Shift that teaches the rules: the lessons one after the other at a table of its own, without a server.
 
 import { useEffect, useState } from "preact/hooks";
-import { inWords } from "../api/faults";
 import { t } from "../i18n";
 import { playNow } from "../lobby/play-now";
 import { lastName } from "../lobby/seat";
 import { announce } from "../parts/Announcer";
+import { useAttempt } from "../parts/attempt";
 import { Button, ButtonLink } from "../parts/Button";
 import { Notice } from "../parts/Notice";
 import { useAnnounced } from "../table/following";
@@ -17,7 +17,7 @@ import { applyEvent } from "../table/model/reduce";
 import type { TableState } from "../table/model/state";
 import { TableView } from "../table/view/TableView";
 import { firstTable, givenBy, LESSONS, type Lesson, nextEvent } from "./lessons";
-import "./tutorial.css";
+import css from "./Tutorial.module.css";
 
 /** From one event of the script to the next, so that they can be followed. */
 const PACE_MS = 850;
@@ -73,9 +73,9 @@ export function TutorialPage() {
       refusal={words.notThis}
       caption={words.title}
       banner={
-        <section class="lesson" aria-label={words.title}>
-          <p class="lesson-count number">{words.step(at + 1, LESSONS.length)}</p>
-          <p class="lesson-words">{ready ? said : words.watch}</p>
+        <section class={css.lesson} data-part="lesson" aria-label={words.title}>
+          <p class={`${css.count} number`}>{words.step(at + 1, LESSONS.length)}</p>
+          <p class={css.words}>{ready ? said : words.watch}</p>
           {ready && !lesson?.decision && at < LESSONS.length - 1 && (
             <Button look="main" onClick={() => goOn(0)}>
               {words.next}
@@ -98,22 +98,11 @@ export function TutorialPage() {
 
 /** A first game of one's own, without the way over the lobby. */
 function PlayNow() {
-  const [busy, setBusy] = useState(false);
-  const [fault, setFault] = useState("");
-  const play = async () => {
-    setBusy(true);
-    setFault("");
-    try {
-      await playNow(lastName());
-    } catch (thrown) {
-      setFault(inWords(thrown));
-      setBusy(false);
-    }
-  };
+  const { busy, fault, run } = useAttempt();
   return (
     <>
       {fault && <Notice kind="fault">{fault}</Notice>}
-      <Button look="main" busy={busy} onClick={() => void play()}>
+      <Button look="main" busy={busy} onClick={() => run(() => playNow(lastName()))}>
         {t().tutorial.play}
       </Button>
     </>

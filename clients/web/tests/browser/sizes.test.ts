@@ -25,8 +25,20 @@ const SIZES = [
 /** The longest name, and one that cannot be broken. */
 const LONG = "W".repeat(64);
 
-const EVERYBODY = [".table-head h1", ".seats .seat", ".seats .seat-points", ".own .seat", ".own .seat-points"];
-const CHOICE = [".board", ".now-heading", ".hand-stack", "[data-action=play]", "[data-action=pass]"];
+const EVERYBODY = [
+  '[data-part="table-head"] h1',
+  '[data-part="seats"] [data-part="seat"]',
+  '[data-part="seats"] [data-part="seat-points"]',
+  '[data-part="own"] [data-part="seat"]',
+  '[data-part="own"] [data-part="seat-points"]',
+];
+const CHOICE = [
+  '[data-part="board"]',
+  '[data-part="now-heading"]',
+  '[data-part="hand-stack"]',
+  "[data-action=play]",
+  "[data-action=pass]",
+];
 
 /** The game that was played to its end. */
 let gameId: string;
@@ -49,12 +61,23 @@ test("a turn, and the end of the game, at every size", async () => {
     for (const language of ["en", "it"]) {
       await page.goto(`${address}?lang=${language}`);
       await page.locator("[data-decision]").waitFor();
-      await expectSeen(page, [...EVERYBODY, ...CHOICE, ".clock", ".expressions", ".own .chip"]);
+      await expectSeen(page, [
+        ...EVERYBODY,
+        ...CHOICE,
+        '[data-part="clock"]',
+        '[data-part="expressions"]',
+        '[data-part="own"] [data-part="chip"]',
+      ]);
       looked += 1;
     }
   });
   expect(looked).toBe(2);
-  await expectSeen(page, [...EVERYBODY, ".own .chip", ".result", ".result-ways .button"]);
+  await expectSeen(page, [
+    ...EVERYBODY,
+    '[data-part="own"] [data-part="chip"]',
+    '[data-part="result"]',
+    '[data-part="result-ways"] [data-part="button"]',
+  ]);
   await page.getByRole("button", { name: "Gioca ancora" }).waitFor();
   gameId = await gameOf(server, roomId);
   expect(faults).toEqual([]);
@@ -63,7 +86,7 @@ test("a turn, and the end of the game, at every size", async () => {
 test("a replay: its controls cover no seat of a desk's screen, and nothing is wider than the screen", async () => {
   const { page } = await person(browser);
   await page.goto(`${server.url}/replay/${gameId}?lang=it`);
-  const slider = page.locator(".replay-slider input");
+  const slider = page.locator('[data-part="replay-slider"] input');
   const last = Number(await slider.getAttribute("max"));
   expect(last).toBeGreaterThan(20);
   for (const [width, height] of SIZES) {
@@ -76,15 +99,26 @@ test("a replay: its controls cover no seat of a desk's screen, and nothing is wi
     // A smaller screen is scrolled.
     if (width < 1000) continue;
     await slider.fill("3");
-    await expectSeenNow(page, [".seats .seat", ".seats .seat-points", ".seat-open", ".board", ".replay-bar"]);
+    await expectSeenNow(page, [
+      '[data-part="seats"] [data-part="seat"]',
+      '[data-part="seats"] [data-part="seat-points"]',
+      '[data-part="seat-open"]',
+      '[data-part="board"]',
+      '[data-part="replay-bar"]',
+    ]);
   }
 });
 
 test.each(["en", "it"])("the tutorial in %s, its words included, at every size", async (language) => {
   const { page } = await person(browser);
   await page.goto(`${server.url}/tutorial?lang=${language}`);
-  await page.locator(".lesson .button").waitFor();
-  await expectSeen(page, [".lesson", ".lesson .button", ...EVERYBODY, ...CHOICE]);
+  await page.locator('[data-part="lesson"] [data-part="button"]').waitFor();
+  await expectSeen(page, [
+    '[data-part="lesson"]',
+    '[data-part="lesson"] [data-part="button"]',
+    ...EVERYBODY,
+    ...CHOICE,
+  ]);
 });
 
 /** At every size nothing of what is named is outside of the window, or under something else. */
@@ -115,7 +149,7 @@ async function unseen(page: Page, parts: readonly string[]): Promise<string[]> {
         const at = document.elementFromPoint(box.left + box.width / 2, box.top + box.height / 2);
         const free = at !== null && (element.contains(at) || at.contains(element));
         // What the board shows may have the result over it, and the cards of a hand lie on each other.
-        const seen = inside && (free || element.matches(".board, .hand-stack"));
+        const seen = inside && (free || element.matches('[data-part="board"], [data-part="hand-stack"]'));
         return seen ? [] : [`${part} ${index}: ${Math.round(box.top)} to ${Math.round(box.bottom)}`];
       });
     });

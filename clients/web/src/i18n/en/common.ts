@@ -17,8 +17,8 @@ export const common = {
   settings: {
     title: "Settings",
     language: "Language",
-    look: "Theme",
-    looks: { system: "System", light: "Light", dark: "Dark" },
+    theme: "Theme",
+    themes: { system: "System", light: "Light", dark: "Dark" },
     forget: "Forget everything on this device",
     forgetSure:
       "This removes your seats, your places in tournaments, the rooms and tournaments you created, your name and your settings from this device. You cannot get them back.",

@@ -18,8 +18,8 @@ export const common: Texts["common"] = {
   settings: {
     title: "Impostazioni",
     language: "Lingua",
-    look: "Tema",
-    looks: { system: "Sistema", light: "Chiaro", dark: "Scuro" },
+    theme: "Tema",
+    themes: { system: "Sistema", light: "Chiaro", dark: "Scuro" },
     forget: "Dimentica tutto su questo dispositivo",
     forgetSure:
       "Da questo dispositivo vengono eliminati i tuoi posti, le iscrizioni ai tornei, le stanze e i tornei creati, il nome e le impostazioni. Non potrai recuperarli.",

@@ -5,12 +5,14 @@ import type { ComponentChildren } from "preact";
 import { DecisionKind } from "../../gen/chefshat/v1/decision_pb";
 import { Role } from "../../gen/chefshat/v1/rules_pb";
 import { t } from "../../i18n";
+import buttonCss from "../../parts/Button.module.css";
 import { Clock } from "../../parts/Clock";
 import { actionOf, type Move } from "../model/actions";
 import type { OpenDecision } from "../model/live";
 import { missing, type Picked } from "../model/picking";
 import type { TableState } from "../model/state";
 import { cardWord, moveWords } from "../words";
+import css from "./ActionBar.module.css";
 import { giftWords } from "./Now";
 
 interface ActionBarProps {
@@ -41,8 +43,8 @@ export function ActionBar(props: ActionBarProps) {
   const special = kind === DecisionKind.SPECIAL_ACTION;
   const mayPass = moves.some((legal) => legal.kind === "pass");
   return (
-    <section class="actions" aria-label={words.label}>
-      <p class={`actions-hint ${remark ? "actions-remark" : ""}`} role="note">
+    <section class={css.actions} data-part="actions" aria-label={words.label}>
+      <p class={`${css.hint} ${remark ? css.remark : ""}`} role="note">
         {remark || hint(props)}
       </p>
       {decision && props.wholeMs > 0 && (
@@ -54,7 +56,7 @@ export function ActionBar(props: ActionBarProps) {
           wholeMs={props.wholeMs}
         />
       )}
-      <div class="actions-buttons">
+      <div class={css.buttons}>
         {special ? (
           <SpecialActions table={table} own={props.own} busy={sending} onAnswer={answer} />
         ) : kind === DecisionKind.EXCHANGE ? (
@@ -141,7 +143,9 @@ function Act({ id, ready, main = false, quiet = false, onClick, children }: ActP
   return (
     <button
       type="button"
-      class={`button ${main ? "button-main" : quiet ? "button-quiet" : "button-plain"}`}
+      class={buttonCss.button}
+      data-part="button"
+      data-look={main ? "main" : quiet ? "quiet" : "plain"}
       aria-disabled={!ready}
       data-action={id}
       onClick={() => ready && onClick()}

@@ -6,7 +6,7 @@ import { Card } from "../../parts/Card";
 import { Drawing, faceDrawing } from "../../parts/Drawing";
 import type { TableState } from "../model/state";
 import { distinctName, playWords } from "../words";
-import "./board.css";
+import css from "./Board.module.css";
 
 /** Most toppings that are drawn. */
 const MOST_TOPPINGS = 44;
@@ -18,22 +18,24 @@ export function Board({ table, children }: { table: TableState; children?: Compo
   const words = t().table.board;
   const { board } = table;
   return (
-    <section class="board" aria-label={words.label}>
-      <div class="pizza" aria-hidden="true">
+    <section class={css.board} data-part="board" aria-label={words.label}>
+      <div class={css.pizza} aria-hidden="true">
         {table.toppings.slice(-MOST_TOPPINGS).map((face, index) => (
           <Topping key={index} name={face > table.faces ? "joker" : faceDrawing(face)} index={index} />
         ))}
       </div>
       <div
-        class={`board-cards ${board.length > 6 ? "board-many" : ""}`}
+        class={`${css.cards} ${board.length > 6 ? css.many : ""}`}
         style={{ "--cards": board.length }}
         key={`${table.shift}-${table.turn}-${board.length}`}
       >
         {board.map((card, index) => (
-          <Card key={index} card={card} class="board-card" />
+          <Card key={index} card={card} class={css.card} />
         ))}
       </div>
-      <p class={`board-words ${board.length === 0 ? "board-empty" : ""}`}>{children ?? boardWords(table)}</p>
+      <p class={`${css.words} ${board.length === 0 ? css.empty : ""}`} data-part="board-words">
+        {children ?? boardWords(table)}
+      </p>
     </section>
   );
 }
@@ -53,7 +55,7 @@ function Topping({ name, index }: { name: string; index: number }) {
   const top = 50 + 50 * radius * Math.sin(angle);
   const style = { left: `${left.toFixed(1)}%`, top: `${top.toFixed(1)}%`, rotate: `${(index * 67) % 360}deg` };
   return (
-    <span class="topping" style={style}>
+    <span class={css.topping} style={style}>
       <Drawing name={name} />
     </span>
   );

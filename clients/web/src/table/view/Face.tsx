@@ -1,6 +1,7 @@
 // Drawings of the expressions that a person can show with one click. Others, from robots and agents, are shown by their label alone.
 
 import type { Label } from "../expressions";
+import css from "./Tools.module.css";
 
 /** Brows, eyes and mouth of each expression, in a box of 48 by 48. */
 const FEATURES: Record<Label, string> = {
@@ -16,7 +17,7 @@ const FEATURES: Record<Label, string> = {
 export function Face({ label }: { label: Label }) {
   return (
     <svg
-      class="face"
+      class={css.face}
       viewBox="0 0 48 48"
       aria-hidden="true"
       fill="none"

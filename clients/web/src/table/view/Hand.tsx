@@ -9,6 +9,7 @@ import { Card } from "../../parts/Card";
 import { type Card as CardValue, countOf, faceOf, stacks } from "../model/cards";
 import type { Picked } from "../model/picking";
 import { cardWord } from "../words";
+import css from "./Hand.module.css";
 
 interface HandProps {
   /** The row, for those who put the focus there. */
@@ -59,7 +60,7 @@ export function Hand(props: HandProps) {
   const go = (index: number) => {
     const to = Math.max(0, Math.min(last, index));
     setFocus(to);
-    row.current?.querySelectorAll<HTMLElement>(".hand-card")[to]?.focus();
+    row.current?.querySelectorAll<HTMLElement>('[data-part="hand-card"]')[to]?.focus();
   };
   const choose = (index: number) => {
     setFocus(index);
@@ -104,7 +105,7 @@ export function Hand(props: HandProps) {
   let index = -1;
   return (
     <div
-      class={`hand ${units <= ONE_ROW_UNITS ? "hand-short" : ""}`}
+      class={`${css.hand} ${units <= ONE_ROW_UNITS ? css.short : ""}`}
       role="toolbar"
       aria-label={props.label}
       aria-describedby="hand-help"
@@ -113,7 +114,7 @@ export function Hand(props: HandProps) {
       tabIndex={-1}
       onKeyDown={onKeyDown}
     >
-      <p id="hand-help" class="only-heard">
+      <p id="hand-help" class="visually-hidden">
         {t().table.hand.help}
       </p>
       {cards.length === 0 && <p class="soft">{t().table.hand.empty}</p>}
@@ -121,7 +122,7 @@ export function Hand(props: HandProps) {
         const face = stack[0] && faceOf(stack[0]);
         const fresh = countOf(received, face);
         return (
-          <div class="hand-stack" key={face ?? "J"}>
+          <div class={css.stack} data-part="hand-stack" key={face ?? "J"}>
             {stack.map((card, inStack) => {
               index += 1;
               const at = index;
@@ -130,7 +131,8 @@ export function Hand(props: HandProps) {
                 <button
                   key={inStack}
                   type="button"
-                  class={`hand-card ${picked.has(at) ? "hand-picked" : ""}`}
+                  class={`${css.card} ${picked.has(at) ? css.picked : ""}`}
+                  data-part="hand-card"
                   aria-pressed={picked.has(at)}
                   aria-disabled={reason !== undefined}
                   aria-label={cardWord(card) + (inStack < fresh ? `, ${t().table.card.received}` : "")}
@@ -141,9 +143,9 @@ export function Hand(props: HandProps) {
                   data-card={card.kind === "joker" ? "J" : card.face}
                 >
                   <Card card={card} />
-                  {inStack < fresh && <span class="hand-fresh" aria-hidden="true" />}
+                  {inStack < fresh && <span class={css.fresh} aria-hidden="true" />}
                   {picked.has(at) && (
-                    <span class="hand-check" aria-hidden="true">
+                    <span class={css.check} aria-hidden="true">
                       ✓
                     </span>
                   )}
@@ -151,7 +153,7 @@ export function Hand(props: HandProps) {
               );
             })}
             {stack.length > 1 && (
-              <span class="hand-count number" aria-hidden="true">
+              <span class={`${css.count} number`} aria-hidden="true">
                 ×{stack.length}
               </span>
             )}

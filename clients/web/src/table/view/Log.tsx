@@ -6,18 +6,19 @@ import { SeatNumber } from "../../parts/SeatNumber";
 import { worthSaying } from "../model/log";
 import type { TableState } from "../model/state";
 import { happeningWords, nameOf } from "../words";
+import css from "./Log.module.css";
 
 export function Log({ table }: { table: TableState }) {
   return (
-    <section class="log sheet" aria-label={t().table.log.title}>
+    <section class={`${css.log} sheet`} data-part="log" aria-label={t().table.log.title}>
       <h2>{t().table.log.title}</h2>
       {/* biome-ignore lint/a11y/noNoninteractiveTabindex: what scrolls must be reached with the keyboard */}
-      <div class="log-lines" tabIndex={0}>
+      <div class={css.lines} tabIndex={0}>
         <ol>
           {worthSaying(table.log, !hidden.value.includes("expressions")).map((line) => {
             const { seat, text } = happeningWords(table, line.happening);
             return (
-              <li key={line.sequence} class={seat === undefined ? "log-aside" : ""}>
+              <li key={line.sequence} class={seat === undefined ? css.aside : ""}>
                 {seat !== undefined && (
                   <>
                     <SeatNumber seat={seat} />

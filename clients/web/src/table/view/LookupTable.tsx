@@ -5,7 +5,7 @@ import { t } from "../../i18n";
 import { Drawing, faceDrawing } from "../../parts/Drawing";
 import type { Cell, CellState, Lookup } from "../model/lookup";
 import { moveWords } from "../words";
-import "./lookup.css";
+import css from "./LookupTable.module.css";
 
 const SIGNS: Record<CellState, string> = { legal: "✓", notInHand: "", notAllowed: "✕", impossible: "" };
 const STATES: readonly CellState[] = ["legal", "notInHand", "notAllowed", "impossible"];
@@ -22,18 +22,18 @@ export function LookupTable({ lookup, taken }: LookupTableProps) {
   const cells = [...lookup.plays.flat(2), ...lookup.others];
   const legal = cells.filter((cell) => cell.state === "legal").length;
   return (
-    <div class="lookup">
-      <p class="lookup-count">
+    <div class={css.lookup} data-part="lookup">
+      <p>
         <strong>{words.count(legal)}</strong> <span class="soft small">{words.groups}</span>
       </p>
       {/* biome-ignore lint/a11y/noNoninteractiveTabindex: what scrolls must be reached with the keyboard */}
-      <section class="lookup-scroll" tabIndex={0} aria-label={words.caption}>
+      <section class={css.scroll} tabIndex={0} aria-label={words.caption}>
         <table>
-          <caption class="only-heard">{words.caption}</caption>
+          <caption class="visually-hidden">{words.caption}</caption>
           <thead>
             <tr>
               <th scope="col">
-                <span class="only-heard">{words.face}</span>
+                <span class="visually-hidden">{words.face}</span>
               </th>
               {lookup.plays.map((_, index) => (
                 <th scope="col" key={index} class="number">
@@ -50,7 +50,7 @@ export function LookupTable({ lookup, taken }: LookupTableProps) {
                 </th>
                 {quantities.map((group, quantity) => (
                   <td key={quantity}>
-                    <span class="lookup-group">
+                    <span class={css.group}>
                       {group.map((cell) => (
                         <Sign key={cell.action} cell={cell} taken={cell.action === taken} />
                       ))}
@@ -62,12 +62,12 @@ export function LookupTable({ lookup, taken }: LookupTableProps) {
             ))}
           </tbody>
           {/* What is no play of a face has a row of its own below all faces. */}
-          <tbody class="lookup-others">
+          <tbody class={css.others}>
             {lookup.others.map((cell) => (
               <tr key={cell.action}>
                 <th scope="row">
                   {cell.move.kind === "pass" ? <span aria-hidden="true">–</span> : <Drawing name="joker" />}
-                  <span class="only-heard">{cell.move.kind === "pass" ? words.pass : words.loneJoker}</span>
+                  <span class="visually-hidden">{cell.move.kind === "pass" ? words.pass : words.loneJoker}</span>
                 </th>
                 <td colSpan={faces}>
                   <Sign cell={cell} taken={cell.action === taken} />{" "}
@@ -78,12 +78,12 @@ export function LookupTable({ lookup, taken }: LookupTableProps) {
           </tbody>
         </table>
       </section>
-      <section class="lookup-key">
+      <section class={css.key}>
         <h3>{words.signs}</h3>
         <ul>
           {STATES.map((state) => (
             <li key={state}>
-              <span class={`lookup-cell lookup-${state}`} aria-hidden="true">
+              <span class={`${css.cell} ${css[state]}`} aria-hidden="true">
                 {SIGNS[state]}
               </span>{" "}
               {words[state]}
@@ -98,15 +98,15 @@ export function LookupTable({ lookup, taken }: LookupTableProps) {
 function Sign({ cell, taken }: { cell: Cell; taken: boolean }) {
   const words = t().table.lookup;
   const said = `${moveWords(cell.move)}: ${words[cell.state]}${taken ? `, ${words.chosen}` : ""}`;
-  const class_ = `lookup-cell lookup-${cell.state} ${taken ? "lookup-taken" : ""}`;
+  const look = `${css.cell} ${css[cell.state]} ${taken ? css.taken : ""}`;
   if (cell.state !== "legal")
     return (
-      <span class={class_} title={said} aria-hidden="true">
+      <span class={look} title={said} aria-hidden="true">
         {SIGNS[cell.state]}
       </span>
     );
   return (
-    <span class={class_} title={said} role="img" aria-label={said}>
+    <span class={look} title={said} role="img" aria-label={said}>
       {SIGNS.legal}
     </span>
   );

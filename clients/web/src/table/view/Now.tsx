@@ -3,12 +3,12 @@
 import { DecisionKind } from "../../gen/chefshat/v1/decision_pb";
 import { Role } from "../../gen/chefshat/v1/rules_pb";
 import { t } from "../../i18n";
+import { SeatNumber } from "../../parts/SeatNumber";
 import { demandOf, giftOf } from "../model/demand";
 import type { OpenDecision } from "../model/live";
 import type { TableState } from "../model/state";
 import { distinctName, headingWords } from "../words";
-import "./now.css";
-import { SeatNumber } from "../../parts/SeatNumber";
+import css from "./Now.module.css";
 
 interface NowProps {
   table: TableState;
@@ -31,13 +31,13 @@ export function Now(props: NowProps) {
   const asked = deciding ?? kind ?? DecisionKind.TURN;
   const turn = asked === DecisionKind.TURN && next !== undefined;
   return (
-    <section class="now" aria-label={nowHeading(props)}>
-      <h2 class="now-heading">
+    <section class={css.now} aria-label={nowHeading(props)}>
+      <h2 class={css.heading} data-part="now-heading">
         {next !== undefined && next !== own && <SeatNumber seat={next} />}
         {nowHeading(props)}
       </h2>
       {turn && <Demands table={table} mayPass={props.mayPass ?? false} />}
-      {deciding === DecisionKind.EXCHANGE && <p class="now-gift">{giftWords(table, own)}</p>}
+      {deciding === DecisionKind.EXCHANGE && <p class={css.gift}>{giftWords(table, own)}</p>}
       {deciding === DecisionKind.SPECIAL_ACTION && (
         <p>{own !== undefined && table.seats[own]?.role === Role.DISHWASHER ? words.foodFight : words.dinner}</p>
       )}
@@ -87,7 +87,7 @@ function Demands({ table, mayPass }: { table: TableState; mayPass: boolean }) {
     case "opening":
       return (
         <>
-          <div class="tiles">
+          <div class={css.tiles}>
             <Tile number={demand.face} text={demand.golden ? words.openingGolden : words.openingFace} />
           </div>
           <p>{mayPass ? words.opensMayPass : words.opens}</p>
@@ -97,7 +97,7 @@ function Demands({ table, mayPass }: { table: TableState; mayPass: boolean }) {
       if (demand.face === 0) return <p>{words.nothing}</p>;
       return (
         <>
-          <div class="tiles">
+          <div class={css.tiles}>
             <Tile sign="≤" number={demand.face} text={words.face} />
             <Tile sign="≥" number={demand.size} text={words.cards(demand.size)} />
           </div>
@@ -109,7 +109,7 @@ function Demands({ table, mayPass }: { table: TableState; mayPass: boolean }) {
 
 function Tile({ sign = "", number, text }: { sign?: string; number: number; text: string }) {
   return (
-    <p class="tile">
+    <p class={css.tile}>
       <strong class="number">
         {sign && <small>{sign}</small>} {number}
       </strong>

@@ -2,7 +2,7 @@
 
 import { t } from "../../i18n";
 import type { TableState } from "../model/state";
-import "./played.css";
+import css from "./Played.module.css";
 
 export function Played({ table }: { table: TableState }) {
   const words = t().table.played;
@@ -15,25 +15,25 @@ export function Played({ table }: { table: TableState }) {
     .filter(({ all }) => all > 0);
   if (cells.length === 0) return null;
   return (
-    <section class="played" aria-label={words.title}>
-      <h3 class="played-title">
+    <section class={css.played} data-part="played" aria-label={words.title}>
+      <h3 class={css.title}>
         {words.title}
-        <span class="played-key" aria-hidden="true">
-          <i class="played-out" /> {words.allOut}
+        <span class={css.key} aria-hidden="true">
+          <i class={css.out} /> {words.allOut}
         </span>
       </h3>
       <ul>
         {cells.map(({ name, count, all }) => (
           <li
             key={name}
-            class={`number ${count === 0 ? "played-none" : ""} ${count === all ? "played-out" : ""}`}
+            class={`number ${count === 0 ? css.none : ""} ${count === all ? css.out : ""}`}
             style={{ "--share": (count / all).toFixed(3) }}
           >
             <b>{name}</b>{" "}
             <span>
               {count}/{all}
             </span>
-            {count === all && <span class="only-heard">, {words.allOut}</span>}
+            {count === all && <span class="visually-hidden">, {words.allOut}</span>}
           </li>
         ))}
       </ul>

@@ -6,7 +6,7 @@ import { ButtonLink } from "../../parts/Button";
 import { SeatNumber } from "../../parts/SeatNumber";
 import type { ShiftResult, TableState } from "../model/state";
 import { nameOf } from "../words";
-import "./result.css";
+import css from "./Result.module.css";
 
 interface ResultProps {
   table: TableState;
@@ -33,9 +33,9 @@ function Ways({ table, onward }: Pick<ResultProps, "table" | "onward">) {
   const words = t().table.result;
   const ended = table.phase === "gameOver";
   return (
-    <div class="result-ways">
+    <div class={css.ways} data-part="result-ways">
       {onward}
-      <span class="result-links">
+      <span class={css.links} data-part="result-links">
         {ended && (
           <ButtonLink href={`/replay/${table.gameId}`} look={onward ? "plain" : "main"}>
             {words.replay}
@@ -52,7 +52,7 @@ function Ways({ table, onward }: Pick<ResultProps, "table" | "onward">) {
 function ShiftTable({ table, result }: { table: TableState; result: ShiftResult }) {
   const words = t().table.result;
   return (
-    <section class="result sheet" aria-label={words.shift(result.shift)}>
+    <section class={`${css.result} sheet`} data-part="result" aria-label={words.shift(result.shift)}>
       <h2>{words.shift(result.shift)}</h2>
       <table>
         <thead>
@@ -86,7 +86,7 @@ function GameResult({ table, own, ways }: EndProps & Pick<ResultProps, "own">) {
   const words = t().table.result;
   const winner = table.standings[0]?.seat;
   return (
-    <section class="result sheet" aria-label={words.game}>
+    <section class={`${css.result} sheet`} data-part="result" aria-label={words.game}>
       <h2>{winner !== undefined && (winner === own ? words.youWon : words.wins(nameOf(table, winner)))}</h2>
       <table>
         <thead>
@@ -113,7 +113,7 @@ function GameResult({ table, own, ways }: EndProps & Pick<ResultProps, "own">) {
 function Aborted({ table, ways }: EndProps) {
   const words = t().table;
   return (
-    <section class="result sheet" aria-label={words.heading.aborted}>
+    <section class={`${css.result} sheet`} data-part="result" aria-label={words.heading.aborted}>
       <h2>{words.heading.aborted}</h2>
       <p>{words.aborted[table.abortReason]}</p>
       {ways}

@@ -13,6 +13,7 @@ import { stacks } from "../model/cards";
 import { isTaken, type SeatState, type TableState } from "../model/state";
 import { cardWord, expressionWord, nameOf, playWords, presenceWords, roleWord } from "../words";
 import { Face } from "./Face";
+import css from "./SeatPanel.module.css";
 
 /** Backs that are drawn of a hidden hand; the number beside them counts. */
 const MOST_BACKS = 17;
@@ -57,27 +58,27 @@ export function SeatPanel({ table, seat, own = false, deciding, kind, cards = tr
   const presence = presenceWords(seat);
   const role = roleWord(seat.role);
   return (
-    <article class={`seat ${state ? `seat-${state}` : ""} ${own ? "seat-own" : ""}`} data-seat={seat.seat}>
+    <article class={`${css.seat} ${css[state] ?? ""}`} data-part="seat" data-seat={seat.seat}>
       <SeatNumber seat={seat.seat} />
-      <div class="seat-who">
-        <h2 class="seat-name">
+      <div class={css.who}>
+        <h2 class={css.name}>
           {isTaken(seat) ? nameOf(table, seat.seat) : freeWords(seat)}
           {own && <span class="soft"> ({words.you})</span>}
         </h2>
-        <p class="seat-kind">
+        <p class={css.kind}>
           {isTaken(seat) && <KindBadge kind={seat.kind} builtIn={seat.builtIn} />}
-          {isTaken(seat) && presence && <span class="seat-presence">{presence}</span>}
+          {isTaken(seat) && presence && <span class={css.presence}>{presence}</span>}
         </p>
       </div>
       {!waiting && (
-        <p class="seat-points">
+        <p class={css.points} data-part="seat-points">
           <strong class="number">{seat.points}</strong> <span class="soft small">{words.pointsWord}</span>
         </p>
       )}
       {!waiting && (
-        <p class="seat-state">
+        <p class={css.state}>
           {role && (
-            <span class="seat-role">
+            <span class={css.role}>
               <Drawing name={ROLE_DRAWINGS[seat.role]} /> {role}
             </span>
           )}
@@ -108,7 +109,11 @@ interface ChipProps {
 function Chip({ table, seat, state, kind }: ChipProps) {
   const words = t().table.chips;
   if (state === "placed") {
-    return <span class="chip chip-placed">{t().common.place(gamePlace(table, seat) ?? seat.place)}</span>;
+    return (
+      <span class={`${css.chip} ${css.chipPlaced}`} data-part="chip">
+        {t().common.place(gamePlace(table, seat) ?? seat.place)}
+      </span>
+    );
   }
   if (state === "deciding") {
     const word =
@@ -117,10 +122,24 @@ function Chip({ table, seat, state, kind }: ChipProps) {
         : kind === DecisionKind.SPECIAL_ACTION
           ? words.toDeclare
           : words.toPlay;
-    return <span class="chip chip-deciding">{word}</span>;
+    return (
+      <span class={`${css.chip} ${css.chipDeciding}`} data-part="chip">
+        {word}
+      </span>
+    );
   }
-  if (seat.lastMove === "pass") return <span class="chip chip-passed">{words.passed}</span>;
-  if (seat.lastMove) return <span class="chip chip-played">{playWords(seat.lastMove)}</span>;
+  if (seat.lastMove === "pass")
+    return (
+      <span class={`${css.chip} ${css.chipPassed}`} data-part="chip">
+        {words.passed}
+      </span>
+    );
+  if (seat.lastMove)
+    return (
+      <span class={`${css.chip} ${css.chipPlayed}`} data-part="chip">
+        {playWords(seat.lastMove)}
+      </span>
+    );
   return null;
 }
 
@@ -133,13 +152,13 @@ function Cards({ seat }: { seat: SeatState }) {
   const count = t().common.cards(seat.cardsLeft);
   if (seat.hand) {
     return (
-      <div class="seat-cards">
-        <span class="only-heard">{seat.hand.map(cardWord).join("; ")}</span>
-        <div class="seat-open" aria-hidden="true">
+      <div class={css.cards} data-part="seat-cards">
+        <span class="visually-hidden">{seat.hand.map(cardWord).join("; ")}</span>
+        <div class={css.open} data-part="seat-open" aria-hidden="true">
           {stacks(seat.hand).map((stack) => (
-            <span class="seat-stack" key={stack[0]?.kind === "joker" ? "J" : stack[0]?.face}>
+            <span class={css.stack} key={stack[0]?.kind === "joker" ? "J" : stack[0]?.face}>
               {stack[0] && <Card card={stack[0]} />}
-              {stack.length > 1 && <b class="seat-stack-count number">×{stack.length}</b>}
+              {stack.length > 1 && <b class={`${css.stackCount} number`}>×{stack.length}</b>}
             </span>
           ))}
         </div>
@@ -147,12 +166,12 @@ function Cards({ seat }: { seat: SeatState }) {
     );
   }
   return (
-    <div class="seat-cards">
-      <span class="seat-count number">{count}</span>
-      <span class="seat-deck number" aria-hidden="true">
+    <div class={css.cards} data-part="seat-cards">
+      <span class={`${css.count} number`}>{count}</span>
+      <span class={`${css.deck} number`} aria-hidden="true">
         {seat.cardsLeft}
       </span>
-      <div class="seat-backs" aria-hidden="true">
+      <div class={css.backs} aria-hidden="true">
         {Array.from({ length: Math.min(MOST_BACKS, seat.cardsLeft) }, (_, index) => (
           <Card key={index} card={undefined} />
         ))}
@@ -164,7 +183,7 @@ function Cards({ seat }: { seat: SeatState }) {
 /** An expression, shown for a while. */
 function Bubble({ label }: { label: string }) {
   return (
-    <p class="bubble">
+    <p class={css.bubble} data-part="bubble">
       {isLabel(label) && <Face label={label} />}
       <span>{expressionWord(label)}</span>
     </p>

@@ -23,13 +23,8 @@ import { Now } from "./Now";
 import { Played } from "./Played";
 import { Result } from "./Result";
 import { SeatPanel } from "./SeatPanel";
+import css from "./TableView.module.css";
 import { Expressions, type ShownTurn, Tools } from "./Tools";
-import "./table.css";
-import "./seats.css";
-import "./hand.css";
-import "./phone.css";
-import "./low.css";
-import "./landscape.css";
 
 interface TableViewProps {
   table: TableState;
@@ -122,23 +117,25 @@ export function TableView(props: TableViewProps) {
   const handLabel = props.replayed && mine ? t().table.hand.of(nameOf(table, mine.seat)) : t().table.hand.label;
 
   return (
-    <div class={`table table-of-${table.seats.length} ${mine ? "table-own" : "table-watched"}`} {...keepFocus}>
-      <header class="table-head">
+    <div class={css.table} data-part="table" data-view={mine ? "own" : "watched"} {...keepFocus}>
+      <header class={css.head} data-part="table-head">
         <h1>{headingWords(table).replace(INSIDE, NO_BREAK)}</h1>
-        {props.caption && <p class="soft table-caption">{props.caption}</p>}
+        {props.caption && <p class={`soft ${css.caption}`}>{props.caption}</p>}
         <Tools turn={lastTurn.current} lookup={mine !== undefined && !props.replayed}>
           {props.tools}
         </Tools>
       </header>
-      <div class="table-banner">{props.banner}</div>
+      <div class={css.banner} data-part="table-banner">
+        {props.banner}
+      </div>
       <Seats table={table} own={own} next={next} kind={kind} />
-      <div class="middle">
+      <div class={css.middle}>
         <Log table={table} />
-        <div class="centre">
+        <div class={css.centre}>
           <Board table={table} />
           <Result table={table} own={own} links={!props.replayed} onward={props.onward} />
         </div>
-        <div class="side sheet">
+        <div class={`${css.side} sheet`}>
           <Now
             table={table}
             own={own}
@@ -152,7 +149,10 @@ export function TableView(props: TableViewProps) {
       </div>
       {mine ? (
         <section
-          class={`own sheet ${decision ? "own-deciding" : ""} ${decision && !special ? "own-picking" : ""}`}
+          class={`${css.own} sheet`}
+          data-part="own"
+          data-deciding={decision && ""}
+          data-picking={decision && !special ? "" : undefined}
           aria-label={handLabel}
           data-decision={decision && String(decision.id)}
         >
@@ -166,7 +166,7 @@ export function TableView(props: TableViewProps) {
           />
           {/* Before the hand, so that from the cards the buttons are one tab further. */}
           {props.onExpress && <Expressions onExpress={props.onExpress} />}
-          <div class="own-cards">
+          <div class={css.ownCards} data-part="own-cards">
             <Hand
               row={row}
               cards={hand}
@@ -236,7 +236,7 @@ function Seats({ table, own, next, kind, lower = false }: SeatsProps) {
             .reverse()
         : numbers.slice(1, players - below + 1);
   return (
-    <ol class="seats" style={{ "--seats": shown.length }} aria-label={t().table.room.seats}>
+    <ol class={css.seats} data-part="seats" style={{ "--seats": shown.length }} aria-label={t().table.room.seats}>
       {shown.map((number) => {
         const seat = table.seats[number];
         if (!seat) return null;

@@ -4,6 +4,7 @@ import type { ComponentChildren } from "preact";
 import { useState } from "preact/hooks";
 import { t } from "../../i18n";
 import { Dialog } from "../../parts/Dialog";
+import { Icon } from "../../parts/Icon";
 import { LABELS, type Label } from "../expressions";
 import type { OpenDecision } from "../model/live";
 import { lookupOf } from "../model/lookup";
@@ -11,6 +12,7 @@ import type { TableState } from "../model/state";
 import { setSound, soundOn } from "../sounds";
 import { Face } from "./Face";
 import { LookupTable } from "./LookupTable";
+import css from "./Tools.module.css";
 
 /** A turn as the look-up table shows it. */
 export interface ShownTurn {
@@ -32,11 +34,12 @@ export function Tools({ turn, lookup, children }: ToolsProps) {
   const [open, setOpen] = useState<ShownTurn | "none" | undefined>(undefined);
   const on = soundOn.value;
   return (
-    <fieldset class="tools" aria-label={words.label}>
+    <fieldset class={css.tools} aria-label={words.label}>
       {lookup && (
         <button
           type="button"
-          class="tool tool-lookup"
+          class={css.tool}
+          data-part="tool tool-lookup"
           onClick={() => setOpen(turn ?? "none")}
           aria-label={words.lookup}
           title={words.lookup}
@@ -55,24 +58,17 @@ export function Tools({ turn, lookup, children }: ToolsProps) {
       )}
       <button
         type="button"
-        class="tool"
+        class={css.tool}
+        data-part="tool"
         aria-pressed={on}
         aria-label={on ? words.soundOn : words.soundOff}
         title={on ? words.soundOn : words.soundOff}
         onClick={() => setSound(!on)}
       >
-        <svg
-          viewBox="0 0 24 24"
-          aria-hidden="true"
-          fill="none"
-          stroke="currentColor"
-          stroke-width="2"
-          stroke-linecap="round"
-          stroke-linejoin="round"
-        >
+        <Icon>
           <path fill="currentColor" d="M4 9.5v5h3.5L12 19V5L7.500 9.500Z" />
           <path d={on ? "M15.500 9a4 4 0 0 1 0 6M18 6.500a8 8 0 0 1 0 11" : "M16 9.500l5 5M21 9.500l-5 5"} />
-        </svg>
+        </Icon>
       </button>
       {children}
       {open && (
@@ -91,12 +87,13 @@ export function Tools({ turn, lookup, children }: ToolsProps) {
 export function Expressions({ onExpress }: { onExpress: (label: Label) => void }) {
   const words = t().table.expressions;
   return (
-    <fieldset class="expressions" aria-label={words.label}>
+    <fieldset class={css.expressions} data-part="expressions" aria-label={words.label}>
       {LABELS.map((label) => (
         <button
           key={label}
           type="button"
-          class="tool"
+          class={css.tool}
+          data-part="tool"
           aria-label={words.words[label]}
           title={words.words[label]}
           onClick={() => onExpress(label)}

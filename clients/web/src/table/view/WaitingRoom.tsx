@@ -15,7 +15,7 @@ import { SeatNumber } from "../../parts/SeatNumber";
 import { isTaken, type SeatState, type TableState } from "../model/state";
 import { nameOf } from "../words";
 import { Board } from "./Board";
-import "./waiting-room.css";
+import css from "./WaitingRoom.module.css";
 
 /** How often it is asked who is connected, milliseconds. */
 const EVERY_MS = 2000;
@@ -47,16 +47,16 @@ export function WaitingRoom({ table, own, banner }: WaitingRoomProps) {
     return TOPPINGS[index % TOPPINGS.length] ?? 1;
   });
   return (
-    <section class="waiting-room">
-      <header class="waiting-head">
+    <section class={css.room} data-part="waiting-room">
+      <header class={css.head}>
         <h1>{table.roomName || t().table.title}</h1>
         {room && <p class="soft">{rulesInShort(room)}</p>}
       </header>
       {banner}
-      <div class="waiting-parts">
-        <div class="waiting-words sheet">
+      <div class={css.parts}>
+        <div class={`${css.words} sheet`}>
           <h2>{t().table.heading.waiting}</h2>
-          <ol class="waiting-seats" aria-label={words.seats}>
+          <ol class={css.seats} aria-label={words.seats}>
             {seats.map((seat) => (
               <WaitingSeat key={seat.seat} table={table} seat={seat} own={seat.seat === own} />
             ))}
@@ -85,18 +85,18 @@ function WaitingSeat({ table, seat, own }: { table: TableState; seat: SeatState;
   const taken = isTaken(seat);
   const ready = taken && isThere(seat);
   return (
-    <li class={`waiting-seat ${ready ? "waiting-ready" : ""}`} data-seat={seat.seat}>
+    <li class={`${css.seat} ${ready ? css.ready : ""}`} data-part="waiting-seat" data-seat={seat.seat}>
       <SeatNumber seat={seat.seat} />
-      <div class="waiting-who">
+      <div class={css.who}>
         {taken ? (
           <>
             <h3>
               {nameOf(table, seat.seat)}
               {own && <span class="soft"> ({t().table.you})</span>}
             </h3>
-            <p class="waiting-state small">
+            <p class={`${css.state} small`}>
               <KindBadge kind={seat.kind} builtIn={seat.builtIn} />
-              <span class={ready ? "waiting-there" : ""}>
+              <span class={ready ? css.there : ""}>
                 <span aria-hidden="true">{ready ? "✓" : "…"}</span>{" "}
                 {ready ? (seat.builtIn ? words.ready : words.here) : words.notHere}
               </span>
@@ -126,7 +126,7 @@ function Ways({ roomId, tournament, seated }: WaysProps) {
   const words = t().table.room;
   const way = tournament ? words.assigned : hostedRoom(roomId) ? words.invite : seated ? words.invited : words.byCode;
   return (
-    <section class="waiting-ways">
+    <section class={css.ways}>
       <h3>{words.ways}</h3>
       <p>{way}</p>
       {!tournament && !seated && !hidden.value.includes("pages") && (

@@ -1,0 +1,81 @@
+// The page of a form that creates something on the server: its title, the form once the server has said what it offers, its first part with the
+// name, the folded part, and the button. What the form holds and checks is in filling.ts.
+
+import type { ComponentChildren } from "preact";
+import { type Offered, useOffered } from "../api/server";
+import { Button } from "../parts/Button";
+import { TextField } from "../parts/Field";
+import { Notice } from "../parts/Notice";
+import css from "./FormPage.module.css";
+import type { Filling } from "./filling";
+import { MAX_NAME } from "./room-form";
+
+/** The page; `children` draws the form. */
+export function FormPage({ title, children }: { title: string; children: (offered: Offered) => ComponentChildren }) {
+  const { offered, fault } = useOffered();
+  return (
+    <section class={css.page}>
+      <h1>{title}</h1>
+      {fault && <Notice kind="fault">{fault}</Notice>}
+      {offered && children(offered)}
+    </section>
+  );
+}
+
+interface FormFrameProps {
+  filling: Filling<{ name: string }, "name">;
+  words: { name: string; namePlaceholder: string; more: string; submit: string };
+  /** Fields below the name. */
+  first: ComponentChildren;
+  /** Further parts. */
+  children: ComponentChildren;
+  /** What most people never change. */
+  folded: ComponentChildren;
+}
+
+/** The form. */
+export function FormFrame({ filling, words, first, children, folded }: FormFrameProps) {
+  return (
+    <form class={css.form} data-part="new-room-form" onSubmit={filling.submit} noValidate>
+      <FormPart>
+        <TextField
+          label={words.name}
+          value={filling.form.name}
+          onText={(name) => filling.change({ name })}
+          fault={filling.faults.name}
+          maxLength={MAX_NAME}
+          autoComplete="off"
+          placeholder={words.namePlaceholder}
+        />
+        {first}
+      </FormPart>
+      {children}
+      <details
+        class={`sheet ${css.part}`}
+        open={filling.unfolded}
+        onToggle={(event) => filling.unfold(event.currentTarget.open)}
+      >
+        <summary>
+          <h2>{words.more}</h2>
+        </summary>
+        {folded}
+      </details>
+      {filling.refusal && <Notice kind="fault">{filling.refusal}</Notice>}
+      <div>
+        <Button look="main" type="submit" busy={filling.busy}>
+          {words.submit}
+        </Button>
+      </div>
+    </form>
+  );
+}
+
+/** A part of the form under a title. */
+export function FormPart({ title, children }: { title?: string; children: ComponentChildren }) {
+  return (
+    <section class={`sheet ${css.part}`}>
+      {title && <h2>{title}</h2>}
+      {children}
+    </section>
+  );
+}

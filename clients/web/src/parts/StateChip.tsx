@@ -1,0 +1,17 @@
+// The state of a room or tournament, as a sign and a word.
+
+import css from "./StateChip.module.css";
+
+/** A state: still open, under way, finished, or ended early. */
+export type ChipState = "open" | "playing" | "finished" | "ended";
+
+const SIGNS: Record<ChipState, string> = { open: "◔", playing: "▶", finished: "✓", ended: "×" };
+
+/** The state as a chip. */
+export function StateChip({ state, word }: { state: ChipState; word: string }) {
+  return (
+    <span class={css.stateChip} data-part="state-chip" data-state={state}>
+      <span aria-hidden="true">{SIGNS[state]}</span> {word}
+    </span>
+  );
+}

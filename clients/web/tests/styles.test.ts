@@ -1,0 +1,68 @@
+// The style sheets beside the parts: every class that a part names is in its sheet, and every class of a sheet is used.
+
+import { readdirSync, readFileSync } from "node:fs";
+import { dirname, join, resolve } from "node:path";
+import { expect, test } from "vitest";
+
+const SRC = resolve(import.meta.dirname, "../src");
+const files = readdirSync(SRC, { recursive: true, encoding: "utf8" });
+const read = (name: string) => readFileSync(join(SRC, name), "utf8");
+const camel = (name: string) => name.replaceAll(/-([a-z0-9])/g, (_, letter: string) => letter.toUpperCase());
+
+/** Classes by sheet, as parts name them. */
+const sheets = new Map(
+  files
+    .filter((name) => name.endsWith(".module.css"))
+    .map((name) => {
+      const text = read(name).replaceAll(/\/\*[\s\S]*?\*\/|:global\([^)]*\)|\{[^{}]*\}/g, " ");
+      return [
+        join(SRC, name),
+        new Set([...text.matchAll(/\.([a-zA-Z][\w-]*)/g)].map(([, found = ""]) => camel(found))),
+      ];
+    }),
+);
+const used = new Map([...sheets.keys()].map((sheet) => [sheet, new Set<string>()]));
+const unknown: string[] = [];
+for (const name of files.filter((file) => file.endsWith(".tsx"))) {
+  const text = read(name);
+  for (const [, local = "", path = ""] of text.matchAll(/import (\w+) from "([^"]+\.module\.css)"/g)) {
+    const sheet = resolve(SRC, dirname(name), path);
+    for (const [, found = ""] of text.matchAll(new RegExp(`\\b${local}\\.(\\w+)`, "g"))) {
+      if (!sheets.get(sheet)?.has(found)) unknown.push(`${name}: ${found}`);
+      used.get(sheet)?.add(found);
+    }
+    // By a value, such as the kind of a card: any class may be meant.
+    if (text.includes(`${local}[`)) for (const any of sheets.get(sheet) ?? []) used.get(sheet)?.add(any);
+  }
+}
+
+test("a part names no class that its sheet lacks", () => expect(unknown).toEqual([]));
+
+test("a sheet has no class that no part uses", () => {
+  const unused = [...sheets].flatMap(([sheet, classes]) =>
+    [...classes]
+      .filter((found) => !used.get(sheet)?.has(found))
+      .map((found) => `${sheet.slice(SRC.length + 1)}: ${found}`),
+  );
+  expect(sheets.size).toBeGreaterThan(30);
+  expect(unused).toEqual([]);
+});
+
+test("a place that a sheet or a test names is one that a part has", () => {
+  const parts = new Set(
+    files
+      .filter((name) => name.endsWith(".tsx"))
+      .flatMap((name) =>
+        [...read(name).matchAll(/data-part=(?:"([^"]*)"|\{([^}]*)\})/g)].flatMap(([, plain, dynamic = ""]) =>
+          plain === undefined ? [...dynamic.matchAll(/"([\w-]+)"/g)].map(([, part = ""]) => part) : plain.split(" "),
+        ),
+      ),
+  );
+  const tests = resolve(SRC, "../tests/browser");
+  const texts = [
+    ...files.filter((name) => name.endsWith(".css")).map(read),
+    ...readdirSync(tests).map((name) => readFileSync(join(tests, name), "utf8")),
+  ];
+  const named = texts.flatMap((text) => [...text.matchAll(/data-part~?="?([\w-]+)/g)].map(([, part = ""]) => part));
+  expect([...new Set(named)].filter((part) => !parts.has(part))).toEqual([]);
+});
