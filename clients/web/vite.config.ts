@@ -1,4 +1,4 @@
-// How the page is built (into dist/, which the server embeds), served while it is worked on, and tested.
+// Builds the page (into dist/, which the server embeds), serves it during development, and configures the tests without a browser.
 
 import { readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { join, resolve } from "node:path";
@@ -8,14 +8,14 @@ import type { Plugin } from "vite";
 import { defineConfig } from "vitest/config";
 
 const repository = fileURLToPath(new URL("../..", import.meta.url));
-/** Where `npm run dev` finds a server to talk to. */
+/** The server that `npm run dev` forwards calls to. */
 const server = process.env.CHEFSHAT_ADDRESS ?? "http://127.0.0.1:50051";
 
-/** Files that are compressed already, and so small ones that compressing gains nothing. */
+/** Files that are compressed already, and the size in bytes below which compression gains nothing. */
 const PACKED = /\.(woff2|gz|png)$/;
 const SMALLEST_PACKED_BYTES = 512;
 
-/** Takes old assets out of dist/ (which keeps its .gitignore) and puts a compressed twin beside each file that gains by it. */
+/** Removes old assets from dist/ (but not its .gitignore) and writes a compressed copy beside each file that is worth it. */
 function packed(): Plugin {
   let dist = "";
   return {
@@ -43,15 +43,16 @@ function packed(): Plugin {
 export default defineConfig({
   plugins: [packed()],
   oxc: { jsx: { runtime: "automatic", importSource: "preact" } },
+  css: { modules: { localsConvention: "camelCaseOnly" } },
   build: {
     target: "es2023",
-    // The first ones that know light-dark(), which theme.css is written with: translated for older ones it would not follow color-scheme.
+    // The first versions with light-dark(), which theme.css uses: a translation for older ones would not follow color-scheme.
     cssTarget: ["chrome123", "firefox120", "safari17.5"],
     emptyOutDir: false,
-    // Symbols are drawn inline; a font or sound must stay a file that a browser can keep.
+    // Drawings are inline; a font must stay a file that the browser can cache.
     assetsInlineLimit: 0,
     modulePreload: { polyfill: false },
-    // A browser without HTTP/2 has six requests at a time: what every page needs comes in a few pieces, by how often it changes.
+    // A browser without HTTP/2 makes six requests at a time: the common code comes in a few chunks, by how often it changes.
     rolldownOptions: {
       output: {
         codeSplitting: {
@@ -64,7 +65,7 @@ export default defineConfig({
       },
     },
   },
-  // The drawings of cards lie with the server's pictures, outside of this folder.
+  // The drawings of cards are outside this folder, with the server's pictures.
   server: { fs: { allow: [repository] }, proxy: { "^/chefshat\\.v1\\.": { target: server } } },
   test: {
     environment: "happy-dom",
