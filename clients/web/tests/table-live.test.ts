@@ -2,13 +2,17 @@
 
 import { create, type MessageInitShape } from "@bufbuild/protobuf";
 import { describe, expect, test } from "vitest";
-import { AnswerStatus, DecisionKind, ObservationSchema } from "../src/gen/chefshat/v1/decision_pb";
+import {
+  AnswerStatus,
+  DecisionKind,
+  type DecisionRequestSchema,
+  ObservationSchema,
+} from "../src/gen/chefshat/v1/decision_pb";
 import { DecisionSource } from "../src/gen/chefshat/v1/event_pb";
 import { DetachReason, type SeatUpdate, SeatUpdateSchema } from "../src/gen/chefshat/v1/play_service_pb";
 import { ParticipantKind } from "../src/gen/chefshat/v1/room_pb";
-import { Role } from "../src/gen/chefshat/v1/rules_pb";
+import { Role, SpecialAction } from "../src/gen/chefshat/v1/rules_pb";
 import { maskOf } from "../src/table/model/actions";
-import { giftOf } from "../src/table/model/demand";
 import { applyUpdate, type LiveState, startLive } from "../src/table/model/live";
 import { legalMoves } from "../src/table/model/picking";
 import { emptyTable } from "../src/table/model/state";
@@ -24,11 +28,17 @@ const told = (live: LiveState, ...updates: Init[]) => {
 const PASS = 199;
 const OWN = 0;
 const start = () => told(startLive(firstTable("Rosa")), { case: "attached", value: { seat: OWN } });
-const decision = (id: bigint, kind = DecisionKind.TURN, gave = new Uint8Array()): Init => ({
+interface Asked {
+  kind?: DecisionKind;
+  playRequirement?: MessageInitShape<typeof PlayRequirementSchema>;
+  giftRequirement?: MessageInitShape<typeof GiftRequirementSchema>;
+  specialAction?: SpecialAction;
+}
+const decision = (id: bigint, asked: Asked = {}): Init => ({
   case: "decision",
   value: {
     decisionId: id,
-    kind,
+    kind: DecisionKind.TURN,
     actionMask: maskOf([0, PASS], 11),
     timeLeftMs: 9000,
     bankLeftMs: 60_000,
@@ -44,8 +54,8 @@ const decision = (id: bigint, kind = DecisionKind.TURN, gave = new Uint8Array())
       roles: Uint8Array.of(1, 2, 4, 5),
       points: [5n, 3n, 1n, 0n],
       played: new Uint8Array(12),
-      gave,
     },
+    ...asked,
   },
 });
 const events = (...kinds: Extract<Init, { case: "events" }>["value"]["events"] & object): Init => {
@@ -91,25 +101,23 @@ describe("an open decision", () => {
   });
 
   test("of an exchange leaves the table's hand to the events", () => {
-    const giving = told(start(), decision(8n, DecisionKind.EXCHANGE));
+    const giving = told(start(), decision(8n, { kind: DecisionKind.EXCHANGE }));
     expect(giving.decision?.hand).toHaveLength(4);
     expect(giving.table.seats[OWN]?.hand).toHaveLength(9);
   });
 
-  test("says which card of how many the Chef gives, unless the hand is so small that the other may have less to give", () => {
-    const table = open.table;
-    const hand = open.decision?.hand ?? [];
-    expect(giftOf(table, OWN, { hand, given: 0 })).toEqual({ number: 1, of: 2 });
-    expect(giftOf(table, OWN, { hand: hand.slice(1), given: 1 })).toEqual({ number: 2, of: 2 });
-    expect(giftOf(table, OWN, { hand: hand.slice(1), given: 0 })).toBeUndefined();
-    // The Sous-Chef gives one.
-    expect(giftOf(table, 1, { hand, given: 0 })).toBeUndefined();
-  });
-
-  test("of an exchange knows what has been given, a turn does not", () => {
-    const gave = (kind: DecisionKind) => decision(8n, kind, Uint8Array.of(0, 1));
-    expect(told(start(), gave(DecisionKind.EXCHANGE)).decision?.given).toBe(1);
-    expect(told(start(), gave(DecisionKind.TURN)).decision?.given).toBe(0);
+  test("has what the server says that a play or a gift must be", () => {
+    const playRequirement = { lowestFace: 1, highestFace: 4, fewestCards: 2, goldenCard: false, loneJoker: false };
+    const turn = told(start(), decision(7n, { playRequirement }));
+    expect(turn.decision?.requirement).toMatchObject(playRequirement);
+    expect(turn.decision?.gift).toBeUndefined();
+    const giftRequirement = { number: 2, total: 2, receiver: 3 };
+    const gift = told(start(), decision(8n, { kind: DecisionKind.EXCHANGE, giftRequirement }));
+    expect(gift.decision?.gift).toMatchObject(giftRequirement);
+    expect(gift.decision?.requirement).toBeUndefined();
+    const specialAction = SpecialAction.FOOD_FIGHT;
+    const special = told(start(), decision(9n, { kind: DecisionKind.SPECIAL_ACTION, specialAction }));
+    expect(special.decision?.special).toBe(specialAction);
   });
 });
 

@@ -2,8 +2,8 @@
 
 import { expect, test } from "vitest";
 import { actionOf } from "../src/table/model/actions";
-import { allows, demandOf, holds } from "../src/table/model/demand";
 import { applyEvent } from "../src/table/model/reduce";
+import { allows, holds, publicRequirement } from "../src/table/model/requirement";
 import { firstTable, LESSONS, nextEvent } from "../src/tutorial/lessons";
 
 test("every lesson asks for something that the rules allow, and leads to the next", () => {
@@ -16,14 +16,14 @@ test("every lesson asks for something that the rules allow, and leads to the nex
       expect(holds(table.seats[0]?.hand ?? [], asked), name).toBe(true);
       if (asked.kind !== "play") continue;
       turns += 1;
-      expect(allows(demandOf(table), asked), name).toBe(true);
+      expect(allows(publicRequirement(table), asked), name).toBe(true);
       expect(table.next ?? 0, name).toBe(0);
     }
     if (move) actions.push(actionOf(move, table.faces));
     for (const kind of follows(actions)) {
       if (kind.case === "play") {
         const { seat = 0, face = 0, quantity = 0, jokers = 0, cardsLeft = 0 } = kind.value;
-        expect(allows(demandOf(table), { kind: "play", face, quantity, jokers }), name).toBe(true);
+        expect(allows(publicRequirement(table), { kind: "play", face, quantity, jokers }), name).toBe(true);
         expect(table.seats[seat]?.cardsLeft, `${name}: seat ${seat}`).toBe(cardsLeft + quantity + jokers);
         expect(table.next ?? 0, name).toBe(seat);
       }

@@ -11,6 +11,7 @@ import { Faulty } from "../parts/Faulty";
 import { useAnnounced } from "../table/following";
 import { legalActions, moveOf } from "../table/model/actions";
 import { lookupOf } from "../table/model/lookup";
+import { publicRequirement } from "../table/model/requirement";
 import type { TableState } from "../table/model/state";
 import { LookupTable } from "../table/view/LookupTable";
 import { TableView } from "../table/view/TableView";
@@ -132,7 +133,12 @@ function Decision({ table, open }: { table: TableState; open: DecisionRecord }) 
 }
 
 function lookupAt(table: TableState, open: Pick<DecisionRequest, "actionMask"> & { seat: number }) {
-  return lookupOf(table, table.seats[open.seat]?.hand ?? [], new Set(legalActions(open.actionMask)));
+  return lookupOf(
+    table,
+    publicRequirement(table),
+    table.seats[open.seat]?.hand ?? [],
+    new Set(legalActions(open.actionMask)),
+  );
 }
 
 /** The moment that the address asks for with ?decision=N, or that of the first cards. */

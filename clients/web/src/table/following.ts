@@ -3,12 +3,11 @@
 
 import { useEffect, useMemo, useRef } from "preact/hooks";
 import { hidden } from "../experiment/hiding";
-import { DecisionKind } from "../gen/chefshat/v1/decision_pb";
 import { t } from "../i18n";
 import { announce } from "../parts/Announcer";
-import { demandOf } from "./model/demand";
 import type { OpenDecision } from "./model/live";
 import { isPresence, worthSaying } from "./model/log";
+import { isOpening } from "./model/requirement";
 import type { TableState } from "./model/state";
 import { tellPresence } from "./presence";
 import { play, soundOf } from "./sounds";
@@ -45,23 +44,17 @@ export function useAnnounced(table: TableState, own: number | undefined, decisio
   useEffect(() => {
     if (!decision) return;
     play("yourTurn");
-    announce(`${nowHeading({ table, own, decision, next: own })}. ${demandWords(table, decision)}`);
+    announce(`${nowHeading({ table, own, decision, next: own })}. ${requirementWords(decision)}`);
   }, [decision?.id]);
 }
 
 /** What the open turn asks for, to be read out. */
-function demandWords(table: TableState, decision: OpenDecision): string {
+function requirementWords({ requirement }: OpenDecision): string {
   const words = t().table.now;
-  if (decision.kind !== DecisionKind.TURN) return "";
-  const demand = demandOf(table);
-  switch (demand.kind) {
-    case "anything":
-      return words.anything;
-    case "opening":
-      return `${demand.face} ${demand.golden ? words.openingGolden : words.openingFace}.`;
-    case "beat":
-      return demand.face === 0
-        ? words.nothing
-        : `${words.face} ≤ ${demand.face}, ${demand.size} ${words.cards(demand.size)}.`;
-  }
+  if (!requirement) return "";
+  const { lowestFace, highestFace, fewestCards, goldenCard, loneJoker } = requirement;
+  if (isOpening(requirement)) return `${lowestFace} ${goldenCard ? words.openingGolden : words.openingFace}.`;
+  if (loneJoker) return words.anything;
+  if (highestFace === 0) return words.nothing;
+  return `${words.face} ≤ ${highestFace}, ${fewestCards} ${words.cards(fewestCards)}.`;
 }

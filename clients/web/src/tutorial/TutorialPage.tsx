@@ -1,6 +1,8 @@
 // A short Shift that teaches the rules: the lessons one after the other at a table of its own, without a server.
 
 import { useEffect, useState } from "preact/hooks";
+import { DecisionKind } from "../gen/chefshat/v1/decision_pb";
+import { SpecialAction } from "../gen/chefshat/v1/rules_pb";
 import { t } from "../i18n";
 import { playNow } from "../lobby/play-now";
 import { lastName } from "../lobby/seat";
@@ -11,12 +13,12 @@ import { Notice } from "../parts/Notice";
 import { useAnnounced } from "../table/following";
 import { actionOf } from "../table/model/actions";
 import { type Card, without } from "../table/model/cards";
-import { holds } from "../table/model/demand";
 import type { OpenDecision } from "../table/model/live";
 import { applyEvent } from "../table/model/reduce";
+import { holds, publicRequirement } from "../table/model/requirement";
 import type { TableState } from "../table/model/state";
 import { TableView } from "../table/view/TableView";
-import { firstTable, givenBy, LESSONS, type Lesson, nextEvent } from "./lessons";
+import { firstTable, GIFTS, givenBy, LESSONS, type Lesson, nextEvent } from "./lessons";
 import css from "./Tutorial.module.css";
 
 /** From one event of the script to the next, so that they can be followed. */
@@ -118,7 +120,9 @@ function openDecision({ lesson, table, actions }: Progress, asked: NonNullable<L
     kind: asked.kind,
     legal: asked.moves.filter((move) => holds(hand, move)).map((move) => actionOf(move, table.faces)),
     hand,
-    given: given.length,
+    requirement: asked.kind === DecisionKind.TURN ? publicRequirement(table) : undefined,
+    gift: asked.kind === DecisionKind.EXCHANGE ? { number: given.length + 1, ...GIFTS } : undefined,
+    special: SpecialAction.UNSPECIFIED,
     timeLeftMs: 0,
     bankLeftMs: 0,
     receivedAtMs: 0,

@@ -49,6 +49,9 @@ const cards = (face: number, quantity: number, jokers = 0): Move => ({ kind: "pl
 
 /** Any card of the second hand. */
 const gifts: readonly Move[] = [...new Set(SECOND_HAND)].map((face) => ({ kind: "give", face }));
+/** How many cards the reader gives in the exchange, and to whom. */
+export const GIFTS = { total: 2, receiver: GUSTAV } as const;
+
 /** The cards given by these actions. */
 export function givenBy(actions: readonly number[]): number[] {
   return actions.flatMap((action) => {

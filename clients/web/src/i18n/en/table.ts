@@ -13,7 +13,7 @@ export const table = {
     turn: (shift: number, pizza: number, turn: number) => `Shift ${shift} · Pizza ${pizza} · Turn ${turn}`,
     shiftOver: (shift: number) => `Shift ${shift} is over`,
     gameOver: "The game is over",
-    aborted: "The game was given up",
+    aborted: "The game was aborted",
   },
   you: "you",
   freeSeat: "free seat",
@@ -60,7 +60,7 @@ export const table = {
     restarted: "The server restarted; the game continues",
     gameStarted: "The game starts",
     gameOver: "The game is over",
-    aborted: "The game was given up",
+    aborted: "The game was aborted",
     causes: {
       agent: "",
       timeout: "time ran out",

@@ -1,12 +1,20 @@
 // What the holder of a seat knows: the table, the decision that is open for the seat, and how the seat is attached. A pure function from one
 // update of the server to the next such value; the stream itself is in session.ts.
 
-import { AnswerStatus, DecisionKind, type DecisionRequest, type Observation } from "../../gen/chefshat/v1/decision_pb";
+import {
+  AnswerStatus,
+  DecisionKind,
+  type DecisionRequest,
+  type GiftRequirement,
+  type Observation,
+} from "../../gen/chefshat/v1/decision_pb";
 import type { GameEvent } from "../../gen/chefshat/v1/event_pb";
 import { DetachReason, type SeatUpdate } from "../../gen/chefshat/v1/play_service_pb";
+import type { SpecialAction } from "../../gen/chefshat/v1/rules_pb";
 import { legalActions } from "./actions";
 import { type Card, cardsFromCounts } from "./cards";
 import { applyEvent } from "./reduce";
+import type { Requirement } from "./requirement";
 import { applyObservation, applySnapshot } from "./snapshot";
 import type { TableState } from "./state";
 
@@ -18,8 +26,12 @@ export interface OpenDecision {
   readonly legal: readonly number[];
   /** The hand it is decided from, in order. */
   readonly hand: readonly Card[];
-  /** Cards that have been given before, in an exchange that is not complete. */
-  readonly given: number;
+  /** At a turn: what a play must be. */
+  readonly requirement: Requirement | undefined;
+  /** In the exchange: which card is due, and for whom. */
+  readonly gift: Pick<GiftRequirement, "number" | "total" | "receiver"> | undefined;
+  /** The special action that may be declared. */
+  readonly special: SpecialAction;
   /** Milliseconds that were left of the decision's own time when the request came. */
   readonly timeLeftMs: number;
   /** Milliseconds that were left in the bank when the request came. */
@@ -152,7 +164,9 @@ function withDecision(live: LiveState, request: DecisionRequest, nowMs: number):
     kind: request.kind,
     legal: legalActions(request.actionMask),
     hand,
-    given: request.kind === DecisionKind.EXCHANGE ? (seen?.gave.reduce((sum, count) => sum + count, 0) ?? 0) : 0,
+    requirement: request.playRequirement,
+    gift: request.giftRequirement,
+    special: request.specialAction,
     timeLeftMs: request.timeLeftMs,
     bankLeftMs: request.bankLeftMs,
     receivedAtMs: nowMs,

@@ -3,7 +3,7 @@
 
 import { actionOf, type Move } from "./actions";
 import type { Card } from "./cards";
-import { allows, demandOf, holds } from "./demand";
+import { allows, holds, type Requirement } from "./requirement";
 import type { TableState } from "./state";
 
 /** Whether the rules allow an action now, whatever the hand is, and whether the hand holds its cards, whatever lies on the board. */
@@ -24,15 +24,18 @@ export interface Lookup {
 }
 
 /** The table of an open turn. */
-export function lookupOf(table: TableState, hand: readonly Card[], legal: ReadonlySet<number>): Lookup {
-  const demand = demandOf(table);
-  const { faces, jokers } = table;
+export function lookupOf(
+  { faces, jokers }: Pick<TableState, "faces" | "jokers">,
+  requirement: Requirement,
+  hand: readonly Card[],
+  legal: ReadonlySet<number>,
+): Lookup {
   const cell = (move: Move): Cell => {
     const action = actionOf(move, faces);
     const held = holds(hand, move);
     if (legal.has(action)) return { move, action, state: "legal" };
     if (held) return { move, action, state: "notAllowed" };
-    return { move, action, state: allows(demand, move) ? "notInHand" : "impossible" };
+    return { move, action, state: allows(requirement, move) ? "notInHand" : "impossible" };
   };
   const upTo = (count: number) => Array.from({ length: count }, (_, index) => index + 1);
   const plays = upTo(faces).map((face) =>

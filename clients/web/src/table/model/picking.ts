@@ -3,8 +3,7 @@
 
 import { type Move, moveOf } from "./actions";
 import { type Card, countOf, faceOf } from "./cards";
-import { demandOf } from "./demand";
-import type { TableState } from "./state";
+import { isOpening, type Requirement } from "./requirement";
 
 /** Positions in the hand that are picked. */
 export type Picked = ReadonlySet<number>;
@@ -155,21 +154,14 @@ function inOrder(hand: readonly Card[], picked: Picked, goldenFirst: boolean): P
 }
 
 /** Why a card cannot be picked at a turn. */
-export function reasonAgainst(table: TableState, hand: readonly Card[], index: number): Reason {
+export function reasonAgainst(requirement: Requirement, hand: readonly Card[], index: number): Reason {
   const card = hand[index];
-  const demand = demandOf(table);
   const face = card && faceOf(card);
-  switch (demand.kind) {
-    case "opening":
-      return { kind: "opening", face: demand.face, golden: demand.golden };
-    case "anything":
-      return { kind: "other" };
-    case "beat": {
-      if (demand.face === 0) return { kind: "nothingRarer" };
-      if (face === undefined) return { kind: "jokerAlone" };
-      if (face > demand.face) return { kind: "notRarer", face, board: demand.face + 1 };
-      const have = countOf(hand, face) + countOf(hand, undefined);
-      return have < demand.size ? { kind: "tooFew", face, need: demand.size, have } : { kind: "other" };
-    }
-  }
+  const { lowestFace, highestFace, fewestCards, goldenCard } = requirement;
+  if (isOpening(requirement)) return { kind: "opening", face: lowestFace, golden: goldenCard };
+  if (highestFace === 0) return { kind: "nothingRarer" };
+  if (face === undefined) return requirement.loneJoker ? { kind: "other" } : { kind: "jokerAlone" };
+  if (face > highestFace) return { kind: "notRarer", face, board: highestFace + 1 };
+  const have = countOf(hand, face) + countOf(hand, undefined);
+  return have < fewestCards ? { kind: "tooFew", face, need: fewestCards, have } : { kind: "other" };
 }

@@ -3,13 +3,14 @@
 
 import type { ComponentChildren } from "preact";
 import { DecisionKind } from "../../gen/chefshat/v1/decision_pb";
-import { Role } from "../../gen/chefshat/v1/rules_pb";
+import { SpecialAction } from "../../gen/chefshat/v1/rules_pb";
 import { t } from "../../i18n";
 import buttonCss from "../../parts/Button.module.css";
 import { Clock } from "../../parts/Clock";
 import { actionOf, type Move } from "../model/actions";
 import type { OpenDecision } from "../model/live";
 import { missing, type Picked } from "../model/picking";
+import { isOpening } from "../model/requirement";
 import type { TableState } from "../model/state";
 import { cardWord, moveWords } from "../words";
 import css from "./ActionBar.module.css";
@@ -58,7 +59,7 @@ export function ActionBar(props: ActionBarProps) {
       )}
       <div class={css.buttons}>
         {special ? (
-          <SpecialActions table={table} own={props.own} busy={sending} onAnswer={answer} />
+          <SpecialActions special={decision?.special} busy={sending} onAnswer={answer} />
         ) : kind === DecisionKind.EXCHANGE ? (
           <Act main ready={move !== undefined && !sending} onClick={() => move && answer(move)} id="give">
             {move ? words.giveCard(giftWord(props, move)) : words.give}
@@ -90,12 +91,12 @@ function giftWord({ decision, picked }: ActionBarProps, move: Move): string {
   return card ? cardWord(card) : moveWords(move);
 }
 
-function hint({ table, own, decision, moves, picked, move, sending, taught }: ActionBarProps): string {
+function hint({ table, decision, moves, picked, move, sending, taught }: ActionBarProps): string {
   const words = t().table.actions;
   if (sending) return words.sending;
   if (!decision) return table.phase === "pizza" || table.phase === "dealt" ? words.notYourTurn : "";
   if (decision.kind === DecisionKind.SPECIAL_ACTION) return "";
-  if (decision.kind === DecisionKind.EXCHANGE) return giftWords(table, own);
+  if (decision.kind === DecisionKind.EXCHANGE) return giftWords(table, decision);
   if (move) return words.ready;
   const mayPass = moves.some((legal) => legal.kind === "pass");
   if (picked.size > 0) {
@@ -103,21 +104,20 @@ function hint({ table, own, decision, moves, picked, move, sending, taught }: Ac
     return more === undefined || more === 0 ? words.pick : words.more(more);
   }
   if (moves.every((legal) => legal.kind === "pass")) return words.onlyPass;
-  if (!mayPass && table.turn === 1) return words.noPass;
+  if (!mayPass && decision.requirement && isOpening(decision.requirement)) return words.noPass;
   if (!mayPass) return table.board.length === 0 && !taught ? words.mustPlay : words.pickMust;
   return words.pick;
 }
 
 interface SpecialProps {
-  table: TableState;
-  own: number | undefined;
+  special: SpecialAction | undefined;
   busy: boolean;
   onAnswer: (move: Move) => void;
 }
 
-function SpecialActions({ table, own, busy, onAnswer }: SpecialProps) {
+function SpecialActions({ special, busy, onAnswer }: SpecialProps) {
   const words = t().table.actions;
-  const fight = own !== undefined && table.seats[own]?.role === Role.DISHWASHER;
+  const fight = special === SpecialAction.FOOD_FIGHT;
   return (
     <>
       <Act main ready={!busy} onClick={() => onAnswer({ kind: "declare" })} id="declare">

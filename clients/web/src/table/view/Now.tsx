@@ -1,11 +1,11 @@
 // What the table waits for: whose decision is open and what a play must be, to be read from afar.
 
 import { DecisionKind } from "../../gen/chefshat/v1/decision_pb";
-import { Role } from "../../gen/chefshat/v1/rules_pb";
+import { SpecialAction } from "../../gen/chefshat/v1/rules_pb";
 import { t } from "../../i18n";
 import { SeatNumber } from "../../parts/SeatNumber";
-import { demandOf, giftOf } from "../model/demand";
 import type { OpenDecision } from "../model/live";
+import { isOpening, publicRequirement, type Requirement } from "../model/requirement";
 import type { TableState } from "../model/state";
 import { distinctName, headingWords } from "../words";
 import css from "./Now.module.css";
@@ -15,7 +15,7 @@ interface NowProps {
   /** The reader's seat, if there is one. */
   own: number | undefined;
   /** The reader's own open decision. */
-  decision: Pick<OpenDecision, "kind" | "hand" | "given"> | undefined;
+  decision: Pick<OpenDecision, "kind" | "requirement" | "gift" | "special"> | undefined;
   /** Whose decision is open, as far as the reader may know. */
   next: number | undefined;
   /** Of which kind that decision is; undefined: a turn. */
@@ -36,10 +36,12 @@ export function Now(props: NowProps) {
         {next !== undefined && next !== own && <SeatNumber seat={next} />}
         {nowHeading(props)}
       </h2>
-      {turn && <Demands table={table} mayPass={props.mayPass ?? false} />}
-      {deciding === DecisionKind.EXCHANGE && <p class={css.gift}>{giftWords(table, own)}</p>}
+      {turn && (
+        <Demands requirement={decision?.requirement ?? publicRequirement(table)} mayPass={props.mayPass ?? false} />
+      )}
+      {deciding === DecisionKind.EXCHANGE && <p class={css.gift}>{giftWords(table, decision)}</p>}
       {deciding === DecisionKind.SPECIAL_ACTION && (
-        <p>{own !== undefined && table.seats[own]?.role === Role.DISHWASHER ? words.foodFight : words.dinner}</p>
+        <p>{decision?.special === SpecialAction.FOOD_FIGHT ? words.foodFight : words.dinner}</p>
       )}
       {!turn && next === undefined && <OwnState table={table} own={own} />}
     </section>
@@ -52,8 +54,8 @@ export function nowHeading({ table, own, decision, next, kind }: NowProps): stri
   const deciding = decision?.kind;
   switch (deciding) {
     case DecisionKind.EXCHANGE: {
-      const gift = decision && giftOf(table, own, decision);
-      return gift ? words.youGiveOf(gift.number, gift.of) : words.youGive;
+      const { number = 1, total = 1 } = decision?.gift ?? {};
+      return total > 1 ? words.youGiveOf(number, total) : words.youGive;
     }
     case DecisionKind.SPECIAL_ACTION:
       return words.youMayDeclare;
@@ -77,34 +79,31 @@ function OwnState({ table, own }: { table: TableState; own: number | undefined }
   return seat.passed ? <p>{t().table.now.outOfPizza}</p> : null;
 }
 
-/** The demands on a play as tiles, and a sentence. */
-function Demands({ table, mayPass }: { table: TableState; mayPass: boolean }) {
+/** The requirement as tiles, and a sentence. */
+function Demands({ requirement, mayPass }: { requirement: Requirement; mayPass: boolean }) {
   const words = t().table.now;
-  const demand = demandOf(table);
-  switch (demand.kind) {
-    case "anything":
-      return <p>{words.anything}</p>;
-    case "opening":
-      return (
-        <>
-          <div class={css.tiles}>
-            <Tile number={demand.face} text={demand.golden ? words.openingGolden : words.openingFace} />
-          </div>
-          <p>{mayPass ? words.opensMayPass : words.opens}</p>
-        </>
-      );
-    case "beat":
-      if (demand.face === 0) return <p>{words.nothing}</p>;
-      return (
-        <>
-          <div class={css.tiles}>
-            <Tile sign="≤" number={demand.face} text={words.face} />
-            <Tile sign="≥" number={demand.size} text={words.cards(demand.size)} />
-          </div>
-          <p>{words.beat}</p>
-        </>
-      );
+  const { lowestFace, highestFace, fewestCards, goldenCard, loneJoker } = requirement;
+  if (isOpening(requirement)) {
+    return (
+      <>
+        <div class={css.tiles}>
+          <Tile number={lowestFace} text={goldenCard ? words.openingGolden : words.openingFace} />
+        </div>
+        <p>{mayPass ? words.opensMayPass : words.opens}</p>
+      </>
+    );
   }
+  if (loneJoker) return <p>{words.anything}</p>;
+  if (highestFace === 0) return <p>{words.nothing}</p>;
+  return (
+    <>
+      <div class={css.tiles}>
+        <Tile sign="≤" number={highestFace} text={words.face} />
+        <Tile sign="≥" number={fewestCards} text={words.cards(fewestCards)} />
+      </div>
+      <p>{words.beat}</p>
+    </>
+  );
 }
 
 function Tile({ sign = "", number, text }: { sign?: string; number: number; text: string }) {
@@ -118,11 +117,9 @@ function Tile({ sign = "", number, text }: { sign?: string; number: number; text
   );
 }
 
-/** To whom a card is given, where there is a choice. */
-export function giftWords(table: TableState, own: number | undefined): string {
+/** To whom a card is given. */
+export function giftWords(table: TableState, decision: Pick<OpenDecision, "gift"> | undefined): string {
   const words = t().table.now;
-  const role = own === undefined ? undefined : table.seats[own]?.role;
-  const partner = role === Role.CHEF ? Role.DISHWASHER : role === Role.SOUS_CHEF ? Role.WAITER : undefined;
-  const seat = table.seats.find((other) => other.role === partner && partner !== undefined);
-  return seat ? words.giveTo(distinctName(table, seat.seat)) : words.give;
+  const { gift } = decision ?? {};
+  return gift ? words.giveTo(distinctName(table, gift.receiver)) : words.give;
 }

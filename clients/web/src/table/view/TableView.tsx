@@ -9,7 +9,6 @@ import { clockOfPeople } from "../../lobby/rooms";
 import type { Label } from "../expressions";
 import { actionOf } from "../model/actions";
 import type { Card } from "../model/cards";
-import { demandOf } from "../model/demand";
 import type { OpenDecision } from "../model/live";
 import { canPick, legalMoves, type Picked, pickedMove, reasonAgainst, toggle } from "../model/picking";
 import type { TableState } from "../model/state";
@@ -74,7 +73,7 @@ export function TableView(props: TableViewProps) {
   const [remark, setRemark] = useState("");
   const lastTurn = useRef<ShownTurn | undefined>(undefined);
   useEffect(() => setRemark(""), [decision?.id]);
-  if (decision?.kind === DecisionKind.TURN) lastTurn.current = { table, decision };
+  if (decision?.requirement) lastTurn.current = { table, decision: { ...decision, requirement: decision.requirement } };
   const row = useRef<HTMLDivElement>(null);
   const keepFocus = useKeptFocus(row);
 
@@ -88,8 +87,6 @@ export function TableView(props: TableViewProps) {
   const next = props.next ?? (decision ? own : table.next);
   const kind = decision?.kind ?? props.nextKind;
 
-  const demand = demandOf(table);
-  const goldenFirst = demand.kind === "opening" && demand.golden;
   const special = decision?.kind === DecisionKind.SPECIAL_ACTION;
 
   const refusal = (index: number): string | undefined => {
@@ -99,7 +96,7 @@ export function TableView(props: TableViewProps) {
     if (special) return words.declareFirst;
     if (props.refusal) return props.refusal;
     if (decision.kind === DecisionKind.EXCHANGE) return words.gift;
-    return reasonWords(reasonAgainst(table, hand, index));
+    return reasonWords(decision.requirement ? reasonAgainst(decision.requirement, hand, index) : { kind: "other" });
   };
   const putBack = () => {
     setPicked(NOTHING);
@@ -176,7 +173,7 @@ export function TableView(props: TableViewProps) {
               label={handLabel}
               onToggle={(index) => {
                 setRemark("");
-                setPicked(toggle(hand, picked, index, moves, goldenFirst));
+                setPicked(toggle(hand, picked, index, moves, decision?.requirement?.goldenCard));
               }}
               onPlay={() => {
                 if (!move || sending) return false;

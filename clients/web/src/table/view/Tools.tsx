@@ -8,6 +8,7 @@ import { Icon } from "../../parts/Icon";
 import { LABELS, type Label } from "../expressions";
 import type { OpenDecision } from "../model/live";
 import { lookupOf } from "../model/lookup";
+import type { Requirement } from "../model/requirement";
 import type { TableState } from "../model/state";
 import { setSound, soundOn } from "../sounds";
 import { Face } from "./Face";
@@ -17,7 +18,7 @@ import css from "./Tools.module.css";
 /** A turn as the look-up table shows it. */
 export interface ShownTurn {
   readonly table: TableState;
-  readonly decision: Pick<OpenDecision, "hand" | "legal">;
+  readonly decision: Pick<OpenDecision, "hand" | "legal"> & { readonly requirement: Requirement };
 }
 
 interface ToolsProps {
@@ -76,7 +77,9 @@ export function Tools({ turn, lookup, children }: ToolsProps) {
           {open === "none" ? (
             <p>{t().table.lookup.none}</p>
           ) : (
-            <LookupTable lookup={lookupOf(open.table, open.decision.hand, new Set(open.decision.legal))} />
+            <LookupTable
+              lookup={lookupOf(open.table, open.decision.requirement, open.decision.hand, new Set(open.decision.legal))}
+            />
           )}
         </Dialog>
       )}
