@@ -5,8 +5,9 @@ import { describe, expect, test } from "vitest";
 import {
   AnswerStatus,
   DecisionKind,
-  type DecisionRequestSchema,
+  type GiftRequirementSchema,
   ObservationSchema,
+  type PlayRequirementSchema,
 } from "../src/gen/chefshat/v1/decision_pb";
 import { DecisionSource } from "../src/gen/chefshat/v1/event_pb";
 import { DetachReason, type SeatUpdate, SeatUpdateSchema } from "../src/gen/chefshat/v1/play_service_pb";

@@ -42,8 +42,8 @@ test("of many rooms the newest are shown, and more when they are asked for", asy
   for (let number = 1; number <= MANY; number += 1)
     await newRoom(server, { name: `Table ${number}`, seats: ["person", "person", "random", "random"] });
   await page.goto(`${server.url}/`);
-  const section = page.locator('[data-part="lobby-section"]').filter({ hasText: "Rooms with free seats" });
-  const cards = section.locator('[data-part="room-card"]');
+  const section = page.locator('[data-part~="lobby-section"]').filter({ hasText: "Rooms with free seats" });
+  const cards = section.locator('[data-part~="room-card"]');
   await section.getByText("12+").waitFor();
   expect(await cards.count()).toBe(12);
   expect(await cards.first().textContent()).toContain(`Table ${MANY}`);
@@ -119,13 +119,13 @@ test("who leaves before the game gives the seat back, during it is told what bec
   const room = host.page.url();
   await host.page.getByRole("button", { name: "Leave", exact: true }).click();
   await host.page.waitForURL(`${server.url}/`);
-  const card = host.page.locator('[data-part="room-card"]').filter({ hasText: "To be left" });
+  const card = host.page.locator('[data-part~="room-card"]').filter({ hasText: "To be left" });
   await card.waitFor();
   expect(await card.getByText("Mia").count()).toBe(0);
   await host.page.goto(room);
   await host.page.getByRole("button", { name: "Sit down" }).click();
   await host.page.getByRole("button", { name: "Leave or close the room…" }).waitFor();
-  const code = (await host.page.locator('[data-part="invite-code"]').textContent()) ?? "";
+  const code = (await host.page.locator('[data-part~="invite-code"]').textContent()) ?? "";
 
   const guest = await person(browser);
   await sitDown(guest.page, server, code, "Rosa");
@@ -149,7 +149,7 @@ test("the dialog of leaving stays open when the game begins meanwhile", async ()
   const dialog = ada.page.getByRole("dialog");
   await dialog.getByText("Your seat becomes free for someone else.").waitFor();
   await sitDown(ben.page, server, code, "Ben");
-  await ada.page.locator('[data-decision], [data-part="table"]').first().waitFor();
+  await ada.page.locator('[data-decision], [data-part~="table"]').first().waitFor();
   await dialog.getByText("after 3 timeouts in a row, the agent “random” plays for you").waitFor();
   await dialog.getByRole("button", { name: "Stay" }).click();
   await dialog.waitFor({ state: "detached" });

@@ -38,7 +38,7 @@ test("a tournament is made on the page, joined from another, filled up, begun, p
   await guest.page.getByText("You are taking part as Rosa.").waitFor();
 
   await host.page.getByText("1 agent “random” is added to make 4.").waitFor();
-  const entrants = host.page.locator('[data-part="entrants"] li');
+  const entrants = host.page.locator('[data-part~="entrants"] li');
   await expect.poll(() => entrants.count()).toBe(3);
   await entrants.filter({ hasText: "Rosa" }).getByText("person", { exact: true }).waitFor();
   // The secret outlasts a reload.
@@ -50,7 +50,7 @@ test("a tournament is made on the page, joined from another, filled up, begun, p
   await guest.page.getByRole("button", { name: "Back to the standings" }).click();
   for (const { page } of [host, guest]) {
     await page.getByRole("heading", { name: "Final standings" }).waitFor();
-    await expect.poll(() => page.locator('[data-part="standings"] tbody tr').count()).toBe(4);
+    await expect.poll(() => page.locator('[data-part~="standings"] tbody tr').count()).toBe(4);
     await page.getByRole("row", { name: /Rosa person/ }).waitFor();
   }
   await host.page.getByRole("button", { name: "Close the tournament…" }).waitFor({ state: "detached" });
@@ -76,7 +76,7 @@ test("what is refused is marked at its field, by the page and by the server", as
   await page.getByLabel("Jokers").fill("0");
   await submit.click();
   await page
-    .locator('[data-part="field"]')
+    .locator('[data-part~="field"]')
     .filter({ has: page.getByLabel("Faces") })
     .getByRole("alert")
     .waitFor();
@@ -93,7 +93,7 @@ test("it begins by itself, its code alone leads to it, and its organiser closes 
   await host.page.getByLabel("Participants", { exact: true }).fill("4");
   await host.page.getByRole("button", { name: "Create the tournament" }).click();
   await host.page.getByText("It starts automatically when 4 have joined.").waitFor();
-  const code = await host.page.locator('[data-part="invite-code"]').textContent();
+  const code = await host.page.locator('[data-part~="invite-code"]').textContent();
 
   const guest = await person(browser);
   await guest.page.goto(`${server.url}/`);

@@ -53,7 +53,7 @@ beforeAll(async () => {
   await seated.getByLabel("Name of the tournament").fill("My league");
   await seated.getByLabel("greedy", { exact: true }).fill("2");
   await seated.getByRole("button", { name: "Create the tournament" }).click();
-  await seated.locator('[data-part="organiser"]').waitFor();
+  await seated.locator('[data-part~="organiser"]').waitFor();
   ownId = new URL(seated.url()).pathname.split("/").at(-1) ?? "";
   await seated.goto(`${server.url}/rooms/${rooms.table}`);
   // Some turns on, so that there is something on the board and in the log.
@@ -65,46 +65,46 @@ beforeAll(async () => {
 
 /** Every page: its address, and what is there once it has drawn itself. */
 const PAGES: Record<string, { path: () => string; ready: string; opened?: string }> = {
-  lobby: { path: () => "/", ready: '[data-part="lobby-rooms"] li' },
+  lobby: { path: () => "/", ready: '[data-part~="lobby-rooms"] li' },
   "new room": {
     path: () => "/new",
-    ready: '[data-part="new-room-form"]',
-    opened: '[data-part="new-room-form"] summary',
+    ready: '[data-part~="new-room-form"]',
+    opened: '[data-part~="new-room-form"] summary',
   },
   join: { path: () => "/join", ready: "form" },
   "wrong code": { path: () => "/join/ABCD2345", ready: '[role="alert"]' },
-  invitation: { path: () => `/join/${code}`, ready: '[data-part="join-room"]' },
-  "waiting room": { path: () => `/rooms/${rooms.waiting}`, ready: '[data-part="waiting-seat"]' },
+  invitation: { path: () => `/join/${code}`, ready: '[data-part~="join-room"]' },
+  "waiting room": { path: () => `/rooms/${rooms.waiting}`, ready: '[data-part~="waiting-seat"]' },
   table: { path: () => `/rooms/${rooms.table}`, ready: "[data-decision]" },
   "look-up table": {
     path: () => `/rooms/${rooms.table}`,
     ready: "[data-decision]",
-    opened: '[data-part="tool-lookup"]',
+    opened: '[data-part~="tool-lookup"]',
   },
-  leaving: { path: () => `/rooms/${rooms.table}`, ready: "[data-decision]", opened: '[data-part="tool-leave"]' },
+  leaving: { path: () => `/rooms/${rooms.table}`, ready: "[data-decision]", opened: '[data-part~="tool-leave"]' },
   watch: { path: () => `/watch/${rooms.table}`, ready: '[data-view="watched"]' },
   replay: {
     path: () => `/replay/${gameId}`,
-    ready: '[data-part="replay"]',
-    opened: '[data-part="replay-decision"] summary',
+    ready: '[data-part~="replay"]',
+    opened: '[data-part~="replay-decision"] summary',
   },
   tournaments: { path: () => "/tournaments", ready: "main li a" },
   "new tournament": {
     path: () => "/tournaments/new",
-    ready: '[data-part="new-room-form"]',
-    opened: '[data-part="new-room-form"] summary',
+    ready: '[data-part~="new-room-form"]',
+    opened: '[data-part~="new-room-form"] summary',
   },
   "tournament of one's own": {
     path: () => `/tournaments/${ownId}`,
-    ready: '[data-part="organiser"]',
-    opened: '[data-part="study-links"] summary',
+    ready: '[data-part~="organiser"]',
+    opened: '[data-part~="study-links"] summary',
   },
-  tournament: { path: () => `/tournaments/${tournamentId}`, ready: '[data-part="standings"] tbody tr' },
-  wall: { path: () => `/tournaments/${tournamentId}?wall`, ready: '[data-part="standings"] tbody tr' },
-  "wall before": { path: () => `/tournaments/${ownId}?wall`, ready: '[data-part="entrants"] li' },
+  tournament: { path: () => `/tournaments/${tournamentId}`, ready: '[data-part~="standings"] tbody tr' },
+  wall: { path: () => `/tournaments/${tournamentId}?wall`, ready: '[data-part~="standings"] tbody tr' },
+  "wall before": { path: () => `/tournaments/${ownId}?wall`, ready: '[data-part~="entrants"] li' },
   leaderboard: { path: () => "/leaderboard", ready: "tbody tr" },
   "a person": { path: () => "/people/Gustav", ready: "h1" },
-  tutorial: { path: () => "/tutorial", ready: '[data-part="lesson"]' },
+  tutorial: { path: () => "/tutorial", ready: '[data-part~="lesson"]' },
   "not found": { path: () => "/nowhere/at/all", ready: "h1" },
 };
 
@@ -144,7 +144,7 @@ test.each(["en-GB", "it-IT"])("the first page, in %s, loads less than 200 kB", a
     underWay.delete(requestId);
   });
   await page.goto(`${server.url}/`);
-  await page.locator('[data-part="lobby-rooms"] li').first().waitFor();
+  await page.locator('[data-part~="lobby-rooms"] li').first().waitFor();
   await page.evaluate(() => document.fonts.ready.then(() => undefined));
   const loaded = expect.arrayContaining(["Document", "Script", "Stylesheet", "Font", "Fetch"]);
   await expect.poll(() => ({ kinds: [...kinds], underWay: underWay.size })).toEqual({ kinds: loaded, underWay: 0 });

@@ -18,7 +18,7 @@ export async function sitDown(page: Page, server: Server, code: string, name: st
 /** Waits for a decision that is not the one before; gives its number, or undefined once the game is over. */
 export async function nextDecision(page: Page, before?: string): Promise<string | undefined> {
   const found = await page.waitForFunction((before) => {
-    if (document.querySelector('[data-part="result"] a[href^="/replay/"]')) return "over";
+    if (document.querySelector('[data-part~="result"] a[href^="/replay/"]')) return "over";
     const id = document.querySelector<HTMLElement>("[data-decision]")?.dataset.decision;
     return id !== before && id;
   }, before);
@@ -47,8 +47,8 @@ export const byClicks: Way = async (page) => {
   const ready = page.locator(
     '[data-action="play"][aria-disabled="false"], [data-action="give"][aria-disabled="false"]',
   );
-  const picked = page.locator('[data-part="hand-card"][aria-pressed="true"]');
-  const free = page.locator('[data-part="hand-card"][aria-disabled="false"][aria-pressed="false"]');
+  const picked = page.locator('[data-part~="hand-card"][aria-pressed="true"]');
+  const free = page.locator('[data-part~="hand-card"][aria-disabled="false"][aria-pressed="false"]');
   while ((await ready.count()) === 0) {
     const already = await picked.count();
     const faces = free.and(page.locator(':not([data-card="J"])'));
@@ -108,7 +108,7 @@ export const byKeys: Way = async (page) => {
   const onHand = (on: Focus) => on.card !== "" || on.label === HAND;
   if (!onHand(await focus(page))) await tabTo(page, onHand, (await focus(page)).action ? "Shift+Tab" : "Tab");
   await page.keyboard.press("End");
-  const cards = await page.locator('[data-part="hand-card"]').count();
+  const cards = await page.locator('[data-part~="hand-card"]').count();
   for (let at = cards; at > 0 && (await ready.count()) === 0; at -= 1) {
     const on = await focus(page);
     if (!on.disabled && !on.pressed) {

@@ -25,7 +25,7 @@ test("scrubbing shows the hands and the choice that the record has at that decis
   const slider = page.getByLabel("Position in the game");
   const all = lines.filter(({ line }) => line.case === "decision").length;
   await expect.poll(() => slider.getAttribute("aria-valuetext")).toBe(`0 of ${all} decisions taken`);
-  const possible = page.locator('[data-part="replay-decision"]');
+  const possible = page.locator('[data-part~="replay-decision"]');
   await possible.locator("summary").click();
   const last = Number(await slider.getAttribute("max"));
   for (const share of [0.1, 0.35, 0.6, 0.85]) {
@@ -99,7 +99,7 @@ async function shownHands(page: Page): Promise<number[][]> {
   const seats = page.locator("[data-seat]");
   const shown: number[][] = [];
   for (const seat of await seats.all()) {
-    const spoken = seat.locator('[data-part="seat-cards"] .visually-hidden');
+    const spoken = seat.locator('[data-part~="seat-cards"] .visually-hidden');
     const words = (await spoken.count()) > 0 ? ((await spoken.textContent()) ?? "") : "";
     const faces = words.split("; ").filter((word) => word !== "");
     shown[Number(await seat.getAttribute("data-seat"))] = faces.map((word) =>

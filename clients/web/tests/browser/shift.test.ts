@@ -67,7 +67,7 @@ test("Food Fight and both gifts of the Chef are decided by keys, and no card goe
   });
   const { page, faults } = await person(browser);
   await sitDown(page, server, code, "Rosa");
-  const picked = page.locator('[data-part="hand-card"][aria-pressed="true"]');
+  const picked = page.locator('[data-part~="hand-card"][aria-pressed="true"]');
   const inNoCard = async () => {
     await expect.poll(() => focus(page)).toMatchObject({ label: HAND, card: "" });
     for (const key of ["Enter", "Space", "Enter"]) await page.keyboard.press(key);
@@ -142,9 +142,9 @@ test("two people in two browsers and two agents play in one room to its end", as
     const agents = Promise.all([agent(server, "greedy", code, "Gustav"), agent(server, "random", code, "Rolf")]);
     const taken = await Promise.all([playOn(rosa.page, byClicks), playOn(karl.page, byClicks)]);
     expect(await agents).toEqual([0, 0]);
-    const standings = await rosa.page.locator('[data-part="result"] tbody tr').allInnerTexts();
+    const standings = await rosa.page.locator('[data-part~="result"] tbody tr').allInnerTexts();
     expect(standings).toHaveLength(4);
-    expect(await karl.page.locator('[data-part="result"] tbody tr').allInnerTexts()).toEqual(standings);
+    expect(await karl.page.locator('[data-part~="result"] tbody tr').allInnerTexts()).toEqual(standings);
     await expectEnd(rosa.page, roomId, taken[0]);
     expect([...rosa.faults, ...karl.faults]).toEqual([]);
   } finally {
@@ -166,10 +166,10 @@ async function seen(page: Page): Promise<Record<"decision" | "hand" | "heading" 
   return {
     decision: await page.locator("[data-decision]").getAttribute("data-decision"),
     hand: await page
-      .locator('[data-part="hand-card"]')
+      .locator('[data-part~="hand-card"]')
       .evaluateAll((cards) => cards.map((card) => card.getAttribute("aria-label"))),
     heading: await page.getByRole("heading", { level: 1 }).textContent(),
-    points: await page.locator('[data-part="seat-points"]').allInnerTexts(),
+    points: await page.locator('[data-part~="seat-points"]').allInnerTexts(),
   };
 }
 

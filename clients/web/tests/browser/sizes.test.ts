@@ -26,16 +26,16 @@ const SIZES = [
 const LONG = "W".repeat(64);
 
 const EVERYBODY = [
-  '[data-part="table-head"] h1',
-  '[data-part="seats"] [data-part="seat"]',
-  '[data-part="seats"] [data-part="seat-points"]',
-  '[data-part="own"] [data-part="seat"]',
-  '[data-part="own"] [data-part="seat-points"]',
+  '[data-part~="table-head"] h1',
+  '[data-part~="seats"] [data-part~="seat"]',
+  '[data-part~="seats"] [data-part~="seat-points"]',
+  '[data-part~="own"] [data-part~="seat"]',
+  '[data-part~="own"] [data-part~="seat-points"]',
 ];
 const CHOICE = [
-  '[data-part="board"]',
-  '[data-part="now-heading"]',
-  '[data-part="hand-stack"]',
+  '[data-part~="board"]',
+  '[data-part~="now-heading"]',
+  '[data-part~="hand-stack"]',
   "[data-action=play]",
   "[data-action=pass]",
 ];
@@ -64,9 +64,9 @@ test("a turn, and the end of the game, at every size", async () => {
       await expectSeen(page, [
         ...EVERYBODY,
         ...CHOICE,
-        '[data-part="clock"]',
-        '[data-part="expressions"]',
-        '[data-part="own"] [data-part="chip"]',
+        '[data-part~="clock"]',
+        '[data-part~="expressions"]',
+        '[data-part~="own"] [data-part~="chip"]',
       ]);
       looked += 1;
     }
@@ -74,9 +74,9 @@ test("a turn, and the end of the game, at every size", async () => {
   expect(looked).toBe(2);
   await expectSeen(page, [
     ...EVERYBODY,
-    '[data-part="own"] [data-part="chip"]',
-    '[data-part="result"]',
-    '[data-part="result-ways"] [data-part="button"]',
+    '[data-part~="own"] [data-part~="chip"]',
+    '[data-part~="result"]',
+    '[data-part~="result-ways"] [data-part~="button"]',
   ]);
   await page.getByRole("button", { name: "Gioca ancora" }).waitFor();
   gameId = await gameOf(server, roomId);
@@ -86,7 +86,7 @@ test("a turn, and the end of the game, at every size", async () => {
 test("a replay: its controls cover no seat of a desk's screen, and nothing is wider than the screen", async () => {
   const { page } = await person(browser);
   await page.goto(`${server.url}/replay/${gameId}?lang=it`);
-  const slider = page.locator('[data-part="replay-slider"] input');
+  const slider = page.locator('[data-part~="replay-slider"] input');
   const last = Number(await slider.getAttribute("max"));
   expect(last).toBeGreaterThan(20);
   for (const [width, height] of SIZES) {
@@ -100,11 +100,11 @@ test("a replay: its controls cover no seat of a desk's screen, and nothing is wi
     if (width < 1000) continue;
     await slider.fill("3");
     await expectSeenNow(page, [
-      '[data-part="seats"] [data-part="seat"]',
-      '[data-part="seats"] [data-part="seat-points"]',
-      '[data-part="seat-open"]',
-      '[data-part="board"]',
-      '[data-part="replay-bar"]',
+      '[data-part~="seats"] [data-part~="seat"]',
+      '[data-part~="seats"] [data-part~="seat-points"]',
+      '[data-part~="seat-open"]',
+      '[data-part~="board"]',
+      '[data-part~="replay-bar"]',
     ]);
   }
 });
@@ -112,10 +112,10 @@ test("a replay: its controls cover no seat of a desk's screen, and nothing is wi
 test.each(["en", "it"])("the tutorial in %s, its words included, at every size", async (language) => {
   const { page } = await person(browser);
   await page.goto(`${server.url}/tutorial?lang=${language}`);
-  await page.locator('[data-part="lesson"] [data-part="button"]').waitFor();
+  await page.locator('[data-part~="lesson"] [data-part~="button"]').waitFor();
   await expectSeen(page, [
-    '[data-part="lesson"]',
-    '[data-part="lesson"] [data-part="button"]',
+    '[data-part~="lesson"]',
+    '[data-part~="lesson"] [data-part~="button"]',
     ...EVERYBODY,
     ...CHOICE,
   ]);
@@ -149,7 +149,7 @@ async function unseen(page: Page, parts: readonly string[]): Promise<string[]> {
         const at = document.elementFromPoint(box.left + box.width / 2, box.top + box.height / 2);
         const free = at !== null && (element.contains(at) || at.contains(element));
         // What the board shows may have the result over it, and the cards of a hand lie on each other.
-        const seen = inside && (free || element.matches('[data-part="board"], [data-part="hand-stack"]'));
+        const seen = inside && (free || element.matches('[data-part~="board"], [data-part~="hand-stack"]'));
         return seen ? [] : [`${part} ${index}: ${Math.round(box.top)} to ${Math.round(box.bottom)}`];
       });
     });

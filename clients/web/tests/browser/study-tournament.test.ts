@@ -53,7 +53,7 @@ test("a participant's link holds for every game of the tournament", async () => 
     await page.getByText(`Study league · round ${round}, table 1`).waitFor();
     taken += await playOn(page, byClicks, async (already) => {
       if (already === 1) await page.reload().then(() => page.locator("[data-decision]").waitFor());
-      for (const left of ['[data-part="log"]', '[data-part="expressions"]', '[data-part="header-nav"]'])
+      for (const left of ['[data-part~="log"]', '[data-part~="expressions"]', '[data-part~="header-nav"]'])
         expect(await page.locator(left).first().isVisible()).toBe(false);
     });
     if (round < ROUNDS) expect(await questionnaire.count()).toBe(0);
@@ -105,11 +105,11 @@ test("the organiser makes links, each for one participant; at one device one aft
     }
     await page.getByText(`You are taking part as ${name}.`).waitFor();
     await page.getByRole("button", { name: "Join the tournament" }).click();
-    await page.locator('[data-part="entrants"] [aria-current]').filter({ hasText: name }).waitFor();
+    await page.locator('[data-part~="entrants"] [aria-current]').filter({ hasText: name }).waitFor();
   }
   // A link that names nobody asks who is there.
   await page.goto((links[0] ?? "").replace("name=P01&", ""));
   await page.getByRole("button", { name: "Continue as P02" }).click();
-  await page.locator('[data-part="entrants"] [aria-current]').filter({ hasText: "P02" }).waitFor();
+  await page.locator('[data-part~="entrants"] [aria-current]').filter({ hasText: "P02" }).waitFor();
   expect(faults).toEqual([]);
 });

@@ -13,13 +13,13 @@ const PERSON_TIME_KEY = "person_decision_time_ms";
 
 /** What a study can leave out, as it is drawn at the table. */
 const PARTS = [
-  '[data-part="header-nav"]',
-  '[data-part="log"]',
-  '[data-part="tool-lookup"]',
-  '[data-part="tool-leave"]',
-  '[data-part="expressions"]',
-  '[data-part="played"]',
-  '[data-part="result-links"]',
+  '[data-part~="header-nav"]',
+  '[data-part~="log"]',
+  '[data-part~="tool-lookup"]',
+  '[data-part~="tool-leave"]',
+  '[data-part~="expressions"]',
+  '[data-part~="played"]',
+  '[data-part~="result-links"]',
 ];
 
 useStage();
@@ -51,7 +51,7 @@ test("a participant's link leads from the consent to the table, and to the quest
 
   const taken = await playOn(page, byClicks, async (already) => {
     if (already === 1) await page.reload().then(() => page.locator("[data-decision]").waitFor());
-    for (const left of ['[data-part="log"]', '[data-part="expressions"]', '[data-part="header-nav"]'])
+    for (const left of ['[data-part~="log"]', '[data-part~="expressions"]', '[data-part~="header-nav"]'])
       expect(await page.locator(left).first().isVisible()).toBe(false);
   });
   const after = page.getByRole("link", { name: "Apri il questionario" });
@@ -67,7 +67,7 @@ test("a participant's link leads from the consent to the table, and to the quest
     away.click();
   });
   await page.getByRole("heading", { name: "Classifica", level: 1 }).waitFor();
-  await page.locator('[data-part="table"]').waitFor({ state: "detached" });
+  await page.locator('[data-part~="table"]').waitFor({ state: "detached" });
   const seats = () => page.evaluate(() => Object.keys(localStorage).filter((key) => key.includes("seat.")));
   await expect.poll(seats).toEqual([]);
   await page.goto(link.href);
@@ -113,7 +113,7 @@ test("each part that a study can leave out is seen where none is left out", asyn
   await page.goto(`${server.url}/join/${code}?name=P09`);
   await page.getByRole("button", { name: "Sit down at the table" }).click();
   await playOn(page, byClicks, look);
-  await page.locator('[data-part="result"]').waitFor();
+  await page.locator('[data-part~="result"]').waitFor();
   await look();
   expect([...seen].toSorted()).toEqual(PARTS.toSorted());
   expect(faults).toEqual([]);
@@ -158,10 +158,10 @@ test("what a study leaves out is left out from its first page to the end of the 
   });
   expect(taken).toBeGreaterThan(1);
   expect(await done).toBe(0);
-  expect(await page.locator('[data-part="result"]').isVisible()).toBe(true);
+  expect(await page.locator('[data-part~="result"]').isVisible()).toBe(true);
   await isLeftOut();
   await page.reload();
-  await page.locator('[data-part="result"]').waitFor();
+  await page.locator('[data-part~="result"]').waitFor();
   await isLeftOut();
   expect(faults).toEqual([]);
 });
@@ -222,7 +222,7 @@ test("where its room is closed before a game, a study has no last questionnaire,
   await page.goto(`${server.url}/rooms/${gone}`);
   await page.getByText("This room no longer exists.").waitFor();
   expect(await page.locator("html").getAttribute("data-hide")).toBe("pages");
-  expect(await page.locator('[data-part="faulty"]').getByRole("link").count()).toBe(0);
+  expect(await page.locator('[data-part~="faulty"]').getByRole("link").count()).toBe(0);
 });
 
 test("the host of a room makes links for its participants", async () => {

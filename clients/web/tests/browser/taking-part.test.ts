@@ -31,7 +31,7 @@ test("a person joins, plays every game of the tournament and sees the final stan
   const wall = await person(browser);
   await wall.page.goto(`${server.url}/tournaments/${id}?wall`);
   await wall.page.getByText("open to join").waitFor();
-  expect(await wall.page.locator('[data-part="header"]').isVisible()).toBe(false);
+  expect(await wall.page.locator('[data-part~="header"]').isVisible()).toBe(false);
 
   const { page, faults } = await person(browser);
   await page.goto(`${server.url}/tournaments/${id}`);

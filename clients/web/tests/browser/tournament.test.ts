@@ -27,9 +27,9 @@ test("a tournament's page follows it from the first participant to the final sta
   });
   await page.goto(`${server.url}/tournaments/${tournament.tournamentId}`);
   await page.getByRole("heading", { name: "Spring cup" }).waitFor();
-  const rows = page.locator('[data-part="standings"] tbody tr');
+  const rows = page.locator('[data-part~="standings"] tbody tr');
   // Before its beginning nobody has a place.
-  await expect.poll(() => page.locator('[data-part="entrants"] li').count()).toBe(3);
+  await expect.poll(() => page.locator('[data-part~="entrants"] li').count()).toBe(3);
   expect(await rows.count()).toBe(0);
   expect(await page.getByText("Gustav").count()).toBe(0);
 
@@ -75,17 +75,17 @@ test.each([
   ] as const) {
     await page.setViewportSize({ width, height });
     for (const [id, ready] of [
-      [open, '[data-part="entrants"]'],
-      [over, '[data-part="standings"]'],
+      [open, '[data-part~="entrants"]'],
+      [over, '[data-part~="standings"]'],
     ]) {
       await page.goto(`${server.url}/tournaments/${id}?wall`);
       await page
-        .locator('[data-part="wall-fitted"]')
+        .locator('[data-part~="wall-fitted"]')
         .locator(ready ?? "")
         .waitFor();
       if (id === over) await page.getByText("finished").first().waitFor();
       const measured = () =>
-        page.locator('[data-part="wall-fitted"]').evaluateAll((boxes) =>
+        page.locator('[data-part~="wall-fitted"]').evaluateAll((boxes) =>
           boxes.map((box) => ({
             size: Number.parseFloat(getComputedStyle(box).fontSize),
             fits: box.scrollHeight <= box.clientHeight && box.scrollWidth <= box.clientWidth,

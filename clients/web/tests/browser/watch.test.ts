@@ -27,7 +27,7 @@ async function watched(policy: { spectatorsSeeHands?: boolean; spectatorDelayDec
     const { page, faults } = await person(browser);
     await page.addInitScript(() => {
       const look = () => {
-        if (document.querySelector('[data-part="seat-open"]')) document.documentElement.dataset.openHand = "seen";
+        if (document.querySelector('[data-part~="seat-open"]')) document.documentElement.dataset.openHand = "seen";
       };
       new MutationObserver(look).observe(document, { childList: true, subtree: true });
     });
