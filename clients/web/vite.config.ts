@@ -1,4 +1,5 @@
-// Builds the page (into dist/, which the server embeds), serves it during development, and configures the tests without a browser.
+// Builds the page (into dist/, which the server embeds), serves it during development, and
+// configures the tests without a browser.
 
 import { readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { join, resolve } from "node:path";
@@ -11,11 +12,16 @@ const repository = fileURLToPath(new URL("../..", import.meta.url));
 /** The server that `npm run dev` forwards calls to. */
 const server = process.env.CHEFSHAT_ADDRESS ?? "http://127.0.0.1:50051";
 
-/** Files that are compressed already, and the size in bytes below which compression gains nothing. */
+/**
+ * Files that are compressed already, and the size in bytes below which compression gains nothing.
+ */
 const PACKED = /\.(woff2|gz|png)$/;
 const SMALLEST_PACKED_BYTES = 512;
 
-/** Removes old assets from dist/ (but not its .gitignore) and writes a compressed copy beside each file that is worth it. */
+/**
+ * Removes old assets from dist/ (but not its .gitignore) and writes a compressed copy beside each
+ * file that is worth it.
+ */
 function packed(): Plugin {
   let dist = "";
   return {
@@ -46,13 +52,15 @@ export default defineConfig({
   css: { modules: { localsConvention: "camelCaseOnly" } },
   build: {
     target: "es2023",
-    // The first versions with light-dark(), which theme.css uses: a translation for older ones would not follow color-scheme.
+    // The first versions with light-dark(), which theme.css uses: a translation for older ones
+    // would not follow color-scheme.
     cssTarget: ["chrome123", "firefox120", "safari17.5"],
     emptyOutDir: false,
     // Drawings are inline; a font must stay a file that the browser can cache.
     assetsInlineLimit: 0,
     modulePreload: { polyfill: false },
-    // A browser without HTTP/2 makes six requests at a time: the common code comes in a few chunks, by how often it changes.
+    // A browser without HTTP/2 makes six requests at a time: the common code comes in a few chunks,
+    // by how often it changes.
     rolldownOptions: {
       output: {
         codeSplitting: {
@@ -69,6 +77,7 @@ export default defineConfig({
   server: { fs: { allow: [repository] }, proxy: { "^/chefshat\\.v1\\.": { target: server } } },
   test: {
     environment: "happy-dom",
+    testTimeout: 60_000,
     include: ["tests/*.test.{ts,tsx}", "src/**/*.test.{ts,tsx}"],
   },
 });

@@ -1,5 +1,6 @@
-// Runs the tests in tests/browser. Each file starts a server (CHEFSHAT_BIN) that serves the built page, and a browser. The files run one
-// after the other, so that they do not compete for the processor.
+// Runs the tests in tests/browser. Each file starts a server (CHEFSHAT_BIN) that serves the built
+// page, and a browser. The files run one after the other, so that they do not compete for the
+// processor.
 
 import { defineConfig } from "vitest/config";
 import { PATIENCE_MS } from "./tests/browser/patience";

@@ -1,5 +1,5 @@
-// Draws the page that the address names inside the common frame. Each page's code is loaded on the first visit, so that the
-// lobby does not wait for the table.
+// Draws the page that the address names inside the common frame. Each page's code is loaded on the
+// first visit, so that the lobby does not wait for the table.
 
 import type { ComponentType } from "preact";
 import { useEffect, useLayoutEffect, useState } from "preact/hooks";
@@ -31,7 +31,10 @@ const pages: Pages = {
   unknown: async () => (await import("./parts/NotFound")).NotFound,
 };
 
-/** A loaded page and its route. Each visit has a number of its own, so that visiting a page again starts it afresh. */
+/**
+ * A loaded page and its route. Each visit has a number of its own, so that visiting a page again
+ * starts it afresh.
+ */
 interface Shown {
   visit: number;
   route: Route;

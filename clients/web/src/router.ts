@@ -1,5 +1,6 @@
-// Maps addresses to pages and navigates between them without reloading the document. Addresses contain no "#": the server
-// returns the same document for every path. The pages themselves are in app.tsx.
+// Maps addresses to pages and navigates between them without reloading the document. Addresses
+// contain no "#": the server returns the same document for every path. The pages themselves are in
+// app.tsx.
 
 import { signal } from "@preact/signals";
 
@@ -97,7 +98,10 @@ export function navigate(to: Route, options: { replace?: boolean; search?: strin
   arrive(0);
 }
 
-/** Follows the browser's Back and Forward buttons and the links of this page. Returns a function that stops it. */
+/**
+ * Follows the browser's Back and Forward buttons and the links of this page. Returns a function
+ * that stops it.
+ */
 export function startRouter(): () => void {
   // The browser would restore a scroll position before the page that it belongs to is drawn.
   history.scrollRestoration = "manual";
@@ -112,13 +116,13 @@ export function startRouter(): () => void {
   };
 }
 
-/** Name of the scroll positions in the session's storage, where they outlast a reload. */
+/** Key of the scroll positions in sessionStorage, where they survive a reload. */
 const SCROLLS = "chefshat.scrolls";
-/** How far each page was scrolled when it was left, by the key of its entry in the browser's history. */
+/** Scroll position of each page when it was left, by the key of its history entry. */
 const scrolls = new Map<string, number>(storedScrolls());
 /** Key of the current entry. */
 let entry: string = history.state?.entry ?? newEntry();
-/** Where the page that is being loaded is to be scrolled. */
+/** Scroll position of the page that is loading. */
 let wanted = scrolls.get(entry) ?? 0;
 
 function newEntry(): string {
@@ -151,7 +155,7 @@ function storeScrolls(): void {
   try {
     sessionStorage.setItem(SCROLLS, JSON.stringify([...scrolls]));
   } catch {
-    // Storage is blocked or full: a reload begins at the top.
+    // Storage is blocked or full: a reload starts at the top.
   }
 }
 
@@ -163,7 +167,10 @@ function arrive(scroll: number): void {
 
 let stopRestoring = () => {};
 
-/** Scrolls a page that has just been drawn to where it was left: as soon as it is long enough, unless the reader acts before. */
+/**
+ * Scrolls a page that was just rendered to where it was left, as soon as it is long enough. Stops
+ * when the reader acts.
+ */
 export function restoreScroll(): void {
   stopRestoring();
   window.scrollTo(0, wanted);
@@ -182,7 +189,7 @@ export function restoreScroll(): void {
   for (const kind of acts) window.addEventListener(kind, stopRestoring);
 }
 
-/** A plain click on a link to this origin changes the page; everything else is left to the browser. */
+/** Follows a plain click on a link to this origin; leaves everything else to the browser. */
 function followLink(event: MouseEvent): void {
   if (event.defaultPrevented || event.button !== 0) return;
   if (event.metaKey || event.ctrlKey || event.shiftKey || event.altKey) return;
@@ -194,7 +201,7 @@ function followLink(event: MouseEvent): void {
   arrive(0);
 }
 
-/** Decodes a part of an address; a badly encoded part is returned as it is. */
+/** Decodes a part of an address; returns a badly encoded part unchanged. */
 function decoded(part: string): string {
   try {
     return decodeURIComponent(part);

@@ -1,10 +1,11 @@
-// What this device remembers between visits: localStorage under one prefix. A browser that refuses to keep things (a private window)
-// is no fault: everything then lasts as long as the page. Nothing is kept here that a host did not ask for or a person did not enter.
+// What this device stores between visits: localStorage under one prefix. Where the browser refuses
+// to store (a private window), values last as long as the page. Only what a host asked for or a
+// person entered is stored.
 
 const PREFIX = "chefshat.";
 const fallback = new Map<string, string>();
 
-/** What was kept under a name, or null. */
+/** The stored value of a name, or null. */
 export function recall(name: string): string | null {
   try {
     return localStorage.getItem(PREFIX + name) ?? fallback.get(name) ?? null;
@@ -13,7 +14,10 @@ export function recall(name: string): string | null {
   }
 }
 
-/** What `take` makes of the JSON object kept under a name, or null: another version may have kept another. */
+/**
+ * The result of `take` for the stored JSON object, or null: another version may have stored
+ * something else.
+ */
 export function recallObject<T>(name: string, take: (kept: Record<string, unknown>) => T | null): T | null {
   try {
     const kept: unknown = JSON.parse(recall(name) ?? "null");
@@ -23,7 +27,7 @@ export function recallObject<T>(name: string, take: (kept: Record<string, unknow
   }
 }
 
-/** Keeps a value under a name; null forgets it. */
+/** Stores a value; null deletes it. */
 export function remember(name: string, value: string | null): void {
   if (value === null) fallback.delete(name);
   else fallback.set(name, value);
@@ -31,11 +35,11 @@ export function remember(name: string, value: string | null): void {
     if (value === null) localStorage.removeItem(PREFIX + name);
     else localStorage.setItem(PREFIX + name, value);
   } catch {
-    // Kept for this page alone.
+    // Kept in memory only.
   }
 }
 
-/** Everything kept, by name. */
+/** All stored values by name. */
 export function remembered(): Map<string, string> {
   const all = new Map(fallback);
   try {
@@ -44,12 +48,12 @@ export function remembered(): Map<string, string> {
       if (key?.startsWith(PREFIX)) all.set(key.slice(PREFIX.length), localStorage.getItem(key) ?? "");
     }
   } catch {
-    // Only what this page knows.
+    // Only what is in memory.
   }
   return all;
 }
 
-/** Forgets everything that this device remembers. */
+/** Deletes everything stored on this device. */
 export function forgetAll(): void {
   for (const name of remembered().keys()) remember(name, null);
 }

@@ -1,4 +1,5 @@
-// How the games of a tournament hang together: rounds and tables, a bracket with who went on, what is known from two sources.
+// How the games of a tournament hang together: rounds and tables, a bracket with who went on, what
+// is known from two sources.
 
 import { create } from "@bufbuild/protobuf";
 import { expect, test } from "vitest";

@@ -1,4 +1,5 @@
-// What a failed call says to a person: our own words for known reasons, the server's for others, and something when nothing came back.
+// What a failed call says to a person: our own words for known reasons, the server's for others,
+// and something when nothing came back.
 
 import { create } from "@bufbuild/protobuf";
 import { Code, ConnectError } from "@connectrpc/connect";

@@ -1,4 +1,5 @@
-// Following a stream: it is opened again when it is lost or silent, and left when it says that it is over or fails for good.
+// Following a stream: it is opened again when it is lost or silent, and left when it says that it
+// is over or fails for good.
 
 import { Code, ConnectError } from "@connectrpc/connect";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";

@@ -1,4 +1,5 @@
-// What a study leaves out stays left out while one part of the page goes and another comes, whichever is first.
+// What a study leaves out stays left out while one part of the page goes and another comes,
+// whichever is first.
 
 import { render } from "preact";
 import { act } from "preact/test-utils";

@@ -1,4 +1,5 @@
-// Every language has the same texts as English; and the language is picked in the order that is promised.
+// Every language has the same texts as English; and the language is picked in the order that is
+// promised.
 
 import { describe, expect, test } from "vitest";
 import { firstKnown } from "../src/i18n";

@@ -1,4 +1,5 @@
-// Rooms for the participants of a study, each like one that stands: who they are, what is asked for, and the table of their links.
+// Rooms for the participants of a study, each like one that stands: who they are, what is asked
+// for, and the table of their links.
 
 import { create } from "@bufbuild/protobuf";
 import { afterEach, expect, test, vi } from "vitest";

@@ -1,4 +1,5 @@
-// Taking part in a tournament: a game whose room cannot be asked for is asked for again, ever more slowly, and only while the place is this page's.
+// Taking part in a tournament: a game whose room cannot be asked for is asked for again, ever more
+// slowly, and only while the place is this page's.
 
 import { create, type MessageInitShape } from "@bufbuild/protobuf";
 import { Code, ConnectError } from "@connectrpc/connect";
@@ -26,7 +27,9 @@ afterEach(() => {
   vi.restoreAllMocks();
 });
 
-/** A stream that says these things at these times, milliseconds from its beginning, and stays open. */
+/**
+ * A stream that says these things at these times, milliseconds from its beginning, and stays open.
+ */
 function streaming(said: readonly (readonly [atMs: number, update: Told])[]) {
   return vi.spyOn(playApi, "watch").mockImplementation(async function* () {
     let nowMs = 0;

@@ -1,4 +1,5 @@
-// Asking again and again: at once, at the interval, more slowly after faults, not while hidden, and never after the page has gone.
+// Asking again and again: at once, at the interval, more slowly after faults, not while hidden, and
+// never after the page has gone.
 
 import { Code, ConnectError } from "@connectrpc/connect";
 import { render } from "preact";

@@ -29,7 +29,10 @@ test.each<[string, Happening[], number[]]>([
   expect(worthSaying(log, false).map(({ sequence }) => sequence)).toEqual(quiet);
 });
 
-/** Lets things happen, each so long after the one before; gives what was said until everything had settled. */
+/**
+ * Lets things happen, each so long after the one before; gives what was said until everything had
+ * settled.
+ */
 function heard(steps: readonly (readonly [afterMs: number, happening: Happening])[]): Happening[] {
   const said: Happening[] = [];
   const teller = tellPresence(({ happening }) => said.push(happening));

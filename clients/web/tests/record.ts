@@ -1,4 +1,5 @@
-// Recorded games of the whole project's fixtures, as the protocol's messages, and what a viewer of the game would have been told.
+// Recorded games of the whole project's fixtures, as the protocol's messages, and what a viewer of
+// the game would have been told.
 
 import { readFileSync } from "node:fs";
 import { create, fromJson, type JsonValue } from "@bufbuild/protobuf";

@@ -1,4 +1,5 @@
-// A record as a film: every decision can be seen before it is taken, and nobody's eyes see more than they may.
+// A record as a film: every decision can be seen before it is taken, and nobody's eyes see more
+// than they may.
 
 import { expect, test } from "vitest";
 import { DecisionKind } from "../src/gen/chefshat/v1/decision_pb";

@@ -1,4 +1,5 @@
-// What this device remembers of its seats and rooms survives a reload and nonsense; join codes are read as people type them.
+// What this device remembers of its seats and rooms survives a reload and nonsense; join codes are
+// read as people type them.
 
 import { beforeEach, expect, test } from "vitest";
 import { codeIn } from "../src/lobby/JoinForm";

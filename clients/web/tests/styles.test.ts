@@ -1,4 +1,5 @@
-// The style sheets beside the parts: every class that a part names is in its sheet, and every class of a sheet is used.
+// The style sheets beside the parts: every class that a part names is in its sheet, and every class
+// of a sheet is used.
 
 import { readdirSync, readFileSync } from "node:fs";
 import { dirname, join, resolve } from "node:path";

@@ -1,4 +1,5 @@
-// The button that asks once more: where the focus goes, that it acts once, and what it says when it could not.
+// The button that asks once more: where the focus goes, that it acts once, and what it says when it
+// could not.
 
 import { render } from "preact";
 import { act } from "preact/test-utils";

@@ -1,4 +1,5 @@
-// A seat's own stream: what each update does to the open decision, to how the seat is attached, and to the table.
+// A seat's own stream: what each update does to the open decision, to how the seat is attached, and
+// to the table.
 
 import { create, type MessageInitShape } from "@bufbuild/protobuf";
 import { describe, expect, test } from "vitest";

@@ -1,5 +1,5 @@
-// The model of the table against recorded games: after every event it must agree with what the server's engine wrote down, at every
-// decision with the mask of legal actions.
+// The model of the table against recorded games: after every event it must agree with what the
+// server's engine wrote down, at every decision with the mask of legal actions.
 
 import { create, type MessageInitShape } from "@bufbuild/protobuf";
 import { describe, expect, test } from "vitest";
@@ -17,7 +17,10 @@ import { applySnapshot } from "../src/table/model/snapshot";
 import { emptyTable, type TableState } from "../src/table/model/state";
 import { RECORDS, recorded, seenBy } from "./record";
 
-/** Plays a record back and shows every decision with the table as it stood; gives the table at the end. */
+/**
+ * Plays a record back and shows every decision with the table as it stood; gives the table at the
+ * end.
+ */
 function follow(
   name: (typeof RECORDS)[number],
   viewer: number | "all" | undefined,
@@ -51,7 +54,8 @@ describe.each(RECORDS)("the recorded game %s", (name) => {
       const hand = table.seats[seat]?.hand ?? [];
       const legal = new Set(legalActions(actionMask));
       expect(legal).toContain(action);
-      // By the rules alone, as the words of the page know them: what the turn asks for, and what the hand holds.
+      // By the rules alone, as the words of the page know them: what the turn asks for, and what
+      // the hand holds.
       const requirement = publicRequirement(table);
       const { plays, others } = lookupOf(table, requirement, hand, legal);
       for (const { move, action: number, state } of [...plays.flat(2), ...others]) {

@@ -1,4 +1,5 @@
-// What the form for a new tournament asks the server for, what it does not send, and where a refusal belongs.
+// What the form for a new tournament asks the server for, what it does not send, and where a
+// refusal belongs.
 
 import { create } from "@bufbuild/protobuf";
 import { Code } from "@connectrpc/connect";

@@ -1,4 +1,5 @@
-// The script of the tutorial keeps the rules it teaches: every lesson can be done with the cards that are there, and counts add up.
+// The script of the tutorial keeps the rules it teaches: every lesson can be done with the cards
+// that are there, and counts add up.
 
 import { expect, test } from "vitest";
 import { actionOf } from "../src/table/model/actions";

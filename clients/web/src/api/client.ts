@@ -1,5 +1,5 @@
-// The one connection to the server this page came from, and a typed client for each of its services (gRPC-web over the page's own
-// origin). What went wrong in a call is said in faults.ts.
+// The connection to the server that served this page, with a typed client for each service
+// (gRPC-web over the page's origin). Errors are put into words in faults.ts.
 
 import { createClient } from "@connectrpc/connect";
 import { createGrpcWebTransport } from "@connectrpc/connect-web";
@@ -16,7 +16,7 @@ const transport = createGrpcWebTransport({ baseUrl: location.origin });
 export const serverApi = createClient(ServerService, transport);
 /** Making, finding and joining rooms. */
 export const roomApi = createClient(RoomService, transport);
-/** Playing: `watch` streams what seats are told, `act` does something for one. */
+/** Playing: `watch` streams a seat's updates, `act` acts for a seat. */
 export const playApi = createClient(PlayService, transport);
 /** Watching without a seat. */
 export const spectatorApi = createClient(SpectatorService, transport);
@@ -25,5 +25,5 @@ export const recordApi = createClient(RecordService, transport);
 /** Tournaments, their results, the leaderboard. */
 export const tournamentApi = createClient(TournamentService, transport);
 
-/** Milliseconds after which a call that is answered at once normally is given up; streams have no such limit. */
+/** Deadline of a unary call, milliseconds. Streams have none. */
 export const CALL_LIMIT_MS = 15_000;

@@ -1,13 +1,14 @@
-// What went wrong in a call, in words for a person. The server says a reason in UPPER_SNAKE (google.rpc.ErrorInfo) and a sentence in
-// English; for reasons that a person at this page can meet there is a sentence in each language (`faults` in i18n).
+// Errors of calls, in words for a person. The server sends a reason in UPPER_SNAKE
+// (google.rpc.ErrorInfo) and a sentence in English; reasons that a person at this page can meet
+// have a sentence in each language (`faults` in i18n).
 
 import { Code, ConnectError } from "@connectrpc/connect";
 import { ErrorInfoSchema } from "../gen/google/rpc/error_details_pb";
 import { t } from "../i18n";
 
-/** A failed call, taken apart. */
+/** The parts of a failed call's error. */
 export interface Fault {
-  /** Reason in UPPER_SNAKE; empty if the server was not reached or said none. */
+  /** Reason in UPPER_SNAKE; empty if the server was not reached or sent none. */
   reason: string;
   /** Canonical code. */
   code: Code;
@@ -17,7 +18,7 @@ export interface Fault {
   metadata: Record<string, string>;
 }
 
-/** Takes apart whatever a call threw. */
+/** Parses anything that a call threw. */
 export function faultOf(thrown: unknown): Fault {
   const error = ConnectError.from(thrown);
   const info = error.findDetails(ErrorInfoSchema)[0];
@@ -29,7 +30,7 @@ export function faultOf(thrown: unknown): Fault {
   };
 }
 
-/** Whether it makes sense to try the same again in a moment: the server is away or shutting down. */
+/** Whether a retry may succeed soon: the server is unreachable or shutting down. */
 export function isPassing(fault: Fault): boolean {
   if (fault.reason === "SHUTTING_DOWN" || fault.reason === "STORE_FAILED") return true;
   return (
@@ -37,7 +38,7 @@ export function isPassing(fault: Fault): boolean {
   );
 }
 
-/** A fault in words: our own where there are some for its reason, else the server's. */
+/** A fault in words: the translated sentence for its reason if there is one, else the server's. */
 export function wordsOf(fault: Fault): string {
   const known: Record<string, string> = t().faults.byReason;
   const own = known[fault.reason];
@@ -46,7 +47,7 @@ export function wordsOf(fault: Fault): string {
   return fault.message || t().faults.unknown;
 }
 
-/** Shortly: whatever a call threw, in words. */
+/** Anything that a call threw, in words. */
 export function inWords(thrown: unknown): string {
   return wordsOf(faultOf(thrown));
 }

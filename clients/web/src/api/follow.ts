@@ -1,30 +1,37 @@
-// Following a stream of the server for as long as a page is open: a lost connection is made again, sooner when the browser says that it is
-// back, and one on which nothing is heard any more (a lid was closed) is given up. What the messages mean is for the caller.
+// Follows a server stream while a page is open: reconnects after a lost connection, at once when
+// the browser is back online, and drops a connection that has gone silent (the lid was closed). The
+// caller interprets the messages.
 
 import { type Signal, signal } from "@preact/signals";
 import { type Fault, faultOf, isPassing } from "./faults";
 
-/** How a stream stands: being opened, open, lost and to be opened again, ended for good, or ended by a fault that trying again does not mend. */
+/**
+ * The state of a stream: connecting, open, lost and about to reconnect, ended for good, or failed
+ * with an error that a retry does not fix.
+ */
 export type Link = "connecting" | "open" | "lost" | "ended" | "failed";
 
-/** A stream that is followed. */
+/** A followed stream. */
 export interface Following {
   readonly link: Signal<Link>;
-  /** What the server said when the stream failed. */
+  /** The server's error when the stream failed. */
   readonly fault: Signal<Fault | undefined>;
-  /** Ends it. */
+  /** Closes the stream. */
   stop(): void;
 }
 
-/** The server sends a heartbeat every 15 seconds; after two that are missing nobody is there. */
+/**
+ * The server sends a heartbeat every 15 seconds; after two missing ones the connection counts as
+ * dead.
+ */
 const SILENCE_MS = 35_000;
 const WATCH_EVERY_MS = 5_000;
 const SHORTEST_WAIT_MS = 250;
 const LONGEST_WAIT_MS = 8_000;
 
 /**
- * Follows what `open` opens. `heard` is given every message and says whether there is more to come. A stream that ends by itself while there is
- * is opened again.
+ * Follows the stream that `open` opens. `heard` receives every message and returns whether more
+ * will follow. A stream that ends while more should follow is reopened.
  */
 export function follow<Message>(
   open: (signal: AbortSignal) => AsyncIterable<Message>,

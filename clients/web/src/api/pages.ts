@@ -1,4 +1,4 @@
-// Lists that the server gives page by page: asked for to their end, or as far as they are shown. What a page holds is for the caller.
+// Paginated lists of the server: read to the end, or as far as they are shown.
 
 import { useState } from "preact/hooks";
 import type { Fault } from "./faults";
@@ -11,27 +11,27 @@ export interface Page<Item> {
   readonly nextPageToken: string;
 }
 
-/** The beginning of a list. */
+/** The first items of a list. */
 export interface Beginning<Item> {
   readonly items: readonly Item[];
-  /** Whether there is more of it. */
+  /** Whether the list continues. */
   readonly more: boolean;
 }
 
-/** A list of which so much is shown as the reader has asked for. */
+/** The part of a list that is shown. */
 export interface Shown<Item> {
-  /** Null until it is known. */
+  /** Null until the first response. */
   readonly list: Beginning<Item> | null;
   readonly fault: Fault | null;
   readonly showMore: () => void;
 }
 
-/** Largest page that the server gives of rooms, tournaments and records. */
+/** The server's largest page of rooms, tournaments and records. */
 const LARGEST_PAGE = 100;
-/** Pages that are asked for at most at a time: a page may hold less than it was asked for. */
+/** Most pages requested at a time. A page may be shorter than requested. */
 const MAX_PAGES = 50;
 
-/** Everything on the pages that `ask` gives by token, in the server's order; of a longer list the first `most` pages. */
+/** All items of a list, in the server's order, from at most `most` pages. */
 export async function allPages<Item>(ask: (pageToken: string) => Promise<Page<Item>>, most: number): Promise<Item[]> {
   const found: Item[] = [];
   let pageToken = "";
@@ -44,10 +44,10 @@ export async function allPages<Item>(ask: (pageToken: string) => Promise<Page<It
   return found;
 }
 
-/** Asks for a page of so many with a token. */
+/** Requests one page of a list. */
 export type AskPage<Item> = (page: { pageSize: number; pageToken: string }, signal: AbortSignal) => Promise<Page<Item>>;
 
-/** The first `count` of a list, and whether there are more, for which one more is asked for. */
+/** The first `count` items, and whether there are more. Requests one item more to find out. */
 export async function firstOf<Item>(ask: AskPage<Item>, count: number, signal: AbortSignal): Promise<Beginning<Item>> {
   const found: Item[] = [];
   let pageToken = "";
@@ -61,14 +61,14 @@ export async function firstOf<Item>(ask: AskPage<Item>, count: number, signal: A
   return { items: found.slice(0, count), more: found.length > count || pageToken !== "" };
 }
 
-/** The beginning of a list, asked for again and again, and as many more at a time as at first. `key` says which list it is. */
+/** The first items of a list, polled, with more of them on request. `key` identifies the list. */
 export function useShown<Item>(ask: AskPage<Item>, atATime: number, everyMs: number, key: string): Shown<Item> {
   const [count, setCount] = useState(atATime);
   const { value, fault } = usePolled((signal) => firstOf(ask, count, signal), everyMs, `${key} ${count}`);
   return { list: value, fault, showMore: () => setCount((before) => before + atATime) };
 }
 
-/** How many there are, as far as it is known: "12+" if there are more than are shown. */
+/** A count in words: "12+" if there are more than are shown. */
 export function countWords(count: number, more: boolean): string {
   return more ? `${count}+` : String(count);
 }

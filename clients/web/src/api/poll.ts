@@ -1,22 +1,25 @@
-// Asking for something again and again while a page shows it: at once, then at an interval, not while the page is hidden, and after a
-// fault more slowly. For what the server does not stream.
+// Polling while a page is shown: at once, then at an interval, not while the page is hidden, and
+// less often after an error. For data that the server does not stream.
 
 import { useEffect, useState } from "preact/hooks";
 import { type Fault, faultOf } from "./faults";
 
-/** What was learned last, and what went wrong last. */
+/** The last response and the last error. */
 export interface Polled<T> {
   value: T | null;
   fault: Fault | null;
 }
 
-/** How many times longer than usual to wait after a fault, at most. */
+/** Longest wait after errors, as a multiple of the interval. */
 const MAX_SLOWDOWN = 8;
 
-/** The newest answer to `ask`, which is asked again every `everyMs` milliseconds, and anew when `key` changes. */
+/**
+ * The latest response to `ask`, which runs every `everyMs` milliseconds and at once when `key`
+ * changes.
+ */
 export function usePolled<T>(ask: (signal: AbortSignal) => Promise<T>, everyMs: number, key: string): Polled<T> {
   const [polled, setPolled] = useState<Polled<T>>({ value: null, fault: null });
-  // `ask` is a new function each time; what it asks for is said by `key`.
+  // `ask` is a new function on each render; `key` identifies the request.
   useEffect(() => {
     const stop = new AbortController();
     let timer: ReturnType<typeof setTimeout> | undefined;

@@ -1,4 +1,5 @@
-// What the server says of itself: asked for once and kept, since it does not change while the page is open.
+// The server's description of itself: requested once, since it does not change while the page is
+// open.
 
 import { useEffect, useState } from "preact/hooks";
 import type { RuleSet } from "../gen/chefshat/v1/rules_pb";
@@ -11,20 +12,20 @@ let asked: Promise<GetServerInfoResponse> | undefined;
 /** Version, presets, built-in agents, limits. */
 export function serverInfo(): Promise<GetServerInfoResponse> {
   asked ??= serverApi.getServerInfo({}, { timeoutMs: CALL_LIMIT_MS }).catch((error: unknown) => {
-    // The next who asks tries again.
+    // The next call tries again.
     asked = undefined;
     throw error;
   });
   return asked;
 }
 
-/** What games can be made of. */
+/** What a game can be configured with. */
 export interface Offered {
   presets: RuleSet[];
   agents: string[];
 }
 
-/** What the server can host, for a form; null until it is known, with what went wrong in words. */
+/** The server's offer for a form, and the error in words; both null while loading. */
 export function useOffered(): { offered: Offered | null; fault: string | null } {
   const [offered, setOffered] = useState<Offered | null>(null);
   const [fault, setFault] = useState<string | null>(null);

@@ -1,4 +1,4 @@
-// What a study says when it is over: thanks, and the way to its last questionnaire.
+// The end of a study: thanks, and a link to the last questionnaire.
 
 import { t } from "../i18n";
 import { Notice } from "../parts/Notice";
@@ -6,10 +6,10 @@ import { QuestionnaireLink } from "./QuestionnaireLink";
 import { type Blanks, finishedIn, hostOf } from "./study";
 
 interface AfterStudyProps {
-  /** Address of the questionnaire; empty: there is none. */
+  /** Address of the questionnaire; empty for none. */
   after: string;
   blanks: Blanks;
-  /** Whether to say whose it is: several may have taken part at this device. */
+  /** Whether to name the participant: several may have taken part on this device. */
   named?: boolean;
 }
 
@@ -29,7 +29,7 @@ export function AfterStudy({ after, blanks, named = false }: AfterStudyProps) {
   );
 }
 
-/** The notices for those who took part in a room at this device and have left its table; mostly none. */
+/** The notices for participants on this device who have left the table of a room; usually none. */
 export function AfterRoom({ roomId }: { roomId: string }) {
   return (
     <>

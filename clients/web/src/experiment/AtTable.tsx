@@ -1,15 +1,18 @@
-// A study at the table: when the game is over its last questionnaire is offered. What is left out is in hiding.ts.
+// A study at the table: offers the last questionnaire after the game. Hidden parts are in
+// hiding.ts.
 
 import { AfterStudy } from "./AfterStudy";
 import { studyIn } from "./study";
 
 interface AtTableProps {
   roomId: string;
-  /** Whether a game is over, with a result or without; not where a room was closed before one began. */
+  /**
+   * Whether a game is over, with or without a result; false if the room was closed before a game.
+   */
   over: boolean;
 }
 
-/** What a study adds to the banner of a table; nothing where this device takes part in none. */
+/** The study's part of a table's banner; null if this device takes part in no study. */
 export function AtTable({ roomId, over }: AtTableProps) {
   const study = studyIn(roomId);
   if (!study || !over) return null;

@@ -1,13 +1,13 @@
-// The links of a study's participants, to be copied one by one or all at once, or taken along as a table (CSV).
+// The links of a study's participants, to copy one by one or all at once, or to download as CSV.
 
 import { t } from "../i18n";
 import { CopyLine, useCopying } from "../lobby/Invite";
 import { Button } from "../parts/Button";
 import css from "./Experiment.module.css";
 
-/** The link of one participant. */
+/** The link of a participant. */
 export interface StudyLink {
-  /** Empty: for whoever opens it. */
+  /** Empty for a link without a name. */
   readonly name: string;
   readonly address: string;
   /** Empty in a tournament. */
@@ -36,7 +36,7 @@ export function LinkList({ links }: { links: readonly StudyLink[] }) {
   );
 }
 
-/** The links as a table of names, addresses and rooms: CSV as RFC 4180 has it. */
+/** The links as CSV (RFC 4180): names, addresses and room ids. */
 export function tableOf(links: readonly StudyLink[]): string {
   const rows = [["name", "link", "room_id"], ...links.map(({ name, address, roomId }) => [name, address, roomId])];
   return rows.map((row) => `${row.map(quoted).join(",")}\r\n`).join("");

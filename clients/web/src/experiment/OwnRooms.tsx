@@ -1,4 +1,5 @@
-// A room of their own for each participant of a study, like the one at hand: made one after the other, with their links.
+// Creates a separate room for each participant of a study, like the current one, and lists their
+// links.
 
 import { useState } from "preact/hooks";
 import { inWords } from "../api/faults";
@@ -13,10 +14,10 @@ import { LinkList } from "./LinkList";
 import { jobs, LONGEST_WAIT_MS, makeOwnRooms, type OwnRoom, ownRooms } from "./own-rooms";
 
 interface OwnRoomsProps {
-  /** The room that those to be made are like. */
+  /** The room to copy. */
   room: Room;
   names: readonly string[];
-  /** What a participant's link says, from its "?" on. */
+  /** The query of a participant's link, from "?" on. */
   searchFor: (name: string) => string;
 }
 
@@ -73,7 +74,7 @@ export function OwnRooms({ room, names, searchFor }: OwnRoomsProps) {
   );
 }
 
-/** The links of the rooms that were made, each as it was then. */
+/** The links of the created rooms, each as it was at the time. */
 export function OwnLinks({ made }: { made: readonly OwnRoom[] }) {
   if (made.length === 0) return null;
   return (

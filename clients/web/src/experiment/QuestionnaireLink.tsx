@@ -1,4 +1,4 @@
-// The way to a questionnaire, in a window of its own which learns nothing of this one.
+// A link to a questionnaire, in a new window without access to this one.
 
 import { t } from "../i18n";
 import css from "../parts/Button.module.css";

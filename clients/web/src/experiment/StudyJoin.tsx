@@ -1,5 +1,5 @@
-// The way of a study's participant to the table or into the tournament, one step after the other: what is agreed to, a questionnaire, the
-// name. How the seat or place is taken is for the page of the invitation.
+// A participant's way into a study, step by step: consent, questionnaire, name. The page of the
+// invitation takes the seat or place.
 
 import { useState } from "preact/hooks";
 import { t } from "../i18n";
@@ -16,13 +16,16 @@ import { hostOf, rememberStudy, type Study } from "./study";
 
 interface StudyJoinProps {
   study: Study;
-  /** What it is that one comes into. */
+  /** What the participant joins. */
   what: "room" | "tournament";
-  /** Takes the seat, or the place in a tournament, under a name; gives the id of the room or tournament, null if the page asks something first. */
+  /**
+   * Takes the seat, or the place in a tournament, with a name. Returns the id of the room or
+   * tournament; null if the page has another question first.
+   */
   take: (name: string) => Promise<string | null>;
-  /** Whether somebody there has a name that a participant chooses; the server says so of tournaments. */
+  /** Whether a chosen name is taken; the server checks this for tournaments. */
   isTaken?: (name: string) => boolean;
-  /** Goes there. */
+  /** Navigates there. */
   arrive: (id: string) => void;
 }
 

@@ -1,5 +1,5 @@
-// The form that makes links for the participants of a study, for whoever made the room or the tournament. It only writes addresses; where each
-// participant is to play in a room of their own, OwnRooms.tsx makes those.
+// The form that writes links for the participants of a study, for the creator of a room or
+// tournament. It only composes addresses; OwnRooms.tsx creates separate rooms.
 
 import { useId, useState } from "preact/hooks";
 import { CALL_LIMIT_MS, roomApi } from "../api/client";
@@ -18,15 +18,17 @@ import { isTooLong, MAX_PARTICIPANTS, participantsIn } from "./participants";
 import { freeForPeople, type Place, placed } from "./places";
 import { HIDEABLE, type Hideable, questionnaire, searchOf } from "./study";
 
-/** How often the seats are asked for, milliseconds. */
+/** Polling interval of the seats, milliseconds. */
 const EVERY_MS = 5_000;
 
 interface StudyLinksProps {
-  /** The address that invites, to which each link adds what it fixes. */
+  /** The invitation address that each link extends. */
   address: string;
 }
 
-/** The form, folded away: for a room, whose seats are asked for once it has been opened, or for a tournament. */
+/**
+ * The form, folded: for a room, whose seats are requested when it is opened, or for a tournament.
+ */
 export function StudyLinks({ address, roomId }: StudyLinksProps & { roomId?: string }) {
   const [opened, setOpened] = useState(false);
   return (
@@ -45,7 +47,10 @@ function RoomStudyForm({ roomId, address }: StudyLinksProps & { roomId: string }
   return fault ? <OwnLinks made={ownRooms(roomId)} /> : <p class="soft">{t().common.loading}</p>;
 }
 
-/** The form again where its room is not invited to any more, for whoever made rooms like it: their links outlast it. */
+/**
+ * The form for a room that is closed to new players, if rooms like it were created: their links
+ * outlast it.
+ */
 export function KeptLinks({ roomId }: { roomId: string }) {
   const hosted = hostedRoom(roomId);
   if (!hosted || ownRooms(roomId).length === 0) return null;
@@ -56,7 +61,7 @@ export function KeptLinks({ roomId }: { roomId: string }) {
   );
 }
 
-/** Where there are no seats to choose among, as in a tournament, none are given. */
+/** A tournament has no seats to choose from. */
 function StudyForm({ address, room }: StudyLinksProps & { room?: Room }) {
   const words = t().experiment.links;
   const seats = room?.seats;

@@ -1,18 +1,21 @@
-// What is left out on the page just now, for a study. The style sheet leaves out most of it by `data-hide` of the document; what is read out or
-// can be followed by keyboard asks here.
+// The parts of the page that a study hides. hiding.css hides most of them by `data-hide` of the
+// document; screen reader announcements and keyboard handling ask here.
 
 import { signal } from "@preact/signals";
 import { useLayoutEffect } from "preact/hooks";
 import type { Hideable, Study } from "./study";
 import "./hiding.css";
 
-/** What is left out; nothing outside a study. */
+/** The hidden parts; empty outside a study. */
 export const hidden = signal<readonly Hideable[]>([]);
 
-/** What each part of the page that is drawn just now wants left out: of two that follow each other the second may come before the first goes. */
+/**
+ * What each rendered part wants hidden. During a change of pages the second one may arrive before
+ * the first one leaves.
+ */
 const wanted = new Set<readonly Hideable[]>();
 
-/** Leaves parts out until what it returns is called. */
+/** Hides parts until the returned function is called. */
 export function leaveOut(parts: readonly Hideable[]): () => void {
   const own = [...parts];
   wanted.add(own);
@@ -23,7 +26,7 @@ export function leaveOut(parts: readonly Hideable[]): () => void {
   };
 }
 
-/** Leaves out what a study leaves out, for as long as the page that uses this is drawn. */
+/** Hides the parts of a study while the calling component is rendered. */
 export function useHiding(study: Study | null): void {
   const hide = study?.hide.join(" ") ?? "";
   useLayoutEffect(() => leaveOut(study?.hide ?? []), [hide]);

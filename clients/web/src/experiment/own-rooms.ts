@@ -1,5 +1,5 @@
-// Rooms like one that stands, one for each participant of a study, and which of them this device has made, with what their links say. They are
-// rooms like any other, whose secrets are kept with those of all rooms made here (lobby/seat.ts).
+// Separate rooms for the participants of a study, like a given room: which ones this device has
+// created, and their links. Their secrets are stored like those of other rooms (lobby/seat.ts).
 
 import { signal } from "@preact/signals";
 import type { Room } from "../gen/chefshat/v1/room_pb";
@@ -8,33 +8,36 @@ import { requestLike } from "../lobby/room-like";
 import { hostedRoom, makeRoom } from "../lobby/seat";
 import { recallObject, remember } from "../store";
 
-/** Longest time that a room can wait for its seats, milliseconds. */
+/** Longest time that a room can wait for its players, milliseconds. */
 export const LONGEST_WAIT_MS = 86_400_000;
 
-/** Between the name of the room at hand and that of the participant. */
+/** Separates the room's name from the participant's. */
 const BETWEEN = " · ";
 
-/** A room that was made for a participant. */
+/** A participant's room. */
 export interface OwnRoom {
   readonly name: string;
   readonly roomId: string;
   readonly joinCode: string;
-  /** What the link says of the study: its address from "?" on. */
+  /** The query of the link: its address from "?" on. */
   readonly search: string;
 }
 
-/** Rooms being made, or the end that this came to. */
+/** Rooms being created, or the result. */
 export interface Job {
   readonly participants: readonly string[];
   readonly busy: boolean;
-  /** What was thrown; undefined: nothing. */
+  /** The error; undefined if there was none. */
   readonly fault: unknown;
 }
 
-/** The jobs of this page by the room that theirs are like. They outlast the form, which may be left and opened again meanwhile. */
+/**
+ * The jobs of this page by the room they copy. They outlast the form, which may be closed and
+ * opened again.
+ */
 export const jobs = signal<ReadonlyMap<string, Job>>(new Map());
 
-/** The rooms that this device has made for participants, after the likeness of one. */
+/** The rooms that this device created for participants, like a given room. */
 export function ownRooms(likeRoomId: string): OwnRoom[] {
   const kept = recallObject(keptUnder(likeRoomId), ({ made }) => (Array.isArray(made) ? made : null));
   return (kept ?? []).flatMap((one: unknown) => {
@@ -46,8 +49,10 @@ export function ownRooms(likeRoomId: string): OwnRoom[] {
   });
 }
 
-/** Makes a room for each participant that has none yet, one after the other; nothing while that is done already. What was made before one is
- * refused is kept. How it goes on and ends stands in `jobs`. */
+/**
+ * Creates a room for each participant without one, one after the other; does nothing while a job
+ * runs. Rooms created before an error are kept. `jobs` shows the progress.
+ */
 export async function makeOwnRooms(
   room: Room,
   participants: readonly string[],
@@ -62,7 +67,7 @@ export async function makeOwnRooms(
   tell(true);
   try {
     for (const name of participants) {
-      // Asked each time: another page of this device may be making some as well.
+      // Read each time: another tab may be creating rooms too.
       if (ownRooms(roomId).some((one) => one.name === name)) continue;
       const { room: own, joinCode } = await makeRoom(requestLike(room, ownName(room.name, name), waitingTimeMs));
       keep(roomId, [...ownRooms(roomId), { name, roomId: own.roomId, joinCode, search: searchFor(name) }]);
@@ -74,7 +79,7 @@ export async function makeOwnRooms(
   }
 }
 
-/** What a participant's room is called: the first name is cut where both are too long for one. */
+/** The name of a participant's room; the room's own part is truncated if both are too long. */
 function ownName(roomName: string, name: string): string {
   const space = MAX_NAME - Array.from(BETWEEN + name).length;
   const beginning = Array.from(roomName).slice(0, Math.max(space, 0)).join("").trim();

@@ -1,11 +1,16 @@
-// The names of a study's participants as they are typed: one a line, or a range such as "P01-P20". Their links are in StudyLinks.tsx.
+// Parses the names of a study's participants: one per line, or a range such as "P01-P20".
 
 import { MAX_NAME } from "../lobby/room-form";
 
-/** Most participants at a time: each may get a room of their own, and a server holds only so many. */
+/**
+ * Most participants at a time: each may get a separate room, and a server holds a limited number.
+ */
 export const MAX_PARTICIPANTS = 100;
 
-/** The names, each once, in the order in which they were typed; no more than `MAX_PARTICIPANTS` and one, so that too many can be told. */
+/**
+ * The distinct names in the order typed; at most one more than `MAX_PARTICIPANTS`, so that an
+ * excess is noticed.
+ */
 export function participantsIn(typed: string): string[] {
   const names = new Set<string>();
   for (const line of typed.split("\n"))
@@ -16,7 +21,7 @@ export function participantsIn(typed: string): string[] {
   return [...names];
 }
 
-/** The names that a line stands for: those of a range with as many digits as its first has, or the line itself. */
+/** The names of a line: a range, with as many digits as its start, or the line itself. */
 function namesOf(line: string): string[] {
   if (line === "") return [];
   const range = /^(.*?)(\d{1,6})\s*[-–]\s*(.*?)(\d{1,6})$/.exec(line);
@@ -28,7 +33,7 @@ function namesOf(line: string): string[] {
   });
 }
 
-/** Whether a name has more characters than the server takes: nobody could sit down by its link. */
+/** Whether a name is longer than the server accepts. */
 export function isTooLong(name: string): boolean {
   return Array.from(name).length > MAX_NAME;
 }

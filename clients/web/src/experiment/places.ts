@@ -1,21 +1,24 @@
-// Which seats of a room the participants of a study can have, as its links are written. Whoever has sat down keeps the link that led there.
+// The seats of a room for the participants of a study. A participant who has joined keeps the link
+// of their seat.
 
 import { type Participant, ParticipantKind } from "../gen/chefshat/v1/room_pb";
 import { isFree } from "../lobby/rooms";
 
-/** A participant's name, empty for whoever opens the link, and the seat there is for it. */
+/** A participant's name, empty if the link sets none, and the seat for it. */
 export interface Place {
   readonly name: string;
   readonly seat: number;
 }
 
-/** The seats that a person can still take. */
+/** The seats that a person can take. */
 export function freeForPeople(seats: readonly Participant[]): number[] {
   const kinds = [ParticipantKind.UNSPECIFIED, ParticipantKind.HUMAN];
   return seats.flatMap((seat, index) => (isFree(seat) && kinds.includes(seat.reservedFor) ? index : []));
 }
 
-/** Names on seats, the first on `first` or the next that is free; as many as there are seats for. */
+/**
+ * Assigns names to seats, from `first` or the next free one on; at most as many as there are seats.
+ */
 export function placed(seats: readonly Participant[], names: readonly string[], first: number): Place[] {
   const free = freeForPeople(seats).filter((seat) => seat >= first);
   return names.flatMap((name) => {

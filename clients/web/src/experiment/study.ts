@@ -1,24 +1,25 @@
-// A study as a link carries it: who takes part, in which seat, what is left out at the table, what is asked before and after. Nothing of it
-// goes to the server but the name and, where the link says so, times as annotations. On this device it is kept with the seat, or with the place
-// in a tournament, so that a reload does not lose it; and of one that is over its last questionnaire, so that the link leads to that again.
+// A study as described by a link: participant, seat, hidden parts, consent and questionnaires. The
+// server receives only the name and, if the link says so, times as annotations. This device stores
+// it with the seat or place, so that a reload keeps it; after the game it keeps the last
+// questionnaire for the link.
 
 import { recall, recallObject, remember, remembered } from "../store";
 
-/** Parts of the table that a study may leave out. */
+/** Parts of the table that a study can hide. */
 export const HIDEABLE = ["log", "lookup", "expressions", "played", "pages"] as const;
 export type Hideable = (typeof HIDEABLE)[number];
 
 export interface Study {
-  /** Name to play under; empty: the participant chooses one. */
+  /** Name of the participant; empty if the participant chooses one. */
   readonly name: string;
-  /** Undefined: any free one. */
+  /** Undefined for any free seat. */
   readonly seat: number | undefined;
-  /** Whether times are measured at the participant's side as well. */
+  /** Whether times are measured in the browser too. */
   readonly times: boolean;
   readonly hide: readonly Hideable[];
-  /** To be agreed to; empty: nothing. */
+  /** Text to agree to; empty for none. */
   readonly consent: string;
-  /** Addresses of questionnaires; empty: none. */
+  /** Addresses of questionnaires; empty for none. */
   readonly before: string;
   readonly after: string;
 }
@@ -27,7 +28,7 @@ export interface Study {
 const MARKS = ["name", "seat", "hide", "times", "consent", "before", "after"];
 const MAX_SEAT = 5;
 
-/** The study that an address speaks of; null if it is an invitation like any other. */
+/** The study of an address; null for a plain invitation. */
 export function studyOf(search: string): Study | null {
   const asked = new URLSearchParams(search);
   if (!MARKS.some((mark) => asked.has(mark))) return null;
@@ -44,7 +45,10 @@ export function studyOf(search: string): Study | null {
   };
 }
 
-/** What follows the "?" of a study's invitation, the inverse of `studyOf`; `language` fixes the language of the page, too. */
+/**
+ * The query of a study's invitation, the inverse of `studyOf`; `language` sets the page's language
+ * too.
+ */
 export function searchOf(study: Study, language: string): string {
   const asked = new URLSearchParams();
   const put = (name: string, value: string) => value !== "" && asked.set(name, value);
@@ -59,13 +63,16 @@ export function searchOf(study: Study, language: string): string {
   return `?${asked}`;
 }
 
-/** What an address says of the language, to be said by the next one too: so a reload there keeps what the link has fixed. */
+/**
+ * The language parameter of an address, to be kept when navigating, so that a reload keeps the
+ * link's language.
+ */
 export function languageOf(search: string): string {
   const language = new URLSearchParams(search).get("lang");
   return language === null ? "" : `?lang=${encodeURIComponent(language)}`;
 }
 
-/** An address that a questionnaire may have; empty if it is none: a link must not run anything. */
+/** A valid address of a questionnaire, or empty: a link must not run a script. */
 export function questionnaire(address: string | null): string {
   try {
     const url = new URL(address ?? "");
@@ -75,14 +82,14 @@ export function questionnaire(address: string | null): string {
   }
 }
 
-/** What is filled into the address of a questionnaire, each empty while it is not known. */
+/** Values for the address of a questionnaire, each empty while unknown. */
 export interface Blanks {
   readonly name: string;
   readonly room?: string;
   readonly tournament?: string;
 }
 
-/** The address of a questionnaire for one participant: {name}, {room} and {tournament} filled in. */
+/** The address of a participant's questionnaire, with {name}, {room} and {tournament} replaced. */
 export function filledIn(address: string, { name, room = "", tournament = "" }: Blanks): string {
   return address
     .replaceAll("{name}", encodeURIComponent(name))
@@ -90,38 +97,44 @@ export function filledIn(address: string, { name, room = "", tournament = "" }: 
     .replaceAll("{tournament}", encodeURIComponent(tournament));
 }
 
-/** Whose questionnaire it is, to be said before it is opened. */
+/** The host of a questionnaire, shown before it is opened. */
 export function hostOf(address: string): string {
   return new URL(address).host;
 }
 
-/** Whose the seat is that this device has already, under a name, when it opens an invitation: a device may be used by one participant after the other. */
+/**
+ * Who holds this device's seat when it opens an invitation: several participants may use one device
+ * in turn.
+ */
 export function holderOf(study: Study | null, name: string): "reader" | "another" | "unclear" {
   if (!study) return "reader";
   if (study.name === "") return "unclear";
   return study.name === name ? "reader" : "another";
 }
 
-/** Keeps a study with the seat that was taken for it in a room, or with the place in a tournament. */
+/** Stores a study with the seat in a room or the place in a tournament. */
 export function rememberStudy(id: string, study: Study): void {
   remember(`study.${id}`, searchOf(study, ""));
   remember(`timed.${id}`, study.times ? "1" : null);
 }
 
-/** The study that this device takes part in, in a room or a tournament. */
+/** The study that this device takes part in, in a room or tournament. */
 export function studyIn(id: string): Study | null {
   const kept = recall(`study.${id}`);
   return kept === null ? null : studyOf(kept);
 }
 
-/** The questionnaire after a study's game that is over, of one who has left the table. */
+/** The last questionnaire of a participant who has left the table. */
 export interface Finished {
   readonly name: string;
   readonly roomId: string;
   readonly after: string;
 }
 
-/** Keeps the last questionnaire of the study in a room, before its seat is forgotten; nothing if there is none. */
+/**
+ * Stores the last questionnaire of a room's study before the seat is deleted; does nothing without
+ * one.
+ */
 export function rememberFinished(roomId: string, code: string): void {
   const study = studyIn(roomId);
   if (!study?.after) return;
@@ -129,12 +142,15 @@ export function rememberFinished(roomId: string, code: string): void {
   remember(`${FINISHED}${code}.${study.name}`, JSON.stringify(finished));
 }
 
-/** The questionnaires after games that this device took part in by the links with this code; of one participant, or with an empty name of all. */
+/**
+ * The last questionnaires of participants on this device who joined with this code; all of them if
+ * the name is empty.
+ */
 export function finishedBy(code: string, name: string): Finished[] {
   return allFinished(`${FINISHED}${code}.`).filter((finished) => name === "" || finished.name === name);
 }
 
-/** The questionnaires after the game of a room. */
+/** The last questionnaires of a room. */
 export function finishedIn(roomId: string): Finished[] {
   return allFinished(FINISHED).filter((finished) => finished.roomId === roomId);
 }

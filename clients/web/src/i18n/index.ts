@@ -1,11 +1,12 @@
-// The language of the page: ?lang= in the address, else what was chosen on this device, else the browser's, else English. All texts
-// are in en/ and it/, one file for each part of the page; English gives the form, and a language that lacks a text does not compile.
+// The language of the page: ?lang= in the address, else the stored choice, else the browser's, else
+// English. The texts are in en/ and it/, one file per part of the page. English defines their
+// shape: a language that lacks a text does not compile.
 
 import { signal } from "@preact/signals";
 import { recall, remember } from "../store";
 import type { Texts } from "./en";
 
-/** Languages there are texts for. */
+/** Languages with texts. */
 export type Language = "en" | "it";
 
 /** The languages by their own names. */
@@ -16,40 +17,43 @@ const loaders: Record<Language, () => Promise<Texts>> = {
   it: async () => (await import("./it")).it,
 };
 
-/** The language in use. */
+/** The current language. */
 export const language = signal<Language>("en");
 const texts = signal<Texts | null>(null);
 
-/** The texts of the language in use. Read in a component it is drawn again when the language changes. */
+/**
+ * The texts of the current language. A component that reads them is rendered again when the
+ * language changes.
+ */
 export function t(): Texts {
   if (texts.value === null) throw new Error("texts are read before startLanguage has ended");
   return texts.value;
 }
 
-/** A number with so many digits after the point, or comma, of the language in use. */
+/** A number with a fixed count of digits after the decimal separator of the current language. */
 export function decimal(value: number, digits: number): string {
   const options = { minimumFractionDigits: digits, maximumFractionDigits: digits };
   return new Intl.NumberFormat(language.value, options).format(value);
 }
 
-/** How dates are written where the reader is, if the browser says so for the page's language. */
+/** The locale of dates: the reader's, if the browser names one for the page's language. */
 export function dateLocale(): string {
   return navigator.languages.find((one) => one.startsWith(language.value)) ?? language.value;
 }
 
-/** Chooses the language to begin with and loads its texts. */
+/** Chooses the initial language and loads its texts. */
 export async function startLanguage(): Promise<void> {
   const asked = new URLSearchParams(location.search).get("lang");
   await load(firstKnown([asked, recall("language"), ...navigator.languages]));
 }
 
-/** Changes the language and keeps the choice on this device. */
+/** Changes the language and stores the choice on this device. */
 export async function setLanguage(chosen: Language): Promise<void> {
   remember("language", chosen);
   await load(chosen);
 }
 
-/** The first of these that there are texts for, by its main part ("it-CH" is Italian). */
+/** The first of these languages that has texts, by its main subtag ("it-CH" is Italian). */
 export function firstKnown(candidates: readonly (string | null)[]): Language {
   for (const candidate of candidates) {
     const main = candidate?.toLowerCase().split("-")[0];

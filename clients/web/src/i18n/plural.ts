@@ -1,12 +1,12 @@
-// Numbers with the form of the word that goes with them, by the plural rules of the language. Texts use it; pages do not.
+// Numbers with the right form of a word, by the plural rules of a language. For the texts only.
 
-/** The forms that English and Italian have; Italian's rare "many" takes `other`. */
+/** The plural forms of English and Italian; Italian's rare "many" uses `other`. */
 export interface Forms {
   one: string;
   other: string;
 }
 
-/** A function from a number to its form, in which "#" stands for the number. */
+/** Returns a function from a number to its form, in which "#" stands for the number. */
 export function plurals(language: string): (count: number, forms: Forms) => string {
   const rules = new Intl.PluralRules(language);
   const digits = new Intl.NumberFormat(language);
@@ -14,7 +14,7 @@ export function plurals(language: string): (count: number, forms: Forms) => stri
     (rules.select(count) === "one" ? forms.one : forms.other).replaceAll("#", digits.format(count));
 }
 
-/** A function from milliseconds to words: in seconds, minutes or hours, whichever is whole enough. */
+/** Returns a function from milliseconds to words, in the largest unit that is a whole number. */
 export function durations(
   language: string,
   forms: Record<"second" | "minute" | "hour", Forms>,
@@ -27,7 +27,7 @@ export function durations(
   };
 }
 
-/** A function from a number to its ordinal, by the ends that the language's ordinal rules name. */
+/** Returns a function from a number to its ordinal, with the suffixes of the language. */
 export function ordinals(
   language: string,
   ends: Partial<Record<Intl.LDMLPluralRule, string>>,

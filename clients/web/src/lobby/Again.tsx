@@ -1,4 +1,4 @@
-// "Play again" after a game that this device has made, for one who played against nobody but agents of the server.
+// "Play again" after a game against built-in agents only, in a room that this device created.
 
 import { t } from "../i18n";
 import { useAttempt } from "../parts/attempt";
@@ -7,7 +7,7 @@ import { Notice } from "../parts/Notice";
 import { playAgain } from "./room-like";
 import { heldSeat, hostedRoom } from "./seat";
 
-/** The button; nothing for those to whom it does not apply. */
+/** The button; null where it does not apply. */
 export function Again({ roomId }: { roomId: string }) {
   const { busy, fault, run } = useAttempt();
   const held = heldSeat(roomId);

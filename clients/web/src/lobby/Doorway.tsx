@@ -1,5 +1,5 @@
-// A room for those who have no seat in it: who sits there, how to get in, how to watch; for whoever made it, how to invite others and
-// how to close it. The table itself is in table/, which shows this to who has no ticket.
+// A room for someone without a seat: its players, how to join or watch; for its creator, how to
+// invite others and how to close it.
 
 import { CALL_LIMIT_MS, roomApi } from "../api/client";
 import { wordsOf } from "../api/faults";
@@ -22,10 +22,10 @@ import { Seats } from "./Seats";
 import { Sure } from "./Sure";
 import { closeRoom, hostedRoom } from "./seat";
 
-/** How often the room is asked for, milliseconds. */
+/** Polling interval of the room, milliseconds. */
 const EVERY_MS = 2000;
 
-/** The room as it is seen from outside. */
+/** The page of a room without a seat. */
 export function Doorway({ roomId }: { roomId: string }) {
   const words = t().lobby.door;
   const ask = async (signal: AbortSignal) =>
@@ -71,7 +71,7 @@ export function Doorway({ roomId }: { roomId: string }) {
   );
 }
 
-/** How to get in, while the room waits. */
+/** How to join while the room waits. */
 function WayIn({ room }: { room: Room }) {
   const words = t().lobby.door;
   const hosted = hostedRoom(room.roomId);

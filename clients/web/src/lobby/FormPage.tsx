@@ -1,5 +1,5 @@
-// The page of a form that creates something on the server: its title, the form once the server has said what it offers, its first part with the
-// name, the folded part, and the button. What the form holds and checks is in filling.ts.
+// The frame of a form that creates something on the server: title, name, folded part and submit
+// button. The state of the form is in filling.ts.
 
 import type { ComponentChildren } from "preact";
 import { type Offered, useOffered } from "../api/server";
@@ -10,7 +10,7 @@ import css from "./FormPage.module.css";
 import type { Filling } from "./filling";
 import { MAX_NAME } from "./room-form";
 
-/** The page; `children` draws the form. */
+/** The page; `children` renders the form once the server's offer is known. */
 export function FormPage({ title, children }: { title: string; children: (offered: Offered) => ComponentChildren }) {
   const { offered, fault } = useOffered();
   return (
@@ -29,7 +29,7 @@ interface FormFrameProps {
   first: ComponentChildren;
   /** Further parts. */
   children: ComponentChildren;
-  /** What most people never change. */
+  /** The settings that few people change. */
   folded: ComponentChildren;
 }
 

@@ -1,5 +1,5 @@
-// The fields of every game, for a room as for a tournament: clock, rules, those who are late or wrong, those who watch. What they hold is in
-// game-form.ts.
+// The form fields that rooms and tournaments share: clock, rules, late and invalid answers,
+// spectators. Their values are in game-form.ts.
 
 import type { ComponentChildren } from "preact";
 import type { RuleSet } from "../gen/chefshat/v1/rules_pb";
@@ -10,14 +10,14 @@ import type { FieldFaults } from "./filling";
 import { type GameField, type GameForm, withPreset } from "./game-form";
 import { LARGEST, type NumberProblem } from "./problems";
 
-/** What the fields get: the form, the faults of its fields, and how to change it. */
+/** The props of each group of fields. */
 export interface GameProps {
   form: GameForm;
   faults: FieldFaults<GameField>;
   change: (changed: Partial<GameForm>) => void;
 }
 
-/** What is wrong with a number, in words. */
+/** A problem with a number, in words. */
 export function wordsOfProblem(problem: NumberProblem): string {
   const words = t().lobby.make.problems;
   if (typeof problem === "string") return words[problem];
@@ -26,7 +26,7 @@ export function wordsOfProblem(problem: NumberProblem): string {
   return to === LARGEST ? words.from(from) : words.between(from, to);
 }
 
-/** The same for all fields that have a problem. */
+/** The same for every field with a problem. */
 export function wordsOfProblems<Name extends string>(
   problems: Partial<Record<Name, NumberProblem>>,
 ): FieldFaults<Name> {
@@ -34,7 +34,7 @@ export function wordsOfProblems<Name extends string>(
   return Object.fromEntries(entries.map(([field, problem]) => [field, wordsOfProblem(problem)])) as FieldFaults<Name>;
 }
 
-/** How fast the game is played. */
+/** The clock. */
 export function ClockFields(props: GameProps) {
   const { form, change } = props;
   const words = t().lobby.make.clocks;
@@ -59,7 +59,7 @@ export function ClockFields(props: GameProps) {
   );
 }
 
-/** The rules of games of so many players: a preset, and every field of it. */
+/** The rules for a number of players: a preset, and every field of it. */
 export function RuleFields(props: GameProps & { players: number; presets: RuleSet[] }) {
   const { form, change, players, presets } = props;
   const words = t().lobby.make.rule;
@@ -128,7 +128,7 @@ export function RuleFields(props: GameProps & { players: number; presets: RuleSe
   );
 }
 
-/** What happens to those who are late or answer what is not legal. */
+/** What happens after late and invalid answers. */
 export function FaultFields(props: GameProps & { agents: string[]; children?: ComponentChildren }) {
   const { form, change, agents, children } = props;
   const words = t().lobby.make.fault;
@@ -147,7 +147,7 @@ export function FaultFields(props: GameProps & { agents: string[]; children?: Co
   );
 }
 
-/** Who may watch, and what they see when. */
+/** Who may watch, and what spectators see. */
 export function WatchFields(props: GameProps) {
   const { form, change } = props;
   const words = t().lobby.make.watch;
@@ -184,7 +184,7 @@ interface TypedProps<Name extends string> {
   hint?: string;
 }
 
-/** A field of a form that is typed. */
+/** A text field of the form. */
 export function Typed<Name extends string>(props: TypedProps<Name>) {
   const { form, faults, change, name, label, hint } = props;
   return (

@@ -1,4 +1,4 @@
-// How others come into a room or a tournament: the join code to read out, the address to send, and the same as a picture to point a phone at.
+// Invitations to a room or tournament: the join code, the address, and its QR code.
 
 import { useMemo, useState } from "preact/hooks";
 import { encode } from "uqr";
@@ -10,15 +10,15 @@ import { Notice } from "../parts/Notice";
 import css from "./Invite.module.css";
 import { hostedRoom, invitation } from "./seat";
 
-/** White around the picture, in its squares: readers need four. */
+/** Quiet zone around the QR code, in modules: scanners need four. */
 const QR_MARGIN = 4;
 
 interface InviteProps {
   title: string;
   code: string;
-  /** What is sent, and what the picture says. */
+  /** The address to send, also in the QR code. */
   address: string;
-  /** What brings an agent from a terminal, and what this is for; undefined where there is no place for one. */
+  /** The command that connects an agent, and its label; undefined if no agent can join. */
   agent: { label: string; command: string } | undefined;
 }
 
@@ -49,12 +49,12 @@ export function Invite({ title, code, address, agent }: InviteProps) {
   );
 }
 
-/** Whether an address with this host leads to nothing but the machine on which it is opened. */
+/** Whether this host name leads only to the machine that opens it. */
 export function isThisMachine(host: string): boolean {
   return host === "localhost" || host.endsWith(".localhost") || host === "[::1]" || /^127(\.\d+){3}$/.test(host);
 }
 
-/** The invitation, for whoever made the room; nothing for all others. */
+/** The invitation, for the creator of the room; null for everyone else. */
 export function HostInvite({ roomId, forAgents }: { roomId: string; forAgents: boolean }) {
   const hosted = hostedRoom(roomId);
   if (!hosted) return null;
@@ -74,7 +74,7 @@ export function HostInvite({ roomId, forAgents }: { roomId: string; forAgents: b
   );
 }
 
-/** Something to copy, with its label. */
+/** A text to copy, with its label. */
 export function CopyLine(props: { label: string; text: string; large?: boolean; mono?: boolean }) {
   const { label, text, large = false, mono = false } = props;
   const words = t().common;
@@ -99,7 +99,10 @@ export function CopyLine(props: { label: string; text: string; large?: boolean; 
   );
 }
 
-/** How a text is copied, and whether it has been; without a secure origin a browser has no clipboard, but the text can be marked by hand. */
+/**
+ * Copies a text. Without a secure origin a browser has no clipboard, but the text can be selected
+ * by hand.
+ */
 export function useCopying(text: string): { copied: boolean; copy: (() => void) | undefined } {
   const [copied, setCopied] = useState("");
   const clipboard: Clipboard | undefined = navigator.clipboard;
@@ -114,7 +117,7 @@ export function useCopying(text: string): { copied: boolean; copy: (() => void) 
   return { copied: text !== "" && copied === text, copy: clipboard && copy };
 }
 
-/** A text as a QR code: black on white by dark as well, as readers want it. */
+/** A text as a QR code: black on white in both themes, as scanners need it. */
 export function QrCode({ text, label }: { text: string; label: string }) {
   const { path, size } = useMemo(() => qrPath(text), [text]);
   return (
@@ -125,7 +128,7 @@ export function QrCode({ text, label }: { text: string; label: string }) {
   );
 }
 
-/** The dark squares of a QR code as one path, and the length of its side in squares. */
+/** The dark modules of a QR code as one path, and the length of its side in modules. */
 export function qrPath(text: string): { path: string; size: number } {
   const { data, size } = encode(text, { ecc: "M", border: QR_MARGIN });
   const path = data.flatMap((row, y) => row.flatMap((dark, x) => (dark ? [`M${x} ${y}h1v1h-1z`] : []))).join("");

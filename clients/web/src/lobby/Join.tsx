@@ -1,4 +1,5 @@
-// The page of an invitation: say a name and take a seat. Who has a seat in the room already goes to it.
+// The page of an invitation: enter a name and take a seat. A device that has a seat in the room
+// goes straight to it.
 
 import { useEffect, useState } from "preact/hooks";
 import { faultOf } from "../api/faults";
@@ -25,7 +26,7 @@ import { nameOf } from "./rooms";
 import { Seats } from "./Seats";
 import { canonical, giveBackSeat, heldSeat, lastName, roomOfCode, takeSeat } from "./seat";
 
-/** How often it is asked what has the code, and who sits there, milliseconds. */
+/** Polling interval of the code and its room, milliseconds. */
 const EVERY_MS = 4_000;
 
 /** The page. */
@@ -63,18 +64,21 @@ export function Join({ route }: PageProps<"join">) {
   );
 }
 
-/** The way into a study, unless there is nothing at its end: that is to be known before a questionnaire is filled in. */
+/**
+ * The way into a study. Checks that the room still exists before the participant fills in a
+ * questionnaire.
+ */
 function StudyWay(props: { study: Study; code: string; arrive: (roomId: string) => void }) {
   const { study, code, arrive } = props;
   const { value: found } = usePolled((signal) => lookUp(code, signal), EVERY_MS, code);
-  // Whose seat this device is to give back, if that was agreed to.
+  // Ticket of the seat that the person agreed to give up.
   const [givenUp, setGivenUp] = useState<string | null>(null);
   const [, setAsked] = useState(0);
   if (found === null) return <p class="soft">{t().common.loading}</p>;
   if (found.kind === "tournament") return <ToTournament tournamentId={found.tournamentId} code={code} />;
   const room = found.kind === "room" ? found.room : undefined;
   const seats = room?.seats ?? [];
-  // Asked anew each time: another page of this device may have sat down in the meantime.
+  // Read on each render: another tab of this device may have taken a seat meanwhile.
   const held = roomOfCode(code);
   const holder = held === null ? null : heldSeat(held);
   const gone = found.kind === "nothing";
@@ -112,19 +116,19 @@ function StudyWay(props: { study: Study; code: string; arrive: (roomId: string) 
 }
 
 interface HolderProps {
-  /** Who has this device's seat. */
+  /** Name on this device's seat. */
   name: string;
-  /** What the link says that was opened. */
+  /** The study of the opened link. */
   study: Study;
   onSame: () => void;
-  /** Undefined once the game has begun: the seat cannot be given back then. */
+  /** Undefined once the game has started: the seat cannot be given up then. */
   onOther: (() => void) | undefined;
 }
 
-/** Asks who is at this device, which has a seat in the room already and would lose it to another. */
+/** Asks who is using this device when it already has a seat in the room. */
 function Holder({ name, study, onSame, onOther }: HolderProps) {
   const words = t().experiment.join;
-  // Another page of this device has sat down by the same link in the meantime.
+  // Another tab took a seat with the same link meanwhile.
   const same = study.name === name;
   return (
     <section class={`sheet ${css.page}`}>
@@ -150,7 +154,7 @@ function StudyNotice({ kind, children }: { kind: "fault" | "hint"; children: str
   );
 }
 
-/** What is known of who has the code, and the way in, or why there is none. */
+/** The room behind the code and the form to join it, or why it cannot be joined. */
 function WayIn({ code }: { code: string }) {
   const words = t().lobby.join;
   const { value: found } = usePolled((signal) => lookUp(code, signal), EVERY_MS, code);
@@ -182,7 +186,10 @@ function WayIn({ code }: { code: string }) {
   );
 }
 
-/** Leads on to the page of the tournament that has the code: there a place that this device has already is found again. */
+/**
+ * Redirects to the page of the tournament with this code, which finds an existing place of this
+ * device.
+ */
 function ToTournament({ tournamentId, code }: { tournamentId: string; code: string }) {
   useEffect(() => {
     const search = new URLSearchParams(location.search);
@@ -194,7 +201,7 @@ function ToTournament({ tournamentId, code }: { tournamentId: string; code: stri
 
 interface NameFormProps {
   code: string;
-  /** The room that the code leads to, as far as it is known: for the names that are taken there. */
+  /** The room behind the code, if known: for the names already taken. */
   room?: Room | undefined;
 }
 
@@ -233,12 +240,14 @@ export function NameForm({ code, room }: NameFormProps) {
   );
 }
 
-/** Whether two names look the same to those at the table. */
+/** Whether two names look the same at the table. */
 function sameName(one: string, other: string): boolean {
   return one !== "" && one.trim().toLocaleLowerCase() === other.trim().toLocaleLowerCase();
 }
 
-/** Takes a seat in the room with this code, or a place in the tournament that has it; gives the way there. */
+/**
+ * Takes a seat in the room, or a place in the tournament, with this code; returns the route to it.
+ */
 async function comeIn(code: string, name: string): Promise<Route> {
   try {
     const { roomId } = await takeSeat(code, name);
@@ -248,7 +257,7 @@ async function comeIn(code: string, name: string): Promise<Route> {
     const found = await lookUp(code);
     if (found.kind !== "tournament") throw thrown;
     const { tournamentId } = found;
-    // A second place would take the first one's ticket from this device.
+    // A second place would overwrite the first one's ticket on this device.
     if (!heldPlace(tournamentId)) await takePlace(tournamentId, code, name);
     return { page: "tournament", tournamentId };
   }

@@ -1,4 +1,4 @@
-// Where a join code is typed in, or the whole address of an invitation is pasted, to a room or to a tournament.
+// The form for a join code or the pasted address of an invitation.
 
 import { useState } from "preact/hooks";
 import { t } from "../i18n";
@@ -37,13 +37,15 @@ export function JoinForm() {
   );
 }
 
-/** The code in what was typed, a code or an address that ends in one, with what the address says besides. */
+/**
+ * The code in the input, which is a code or an address that ends in one, and the address's query.
+ */
 export function codeIn(typed: string): { code: string; search: string } {
   const address = /\/join\/([^/?#\s]+)(\?[^#\s]*)?/.exec(typed);
   return { code: canonical(address?.[1] ?? typed), search: address?.[2] ?? "" };
 }
 
-/** The tournament whose invitation was pasted, with what the address says besides; null if it is none. */
+/** The tournament of a pasted invitation, and its query; null for any other input. */
 export function tournamentIn(typed: string): { id: string; search: string } | null {
   const address = /\/tournaments\/([0-9a-f]+)(\?\S*)?$/.exec(typed.trim());
   return address?.[1] ? { id: address[1], search: address[2] ?? "" } : null;

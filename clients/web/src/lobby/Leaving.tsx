@@ -1,5 +1,6 @@
-// Leaving a room in which this device has a seat, said before it is done: what becomes of the seat, and how to come back. Before the game begins
-// the seat is given back; afterwards it stays this device's. Whoever made the room can close it here as well.
+// Leaving a room in which this device has a seat. The dialog says beforehand what happens to the
+// seat and how to come back: before the game the seat becomes free, afterwards it stays this
+// device's. The creator of the room can also close it here.
 
 import { AbortPolicy, type RoomPolicy } from "../gen/chefshat/v1/room_pb";
 import { t } from "../i18n";

@@ -1,4 +1,5 @@
-// The first page: start a game at once, make a room, join with a code; then the rooms of the server and its tournaments.
+// The start page: start a game at once, create a room, join with a code; below, the rooms and
+// tournaments of the server.
 
 import type { ComponentChildren } from "preact";
 import { wordsOf } from "../api/faults";
@@ -15,11 +16,11 @@ import { RoomCard } from "./RoomCard";
 import { roomsIn } from "./rooms";
 import { TournamentStrip } from "./TournamentStrip";
 
-/** How often the lists are asked for, milliseconds. */
+/** Polling interval of the lists, milliseconds. */
 const EVERY_MS = 3000;
-/** And the rooms that are over, milliseconds: nobody waits for them. */
+/** Polling interval of finished rooms, milliseconds: nobody is waiting for them. */
 const OVER_EVERY_MS = 20_000;
-/** Rooms of one kind shown at first, and more at a time. */
+/** Rooms shown at first, and more at a time. */
 const AT_A_TIME = 12;
 
 /** The page. */
@@ -57,7 +58,7 @@ export function Lobby() {
   );
 }
 
-/** A list of rooms under its title; what is said if there are none; more on demand. */
+/** A list of rooms with its title; `children` if it is empty. */
 function RoomSection(props: { title: string; shown: Shown<Room>; children?: ComponentChildren }) {
   const { title, shown, children } = props;
   const { list } = shown;

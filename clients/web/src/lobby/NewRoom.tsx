@@ -1,5 +1,5 @@
-// The page that creates a room: who plays, by which rules, how fast, what happens to late answers, who may watch. The form's fields are in
-// room-form.ts.
+// The page that creates a room: who plays, by which rules, how fast, what happens to late answers,
+// who may watch. The form's fields are in room-form.ts.
 
 import type { Offered } from "../api/server";
 import { t } from "../i18n";

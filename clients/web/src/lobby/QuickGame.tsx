@@ -1,4 +1,5 @@
-// One press from the lobby to the table: a room with three built-in agents, the relaxed clock, and the person on the first seat.
+// A game in one click: a room with three built-in agents and the relaxed clock, with the person on
+// the first seat.
 
 import { useState } from "preact/hooks";
 import { t } from "../i18n";

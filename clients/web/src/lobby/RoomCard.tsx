@@ -1,4 +1,4 @@
-// One room of the lobby's lists: its name, where it stands, who sits there, what one can do.
+// A room in the lists of the lobby: name, state, players, actions.
 
 import { ParticipantKind, type Room, RoomState } from "../gen/chefshat/v1/room_pb";
 import { t } from "../i18n";
@@ -65,7 +65,7 @@ export function RoomStateChip({ room }: { room: Room }) {
   }
 }
 
-/** How long a game lasts and how long a decision may take, in a line. */
+/** The length of a game and the time per decision, in one line. */
 export function rulesInShort(room: Room): string {
   const words = t().lobby.rooms;
   const parts: string[] = [];

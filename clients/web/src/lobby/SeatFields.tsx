@@ -1,4 +1,5 @@
-// How many play, and who fills each seat: people, robots, agents that connect, or a built-in agent.
+// The number of players, and who fills each seat: people, robots, connected agents or built-in
+// agents.
 
 import { t } from "../i18n";
 import { SelectField } from "../parts/Field";
@@ -7,7 +8,7 @@ import css from "./FormPage.module.css";
 import type { FormProps } from "./NewRoom";
 import { type SeatChoice, withPlayers } from "./room-form";
 
-/** Numbers of seats that a game can have. */
+/** Possible numbers of players. */
 const PLAYERS = ["2", "3", "4", "5", "6"] as const;
 
 /** The part of the form. */

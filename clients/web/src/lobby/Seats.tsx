@@ -1,4 +1,5 @@
-// Who sits in a room: one line for each seat, with its number, its colour, the name, and what it is. Also for whom a free seat is kept.
+// The players of a room: one line per seat with number, colour, name and kind, or whom a free seat
+// is reserved for.
 
 import { ParticipantKind, type Room } from "../gen/chefshat/v1/room_pb";
 import { t } from "../i18n";

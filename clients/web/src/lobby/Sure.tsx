@@ -1,5 +1,5 @@
-// A button for what cannot be undone: it asks once more before it does it, and says what went wrong if it could not. The focus goes to the
-// question, so that it is read out, and back to the button.
+// A button for an irreversible action: asks for confirmation and shows why the action failed. The
+// focus moves to the question, so that it is read out, and back to the button.
 
 import type { ComponentChildren } from "preact";
 import { useEffect, useRef, useState } from "preact/hooks";
@@ -10,12 +10,12 @@ import { Notice } from "../parts/Notice";
 import css from "./Sure.module.css";
 
 interface SureProps {
-  /** What the button says at first. */
+  /** Label of the button. */
   label: string;
-  /** What it says when it has asked; the same if not given. */
+  /** Label of the confirmation; `label` by default. */
   confirm?: string;
   act: () => Promise<void>;
-  /** What will come of it, said when it asks. */
+  /** The consequence, shown with the confirmation. */
   children: ComponentChildren;
 }
 

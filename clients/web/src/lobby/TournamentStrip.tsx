@@ -1,4 +1,4 @@
-// The tournaments that one can join or follow, in the lobby: a line each. Their own pages are in tournaments/.
+// The open and running tournaments, in the lobby. Their own pages are in tournaments/.
 
 import { firstOf } from "../api/pages";
 import { usePolled } from "../api/poll";
@@ -11,9 +11,9 @@ import { formatWord, madeWords } from "../tournaments/words";
 import lobbyCss from "./Lobby.module.css";
 import css from "./TournamentStrip.module.css";
 
-/** How often the list is asked for, milliseconds. */
+/** Polling interval, milliseconds. */
 const EVERY_MS = 6000;
-/** Tournaments shown: those that one can join before those that are being played. */
+/** Tournaments shown, open ones first. */
 const SHOWN = 6;
 
 /** The section. */

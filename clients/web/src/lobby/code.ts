@@ -1,18 +1,18 @@
-// What a join code leads to, asked for before somebody types a name. Sitting down is in seat.ts.
+// Resolves a join code before the person enters a name. Taking a seat is in seat.ts.
 
 import { CALL_LIMIT_MS, roomApi, tournamentApi } from "../api/client";
 import { faultOf } from "../api/faults";
 import type { Room } from "../gen/chefshat/v1/room_pb";
 import { canonical } from "./seat";
 
-/** What has a code. */
+/** What a code belongs to. */
 export type Found =
   | { readonly kind: "room"; readonly room: Room }
   | { readonly kind: "tournament"; readonly tournamentId: string }
   | { readonly kind: "nothing" }
   | { readonly kind: "unknown" };
 
-/** Looks for what has a code. */
+/** Resolves a code. */
 export async function lookUp(code: string, signal?: AbortSignal): Promise<Found> {
   const call = { ...(signal && { signal }), timeoutMs: CALL_LIMIT_MS };
   const asked = { joinCode: canonical(code) };

@@ -1,39 +1,39 @@
-// Filling in a form that makes something on the server: what was typed, which fields cannot be accepted and why, and sending it. Which
-// fields there are is for the form itself.
+// The state of a form that creates something on the server: its values, its invalid fields and its
+// submission. The form itself defines the fields.
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import { type Fault, faultOf, wordsOf } from "../api/faults";
 import { t } from "../i18n";
 
-/** What is wrong with fields, in words, by name. */
+/** Error messages by field. */
 export type FieldFaults<Name extends string> = Partial<Record<Name, string>>;
 
-/** What is done with a form. */
+/** What a form does. */
 export interface FormUse<Form, Name extends string> {
-  /** What can be seen to be wrong before it is sent. */
+  /** Errors that can be found before submitting. */
   check(form: Form): FieldFaults<Name>;
-  /** Fields of the form by the names that the protocol has for them. */
+  /** The form's fields by their names in the protocol. */
   fields: Readonly<Record<string, Name>>;
-  /** Sends it and goes to what was made. */
+  /** Submits the form and navigates to what was created. */
   send(form: Form): Promise<void>;
 }
 
-/** A form that is being filled in. */
+/** The state of a form. */
 export interface Filling<Form, Name extends string> {
   form: Form;
   faults: FieldFaults<Name>;
   change: (changed: Partial<Form>) => void;
-  /** Why it was not accepted; null if nothing says that it is not. */
+  /** Why it was refused; null if it was not. */
   refusal: string | null;
-  /** It is on its way. */
+  /** The form is being submitted. */
   busy: boolean;
-  /** Whether what is folded away is to be seen: it is when something there may be at fault. */
+  /** Whether the folded part is open: it opens when a field in it may be invalid. */
   unfolded: boolean;
   unfold: (open: boolean) => void;
   submit: (event: Event) => void;
 }
 
-/** Begins with the form that `begin` gives. */
+/** A form that starts with the values of `begin`. */
 export function useFilling<Form extends object, Name extends string>(
   begin: () => Form,
   use: FormUse<Form, Name>,
@@ -46,7 +46,7 @@ export function useFilling<Form extends object, Name extends string>(
   const sent = useRef<HTMLElement | null>(null);
   const [refusals, setRefusals] = useState(0);
   useEffect(() => {
-    // The first field at fault, once all of them are marked and unfolded.
+    // The first invalid field, once all are marked and unfolded.
     if (refusals > 0) sent.current?.querySelector<HTMLElement>('[aria-invalid="true"]')?.focus();
   }, [refusals]);
   const change = (changed: Partial<Form>) => {
@@ -86,14 +86,14 @@ export function useFilling<Form extends object, Name extends string>(
   return { form, faults, change, refusal, busy, unfolded, unfold, submit };
 }
 
-/** The field of a form that the server refused, and its words for it; null if it is none of the form's own. */
+/** The field that the server refused and its message; null if it is not a field of this form. */
 export function refusedField<Name extends string>(
   { metadata, message }: Fault,
   fields: Readonly<Record<string, Name>>,
 ): { field: Name; words: string } | null {
   const outer = metadata.field ?? "";
   const words = message.startsWith(`${outer}: `) ? message.slice(outer.length + 2) : message;
-  // Within the rules and the policy of a tournament the message alone names the field.
+  // Within the rules and the policy of a tournament, only the message names the field.
   const within = /^(\w+): ([\s\S]+)$/.exec(words);
   const inner = within?.[1] === undefined ? undefined : fields[within[1]];
   if (inner !== undefined) return { field: inner, words: within?.[2] ?? words };

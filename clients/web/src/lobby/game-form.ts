@@ -1,33 +1,33 @@
-// The part of a form that says how games are played: rules, clock, what happens to those who are late or wrong, who watches. The forms for a
-// new room (room-form.ts) and for a new tournament (tournaments/tournament-form.ts) have it in common. Values without a page: how they are
-// asked for is in GameFields.tsx. Whether rules and times can be accepted is the server's to say; here it is looked for what is plainly wrong.
+// The values of the fields that rooms and tournaments share: rules, clock, late and invalid
+// answers, spectators. Used by room-form.ts and tournaments/tournament-form.ts; drawn by
+// GameFields.tsx. The server validates rules and times; this module only finds obvious mistakes.
 
 import type { MessageInitShape } from "@bufbuild/protobuf";
 import type { RoomPolicySchema } from "../gen/chefshat/v1/room_pb";
 import { Opening, PassScope, type RuleSet, type RuleSetSchema } from "../gen/chefshat/v1/rules_pb";
 import { type Bounds, LARGEST, type NumberProblem, pointsProblem, secondsProblem, wholeProblem } from "./problems";
 
-/** How fast a game is played. */
+/** The choice of a clock. */
 export type ClockChoice = "noHurry" | "relaxed" | "brisk" | "own";
 
-/** Milliseconds of each clock: for a decision, and for all decisions of a seat beyond that. */
+/** Milliseconds of each clock: per decision, and for all decisions of a seat beyond that. */
 export const CLOCKS: Record<Exclude<ClockChoice, "own">, { decisionTimeMs: number; bankMs: number }> = {
   noHurry: { decisionTimeMs: 3_600_000, bankMs: 0 },
   relaxed: { decisionTimeMs: 60_000, bankMs: 300_000 },
   brisk: { decisionTimeMs: 20_000, bankMs: 60_000 },
 };
 
-/** How long built-in agents wait before they decide, so that a person can follow, milliseconds. */
+/** Delay of built-in agents before each decision, milliseconds, so that people can follow. */
 export const PACE_MS = 1200;
 
-/** The fields; numbers as they were typed. */
+/** The fields; numbers as typed. */
 export interface GameForm {
   preset: string;
   faces: string;
   jokers: string;
   stop: "points" | "shifts";
   target: string;
-  /** Points by place, separated by commas; empty: the standard ones. */
+  /** Points by place, separated by commas; empty for the default. */
   points: string;
   exchange: boolean;
   specialActions: boolean;
@@ -51,7 +51,7 @@ export interface GameForm {
 /** Names of the fields. */
 export type GameField = keyof GameForm;
 
-/** The standard rules, with the relaxed clock. */
+/** The default rules, with the relaxed clock. */
 export function newGame(): GameForm {
   return {
     preset: "paper",
@@ -80,7 +80,7 @@ export function newGame(): GameForm {
   };
 }
 
-/** A form with the rules of a preset, which has every field set, for games of so many players. */
+/** The form with the rules of a preset, which sets every field. */
 export function withPreset<Form extends GameForm>(form: Form, preset: RuleSet, players: number): Form {
   return {
     ...form,
@@ -100,7 +100,7 @@ export function withPreset<Form extends GameForm>(form: Form, preset: RuleSet, p
   };
 }
 
-/** What each whole number may be. */
+/** Bounds of the integer fields. */
 const WHOLE: Partial<Record<GameField, Bounds>> = {
   faces: [4, 15],
   jokers: [0, 2],
@@ -115,7 +115,7 @@ const PACE_SECONDS: Bounds = [0, 60];
 const DECISION_SECONDS: Bounds = [0.01, 86_400];
 const BANK_SECONDS: Bounds = [0, 86_400];
 
-/** What can be seen to be wrong with the fields, for games of so many players. */
+/** The problems of the fields. */
 export function gameProblems(form: GameForm, players: number): Partial<Record<GameField, NumberProblem>> {
   const found: Partial<Record<GameField, NumberProblem | undefined>> = {
     points: pointsProblem(form.points, players),
@@ -124,7 +124,7 @@ export function gameProblems(form: GameForm, players: number): Partial<Record<Ga
   for (const [field, bounds] of Object.entries(WHOLE)) {
     found[field as GameField] = wholeProblem(String(form[field as GameField]), bounds);
   }
-  // What is not asked for is not sent as it was typed.
+  // A disabled field is not submitted.
   if (!form.spectators) delete found.spectatorDelay;
   if (form.clock === "own") {
     found.decisionSeconds = secondsProblem(form.decisionSeconds, DECISION_SECONDS);
@@ -133,7 +133,7 @@ export function gameProblems(form: GameForm, players: number): Partial<Record<Ga
   return problemsAlone(found);
 }
 
-/** The fields with which something is wrong. */
+/** The entries that have a problem. */
 export function problemsAlone<Field extends string, Problem>(
   found: Partial<Record<Field, Problem | undefined>>,
 ): Partial<Record<Field, Problem>> {
@@ -141,7 +141,7 @@ export function problemsAlone<Field extends string, Problem>(
   return Object.fromEntries(wrong) as Partial<Record<Field, Problem>>;
 }
 
-/** The rules that a form asks for; its numbers must be readable. */
+/** The rules of a form without problems. */
 export function rulesOf(form: GameForm, players: number): MessageInitShape<typeof RuleSetSchema> {
   const target = Number(form.target);
   return {
@@ -161,7 +161,7 @@ export function rulesOf(form: GameForm, players: number): MessageInitShape<typeo
   };
 }
 
-/** The policy that a form asks for; its numbers must be readable. */
+/** The policy of a form without problems. */
 export function policyOf(form: GameForm) {
   const clock =
     form.clock === "own"
@@ -179,7 +179,7 @@ export function policyOf(form: GameForm) {
   } satisfies MessageInitShape<typeof RoomPolicySchema>;
 }
 
-/** The fields by the names that the protocol has for what is typed in them. */
+/** The fields by their names in the protocol. */
 export const GAME_FIELDS: Record<string, GameField> = {
   preset: "preset",
   faces: "faces",
@@ -199,7 +199,7 @@ export const GAME_FIELDS: Record<string, GameField> = {
   spectators_see_hands: "spectatorsSeeHands",
 };
 
-/** Typed seconds as milliseconds. */
+/** Converts typed seconds to milliseconds. */
 export function milliseconds(seconds: string): number {
   return Math.round(Number(seconds.trim().replace(",", ".")) * 1000);
 }

@@ -1,4 +1,5 @@
-// A game at once: a room with three built-in agents and the relaxed clock, the person on its first seat.
+// A quick game: a room with three built-in agents and the relaxed clock, with the person on the
+// first seat.
 
 import { serverInfo } from "../api/server";
 import { t } from "../i18n";
@@ -6,7 +7,7 @@ import { navigate } from "../router";
 import { quickGame } from "./room-form";
 import { makeRoom, takeSeat } from "./seat";
 
-/** Makes the game and goes there. Without a name the person is a guest. */
+/** Creates the game and navigates to it. Without a name the person is a guest. */
 export async function playNow(name: string): Promise<void> {
   const words = t().lobby.quick;
   const { builtInAgents } = await serverInfo();

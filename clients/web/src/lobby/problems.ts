@@ -1,10 +1,11 @@
-// What can be wrong with a number that was typed, found before a form is sent, so that all of it is marked at once: the server names one field
-// at a time. The words are in GameFields.tsx. The bounds are those of the protocol (rules.proto, room.proto, tournament.proto).
+// Problems with typed numbers, found before submitting so that all are marked at once: the server
+// reports one field at a time. The messages are in GameFields.tsx, the bounds are those of the
+// protocol.
 
 /** Smallest and largest number that a field can hold. */
 export type Bounds = readonly [from: number, to: number];
 
-/** Why a number cannot be sent. */
+/** Why a number is invalid. */
 export type NumberProblem =
   | "notANumber"
   | "notWhole"
@@ -13,10 +14,10 @@ export type NumberProblem =
   | { readonly bounds: Bounds }
   | { readonly places: number };
 
-/** Largest number that the protocol can carry. */
+/** The largest uint32. */
 export const LARGEST = 4_294_967_295;
 
-/** What is wrong with a whole number; undefined if nothing is. */
+/** The problem with an integer; undefined if it is valid. */
 export function wholeProblem(typed: string, bounds: Bounds): NumberProblem | undefined {
   const number = typed.trim();
   if (!/^[+-]?\d+([.,]\d+)?$/.test(number)) return "notANumber";
@@ -24,13 +25,13 @@ export function wholeProblem(typed: string, bounds: Bounds): NumberProblem | und
   return within(Number(number), bounds);
 }
 
-/** What is wrong with a time in seconds; undefined if nothing is. */
+/** The problem with a time in seconds; undefined if it is valid. */
 export function secondsProblem(typed: string, bounds: Bounds): NumberProblem | undefined {
   const number = typed.trim().replace(",", ".");
   return /^[+-]?\d+(\.\d+)?$/.test(number) ? within(Number(number), bounds) : "notANumber";
 }
 
-/** What is wrong with the points of so many places; undefined if nothing is, as with none. */
+/** The problem with the points by place; undefined if they are valid or empty. */
 export function pointsProblem(typed: string, places: number): NumberProblem | undefined {
   if (typed.trim() === "") return undefined;
   const points = typed.trim().split(/[\s,;]+/);

@@ -1,5 +1,5 @@
-// What the form for a new room holds, and the request that it makes: who has which seat, and the fields of every game (game-form.ts). Values
-// without a page: how they are asked for is in NewRoom.tsx.
+// The form for a new room and its request: the seats, and the fields of every game (game-form.ts).
+// Drawn by NewRoom.tsx.
 
 import type { MessageInitShape } from "@bufbuild/protobuf";
 import { AbortPolicy, ParticipantKind } from "../gen/chefshat/v1/room_pb";
@@ -9,20 +9,20 @@ import { GAME_FIELDS, type GameForm, newGame, policyOf, rulesOf } from "./game-f
 /** Longest name of a room or participant, characters. */
 export const MAX_NAME = 64;
 
-/** For whom a seat is free, or by which built-in agent it is filled. */
+/** Whom a seat is reserved for, or the built-in agent that fills it. */
 export type SeatChoice = "human" | "robot" | "agent" | "anybody" | `built-in ${string}`;
 
-/** The form; numbers as they were typed. */
+/** The form; numbers as typed. */
 export interface RoomForm extends GameForm {
   name: string;
   seats: SeatChoice[];
   abort: "allLost" | "anyLost" | "never";
 }
 
-/** Names of the fields that hold one value. */
+/** Names of the fields with a single value. */
 export type FieldName = Exclude<keyof RoomForm, "seats">;
 
-/** A form to begin with: a person against three built-in agents, by the standard rules. */
+/** The initial form: a person and three built-in agents, with the default rules. */
 export function newForm(opponents: readonly string[]): RoomForm {
   return {
     ...newGame(),
@@ -32,14 +32,17 @@ export function newForm(opponents: readonly string[]): RoomForm {
   };
 }
 
-/** The form with so many seats: the last ones go, new ones are free for people. Points of another number of seats fit no more. */
+/**
+ * Changes the number of seats: removes the last ones, or adds ones free for people. Points for
+ * another number of seats are cleared.
+ */
 export function withPlayers(form: RoomForm, players: number): RoomForm {
   const seats = form.seats.slice(0, players);
   while (seats.length < players) seats.push("human");
   return { ...form, seats, points: seats.length === form.seats.length ? form.points : "" };
 }
 
-/** The request that a form makes; its numbers must be readable. */
+/** The request of a form without problems. */
 export function requestOf(form: RoomForm): MessageInitShape<typeof CreateRoomRequestSchema> {
   return {
     name: form.name.trim(),
@@ -49,7 +52,7 @@ export function requestOf(form: RoomForm): MessageInitShape<typeof CreateRoomReq
   };
 }
 
-/** The request for a game of one person against three built-in agents, with the relaxed clock. */
+/** The request for a game of one person and three built-in agents, with the relaxed clock. */
 export function quickGame(
   name: string,
   builtInAgents: readonly string[],
@@ -57,7 +60,7 @@ export function quickGame(
   return { ...requestOf(newForm(builtInAgents)), name: Array.from(name).slice(0, MAX_NAME).join("") };
 }
 
-/** The fields by the names that the protocol has for what is typed in them. */
+/** The fields by their names in the protocol. */
 export const ROOM_FIELDS: Record<string, FieldName> = { ...GAME_FIELDS, name: "name" };
 
 const ABORTS = { allLost: AbortPolicy.ALL_LOST, anyLost: AbortPolicy.ANY_LOST, never: AbortPolicy.NEVER };

@@ -1,5 +1,5 @@
-// A room like one that stands: the same rules, times and agents, all other seats free again. For a study, in which each participant plays in a room
-// of their own, and for who wants to play once more.
+// Creates a room with the rules, times and agents of another and its other seats free: for studies
+// in which each participant has a room of their own, and for playing again.
 
 import { create, type MessageInitShape } from "@bufbuild/protobuf";
 import { CALL_LIMIT_MS, roomApi } from "../api/client";
@@ -9,7 +9,7 @@ import { navigate } from "../router";
 import { MAX_NAME } from "./room-form";
 import { makeRoom, takeSeat } from "./seat";
 
-/** Why there can be no other room quite like this one; null if there can. */
+/** Why a room cannot be repeated exactly; null if it can. */
 export function notToBeRepeated(room: Room): "seed" | "hands" | null {
   if (room.origin === GameOrigin.SCRIPTED) return "hands";
   return room.seedFixed ? "seed" : null;
@@ -25,7 +25,7 @@ export function requestLike(
     name: Array.from(name).slice(0, MAX_NAME).join(""),
     seats: room.seats.map(seatLike),
     policy: { ...(room.policy ?? create(RoomPolicySchema)), ...(waitingTimeMs === undefined ? {} : { waitingTimeMs }) },
-    // The rules of a game that branches from another are that one's.
+    // A branched game keeps the rules of the game it branches from.
     ...(room.branchedFrom
       ? { start: { case: "branch" as const, value: room.branchedFrom } }
       : room.rules && { rules: room.rules }),
@@ -39,7 +39,7 @@ function seatLike(seat: Participant) {
   return { filledBy: { case: "reservedFor" as const, value: reservedFor } };
 }
 
-/** Makes a room like one that this device has made, takes the same seat in it and goes there. */
+/** Creates a room like one of this device's, takes the same seat and navigates to it. */
 export async function playAgain(roomId: string, name: string, seat: number): Promise<void> {
   const { room } = await roomApi.getRoom({ roomId }, { timeoutMs: CALL_LIMIT_MS });
   if (!room) throw new Error("the server did not say which room it is");

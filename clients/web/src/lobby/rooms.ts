@@ -1,10 +1,10 @@
-// The rooms of the server as the lobby shows them: which there are, who sits there.
+// The rooms of the server, for the lobby.
 
 import { CALL_LIMIT_MS, roomApi } from "../api/client";
 import type { AskPage } from "../api/pages";
 import { type Participant, ParticipantKind, type Room, type RoomPolicy, RoomState } from "../gen/chefshat/v1/room_pb";
 
-/** Asks for the rooms in a state, newest first. Those that were given up are of no interest to anybody. */
+/** Requests the rooms in a state, newest first. Aborted rooms are left out. */
 export function roomsIn(state: RoomState): AskPage<Room> {
   return async (page, signal) => {
     const { rooms, nextPageToken } = await roomApi.listRooms({ state, ...page }, { signal, timeoutMs: CALL_LIMIT_MS });
@@ -12,23 +12,28 @@ export function roomsIn(state: RoomState): AskPage<Room> {
   };
 }
 
-/** Whether nobody has taken a seat. */
+/** Whether the seat is free. */
 export function isFree(participant: Participant): boolean {
   return participant.name === "" && participant.builtInAgent === "";
 }
 
-/** Whether somebody may still sit down: the seats of a tournament's room are its participants'. */
+/**
+ * Whether a person or agent can still join. The seats of a tournament's room belong to its
+ * participants.
+ */
 export function isOpen(room: Room): boolean {
   return room.state === RoomState.WAITING && room.tournamentId === "" && room.seats.some(isFree);
 }
 
-/** Whether an agent may still sit down: a free seat is kept for none but agents, or for nobody. */
+/** Whether an agent can still join: a seat is reserved for agents, or for nobody. */
 export function isForAgents(seats: readonly Participant[]): boolean {
   const kinds = [ParticipantKind.UNSPECIFIED, ParticipantKind.AGENT];
   return seats.some((seat) => isFree(seat) && kinds.includes(seat.reservedFor));
 }
 
-/** The clock of a person under a policy, milliseconds: for a decision, and beyond that over the game. */
+/**
+ * The clock of a person under a policy, milliseconds: per decision, and for the game beyond that.
+ */
 export function clockOfPeople(policy: RoomPolicy): { decisionTimeMs: number; bankMs: number } {
   const own = policy.clocks.find(({ kind }) => kind === ParticipantKind.HUMAN);
   return {
@@ -37,7 +42,7 @@ export function clockOfPeople(policy: RoomPolicy): { decisionTimeMs: number; ban
   };
 }
 
-/** The name to show for a participant: its own, else that of the built-in agent. */
+/** A participant's display name: its own, else that of the built-in agent. */
 export function nameOf(participant: Participant): string {
   return participant.name || participant.builtInAgent;
 }

@@ -1,5 +1,5 @@
-// Taking seats and making rooms, and what this device must remember for it: the ticket of each seat it has taken, the secrets of each
-// room it has made. Without them a reload would lose the seat. How a seat is played is in table/.
+// Taking seats and creating rooms, and the secrets that this device stores for it: the ticket of
+// each seat, the owner token of each room. Without them a reload would lose the seat.
 
 import type { MessageInitShape } from "@bufbuild/protobuf";
 import { CALL_LIMIT_MS, roomApi } from "../api/client";
@@ -8,20 +8,20 @@ import { ParticipantKind, type Room } from "../gen/chefshat/v1/room_pb";
 import type { CreateRoomRequestSchema } from "../gen/chefshat/v1/room_service_pb";
 import { recall, recallObject, remember, remembered } from "../store";
 
-/** A seat that this device has taken. */
+/** A seat of this device. */
 export interface HeldSeat {
   ticket: string;
   seat: number;
   name: string;
 }
 
-/** The secrets of a room that this device has made. */
+/** The secrets of a room that this device created. */
 export interface HostedRoom {
   joinCode: string;
   ownerToken: string;
 }
 
-/** The seat that this device has in a room, if any. */
+/** This device's seat in a room, if any. */
 export function heldSeat(roomId: string): HeldSeat | null {
   return recallObject(`seat.${roomId}`, (value) =>
     typeof value.ticket === "string" && typeof value.seat === "number" && typeof value.name === "string"
@@ -30,26 +30,26 @@ export function heldSeat(roomId: string): HeldSeat | null {
   );
 }
 
-/** Forgets a seat and all that was kept with it: its room is gone, or it was given up. */
+/** Deletes a seat and everything stored with it: the room is gone, or the seat was given up. */
 export function giveUpSeat(roomId: string): void {
   for (const kept of ["seat", "study", "timed"]) remember(`${kept}.${roomId}`, null);
   for (const name of codesOf(roomId)) remember(name, null);
 }
 
-/** Gives a seat back to others before the game begins, and forgets it. */
+/** Frees a seat before the game starts, and deletes it here. */
 export async function giveBackSeat(roomId: string): Promise<void> {
   const held = heldSeat(roomId);
   if (held) await roomApi.leaveRoom({ ticket: held.ticket }, { timeoutMs: CALL_LIMIT_MS });
   giveUpSeat(roomId);
 }
 
-/** Forgets a seat whose game is over, but for what a study still asks of its participant. */
+/** Deletes a seat whose game is over, but keeps a study's last questionnaire. */
 export function leaveSeat(roomId: string): void {
   for (const name of codesOf(roomId)) rememberFinished(roomId, name.slice(CODE.length));
   giveUpSeat(roomId);
 }
 
-/** The secrets of a room if this device made it. */
+/** The secrets of a room, if this device created it. */
 export function hostedRoom(roomId: string): HostedRoom | null {
   return recallObject(`hosted.${roomId}`, (value) =>
     typeof value.joinCode === "string" && typeof value.ownerToken === "string"
@@ -58,13 +58,13 @@ export function hostedRoom(roomId: string): HostedRoom | null {
   );
 }
 
-/** The room that this device has a seat in by this code, if any: who opens an invitation again goes back to the seat. */
+/** The room in which this device has a seat taken with this code, if any. */
 export function roomOfCode(code: string): string | null {
   const roomId = recall(CODE + canonical(code));
   return roomId !== null && heldSeat(roomId) ? roomId : null;
 }
 
-/** Takes a seat for a person; without a number the first free one. Gives the room. */
+/** Takes a seat for a person; the first free one without a number. Returns the room. */
 export async function takeSeat(code: string, name: string, seat?: number): Promise<Room> {
   const joined = await roomApi.joinRoom(
     {
@@ -83,7 +83,7 @@ export async function takeSeat(code: string, name: string, seat?: number): Promi
   return room;
 }
 
-/** Makes a room and remembers its secrets. */
+/** Creates a room and stores its secrets. */
 export async function makeRoom(
   request: MessageInitShape<typeof CreateRoomRequestSchema>,
 ): Promise<{ room: Room; joinCode: string }> {
@@ -94,30 +94,30 @@ export async function makeRoom(
   return { room, joinCode: made.joinCode };
 }
 
-/** Closes a room that this device has made; a running game is aborted. */
+/** Closes a room that this device created; a running game is aborted. */
 export async function closeRoom(roomId: string): Promise<void> {
   const hosted = hostedRoom(roomId);
   if (hosted) await roomApi.closeRoom({ roomId, ownerToken: hosted.ownerToken }, { timeoutMs: CALL_LIMIT_MS });
 }
 
-/** The name that was used last on this device. */
+/** The last name used on this device. */
 export function lastName(): string {
   return recall("name") ?? "";
 }
 
 const CODE = "code.";
 
-/** Under which names the codes are kept that led to a room. */
+/** Storage keys of the codes that led to a room. */
 function codesOf(roomId: string): string[] {
   return [...remembered()].flatMap(([name, value]) => (name.startsWith(CODE) && value === roomId ? name : []));
 }
 
-/** A join code as the server writes it: capitals, nothing between them. */
+/** A join code as the server writes it: capitals without separators. */
 export function canonical(code: string): string {
   return code.replaceAll(/[\s-]/g, "").toUpperCase();
 }
 
-/** The address that invites to a room. */
+/** The invitation address of a room. */
 export function invitation(code: string): string {
   return `${location.origin}/join/${canonical(code)}`;
 }

@@ -1,21 +1,24 @@
-// What is said to those who listen to the page. One region for all pages: a region that comes and goes with a page is not read
-// reliably. Things said in quick succession are read together, in order.
+// The live region for screen readers. All pages share one, because a region that comes and goes
+// with a page is not read reliably. Announcements in quick succession are read together, in order.
 
 import { signal } from "@preact/signals";
 
-/** How long things said are gathered before they are read, so that one does not cut off the other. */
+/**
+ * How long announcements are collected before they are read, milliseconds, so that none cuts off
+ * another.
+ */
 const GATHER_MS = 150;
 
 const spoken = signal("");
 let gathered: string[] = [];
 let timer: ReturnType<typeof setTimeout> | undefined;
 
-/** Says something, after what is being said. */
+/** Announces a text, after those being read. */
 export function announce(text: string): void {
   gathered.push(text);
   if (timer !== undefined) return;
   timer = setTimeout(() => {
-    // The same words twice would be no change, and not be read: a no-break space makes one.
+    // Repeating the same text would be no change and not be read: a no-break space makes it one.
     const words = gathered.join(" ");
     spoken.value = words === spoken.value ? `${words}\u00a0` : words;
     gathered = [];
@@ -23,7 +26,7 @@ export function announce(text: string): void {
   }, GATHER_MS);
 }
 
-/** The region itself; drawn once, by the layout. */
+/** The region; rendered once, by the layout. */
 export function Announcer() {
   return (
     <div class="visually-hidden" role="status" aria-live="polite" data-testid="announcer">

@@ -1,15 +1,15 @@
-// A button, and a link that looks like one. Colour is never all that tells them apart: the main one of a page is filled, others have an
-// edge, dangerous ones say so in words.
+// A button, and a link that looks like one. Colour is never the only difference: the main button is
+// filled, others have a border, dangerous ones say so in words.
 
 import type { ButtonHTMLAttributes, ComponentChildren } from "preact";
 import css from "./Button.module.css";
 
-/** How much a button stands out. */
+/** How prominent a button is. */
 export type ButtonLook = "main" | "plain" | "quiet";
 
 interface ButtonProps extends Omit<ButtonHTMLAttributes<HTMLButtonElement>, "loading"> {
   look?: ButtonLook;
-  /** Something is under way: the button cannot be pressed again until it is done. */
+  /** An action is running: the button cannot be pressed. */
   busy?: boolean;
   children: ComponentChildren;
 }

@@ -1,18 +1,18 @@
-// A card as it is drawn everywhere in the page, in the shapes and colours of the server's pictures: the number in the corner that stays to be
-// seen when cards overlap, the ingredient below. Picking cards is a matter of the hand, not of the card.
+// A card in the shapes and colours of the server's pictures: the number in the corner stays visible
+// when cards overlap, the ingredient is below. Picking cards is in table/view/Hand.tsx.
 
 import type { Card as CardValue } from "../table/model/cards";
 import css from "./Card.module.css";
 import { Drawing, faceDrawing } from "./Drawing";
 
 interface CardProps {
-  /** The card; undefined: its back. */
+  /** The card; undefined for a card back. */
   card: CardValue | undefined;
-  /** Classes besides the standard one. */
+  /** Additional classes. */
   class?: string | undefined;
 }
 
-/** The front of a card, or its back. Decoration: who draws it says in words what it is. */
+/** The front or the back of a card. Decorative: the surrounding part names it in words. */
 export function Card({ card, class: more = "" }: CardProps) {
   if (!card) {
     return (

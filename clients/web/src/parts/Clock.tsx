@@ -1,5 +1,5 @@
-// The time that is left for a decision, as a bar that shrinks and in seconds: first the decision's own time, then the seat's bank. The server's
-// clock decides; this one shows what it said, counted on here.
+// The time left for a decision as a shrinking bar and in seconds: the decision's own time, then the
+// seat's time bank. The server's clock decides; this one extrapolates from what the server sent.
 
 import { useEffect, useState } from "preact/hooks";
 import { t } from "../i18n";
@@ -7,18 +7,18 @@ import { announce } from "./Announcer";
 import css from "./Clock.module.css";
 
 interface ClockProps {
-  /** Milliseconds left of the decision's own time at `sinceMs`. */
+  /** Milliseconds left for the decision at `sinceMs`. */
   timeLeftMs: number;
-  /** Milliseconds left in the bank at `sinceMs`. */
+  /** Milliseconds left in the time bank at `sinceMs`. */
   bankLeftMs: number;
-  /** When that was, by performance.now(). */
+  /** The reference time, by performance.now(). */
   sinceMs: number;
-  /** Milliseconds of a whole decision, for the length of the bar. */
+  /** Milliseconds of a full decision, for the length of the bar. */
   wholeMs: number;
 }
 
 const REFRESH_MS = 200;
-/** Seconds left of everything at which the clock warns. */
+/** Total seconds left at which the clock warns. */
 const HURRY_SECONDS = 10;
 
 export function Clock({ timeLeftMs, bankLeftMs, sinceMs, wholeMs }: ClockProps) {
@@ -56,7 +56,7 @@ export function Clock({ timeLeftMs, bankLeftMs, sinceMs, wholeMs }: ClockProps) 
   );
 }
 
-/** So many seconds, or minutes and seconds where they are many. */
+/** Seconds, or minutes and seconds above 99 s. */
 function clockTime(leftMs: number): string {
   const seconds = Math.ceil(leftMs / 1000);
   if (seconds < 100) return `${seconds} s`;

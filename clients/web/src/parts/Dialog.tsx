@@ -1,4 +1,4 @@
-// A dialog over the page. The browser's own <dialog> keeps the focus inside, closes with Escape and gives the focus back.
+// A modal dialog. The browser's <dialog> traps the focus, closes on Escape and restores the focus.
 
 import type { ComponentChildren } from "preact";
 import { useEffect, useId, useRef } from "preact/hooks";
@@ -7,12 +7,12 @@ import css from "./Dialog.module.css";
 
 interface DialogProps {
   title: string;
-  /** Called when the reader closes it; the owner then stops drawing it. */
+  /** Called when the reader closes the dialog; the parent then stops rendering it. */
   onClose: () => void;
   children: ComponentChildren;
 }
 
-/** A dialog, open for as long as it is drawn. */
+/** A dialog that is open while it is rendered. */
 export function Dialog({ title, onClose, children }: DialogProps) {
   const dialog = useRef<HTMLDialogElement>(null);
   const heading = useId();

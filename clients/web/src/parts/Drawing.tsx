@@ -1,5 +1,6 @@
-// The drawings of the server's pictures (ingredients, hats, kinds, roles), taken from there so that a table looks the same on paper and in
-// a browser, and drawn inline so that a part may colour their lines. They are decoration: what they mean is said in words beside them.
+// The drawings of the server's pictures (ingredients, hats, kinds, roles), so that a table looks
+// the same on paper and in a browser. They are inline, so that a part may colour their lines, and
+// decorative: text beside them says what they mean.
 
 import css from "./Drawing.module.css";
 
@@ -9,7 +10,7 @@ const files = import.meta.glob<string>("../../../../server/assets/symbols/*.svg"
   eager: true,
 });
 
-/** By name, what stands between the outermost tags; all have a view box of 48 by 48. */
+/** The content of each drawing's <svg> by name; all have a view box of 48 by 48. */
 const drawings: ReadonlyMap<string, string> = new Map(
   Object.entries(files).map(([path, svg]) => [
     path.slice(path.lastIndexOf("/") + 1, -".svg".length),
@@ -17,7 +18,10 @@ const drawings: ReadonlyMap<string, string> = new Map(
   ]),
 );
 
-/** A drawing by the name of its file, such as "face-3-anchovy" or "role-chef"; as high as a line of text unless styled. */
+/**
+ * A drawing by file name, such as "face-3-anchovy" or "role-chef"; one line of text high unless
+ * styled.
+ */
 export function Drawing(props: { name: string; class?: string | undefined }) {
   return (
     <svg
@@ -30,18 +34,18 @@ export function Drawing(props: { name: string; class?: string | undefined }) {
       stroke-width="2"
       stroke-linecap="round"
       stroke-linejoin="round"
-      // Files of this repository, put in when the page is built.
+      // Files of this repository, inserted at build time.
       dangerouslySetInnerHTML={{ __html: insideOf(props.name) }}
     />
   );
 }
 
-/** What stands inside the drawing's <svg>, for a picture made of several; empty if there is none of the name. */
+/** The content of a drawing's <svg>, for composite pictures; empty if the name is unknown. */
 export function insideOf(name: string): string {
   return drawings.get(name) ?? "";
 }
 
-/** The name of a face's drawing: its ingredient, or the plate for faces that have none (12 and above). */
+/** The drawing of a face: its ingredient, or the plate for faces without one (12 and above). */
 export function faceDrawing(face: number): string {
   const start = `face-${face}-`;
   return [...drawings.keys()].find((name) => name.startsWith(start)) ?? "plate";

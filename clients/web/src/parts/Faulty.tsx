@@ -1,4 +1,5 @@
-// A page that cannot be shown: its name, what went wrong, and the way to the lobby, unless a study leaves out the ways to other pages.
+// The page in place of one that cannot be shown: title, error, and a link to the lobby unless a
+// study hides links.
 
 import { hidden } from "../experiment/hiding";
 import { t } from "../i18n";
@@ -6,7 +7,7 @@ import { ButtonLink } from "./Button";
 import { Notice } from "./Notice";
 import css from "./Notice.module.css";
 
-/** The page in place of one that failed. */
+/** The error page. */
 export function Faulty({ title, words }: { title: string; words: string }) {
   return (
     <section class={css.faulty} data-part="faulty">

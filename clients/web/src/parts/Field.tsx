@@ -1,4 +1,4 @@
-// Fields of forms: a label, the field, a hint below, a fault in words. The field's id joins them for those who do not see it.
+// Form fields: a label, the control, a hint, an error. Ids connect them for screen readers.
 
 import type { ComponentChildren } from "preact";
 import { useId } from "preact/hooks";
@@ -8,11 +8,11 @@ interface FieldFrame {
   label: string;
   hint?: string | undefined;
   fault?: string | undefined;
-  /** The element that says the fault, where it is that of a whole group which this field has a part in. */
+  /** Id of the error message of a group that this field belongs to. */
   faultId?: string | undefined;
 }
 
-/** Attributes that join a field to its hint and fault. */
+/** Attributes that connect a control to its hint and error. */
 interface Joined {
   id: string;
   "aria-describedby": string | undefined;
@@ -24,7 +24,7 @@ function joinedTo(id: string, { hint, fault, faultId }: Omit<FieldFrame, "label"
   return { id, "aria-describedby": described || undefined, "aria-invalid": Boolean(fault || faultId) };
 }
 
-/** A frame around any field; `children` gets the attributes to put on it. */
+/** The frame of any control; `children` receives the attributes to put on it. */
 export function Field(props: FieldFrame & { children: (joined: Joined) => ComponentChildren }) {
   const id = useId();
   const { label, hint, fault } = props;
@@ -37,7 +37,7 @@ export function Field(props: FieldFrame & { children: (joined: Joined) => Compon
   );
 }
 
-/** The hint and the fault below a field. */
+/** The hint and the error below a control. */
 function Remarks({ id, hint, fault }: { id: string } & Pick<FieldFrame, "hint" | "fault">) {
   return (
     <>
@@ -86,7 +86,7 @@ interface SelectProps<Value extends string> extends FieldFrame {
   onPick: (value: Value) => void;
 }
 
-/** One of a few. */
+/** A choice of one option. */
 export function SelectField<Value extends string>({ label, hint, fault, value, options, onPick }: SelectProps<Value>) {
   return (
     <Field label={label} hint={hint} fault={fault}>
@@ -116,7 +116,7 @@ interface CheckProps extends FieldFrame {
   onCheck: (checked: boolean) => void;
 }
 
-/** Yes or no. */
+/** A checkbox. */
 export function CheckField({ label, hint, fault, faultId, checked, disabled = false, onCheck }: CheckProps) {
   const id = useId();
   return (

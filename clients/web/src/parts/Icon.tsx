@@ -1,4 +1,5 @@
-// A drawing of lines in a box of 24 by 24, in the colour of the text around it. Decoration: its button says what it does.
+// A line icon in a box of 24 by 24, in the colour of the surrounding text. Decorative: its button
+// has a label.
 
 import type { ComponentChildren } from "preact";
 

@@ -1,5 +1,5 @@
-// What a participant is: person, robot or agent, always by drawing and word together. A built-in agent of the server has a drawing of its
-// own; which one it is stands where its name stands.
+// The kind of a participant: person, robot or agent, always as a drawing and a word. A built-in
+// agent has a drawing of its own; its name is shown elsewhere.
 
 import { ParticipantKind } from "../gen/chefshat/v1/room_pb";
 import { t } from "../i18n";
@@ -8,7 +8,7 @@ import css from "./KindBadge.module.css";
 
 interface KindBadgeProps {
   kind: ParticipantKind;
-  /** Name of the built-in agent that it is; empty or left out if it is none. */
+  /** Name of the built-in agent; empty or absent for other participants. */
   builtIn?: string;
 }
 
@@ -29,7 +29,7 @@ const symbols: Record<ParticipantKind, string> = {
   [ParticipantKind.ROBOT]: "kind-robot",
 };
 
-/** The word for a kind. */
+/** A kind in a word. */
 export function kindWord(kind: ParticipantKind): string {
   const words = t().common.kinds;
   switch (kind) {

@@ -1,4 +1,4 @@
-// The frame of all pages: the dark header with the ways to other pages and the settings, the content, the region that is read out.
+// The frame of all pages: header with navigation and settings, content, live region.
 
 import type { ComponentChildren } from "preact";
 import { useEffect, useRef, useState } from "preact/hooks";
@@ -20,7 +20,7 @@ export function Layout({ here, children }: LayoutProps) {
   const content = useRef<HTMLElement>(null);
   const [open, setOpen] = useState(false);
   const first = useRef(true);
-  // Who goes to another page by keyboard goes on at its beginning, not somewhere in the header.
+  // After keyboard navigation the focus is at the start of the new page, not in the header.
   useEffect(() => {
     if (first.current) first.current = false;
     else content.current?.focus({ preventScroll: true });
@@ -87,7 +87,7 @@ function links(): { href: string; label: string; pages: Route["page"][] }[] {
   ];
 }
 
-/** What a page is called in the browser's list of tabs. */
+/** The page's title in the browser's tab. */
 function pageName(here: Route): string {
   const words = t();
   switch (here.page) {
@@ -119,7 +119,7 @@ function pageName(here: Route): string {
   }
 }
 
-/** Two sliders: what settings look like without a word. */
+/** Two sliders, as the icon of the settings. */
 function GearSign() {
   return (
     <svg

@@ -1,10 +1,10 @@
-// The button below a list that shows more of it; nothing where there is no more.
+// The button below a list that shows more of it; absent if there is no more.
 
 import type { Shown } from "../api/pages";
 import { t } from "../i18n";
 import { Button } from "./Button";
 
-/** The button, and for those who hear it which list it is for. */
+/** The button; `what` names the list for screen readers. */
 export function MoreButton({ shown, what }: { shown: Shown<unknown>; what: string }) {
   if (!shown.list?.more) return null;
   return (

@@ -1,10 +1,10 @@
-// The page of an address that names nothing.
+// The page of an unknown address.
 
 import { t } from "../i18n";
 import { ButtonLink } from "./Button";
 import css from "./Layout.module.css";
 
-/** Says so, and leads back. */
+/** Says so, and links to the lobby. */
 export function NotFound() {
   const words = t().common.notFound;
   return (

@@ -1,4 +1,4 @@
-// A short word to the reader in a page: something went wrong, something is good to know, nothing is here yet.
+// A short message in a page: an error, a hint, or good news.
 
 import type { ComponentChildren } from "preact";
 import css from "./Notice.module.css";
@@ -10,7 +10,7 @@ interface NoticeProps {
 
 const signs = { fault: "!", hint: "i", good: "✓" };
 
-/** A notice; a fault is read out at once. */
+/** A notice; an error is read out at once. */
 export function Notice({ kind, children }: NoticeProps) {
   return (
     <div class={`${css.notice} ${css[kind]}`} role={kind === "fault" ? "alert" : undefined}>

@@ -1,8 +1,9 @@
-// A seat as a number on a disc of its colour: what all pages and pictures know a seat by. As high as the text around it.
+// A seat's number on a disc of its colour, as on all pages and pictures. As high as the surrounding
+// text.
 
 import css from "./SeatNumber.module.css";
 
-/** The disc. Who listens hears nothing of it: the seat's name or number is said beside it. */
+/** The disc. Hidden from screen readers: text beside it names the seat. */
 export function SeatNumber({ seat }: { seat: number }) {
   return (
     <span

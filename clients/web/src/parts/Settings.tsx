@@ -1,4 +1,5 @@
-// The settings of this device: language, theme, and deleting what is stored. Settings of a single page (sound, replay speed) are on that page.
+// The settings of this device: language, theme, and deleting what is stored. Settings of a single
+// page (sound, replay speed) are on that page.
 
 import { useState } from "preact/hooks";
 import { type Language, language, languages, setLanguage, t } from "../i18n";
@@ -35,13 +36,13 @@ export function Settings({ onClose }: { onClose: () => void }) {
   );
 }
 
-/** Forgets everything, after asking once more: seats are lost with it. */
+/** Deletes everything that is stored, after a confirmation: seats are lost with it. */
 function Forget() {
   const words = t().common.settings;
   const [sure, setSure] = useState(false);
   const forget = () => {
     forgetAll();
-    // A page that goes on would write down again what it still knows.
+    // A page that stays open would store again what it still has in memory.
     location.assign("/");
   };
   if (!sure) {

@@ -9,7 +9,10 @@ export interface Attempt {
   readonly busy: boolean;
   /** Why the last attempt failed, in words; null if it did not. */
   readonly fault: string | null;
-  /** Starts the action. One that resolves to false may be started again; after any other the page has no more use for its button. */
+  /**
+   * Starts the action. One that resolves to false may be started again; after any other the page
+   * has no more use for its button.
+   */
   readonly run: (action: () => Promise<unknown>) => void;
   /** Forgets a failure. */
   readonly reset: () => void;

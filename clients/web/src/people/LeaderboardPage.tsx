@@ -1,4 +1,5 @@
-// The ratings of all who have played rated games here: by kind if one likes, each with its uncertainty as a bar and in numbers.
+// The ratings of everyone with rated games on this server, by kind if desired, with their
+// uncertainty.
 
 import { useState } from "preact/hooks";
 import { CALL_LIMIT_MS, tournamentApi } from "../api/client";
@@ -16,9 +17,9 @@ import css from "./People.module.css";
 import { ratingRange, ratingWords } from "./rating";
 import { WhichAreRated } from "./WhichAreRated";
 
-/** How often it is asked for, milliseconds. */
+/** Polling interval, milliseconds. */
 const EVERY_MS = 15_000;
-/** Most lines. */
+/** Most lines shown. */
 const LINES = 200;
 
 const KINDS = {
@@ -72,7 +73,7 @@ export function LeaderboardPage() {
   );
 }
 
-/** What to do where there are no lines: other filters, or the first game. */
+/** What to do about an empty list: other filters, or the first game. */
 function Nobody({ anybody }: { anybody: boolean }) {
   const words = t().people;
   if (anybody) return <p class="sheet">{words.noneOfThese}</p>;

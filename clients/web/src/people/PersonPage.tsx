@@ -1,4 +1,4 @@
-// One participant: its rating, what its games add up to, and the games, each with a link to its replay.
+// A participant: rating, totals, and games with links to their replays.
 
 import { wordsOf } from "../api/faults";
 import { type Beginning, countWords, useShown } from "../api/pages";
@@ -18,7 +18,7 @@ import css from "./People.module.css";
 import { ratingRange, ratingWords } from "./rating";
 import { WhichAreRated } from "./WhichAreRated";
 
-/** How often it is asked for, milliseconds. */
+/** Polling interval, milliseconds. */
 const EVERY_MS = 60_000;
 /** Games shown at first, and more at a time. */
 const AT_A_TIME = 50;
@@ -61,7 +61,7 @@ export function PersonPage({ route }: PageProps<"person">) {
   );
 }
 
-/** What a participant is worth, and what its games add up to as far as they are known. */
+/** The rating, and the totals of the known games. */
 function Facts({ rated, games }: { rated: readonly Rated[] | null; games: Beginning<OwnGame> }) {
   const words = t().people.person;
   const all = sum(games.items);
@@ -100,7 +100,7 @@ function Fact(props: { label: string; value: string; text?: string; wide?: boole
   );
 }
 
-/** That a game counts for no rating, and why. */
+/** Why a game is not rated. */
 function NotRated({ record }: { record: RecordSummary }) {
   const why = unratedBecause(record);
   return why && ` · ${t().people.notRated(t().people.unrated[why])}`;

@@ -1,9 +1,9 @@
-// Which games count for ratings, as docs/ratings.md says, folded away.
+// Which games are rated, as in docs/ratings.md, folded.
 
 import { t } from "../i18n";
 import css from "./People.module.css";
 
-/** The words. */
+/** The folded text. */
 export function WhichAreRated({ open = false }: { open?: boolean }) {
   const words = t().people.which;
   return (

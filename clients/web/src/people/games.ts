@@ -1,4 +1,4 @@
-// The games of one participant, from the server's records: found by name, newest first, with what they add up to.
+// A participant's games from the server's records: found by name, newest first, with totals.
 
 import { CALL_LIMIT_MS, recordApi, tournamentApi } from "../api/client";
 import type { AskPage } from "../api/pages";
@@ -9,7 +9,7 @@ import type { Rated } from "../gen/chefshat/v1/tournament_pb";
 /** Lines of the leaderboard that are searched. */
 const MAX_LINES = 1000;
 
-/** What a participant did in a game. */
+/** A participant's result in a game. */
 export interface OwnGame {
   readonly record: RecordSummary;
   readonly seat: number;
@@ -19,14 +19,14 @@ export interface OwnGame {
   readonly others: readonly Participant[];
 }
 
-/** What all games of a participant add up to; of those with a result. */
+/** The totals of a participant's games with a result. */
 export interface Sum {
   readonly games: number;
   readonly wins: number;
   readonly meanPlace: number;
 }
 
-/** Asks for the games of a participant, newest first. */
+/** Requests a participant's games, newest first. */
 export function gamesOf(name: string): AskPage<OwnGame> {
   return async (page, signal) => {
     const asked = { filter: { participant: name }, newestFirst: true, ...page };
@@ -35,13 +35,13 @@ export function gamesOf(name: string): AskPage<OwnGame> {
   };
 }
 
-/** Asks for a participant's lines of the leaderboard: more than one where kinds differ. */
+/** Requests a participant's lines of the leaderboard: one per kind. */
 export async function ratedAs(name: string, signal: AbortSignal): Promise<Rated[]> {
   const board = await tournamentApi.getLeaderboard({ limit: MAX_LINES }, { signal, timeoutMs: CALL_LIMIT_MS });
   return board.rated.filter((line) => line.name === name);
 }
 
-/** What the participant of a name did in a game: at its first seat if it has several. */
+/** The result of a participant in a game; at its first seat if it has several. */
 export function ownGame(record: RecordSummary, name: string): OwnGame | undefined {
   const own =
     record.seats.find((seat) => seat.name === name && seat.builtInAgent === "") ??
@@ -58,10 +58,10 @@ export function ownGame(record: RecordSummary, name: string): OwnGame | undefine
   };
 }
 
-/** Why a game with a result counts for no rating. */
+/** Why a game with a result is not rated. */
 export type Unrated = "added" | "notDealt" | "recorded" | "substituted" | "twice";
 
-/** Why a game counts for no rating, as docs/ratings.md says; null if it does, and of one that was aborted. */
+/** Why a game is not rated, as in docs/ratings.md; null if it is, or was aborted. */
 export function unratedBecause(record: RecordSummary): Unrated | null {
   if (record.state !== RoomState.FINISHED) return null;
   if (record.added) return "added";
@@ -74,7 +74,7 @@ export function unratedBecause(record: RecordSummary): Unrated | null {
   return new Set(participants).size < participants.length ? "twice" : null;
 }
 
-/** What games add up to. */
+/** The totals of games. */
 export function sum(games: readonly OwnGame[]): Sum {
   const places = games.flatMap(({ place }) => place ?? []);
   const total = places.reduce((all, place) => all + place, 0);

@@ -1,4 +1,4 @@
-// The controls of a replay: to and fro, play and pause, a slider over all moments, speed, whose eyes.
+// The controls of a replay: steps, play and pause, a slider, speed, perspective.
 
 import { t } from "../i18n";
 import { SelectField } from "../parts/Field";
@@ -9,11 +9,11 @@ import type { Eyes } from "./eyes";
 import type { Film, Frame } from "./frames";
 import replayCss from "./Replay.module.css";
 
-/** Moments a second at a speed of 1. */
+/** Playback speeds; at 1, MOMENT_MS per moment. */
 export const SPEEDS = [0.5, 1, 2, 4, 8] as const;
 export type Speed = (typeof SPEEDS)[number];
 
-/** Beginnings of Shifts that are marked; more of them would be a bar. */
+/** Most Shifts marked on the slider; more would look like a bar. */
 const MOST_MARKS = 60;
 
 interface ControlsProps {
@@ -111,7 +111,7 @@ interface StepProps {
   onClick: () => void;
 }
 
-/** A button that stays in reach of the keyboard when it leads nowhere. */
+/** A button that stays focusable when disabled. */
 function Step({ label, path, main = false, disabled = false, onClick }: StepProps) {
   return (
     <button

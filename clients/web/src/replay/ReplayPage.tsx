@@ -1,4 +1,4 @@
-// A record played back at the table, with all hands or with somebody's eyes, and the look-up table of every turn.
+// A record played back at the table, from any perspective, with the look-up table of every turn.
 
 import { useEffect, useMemo, useState } from "preact/hooks";
 import { recordApi } from "../api/client";
@@ -21,10 +21,10 @@ import { decidingFor, type Eyes, seenWith } from "./eyes";
 import { type Film, filmOf } from "./frames";
 import css from "./Replay.module.css";
 
-/** How long a moment is seen at a speed of 1. */
+/** Duration of a moment at speed 1, milliseconds. */
 const MOMENT_MS = 1000;
 
-/** A shorter time would be said as 0.0 s. */
+/** A shorter time would be shown as 0.0 s. */
 const SHOWN_SECONDS = 0.05;
 
 /** The page. */
@@ -107,7 +107,7 @@ function Playback({ film }: { film: Film }) {
   );
 }
 
-/** The open decision: what was answered, how long it took, and what was possible. */
+/** The open decision: answer, decision time and possible plays. */
 function Decision({ table, open }: { table: TableState; open: DecisionRecord }) {
   const words = t().replay;
   const move = moveOf(open.action, table.faces);
@@ -141,7 +141,7 @@ function lookupAt(table: TableState, open: Pick<DecisionRequest, "actionMask"> &
   );
 }
 
-/** The moment that the address asks for with ?decision=N, or that of the first cards. */
+/** The moment of ?decision=N in the address, or of the first deal. */
 function firstFrame(film: Film): number {
   const asked = Number(new URLSearchParams(location.search).get("decision"));
   const found = asked >= 1 ? film.after(asked - 1) : undefined;

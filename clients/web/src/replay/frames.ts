@@ -1,42 +1,43 @@
-// A record as a row of moments to be stepped through: after every event, and after every decision that brought none. Each knows the table with
-// all hands, and the decision that is open, which the record says already. Whose eyes it is looked at with is said in eyes.ts. A long game has
-// tens of thousands of moments: only some tables are kept, the others are made from the one before and the events since.
+// A record as a sequence of moments: one after every event, and after every decision without an
+// event. Each moment has the table with all hands and the open decision with its recorded answer. A
+// long game has tens of thousands of moments: only some tables are stored, the others are computed
+// from the previous one.
 
 import type { GameEvent } from "../gen/chefshat/v1/event_pb";
 import type { DecisionRecord, RecordHeader, RecordLine } from "../gen/chefshat/v1/record_pb";
 import { applyEvent } from "../table/model/reduce";
 import { emptyTable, fromRules, seatFromParticipant, type TableState } from "../table/model/state";
 
-/** From one table that is kept to the next, in moments: so many events are applied in less time than it takes to draw the table. */
+/** Moments between stored tables: this many events are applied faster than the table is drawn. */
 const KEPT_EVERY = 200;
 
-/** One moment of a recorded game. */
+/** A moment of a recorded game. */
 export interface Frame {
   readonly table: TableState;
-  /** The decision that is open, with what was answered; undefined when nobody decides any more. */
+  /** The open decision with its recorded answer; undefined if none is open. */
   readonly open: DecisionRecord | undefined;
-  /** How many decisions have been taken. */
+  /** Decisions taken so far. */
   readonly decisions: number;
 }
 
 /** A record that can be stepped through. */
 export interface Film {
   readonly header: RecordHeader | undefined;
-  /** How many moments there are. */
+  /** Number of moments. */
   readonly length: number;
-  /** How many decisions there are in all. */
+  /** Number of decisions. */
   readonly decisions: number;
-  /** Where each Shift begins: the first moment with its cards. */
+  /** The first moment of each Shift with its cards. */
   readonly shifts: readonly { readonly shift: number; readonly frame: number }[];
-  /** A moment by its number, from 0 to `length` - 1. */
+  /** A moment by number, from 0 to `length` - 1. */
   at(moment: number): Frame;
-  /** The first moment at which so many decisions have been taken; undefined if there are fewer. */
+  /** The first moment after a number of decisions; undefined if there are fewer. */
   after(decisions: number): number | undefined;
 }
 
-/** What a moment adds to the one before. */
+/** The change from one moment to the next. */
 interface Moment {
-  /** What happened; undefined where a decision brought no event. */
+  /** Undefined for a decision without an event. */
   readonly event: GameEvent | undefined;
   readonly decisions: number;
   open: DecisionRecord | undefined;
@@ -54,7 +55,8 @@ export function filmOf(lines: readonly RecordLine[], keptEvery = KEPT_EVERY): Fi
         header = line.value;
         break;
       case "decision": {
-        // Open it is once everything before it has happened: not between the last pass of a pizza and the next leader's turn.
+        // A decision opens after every event before it: not between the last pass of a pizza and
+        // the next leader's turn.
         const before = moments.at(-1);
         if (before) before.open = line.value;
         decisions += 1;
@@ -87,7 +89,7 @@ export function filmOf(lines: readonly RecordLine[], keptEvery = KEPT_EVERY): Fi
   };
 }
 
-/** The table at each moment: folded once from the beginning, then from the last one that was kept or looked at. */
+/** The table at each moment, computed from the nearest stored or last requested one before it. */
 function folded(start: TableState, moments: readonly Moment[], keptEvery: number): (number: number) => TableState {
   const kept: TableState[] = [];
   let looked = { number: -1, table: start };

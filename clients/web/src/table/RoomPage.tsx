@@ -1,4 +1,5 @@
-// A room as one of its players sees it: the seats while it waits, then the table, for as long as this device holds a seat there.
+// A room as one of its players sees it: the seats while it waits, then the table, as long as this
+// device holds a seat.
 
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { CALL_LIMIT_MS, roomApi } from "../api/client";
@@ -31,8 +32,8 @@ export function RoomPage({ route }: PageProps<"room">) {
   const [ticket, setTicket] = useState("");
   const [fault, setFault] = useState("");
   const ended = useRef<TableState | undefined>(undefined);
-  // For the whole page, from its loading on: not for a part of it, of which the table has others than the waiting room. And for as long as it is
-  // shown, also when the seat is forgotten: where something fails, a study leaves out what it has left out before.
+  // For the page as a whole: its parts change between waiting room and table. The study's hiding
+  // stays on even when the seat is deleted after an error.
   useHiding(useMemo(() => studyIn(roomId), [roomId]));
 
   useEffect(() => {
@@ -59,12 +60,13 @@ export function RoomPage({ route }: PageProps<"room">) {
     return () => {
       left = true;
       started?.stop();
-      // A reload goes on with the last page of a study; who leaves it is done, and finds its questionnaire by the link again.
+      // A reload shows the last page of a study again. A participant who leaves it is done, and
+      // finds the questionnaire through the link.
       if (ended.current?.roomId === roomId) depart(ended.current);
     };
   }, [roomId]);
 
-  // What is over stays over, also while the page hears of it once more from the beginning.
+  // A finished game stays finished, even while the page replays it from the start.
   const live = session?.live.value.table;
   if (live && isOver(live)) ended.current = live;
 
@@ -73,8 +75,9 @@ export function RoomPage({ route }: PageProps<"room">) {
     attachment?.kind === "left" || (attachment?.kind === "refused" && attachment.reason === "TICKET_UNKNOWN");
   useEffect(() => {
     if (!vacated) return;
-    // The seat was given back, here or in another page, or to others while this page was away: the room is one to come into.
-    // Unless another page of this device has sat down here since, for somebody else.
+    // The seat was given up, here or in another tab, or went to others while this page was away:
+    // show the room from outside. Delete the stored seat unless another tab has taken a new one
+    // since.
     if (session && heldSeat(roomId)?.ticket === ticket) depart(session.live.peek().table);
     session?.stop();
     setSession(undefined);
@@ -100,13 +103,13 @@ export function RoomPage({ route }: PageProps<"room">) {
   );
 }
 
-/** Forgets a seat; a study's last questionnaire stays to be found if there was a game. */
+/** Deletes a seat. If there was a game, a study's last questionnaire stays available. */
 function depart(table: TableState): void {
   if (hasBegun(table)) leaveSeat(table.roomId);
   else giveUpSeat(table.roomId);
 }
 
-/** The table from the seat that this device holds. */
+/** The table from this device's seat. */
 function Held({ session }: { session: Session }) {
   const { table, own } = session.live.value;
   const { roomId } = table;
@@ -135,7 +138,7 @@ function Held({ session }: { session: Session }) {
         }
       />
       {!waiting && <KeptLinks roomId={roomId} />}
-      {/* Outside of waiting room and table, so that it stays open when the one becomes the other. */}
+      {/* Outside of waiting room and table, so that it stays open when one replaces the other. */}
       {leaving && !isOver(table) && (
         <LeaveDialog
           roomId={roomId}
@@ -149,7 +152,7 @@ function Held({ session }: { session: Session }) {
   );
 }
 
-/** Whether an agent may still take the seat. */
+/** Whether an agent can still take the seat. */
 function isForAgent(seat: SeatState): boolean {
   return !isTaken(seat) && [ParticipantKind.UNSPECIFIED, ParticipantKind.AGENT].includes(seat.reservedFor);
 }
@@ -163,7 +166,7 @@ function isOver({ phase }: TableState): boolean {
   return phase === "gameOver" || phase === "aborted";
 }
 
-/** What is to be said about the connection, if anything. */
+/** The state of the connection, if there is something to say. */
 function Banner({ session }: { session: Session }) {
   const { attachment, substituted, table } = session.live.value;
   const { link, fault } = session.following.value;

@@ -1,5 +1,5 @@
-// The table as the holder of a seat sees and plays it, with what happens announced and heard. Where the seat comes from (a room, a
-// tournament) is for the page, which says what is wrong with it in the banner.
+// The table from a seat, with announcements and sounds. The page knows where the seat comes from (a
+// room or a tournament) and shows problems with it in the banner.
 
 import type { ComponentChildren } from "preact";
 import type { Acting } from "./acting";
@@ -11,11 +11,11 @@ import { WaitingRoom } from "./view/WaitingRoom";
 interface SeatedProps {
   acting: Acting;
   banner?: ComponentChildren;
-  /** Beside the tools of the table. */
+  /** Additional tools of the table. */
   tools?: ComponentChildren;
-  /** The next step once the game is over. */
+  /** The next step after the game. */
   onward?: ComponentChildren;
-  /** Below the seats while the room waits. */
+  /** Shown below the seats while the room waits. */
   below?: ComponentChildren;
 }
 

@@ -1,4 +1,4 @@
-// A room as those see it who watch: the public events alone, or with hands where the room shows them.
+// A room as spectators see it: public events, with hands if the room shows them.
 
 import { useEffect, useState } from "preact/hooks";
 import { wordsOf } from "../api/faults";

@@ -1,5 +1,6 @@
-// A seat that a person plays: what it has been told so far, and what it does over Act. Where the updates come from is not its concern: the
-// stream of a seat (session.ts) or that of a participant of a tournament, whom the server seats (tournaments/participation.ts).
+// A seat that a person plays: the updates it has received and the commands it sends with Act. The
+// updates come from a seat's stream (session.ts) or a tournament participant's
+// (tournaments/participation.ts).
 
 import { batch, type Signal, signal } from "@preact/signals";
 import { CALL_LIMIT_MS, playApi } from "../api/client";
@@ -11,43 +12,46 @@ import { applyUpdate, type LiveState, startLive } from "./model/live";
 import type { TableState } from "./model/state";
 import { answerWords } from "./words";
 
-/** Name of the annotation that holds how long the person took, in whole milliseconds by the person's own clock. */
+/**
+ * Key of the annotation with the person's decision time, in whole milliseconds by this device's
+ * clock.
+ */
 export const PERSON_TIME_KEY = "person_decision_time_ms";
 
 /**
- * Whether decisions in a room or a tournament are sent with the time that the person took, measured here: only where the host of an experiment
- * asked for it.
+ * Whether decisions in a room or tournament are sent with the time measured here: only if the host
+ * of a study asked for it.
  */
 export function asksForTimes(id: string): boolean {
   return recall(`timed.${id}`) !== null;
 }
 
-/** How often an answer that did not get through is sent again while its decision is open. */
+/** Attempts to send an answer while its decision is open, and the delay between them. */
 const MAX_ATTEMPTS = 5;
 const RETRY_MS = 400;
 
 export interface Acting {
   readonly live: Signal<LiveState>;
-  /** The action that is on its way; undefined if none is. */
+  /** The action being sent; undefined if none is. */
   readonly sending: Signal<number | undefined>;
-  /** What went wrong last, in words; empty if nothing did. */
+  /** The last error in words; empty if there is none. */
   readonly trouble: Signal<string>;
-  /** Takes in what the seat is told. */
+  /** Applies updates of the seat. */
   hear(updates: readonly SeatUpdate[]): void;
   /** Answers the open decision. */
   answer(action: number): void;
   /** Shows an expression to the table. */
   express(gesture: Gesture): void;
-  /** Plays for itself again after a substitute has. */
+  /** Takes the seat back from a substitute. */
   resume(): void;
 }
 
-/** Begins to act with a seat's ticket; `timed` if decisions are sent with the time that the person took. */
+/** Starts acting with a seat's ticket; `timed` sends the decision time with each answer. */
 export function startActing(ticket: string, table: TableState, seat: number, timed: boolean): Acting {
   const live = signal(startLive(table, seat));
   const sending = signal<number | undefined>(undefined);
   const trouble = signal("");
-  /** When the open decision was first drawn. */
+  /** The open decision and when it was first rendered. */
   let shown = { id: 0n, atMs: 0 };
 
   const hear = (updates: readonly SeatUpdate[]) => {

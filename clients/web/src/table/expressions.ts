@@ -1,9 +1,9 @@
-// What a person can show to the table with one click: a label with valence and arousal as the protocol wants them, reported by the person.
-// Their words are in the texts, their drawings in view/Face.tsx.
+// The expressions that a person can show with one click: label, valence and arousal as in the
+// protocol, reported by the person. The words are in the texts, the drawings in view/Face.tsx.
 
 import { ExpressionSource } from "../gen/chefshat/v1/decision_pb";
 
-/** Labels that have words and a drawing here. Others, of robots and agents, are shown by their label. */
+/** Labels with words and a drawing. Other labels, of robots and agents, are shown as they are. */
 export const LABELS = ["joy", "amusement", "surprise", "concentration", "annoyance", "sadness"] as const;
 export type Label = (typeof LABELS)[number];
 
@@ -17,7 +17,7 @@ export interface Gesture {
   source: ExpressionSource;
 }
 
-/** Where each label lies between unpleasant and pleasant (-1..1) and between calm and excited (-1..1). */
+/** Valence (-1..1, unpleasant to pleasant) and arousal (-1..1, calm to excited) of each label. */
 const PLACES: Record<Label, readonly [valence: number, arousal: number]> = {
   joy: [0.8, 0.5],
   amusement: [0.6, 0.7],

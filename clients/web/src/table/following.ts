@@ -1,5 +1,5 @@
-// What goes with what happens at a table: it is read out to those who listen, and heard. Whoever catches up with a game after a reload is not
-// told all of it again.
+// Announcements and sounds for the events of a table. A reader who catches up after a reload does
+// not hear every past event.
 
 import { useEffect, useMemo, useRef } from "preact/hooks";
 import { hidden } from "../experiment/hiding";
@@ -14,10 +14,10 @@ import { play, soundOf } from "./sounds";
 import { nowHeading } from "./view/Now";
 import { spokenLine } from "./words";
 
-/** More happenings than this at once are a past that is being caught up with. */
+/** More events than this at once are a past that is caught up with. */
 const MOST_AT_ONCE = 14;
 
-/** Announces what happens, with sounds, for as long as the table is drawn. */
+/** Announces events, with sounds, while the table is rendered. */
 export function useAnnounced(table: TableState, own: number | undefined, decision: OpenDecision | undefined): void {
   const heard = useRef<number | undefined>(undefined);
   const seen = useRef(table);
@@ -37,7 +37,7 @@ export function useAnnounced(table: TableState, own: number | undefined, decisio
       else announce(spokenLine(table, line));
     }
     const sounds = said.flatMap((line) => soundOf(line) ?? []);
-    // Together they would be a noise: the last is heard, and it is the most telling.
+    // All at once would be noise: only the last one is played, which says the most.
     const sound = sounds.at(-1);
     if (sound) play(sound);
   }, [last]);
@@ -48,7 +48,7 @@ export function useAnnounced(table: TableState, own: number | undefined, decisio
   }, [decision?.id]);
 }
 
-/** What the open turn asks for, to be read out. */
+/** The requirement of the open turn, as read out. */
 function requirementWords({ requirement }: OpenDecision): string {
   const words = t().table.now;
   if (!requirement) return "";

@@ -1,29 +1,29 @@
-// Comings and goings as they are read out: once for each change that lasted. A connection that flaps says nothing until it has made up its
-// mind, and nothing at all if it ends as it began.
+// Announces changes of a seat's connection once they have lasted. A flapping connection is
+// announced when it settles, and not at all if it ends as it started.
 
 import type { PresenceLine } from "./model/log";
 
-/** How long a seat's connection must have been as it is before that is said. */
+/** How long a change must last before it is announced, milliseconds. */
 export const SETTLED_MS = 2000;
 
 type Presence = PresenceLine["happening"]["kind"];
 
 export interface PresenceTeller {
-  /** Takes in what happened to a seat's connection. */
+  /** Takes in an event of a seat's connection. */
   hear(line: PresenceLine): void;
-  /** Says nothing any more. */
+  /** Cancels pending announcements. */
   stop(): void;
 }
 
-/** Tells `say` of each change that lasted. */
+/** Calls `say` for each change that lasts. */
 export function tellPresence(say: (line: PresenceLine) => void): PresenceTeller {
-  /** How each seat's connection stood when it was last quiet. */
+  /** Each seat's last settled state. */
   const stood = new Map<number, Presence>();
   const waiting = new Map<number, ReturnType<typeof setTimeout>>();
   return {
     hear: (line) => {
       const { seat, kind } = line.happening;
-      // Of a seat that nothing was heard of: who is lost had been there, who is back had been lost.
+      // A first event implies the opposite state before it.
       if (!stood.has(seat)) stood.set(seat, kind === "lost" ? "back" : "lost");
       clearTimeout(waiting.get(seat));
       const timer = setTimeout(() => {

@@ -1,5 +1,5 @@
-// A person's seat in a room: follows what the seat is told over Watch; what it does is in acting.ts. What the updates mean is in
-// model/live.ts, how it looks in view/. The ticket comes from what this device remembers and stays here.
+// A person's seat in a room: follows its stream with Watch. Commands are in acting.ts, updates are
+// applied in model/live.ts. The ticket comes from this device's storage.
 
 import { type Signal, signal } from "@preact/signals";
 import { playApi } from "../api/client";
@@ -10,12 +10,12 @@ import type { TableState } from "./model/state";
 
 export interface Session extends Acting {
   readonly following: Signal<Following>;
-  /** Takes the seat back from another page that has taken it. */
+  /** Takes the seat back from another tab. */
   takeBack(): void;
   stop(): void;
 }
 
-/** Sits down on a seat. */
+/** Attaches to a seat. */
 export function startSession(held: HeldSeat, table: TableState): Session {
   const { ticket } = held;
   const acting = startActing(ticket, table, held.seat, asksForTimes(table.roomId));

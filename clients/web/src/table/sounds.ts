@@ -1,10 +1,11 @@
-// The sounds of the table, made as they are needed: no files. They can be turned off, and say nothing that is not also seen and read out.
+// The sounds of the table, synthesized on demand. They can be turned off, and everything they
+// signal is also visible and read out.
 
 import { signal } from "@preact/signals";
 import { recall, remember } from "../store";
 import type { LogLine } from "./model/state";
 
-/** Whether sounds are on; kept on this device. */
+/** Whether sounds are on; stored on this device. */
 export const soundOn = signal(recall("sound") !== "off");
 
 export function setSound(on: boolean): void {
@@ -13,7 +14,7 @@ export function setSound(on: boolean): void {
   if (on) play("play");
 }
 
-/** One tone: pitch in hertz, when it begins and how long it is heard in seconds, how loud from 0 to 1. */
+/** A tone: pitch in hertz, start and length in seconds, volume from 0 to 1. */
 interface Tone {
   hertz: number;
   at: number;
@@ -27,7 +28,7 @@ const tone = (hertz: number, at: number, length: number, loud: number, wave: Osc
 };
 
 const SOUNDS = {
-  /** A card is put down. */
+  /** A card is played. */
   play: [tone(190, 0, 0.09, 0.5, "triangle"), tone(95, 0.01, 0.12, 0.5)],
   pass: [tone(240, 0, 0.06, 0.16, "triangle")],
   pizzaDone: [tone(523, 0, 0.18, 0.2), tone(659, 0.09, 0.22, 0.2)],
@@ -45,7 +46,9 @@ export type Sound = keyof typeof SOUNDS;
 
 let context: AudioContext | undefined;
 
-/** Makes a sound, if sounds are on and the reader has clicked or typed here: before that browsers keep silent. */
+/**
+ * Plays a sound, if sounds are on and the reader has clicked or typed: browsers allow none before.
+ */
 export function play(sound: Sound): void {
   if (!soundOn.peek() || typeof AudioContext === "undefined" || !navigator.userActivation?.hasBeenActive) return;
   context ??= new AudioContext();
@@ -63,7 +66,7 @@ export function play(sound: Sound): void {
   }
 }
 
-/** The sound of what happened. */
+/** The sound of an event. */
 export function soundOf({ happening }: LogLine): Sound | undefined {
   switch (happening.kind) {
     case "played":

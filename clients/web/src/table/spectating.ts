@@ -1,4 +1,4 @@
-// Watching a room without a seat: follows its public events. What they mean is in model/reduce.ts.
+// Watching a room without a seat: follows its public events, which model/reduce.ts applies.
 
 import { type Signal, signal } from "@preact/signals";
 import { spectatorApi } from "../api/client";
@@ -13,7 +13,7 @@ export interface Spectating {
   stop(): void;
 }
 
-/** Starts to watch a room. */
+/** Starts watching a room. */
 export function startSpectating(roomId: string): Spectating {
   const table = signal(emptyTable());
   const following = follow(

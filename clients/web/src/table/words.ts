@@ -1,5 +1,4 @@
-// What the table says in words: cards, what happened, what the open turn asks for. The words themselves are in the texts; here they are put
-// together from the model's values.
+// The table in words: cards, events, decisions. Combines the texts with the model's values.
 
 import { type AnswerResult, AnswerStatus } from "../gen/chefshat/v1/decision_pb";
 import { Role, SpecialAction } from "../gen/chefshat/v1/rules_pb";
@@ -10,19 +9,19 @@ import { type Card, faceOf } from "./model/cards";
 import type { Reason } from "./model/picking";
 import type { Happening, LogLine, SeatState, TableState } from "./model/state";
 
-/** What a seat is called: its name, or its number while nobody has it. */
+/** A seat's name, or its number while it is free. */
 export function nameOf(table: TableState, seat: number): string {
   return table.seats[seat]?.name || t().common.seat(seat);
 }
 
-/** What a seat is called where others may be called the same and its number does not stand beside it. */
+/** A seat's name, with its number if another seat has the same name. */
 export function distinctName(table: TableState, seat: number): string {
   const name = nameOf(table, seat);
   const same = table.seats.some((other) => other.seat !== seat && nameOf(table, other.seat) === name);
   return same ? `${name} (${seat})` : name;
 }
 
-/** One card, for listeners and in sentences. */
+/** A card, for screen readers and sentences. */
 export function cardWord(card: Card): string {
   const words = t().table.card;
   if (card.kind === "joker") return words.joker;
@@ -40,7 +39,7 @@ export function playWords(cards: readonly Card[]): string {
   return t().table.play(cards.length - jokers, face, golden, jokers);
 }
 
-/** A move as cards, for words. */
+/** A move, as the cards it takes. */
 export function moveWords(move: Move): string {
   const words = t().table;
   switch (move.kind) {
@@ -60,7 +59,7 @@ export function moveWords(move: Move): string {
   }
 }
 
-/** Cards that need not be of one face. */
+/** Cards of any faces. */
 function giftWords(cards: readonly Card[], count: number): string {
   if (cards.length === 0) return t().common.cards(count);
   return cards
@@ -71,13 +70,13 @@ function giftWords(cards: readonly Card[], count: number): string {
     .join(", ");
 }
 
-/** Who a line is about, and what is said of it. */
+/** The seat that a line is about, and the rest of the sentence. */
 export interface SaidLine {
   readonly seat: number | undefined;
   readonly text: string;
 }
 
-/** What happened, in words. */
+/** An event, in words. */
 export function happeningWords(table: TableState, happening: Happening): SaidLine {
   const words = t().table.log;
   const because = (cause: keyof typeof words.causes) => (words.causes[cause] ? ` (${words.causes[cause]})` : "");
@@ -116,18 +115,18 @@ export function happeningWords(table: TableState, happening: Happening): SaidLin
   }
 }
 
-/** A line to be read out. */
+/** A line as it is read out. */
 export function spokenLine(table: TableState, { happening }: LogLine): string {
   const { seat, text } = happeningWords(table, happening);
   return seat === undefined ? `${text}.` : `${distinctName(table, seat)} ${text}.`;
 }
 
-/** An expression's word: ours where the label is one of ours. */
+/** The word of an expression, or its label if it has none. */
 export function expressionWord(label: string): string {
   return isLabel(label) ? t().table.expressions.words[label] : label;
 }
 
-/** The name of a role; empty for none. */
+/** A role's name; empty for none. */
 export function roleWord(role: Role): string {
   const words = t().common.roles;
   switch (role) {
@@ -161,7 +160,7 @@ export function reasonWords(reason: Reason): string {
   }
 }
 
-/** Where the game stands. */
+/** The state of the game, for the heading. */
 export function headingWords(table: TableState): string {
   const words = t().table.heading;
   switch (table.phase) {
@@ -180,14 +179,14 @@ export function headingWords(table: TableState): string {
   }
 }
 
-/** What a seat is beyond its kind: lost, or played for by another. */
+/** The state of a seat's connection: lost, or replaced by a substitute. */
 export function presenceWords(seat: SeatState): string {
   const words = t().table.presence;
   if (seat.substitute) return words.substituted(seat.substitute);
   return seat.connected || seat.builtIn ? "" : words.away;
 }
 
-/** What has become of an answer, where it was not simply taken. */
+/** The result of an answer that was not accepted. */
 export function answerWords({ status, invalidAttemptsLeft }: AnswerResult): string {
   const words = t().table.answers;
   switch (status) {

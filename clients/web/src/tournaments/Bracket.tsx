@@ -1,5 +1,5 @@
-// A knockout as a bracket: a column for each round, a box for each table, the first two of each marked by word and sign as those who go on.
-// On a narrow page the rounds stand one below the other.
+// A knockout as a bracket: a column per round, a box per table; the two who advance are marked by
+// text and sign. On a narrow page the rounds are stacked.
 
 import type { Tournament, TournamentGame } from "../gen/chefshat/v1/tournament_pb";
 import { t } from "../i18n";
@@ -11,9 +11,9 @@ interface BracketProps {
   tournament: Tournament;
   games: readonly TournamentGame[];
   mine?: number | undefined;
-  /** For a wall: without links. */
+  /** Wall view: without links. */
   large?: boolean;
-  /** The first round that is drawn. */
+  /** The first round shown. */
   from?: number;
 }
 

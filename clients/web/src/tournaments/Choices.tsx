@@ -1,4 +1,4 @@
-// One of a few, each with a line that says what it is: for choices whose names alone say too little.
+// A choice among options that each need a line of explanation.
 
 import { useId } from "preact/hooks";
 import fieldCss from "../parts/Field.module.css";
@@ -25,7 +25,7 @@ export function Choices<Value extends string>({ label, value, options, fault, on
               type="radio"
               name={id}
               checked={option.value === value}
-              // The one that is picked is the one at fault, and the one that the focus goes to.
+              // The chosen option is the invalid one, and receives the focus.
               aria-invalid={Boolean(fault) && option.value === value}
               aria-labelledby={`${id}-${option.value}-name`}
               aria-describedby={`${id}-${option.value}`}

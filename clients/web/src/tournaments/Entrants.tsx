@@ -1,5 +1,5 @@
-// Who takes part in a tournament that has not begun: names and kinds, in the order of joining. Places and scores come with the first game
-// (Standings.tsx).
+// The participants before the tournament starts, in the order of joining. Places and scores come
+// with the first game (Standings.tsx).
 
 import type { Tournament } from "../gen/chefshat/v1/tournament_pb";
 import { t } from "../i18n";
@@ -10,13 +10,13 @@ import { PersonName } from "./PersonName";
 
 interface EntrantsProps {
   tournament: Tournament;
-  /** The participant that this device plays for. */
+  /** The participant of this device. */
   mine?: number | undefined;
-  /** For a wall: nothing to follow, and no more than it has room for. */
+  /** Wall view: without links, and no more names than fit. */
   large?: boolean;
 }
 
-/** Most names on a wall. */
+/** Most names in the wall view. */
 const ON_WALL = 40;
 
 /** The list. */
@@ -24,7 +24,7 @@ export function Entrants({ tournament, mine, large = false }: EntrantsProps) {
   const words = t().tournaments.standings;
   const { participants } = tournament;
   if (participants.length === 0) return <p class="soft">{words.none}</p>;
-  // On a wall those are of interest who have just come.
+  // The wall view shows the newest participants.
   const shown = large ? participants.slice(-ON_WALL) : participants;
   return (
     <ul class={css.entrants} data-part="entrants">

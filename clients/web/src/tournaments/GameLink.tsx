@@ -1,4 +1,4 @@
-// Where a game of a tournament can be seen: live while it is being played, as a replay once it counts.
+// A link to a game of a tournament: live while it runs, as a replay once it counts.
 
 import { hidden } from "../experiment/hiding";
 import { type Tournament, type TournamentGame, TournamentGameState } from "../gen/chefshat/v1/tournament_pb";
@@ -8,17 +8,17 @@ import { pathOf } from "../router";
 interface GameLinkProps {
   tournament: Tournament;
   game: TournamentGame;
-  /** Whether the pairing plays several games: then each link has its number. */
+  /** Whether the pairing has several games: then each link has its number. */
   several: boolean;
 }
 
-/** A link to the game, or where it stands. */
+/** A link to the game, or its state. */
 export function GameLink({ tournament, game, several }: GameLinkProps) {
   const words = t().tournaments;
   const number = several ? ` ${game.number}` : "";
   const which = words.games.of(`${words.round(game.round)}, ${words.table(game.table)}`, game.number);
   const heard = <span class="visually-hidden"> {which}</span>;
-  // A study may leave out the ways to other pages.
+  // A study may hide links to other pages.
   const linked = !hidden.value.includes("pages");
   switch (game.state) {
     case TournamentGameState.COUNTED:

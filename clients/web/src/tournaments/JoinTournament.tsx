@@ -1,4 +1,4 @@
-// The form that takes a place in a tournament: its join code (which a link may bring, ?code=) and a name.
+// The form that joins a tournament: the join code (which a link may set with ?code=) and a name.
 
 import { useState } from "preact/hooks";
 import type { Tournament } from "../gen/chefshat/v1/tournament_pb";
@@ -65,7 +65,7 @@ export function JoinTournament({ tournament, onJoined }: JoinTournamentProps) {
   );
 }
 
-/** The join code as far as it is known here: a link has brought it, or this device has made the tournament. */
+/** The join code, if it is in the address or this device created the tournament. */
 function codeOf({ tournamentId }: Tournament): string {
   return new URLSearchParams(location.search).get("code") ?? hostedTournament(tournamentId)?.joinCode ?? "";
 }

@@ -1,5 +1,5 @@
-// Making a tournament: its form, who takes part, when it begins, how fast it is played; what most people never change is folded away. What the
-// form holds and asks for is in tournament-form.ts; the fields of every game are those of a new room (lobby/GameFields.tsx).
+// The page that creates a tournament. The form's values are in tournament-form.ts; the fields of
+// every game are shared with new rooms (lobby/GameFields.tsx).
 
 import type { Offered } from "../api/server";
 import { t } from "../i18n";
@@ -65,7 +65,7 @@ function TournamentFormView({ offered }: { offered: Offered }) {
   );
 }
 
-/** The clock of all, and other times for programs. */
+/** The clock for everyone, and different times for programs. */
 function Clocks(props: FormProps) {
   const { form, change } = props;
   const words = t().organise;

@@ -1,4 +1,4 @@
-// A tournament's page for whoever made it on this device: how to invite others, how to begin it, how to close it.
+// The organiser's part of a tournament's page: inviting, starting, closing.
 
 import { StudyLinks } from "../experiment/StudyLinks";
 import { type Tournament, TournamentFormat, TournamentState } from "../gen/chefshat/v1/tournament_pb";
@@ -13,7 +13,7 @@ import { closeTournament, hostedTournament, invitationTo, startTournament } from
 import css from "./Tournaments.module.css";
 import { isForAgents, isForPeople } from "./words";
 
-/** The organiser's part of the page; nothing for all others, and once it is over. */
+/** The organiser's part; null on other devices, and after the end. */
 export function Organiser({ tournament }: { tournament: Tournament }) {
   const { tournamentId, state } = tournament;
   const hosted = hostedTournament(tournamentId);
@@ -47,7 +47,7 @@ export function Organiser({ tournament }: { tournament: Tournament }) {
   );
 }
 
-/** Beginning it, with what comes of it. */
+/** Starts the tournament, and says what follows. */
 function Begin({ tournament }: { tournament: Tournament }) {
   const { tournamentId, participants, settings } = tournament;
   const words = t().organise.own;
@@ -69,7 +69,7 @@ function Begin({ tournament }: { tournament: Tournament }) {
   );
 }
 
-/** How many take part once it has been filled up: a knockout to a power of two, all others to one table. */
+/** Number of participants after filling up: a knockout to a power of two, others to one table. */
 export function fieldFor({ participants, settings }: Tournament): number {
   const joined = participants.length;
   const table = settings?.rules?.players ?? 4;

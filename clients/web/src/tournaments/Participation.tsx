@@ -1,5 +1,5 @@
-// A participant's own part of a tournament's page: that it is there and what comes next, and its game once one has begun, in place of the
-// rest of the page.
+// A participant's part of a tournament's page: status and next game; during a game, the table in
+// place of the page.
 
 import type { ComponentChildren } from "preact";
 import { useEffect, useState } from "preact/hooks";
@@ -22,17 +22,17 @@ import type { HeldPlace } from "./place";
 interface ParticipationProps {
   held: HeldPlace;
   heard: Heard;
-  /** The page besides, drawn while no game is. */
+  /** The rest of the page, shown between games. */
   children: ComponentChildren;
 }
 
-/** The page as a participant sees it. */
+/** The page for a participant. */
 export function Participation({ held, heard, children }: ParticipationProps) {
   const { tournamentId } = heard.tournament;
   const ended = isEnded(heard.tournament);
   const [part, setPart] = useState<Part | undefined>(undefined);
   useEffect(() => {
-    // One that ends meanwhile is heard of on the stream, after the end of the participant's own game.
+    // The stream reports games of others that end only after the participant's own game.
     if (ended) return;
     const started = startParticipation(held.ticket, asksForTimes(tournamentId));
     setPart(started);
@@ -49,7 +49,7 @@ export function Participation({ held, heard, children }: ParticipationProps) {
     if (game) announce(t().tournaments.part.begins(placeWords(heard, game)));
   }, [game]);
   const banner = part && <Banner part={part} />;
-  // The tournament was closed while its game was open.
+  // The tournament was closed during the game.
   const gone = part?.presence.value === "over" && game && !isOverThere(game);
   if (game && game !== left && !gone) {
     return (
@@ -88,7 +88,7 @@ export function Participation({ held, heard, children }: ParticipationProps) {
   );
 }
 
-/** That one takes part, and what to wait for. */
+/** The participant's status, and what happens next. */
 function OwnState(props: { held: HeldPlace; heard: Heard; children: ComponentChildren }) {
   const words = t().tournaments.part;
   const { state } = props.heard.tournament;
@@ -105,7 +105,7 @@ function OwnState(props: { held: HeldPlace; heard: Heard; children: ComponentChi
   );
 }
 
-/** What is to be said about the connection, if anything. */
+/** The state of the connection, if there is something to say. */
 function Banner({ part }: { part: Part }) {
   const words = t().tournaments.part;
   const { link, fault } = part.following.value;
@@ -122,7 +122,7 @@ function Banner({ part }: { part: Part }) {
   return link.value === "lost" ? <Notice kind="fault">{words.lost}</Notice> : null;
 }
 
-/** Within a game: how to come back to one's own seat after a substitute has played. */
+/** During a game: takes the seat back from a substitute. */
 function GameBanner({ game }: { game: Acting }) {
   const { substituted } = game.live.value;
   if (!substituted || isOverThere(game)) return null;

@@ -1,4 +1,5 @@
-// A round robin or Swiss tournament as rounds of tables: the newest round open, the others folded; and the tables of one round, for a wall.
+// The rounds of a round robin or Swiss tournament, the newest one open; and the tables of one round
+// for the wall view.
 
 import {
   type Tournament,
@@ -67,7 +68,7 @@ function Tables({ tournament, tables, mine }: TablesProps) {
   );
 }
 
-/** Tables for a wall: of each the game that is being played, else its newest result. */
+/** Tables for the wall view: the running game of each, or its newest result. */
 export function TablesOnWall({ tournament, tables }: Omit<TablesProps, "mine">) {
   const words = t().tournaments;
   return (
@@ -100,7 +101,7 @@ export function TablesOnWall({ tournament, tables }: Omit<TablesProps, "mine">) 
   );
 }
 
-/** The game of a table that is of interest just now. */
+/** The table's game to show now. */
 function ofTheMoment(games: readonly TournamentGame[]): TournamentGame | undefined {
   return (
     games.find(({ state }) => state === TournamentGameState.PLAYING) ??
@@ -135,7 +136,7 @@ function Seat({ tournament, game, seat, mine }: SeatProps) {
   );
 }
 
-/** The seats of a game: by place once it counts, else in order. */
+/** The seats of a game: by place once it counts, otherwise in order. */
 function byPlace(game: TournamentGame): TournamentGameSeat[] {
   if (game.state !== TournamentGameState.COUNTED) return [...game.seats];
   return [...game.seats].sort((one, other) => one.place - other.place);

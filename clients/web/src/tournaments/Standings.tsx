@@ -1,4 +1,5 @@
-// The standings of a tournament, as a table, and how sure the order is, in words. Before its beginning there is Entrants.tsx instead.
+// The standings of a tournament, and how certain their order is. Before the start there is
+// Entrants.tsx instead.
 
 import {
   type OrderConfidence,
@@ -14,15 +15,15 @@ import { gradeOf, isEnded, meanScore, nameOf, participantOf } from "./course";
 import { PersonName } from "./PersonName";
 import css from "./Standings.module.css";
 
-/** Lines that leave room for two rows each, on a wall. */
+/** Number of lines up to which each has room for two rows, in the wall view. */
 const FEW = 5;
 
 interface StandingsProps {
   tournament: Tournament;
   standings: readonly TournamentStanding[];
-  /** The participant that this device plays for. */
+  /** The participant of this device. */
   mine?: number | undefined;
-  /** For a wall: without what cannot be read from afar. */
+  /** Wall view: without details that cannot be read from afar. */
   large?: boolean;
 }
 
@@ -115,7 +116,7 @@ function Who(props: { tournament: Tournament; standing: TournamentStanding; larg
   );
 }
 
-/** How often each place was taken. */
+/** How often the participant took each place. */
 function Places({ places, count }: { places: readonly number[]; count: number }) {
   const all = Array.from({ length: count }, (_, index) => places[index] ?? 0);
   return (
@@ -126,7 +127,7 @@ function Places({ places, count }: { places: readonly number[]; count: number })
   );
 }
 
-/** For each two who follow one another, how sure their order is. */
+/** How certain the order of each two neighbours is. */
 export function Confidence(props: { tournament: Tournament; confidence: readonly OrderConfidence[] }) {
   const { tournament, confidence } = props;
   const words = t().tournaments.confidence;

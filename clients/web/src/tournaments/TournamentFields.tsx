@@ -1,4 +1,4 @@
-// The parts of the form for a new tournament that most people look at: who plays whom, who takes part, when it begins.
+// The fields of a new tournament: format, participants, start.
 
 import { useId } from "preact/hooks";
 import { t } from "../i18n";
@@ -18,7 +18,7 @@ import {
   withTable,
 } from "./tournament-form";
 
-/** What a part of the form gets: the form, the faults of its fields, and how to change it. */
+/** The props of each group of fields. */
 export interface FormProps {
   form: TournamentForm;
   faults: FieldFaults<TournamentField>;
@@ -28,7 +28,7 @@ export interface FormProps {
 const FORMATS: readonly TournamentForm["format"][] = ["knockout", "roundRobin", "swiss"];
 const PLAYERS: readonly TournamentForm["players"][] = ["2", "3", "4", "5", "6"];
 
-/** Who plays whom, and how often. */
+/** The format, and the number of games. */
 export function FormatFields(props: FormProps) {
   const { form, faults, change } = props;
   const words = t().organise;
@@ -67,12 +67,12 @@ export function FormatFields(props: FormProps) {
   );
 }
 
-/** Built-in agents by number, and who may join besides. */
+/** The built-in agents, and who else may join. */
 export function WhoFields(props: FormProps & { agents: string[] }) {
   const { form, faults, change, agents } = props;
   const words = t().organise;
   const id = useId();
-  // The sum is the fault of all of them.
+  // An error in the sum belongs to all of them.
   const counts = Object.values(form.builtIn);
   const atFault = (count: string) => Boolean(faults.builtIn) && (isNoCount(count) || !counts.some(isNoCount));
   return (
@@ -108,7 +108,8 @@ export function WhoFields(props: FormProps & { agents: string[] }) {
               label={words.kind[kind]}
               checked={form[kind]}
               faultId={faults.people && `${id}-kinds`}
-              // The fault that nobody may join is the first one's, whichever is picked to mend it.
+              // The error that nobody may join is shown at the first kind, whichever is picked to
+              // fix it.
               onCheck={(may) => change({ people: form.people, [kind]: may })}
             />
           ))}
@@ -126,7 +127,7 @@ export function WhoFields(props: FormProps & { agents: string[] }) {
   );
 }
 
-/** When it begins, and how long those are waited for who are absent then. */
+/** When it starts, and how long games wait for absent players. */
 export function StartFields(props: FormProps) {
   const { form, change } = props;
   const words = t().organise;

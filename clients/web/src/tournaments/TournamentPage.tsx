@@ -1,5 +1,5 @@
-// One tournament, as it goes on: where it stands, the standings, the bracket or the rounds. Who has joined here plays here, who has made it
-// here begins it here. With ?wall it is drawn for a wall.
+// A tournament: state, standings, bracket or rounds. Participants of this device play here, its
+// organiser starts it here. With ?wall it is shown as a wall view.
 
 import type { ComponentChildren } from "preact";
 import { useState } from "preact/hooks";
@@ -56,7 +56,7 @@ function Followed({ followed }: { followed: FollowedTournament }) {
   );
 }
 
-/** The page for a visitor, or for a participant. */
+/** The page for a visitor or a participant. */
 function Visited({ heard }: { heard: Heard }) {
   const { tournament } = heard;
   const { tournamentId } = tournament;
@@ -67,7 +67,7 @@ function Visited({ heard }: { heard: Heard }) {
   const holder = another ? "another" : holderOf(invited?.study ?? null, held?.name ?? "");
   const open = tournament.state === TournamentState.OPEN;
   const arrive = () => {
-    // The link has been followed: a reload goes on with the place that was taken.
+    // The link has been used: a reload shows the place that was taken.
     history.replaceState(history.state, "", location.pathname + languageOf(location.search));
     setHeld(heldPlace(tournamentId));
     setAnother(false);
@@ -100,23 +100,23 @@ function Visited({ heard }: { heard: Heard }) {
   );
 }
 
-/** The join code that an address brings, and the study that it is for; null without a code. */
+/** The join code in the address, and its study; null without a code. */
 function inviteIn(search: string): { code: string; study: Study | null } | null {
   const code = new URLSearchParams(search).get("code");
   return code ? { code, study: studyOf(search) } : null;
 }
 
 interface WhoseProps {
-  /** Who has this device's place. */
+  /** Name on this device's place. */
   name: string;
-  /** Whom the link names; empty: nobody. */
+  /** Name in the link; empty for none. */
   as: string;
   onSame: () => void;
   /** Undefined once nobody can join any more. */
   onOther: (() => void) | undefined;
 }
 
-/** Asks who is at this device, where somebody has a place already and would lose it to another. */
+/** Asks who is using this device when it already has a place in the tournament. */
 function Whose({ name, as, onSame, onOther }: WhoseProps) {
   const words = t().experiment.join;
   return (
@@ -134,9 +134,9 @@ function Whose({ name, as, onSame, onOther }: WhoseProps) {
 
 interface CourseProps {
   heard: Heard;
-  /** The participant that this device plays for. */
+  /** The participant of this device. */
   mine: number | undefined;
-  /** Between the head and the standings. */
+  /** Shown between heading and standings. */
   children?: ComponentChildren;
 }
 

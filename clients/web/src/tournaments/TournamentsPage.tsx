@@ -1,4 +1,4 @@
-// The tournaments of the server: those that can be joined, those that are being played, those that are over.
+// The tournaments of the server: open, running and finished.
 
 import { wordsOf } from "../api/faults";
 import { countWords, type Shown, useShown } from "../api/pages";
@@ -12,11 +12,11 @@ import { tournamentsIn } from "./list";
 import css from "./Tournaments.module.css";
 import { inShort, madeWords, TournamentStateChip } from "./words";
 
-/** How often the lists are asked for, milliseconds. */
+/** Polling interval of the lists, milliseconds. */
 const EVERY_MS = 4_000;
-/** And those that are over, milliseconds: nobody waits for them. */
+/** Polling interval of finished tournaments, milliseconds: nobody is waiting for them. */
 const OVER_EVERY_MS = 20_000;
-/** Tournaments of one kind shown at first, and more at a time. */
+/** Tournaments shown at first, and more at a time. */
 const AT_A_TIME = 12;
 
 /** The page. */

@@ -1,5 +1,5 @@
-// A tournament for a wall: nothing but its name, the standings and the tables of the moment, as large as the wall allows; before its beginning
-// who has joined. What does not fit is shown a part at a time.
+// The wall view of a tournament: name, standings and current tables, as large as the screen allows;
+// before the start, the participants. What does not fit is shown in turns.
 
 import type { ComponentChildren } from "preact";
 import { useEffect, useState } from "preact/hooks";
@@ -17,13 +17,13 @@ import { Standings } from "./Standings";
 import css from "./Wall.module.css";
 import { inShort, playWords, TournamentStateChip } from "./words";
 
-/** Lines of the standings that are read at a time. */
+/** Most lines of the standings at a time. */
 const LINES = 10;
-/** Tables that are read at a time. */
+/** Most tables at a time. */
 const TABLES = 12;
-/** Tables of a round with which a bracket can be read: of larger rounds the tables stand side by side. */
+/** Most tables per round for a readable bracket: with more, the tables are shown side by side. */
 const BRACKET_TABLES = 4;
-/** How long each part stays, milliseconds. */
+/** Duration of each part, milliseconds. */
 const EVERY_MS = 9_000;
 
 /** The wall. */
@@ -58,7 +58,7 @@ export function Wall({ heard }: { heard: Heard }) {
   );
 }
 
-/** The standings and the tables, once it has begun. */
+/** The standings and the tables after the start. */
 function Played({ heard }: { heard: Heard }) {
   const { tournament, standings } = heard;
   const words = t().tournaments;
@@ -79,7 +79,7 @@ function Played({ heard }: { heard: Heard }) {
   );
 }
 
-/** The tables of the moment: those of the round, or what is left of a bracket. */
+/** The current tables: those of the round, or the rest of a bracket. */
 function Tables({ heard }: { heard: Heard }) {
   const { tournament } = heard;
   const words = t().tournaments;
@@ -112,7 +112,7 @@ function Tables({ heard }: { heard: Heard }) {
   );
 }
 
-/** A place whose writing is as large as it can be. */
+/** A box whose text is as large as possible. */
 function Fitted({ children }: { children: ComponentChildren }) {
   const box = useFit<HTMLDivElement>();
   return (
@@ -122,7 +122,7 @@ function Fitted({ children }: { children: ComponentChildren }) {
   );
 }
 
-/** Takes the frame of all pages away for as long as the wall is drawn. */
+/** Hides the frame of all pages while the wall view is shown. */
 function useWithoutFrame(): void {
   useEffect(() => {
     document.documentElement.dataset.wall = "";
@@ -132,7 +132,7 @@ function useWithoutFrame(): void {
   }, []);
 }
 
-/** A part of a list, one after the other, each of about the same length and none longer than `most`. */
+/** Splits a list into parts of about equal length, none longer than `most`. */
 function useParts<Item>(all: readonly Item[], most: number) {
   const parts = Math.max(1, Math.ceil(all.length / most));
   const length = Math.ceil(all.length / parts);

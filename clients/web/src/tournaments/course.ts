@@ -1,5 +1,5 @@
-// How the games of a tournament hang together: by round and table, and in a knockout which table leads to which. Pure functions of what the
-// server says; how it is drawn is in Bracket.tsx and Rounds.tsx.
+// The structure of a tournament's games: by round and table, and in a knockout which tables lead to
+// which. Pure functions of the server's data; drawn by Bracket.tsx and Rounds.tsx.
 
 import {
   type Tournament,
@@ -10,11 +10,11 @@ import {
   TournamentState,
 } from "../gen/chefshat/v1/tournament_pb";
 
-/** Participants of a table of a knockout, and how many of them go on. */
+/** Participants per table of a knockout, and how many of them advance. */
 const KNOCKOUT_SEATS = 4;
 const ADVANCING = 2;
 
-/** The games of one table of one round: the same participants, seats rotated. */
+/** The games of a table in a round: the same participants, with rotated seats. */
 export interface PlayedTable {
   readonly table: number;
   readonly games: readonly TournamentGame[];
@@ -26,34 +26,34 @@ export interface PlayedRound {
   readonly tables: readonly PlayedTable[];
 }
 
-/** Who sits at a table of a knockout. */
+/** A participant at a table of a knockout. */
 export interface BracketSeat {
   readonly participant: number;
   /** Score of the table's games that count. */
   readonly score: number;
-  /** Points of those games, which decide between equal scores. */
+  /** Points of those games, which break ties. */
   readonly points: number;
-  /** Whether a later round, or the end of the tournament, says that it got further. */
+  /** Whether a later round, or the end of the tournament, shows that it advanced. */
   readonly wentOn: boolean;
 }
 
 /** A table of a knockout's bracket. */
 export interface BracketTable {
   readonly table: number;
-  /** The tables of the round before whose first two meet here; empty in the first round. */
+  /** The two tables of the previous round that lead here; empty in the first round. */
   readonly from: readonly number[];
-  /** Best first once there are results; empty until it is drawn. */
+  /** Best first once there are results; empty before the draw. */
   readonly seats: readonly BracketSeat[];
   readonly games: readonly TournamentGame[];
 }
 
-/** One round of a knockout. */
+/** A round of a knockout. */
 export interface BracketRound {
   readonly round: number;
   readonly tables: readonly BracketTable[];
 }
 
-/** Games by round and table, each in order. */
+/** Games by round and table, in order. */
 export function playedRounds(games: readonly TournamentGame[]): PlayedRound[] {
   const rounds = new Map<number, Map<number, TournamentGame[]>>();
   for (const game of [...games].sort((one, other) => one.game - other.game)) {
@@ -69,7 +69,7 @@ export function playedRounds(games: readonly TournamentGame[]): PlayedRound[] {
     }));
 }
 
-/** All rounds of a knockout, also those that are not drawn yet. Empty before the first draw. */
+/** All rounds of a knockout, including those not drawn yet. Empty before the first draw. */
 export function bracket(tournament: Tournament, games: readonly TournamentGame[]): BracketRound[] {
   const played = playedRounds(games);
   const first = played[0];
@@ -112,19 +112,19 @@ function ranked(
     };
   });
   const sorted = (seats ?? []).sort((one, other) => other.score - one.score || other.points - one.points);
-  // Who went on stands above who did not: the server breaks ties that the scores leave open.
+  // Those who advanced come first: the server breaks ties that scores leave open.
   const marked = sorted.map((seat, rank) => ({ ...seat, wentOn: wentOn(seat.participant, rank) }));
   return marked.every(({ wentOn: went }) => !went) || marked.filter(({ wentOn: went }) => went).length > ADVANCING
     ? marked
     : marked.sort((one, other) => Number(other.wentOn) - Number(one.wentOn));
 }
 
-/** What a participant did in a game, if it has a seat there. */
+/** A participant's result in a game, if it has a seat there. */
 export function seatOf(game: TournamentGame, participant: number) {
   return game.seats.find((seat) => seat.participant === participant);
 }
 
-/** Games as they are known from a list, with those that were heard of since in their place. */
+/** Games from a list, updated with those from the stream. */
 export function mergedGames(listed: readonly TournamentGame[], heard: readonly TournamentGame[]): TournamentGame[] {
   const byNumber = new Map(listed.map((game) => [game.game, game]));
   for (const game of heard) {
@@ -134,41 +134,41 @@ export function mergedGames(listed: readonly TournamentGame[], heard: readonly T
   return [...byNumber.values()].sort((one, other) => one.game - other.game);
 }
 
-/** Whether nothing more happens to a game. */
+/** Whether the game has ended. */
 export function isOver(game: TournamentGame): boolean {
   return game.state === TournamentGameState.COUNTED || game.state === TournamentGameState.VOID;
 }
 
-/** Whether nothing more happens in a tournament. */
+/** Whether the tournament has ended. */
 export function isEnded(tournament: Tournament): boolean {
   return tournament.state === TournamentState.FINISHED || tournament.state === TournamentState.CLOSED;
 }
 
-/** The game of a participant that is being played, if any. */
+/** The running game of a participant, if any. */
 export function gameOf(games: readonly TournamentGame[], gameId: string): TournamentGame | undefined {
   return games.find((game) => game.gameId === gameId);
 }
 
-/** A participant by its number. */
+/** A participant by number. */
 export function participantOf(tournament: Tournament, number: number): TournamentParticipant | undefined {
   return tournament.participants[number];
 }
 
-/** The name to show for a participant: its own, else that of the built-in agent. */
+/** A participant's display name: its own, else that of the built-in agent. */
 export function nameOf(tournament: Tournament, number: number): string {
   const participant = participantOf(tournament, number);
   return participant?.name || participant?.builtInAgent || `#${number}`;
 }
 
-/** The mean score of a game, which decides the order; 0 before the first. */
+/** The mean score per game, which decides the order; 0 before the first game. */
 export function meanScore(standing: TournamentStanding): number {
   return standing.games === 0 ? 0 : Number(standing.score) / standing.games;
 }
 
-/** How sure an order is, as one of a few grades. */
+/** How certain an order is, as a grade. */
 export type Grade = "certain" | "likely" | "leaning" | "open" | "against";
 
-/** The grade of a confidence of 0..=1. */
+/** The grade of a confidence in 0..=1. */
 export function gradeOf(confidence: number): Grade {
   if (confidence >= 0.95) return "certain";
   if (confidence >= 0.8) return "likely";

@@ -1,33 +1,34 @@
-// Writing that is as large as its place allows, for a wall: the size is sought at which everything in it can just be seen.
+// Text as large as its box allows, for the wall view: finds the largest size at which everything
+// fits.
 
 import type { RefObject } from "preact";
 import { useLayoutEffect, useRef } from "preact/hooks";
 
-/** Smallest size that is tried, pixels: what cannot be read from afar is still not cut off. */
+/** Smallest size, pixels: text too small to read is still not cut off. */
 const SMALLEST = 8;
-/** Largest, as a share of the height of the window: a name is a line of a table, not a headline. */
+/** Largest size, as a share of the window's height: a name is a line of a table, not a headline. */
 const LARGEST = 0.075;
-/** Halvings of the range between the two: then it is found to less than a pixel. */
+/** Halvings of the range between them, which find the size to less than a pixel. */
 const STEPS = 8;
 
-/** A box whose type is as large as its own size allows. What is in it gives its sizes in `em`. */
+/** A box with the largest type that fits it. Its content is sized in `em`. */
 export function useFit<Box extends HTMLElement>(): RefObject<Box | null> {
   const box = useRef<Box>(null);
-  // After each drawing, since anything in it may have changed.
+  // After each render, since anything in it may have changed.
   useLayoutEffect(() => {
     const fitted = box.current;
     if (!fitted) return;
     fitTo(fitted);
     const watch = new ResizeObserver(() => fitTo(fitted));
     watch.observe(fitted);
-    // The page's own type may come later than what is written in it.
+    // The page's font may load after the text is rendered.
     void document.fonts.ready.then(() => fitTo(fitted));
     return () => watch.disconnect();
   });
   return box;
 }
 
-/** Sets the largest size of type at which nothing of a box is out of sight. */
+/** Sets the largest font size at which the content of a box fits. */
 export function fitTo(box: HTMLElement): void {
   let [small, large] = [SMALLEST, Math.max(SMALLEST, LARGEST * window.innerHeight)];
   for (let step = 0; step < STEPS; step += 1) {

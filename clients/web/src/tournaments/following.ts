@@ -1,5 +1,5 @@
-// What the page of a tournament knows: its state and standings as they change (a stream), and besides all its games and how sure the order
-// is, which are asked for when the stream says that something has changed.
+// The data of a tournament's page: its state and standings from a stream, and its games and
+// confidence, which are requested when the stream reports a change.
 
 import { type Signal, signal } from "@preact/signals";
 import { useEffect, useRef, useState } from "preact/hooks";
@@ -10,21 +10,21 @@ import { usePolled } from "../api/poll";
 import type { OrderConfidence, Tournament, TournamentGame, TournamentStanding } from "../gen/chefshat/v1/tournament_pb";
 import { isEnded, mergedGames } from "./course";
 
-/** What the stream says. */
+/** The data of the stream. */
 export interface Heard {
   readonly tournament: Tournament;
   readonly standings: readonly TournamentStanding[];
-  /** Games of the round, or of a round robin those that are being played. */
+  /** Games of the round; of a round robin, the running ones. */
   readonly games: readonly TournamentGame[];
 }
 
-/** A tournament that is followed. */
+/** A followed tournament. */
 export interface FollowedTournament {
   readonly heard: Signal<Heard | undefined>;
   readonly following: Following;
 }
 
-/** Follows a tournament for as long as the page shows it. */
+/** Follows a tournament while its page is shown. */
 export function useTournament(tournamentId: string): FollowedTournament | undefined {
   const [followed, setFollowed] = useState<FollowedTournament | undefined>(undefined);
   useEffect(() => {
@@ -44,26 +44,29 @@ export function useTournament(tournamentId: string): FollowedTournament | undefi
 }
 
 const PAGE_SIZE = 500;
-/** Most pages of games that are asked for. */
+/** Most pages of games requested. */
 const MAX_PAGES = 6;
-/** Games and confidence are not asked for again sooner than this, milliseconds: in a large tournament something changes all the time. */
+/**
+ * Shortest interval between requests of games and confidence, milliseconds: in a large tournament
+ * something changes all the time.
+ */
 const SOONEST_MS = 4_000;
-/** How often they are asked for although the stream says nothing new, milliseconds. */
+/** Interval of these requests without changes, milliseconds. */
 const SELDOM_MS = 60_000;
-/** And when the tournament is over: what does not change needs no asking. */
+/** And when the tournament is over, since nothing changes any more. */
 const HARDLY_MS = 3_600_000;
 
-/** Most games that a page shows. */
+/** Most games shown. */
 export const MAX_GAMES = PAGE_SIZE * MAX_PAGES;
 
-/** All games of a tournament, with what the stream has said of them since. */
+/** All games of a tournament, updated with those from the stream. */
 export function useGames({ tournament, games }: Heard): TournamentGame[] {
   const { tournamentId } = tournament;
   const listed = usePolled((abort) => listGames(tournamentId, abort), quietMs(tournament), useChanges(tournament));
   return mergedGames(listed.value ?? [], games);
 }
 
-/** For each two who follow one another in the standings, how sure their order is. */
+/** How certain the order of each two neighbours in the standings is. */
 export function useConfidence({ tournament }: Heard): readonly OrderConfidence[] {
   const { tournamentId, gamesOver } = tournament;
   const ask = async (abort: AbortSignal) => {
@@ -78,7 +81,10 @@ function quietMs(tournament: Tournament): number {
   return isEnded(tournament) ? HARDLY_MS : SELDOM_MS;
 }
 
-/** Another text whenever something has changed that only the server's lists tell, but not sooner than `SOONEST_MS` after the one before. */
+/**
+ * A key that changes when something in the server's lists has changed, but at most once per
+ * `SOONEST_MS`.
+ */
 function useChanges({ tournamentId, state, round, gamesOver }: Tournament): string {
   const now = `${tournamentId} ${state} ${round} ${gamesOver}`;
   const [told, setTold] = useState(now);

@@ -1,4 +1,5 @@
-// Holding a tournament: making it, beginning it, closing it, and the secrets of it that this device keeps for that. Taking part is in place.ts.
+// Organising a tournament: creating, starting and closing it, and the secrets that this device
+// stores for it. Taking part is in place.ts.
 
 import type { MessageInitShape } from "@bufbuild/protobuf";
 import { CALL_LIMIT_MS, tournamentApi } from "../api/client";
@@ -6,20 +7,20 @@ import type { TournamentSettingsSchema } from "../gen/chefshat/v1/tournament_pb"
 import { pathOf } from "../router";
 import { recallObject, remember } from "../store";
 
-/** The secrets of a tournament that this device has made. */
+/** The secrets of a tournament that this device created. */
 export interface HostedTournament {
   joinCode: string;
   ownerToken: string;
 }
 
-/** The secrets of a tournament if this device made it. */
+/** The secrets of a tournament, if this device created it. */
 export function hostedTournament(tournamentId: string): HostedTournament | null {
   return recallObject(`organised.${tournamentId}`, ({ joinCode, ownerToken }) =>
     typeof joinCode === "string" && typeof ownerToken === "string" ? { joinCode, ownerToken } : null,
   );
 }
 
-/** Makes a tournament and remembers its secrets; gives its id. */
+/** Creates a tournament and stores its secrets; returns its id. */
 export async function makeTournament(settings: MessageInitShape<typeof TournamentSettingsSchema>): Promise<string> {
   const { tournament, joinCode, ownerToken } = await tournamentApi.createTournament(
     { settings },
@@ -31,17 +32,17 @@ export async function makeTournament(settings: MessageInitShape<typeof Tournamen
   return tournament.tournamentId;
 }
 
-/** Begins a tournament that this device has made. */
+/** Starts a tournament that this device created. */
 export async function startTournament(tournamentId: string): Promise<void> {
   await tournamentApi.startTournament(ownership(tournamentId), { timeoutMs: CALL_LIMIT_MS });
 }
 
-/** Closes a tournament that this device has made; games that are being played are aborted. */
+/** Closes a tournament that this device created; running games are aborted. */
 export async function closeTournament(tournamentId: string): Promise<void> {
   await tournamentApi.closeTournament(ownership(tournamentId), { timeoutMs: CALL_LIMIT_MS });
 }
 
-/** The address that invites to a tournament. */
+/** The invitation address of a tournament. */
 export function invitationTo(tournamentId: string, code: string): string {
   return `${location.origin}${pathOf({ page: "tournament", tournamentId })}?code=${encodeURIComponent(code)}`;
 }

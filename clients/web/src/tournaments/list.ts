@@ -4,7 +4,7 @@ import { CALL_LIMIT_MS, tournamentApi } from "../api/client";
 import type { AskPage } from "../api/pages";
 import type { Tournament, TournamentState } from "../gen/chefshat/v1/tournament_pb";
 
-/** Asks for the tournaments in a state. */
+/** Requests the tournaments in a state. */
 export function tournamentsIn(state: TournamentState): AskPage<Tournament> {
   return async (page, signal) => {
     const call = { signal, timeoutMs: CALL_LIMIT_MS };

@@ -1,5 +1,5 @@
-// Playing in a tournament: one stream for the participant, on which the server seats it in each of its games. Each seat becomes a table to
-// act at; acting itself is in table/acting.ts, what is drawn in Participation.tsx.
+// Playing in a tournament: one stream per participant, on which the server attaches it to a seat in
+// each of its games. Each seat becomes a table (table/acting.ts), drawn by Participation.tsx.
 
 import { batch, type Signal, signal } from "@preact/signals";
 import { CALL_LIMIT_MS, playApi, roomApi } from "../api/client";
@@ -10,10 +10,13 @@ import type { Room } from "../gen/chefshat/v1/room_pb";
 import { type Acting, startActing } from "../table/acting";
 import { tableFromRoom } from "../table/model/state";
 
-/** Seats that the server attaches by itself are numbered from here. */
+/** Handles of seats that the server attaches start here. */
 const FIRST_SEATED = 2 ** 31;
 
-/** How long to wait after a room could not be asked for: at first, and at most, doubled each time. */
+/**
+ * Delay before a failed request of a room is repeated: the first, and the longest, doubled each
+ * time.
+ */
 const SHORTEST_WAIT_MS = 500;
 const LONGEST_WAIT_MS = 16_000;
 
@@ -23,30 +26,33 @@ export type Presence = "coming" | "here" | "superseded" | "over" | "refused";
 export interface Participation {
   readonly presence: Signal<Presence>;
   readonly following: Signal<Following>;
-  /** The game that was begun last; undefined before the first. */
+  /** The newest game; undefined before the first. */
   readonly game: Signal<Acting | undefined>;
-  /** Takes the place back from another page that has taken it. */
+  /** Takes the place back from another tab. */
   takeBack(): void;
   stop(): void;
 }
 
-/** What is heard of a seat before its room is known. */
+/** Updates of a seat before its room is known. */
 interface Seated {
   acting: Acting | undefined;
   waiting: SeatUpdate[];
 }
 
-/** Takes part with a participant's ticket; `timed` if its decisions are sent with the time that the person took. */
+/** Takes part with a participant's ticket; `timed` sends the decision time with each answer. */
 export function startParticipation(ticket: string, timed: boolean): Participation {
   const presence = signal<Presence>("coming");
   const game = signal<Acting | undefined>(undefined);
   let stopped = false;
-  /** By room: after a lost connection a seat has another handle, but it is the same table. */
+  /** By room: after a reconnect a seat has another handle, but the same table. */
   const rooms = new Map<string, Seated>();
 
   const isPresent = () => !stopped && (presence.peek() === "coming" || presence.peek() === "here");
 
-  /** The room of a game, without which its table cannot be drawn; undefined if it is gone or the place is not this page's any more. */
+  /**
+   * The room of a game, needed to draw its table; undefined if it is gone or the place belongs to
+   * another tab.
+   */
   const askRoom = async (roomId: string): Promise<Room | undefined> => {
     for (let waitMs = SHORTEST_WAIT_MS; isPresent(); waitMs = Math.min(LONGEST_WAIT_MS, 2 * waitMs)) {
       try {
@@ -67,7 +73,7 @@ export function startParticipation(ticket: string, timed: boolean): Participatio
     const load = async () => {
       const room = await askRoom(attached.roomId);
       if (!room) {
-        // Should the seat be announced again, it is asked for anew.
+        // If the seat is announced again, the request is repeated.
         rooms.delete(attached.roomId);
         return;
       }
@@ -78,7 +84,7 @@ export function startParticipation(ticket: string, timed: boolean): Participatio
       });
       seated.acting = acting;
       seated.waiting = [];
-      // Only the newest game is shown: one that has ended is done with.
+      // Only the newest game is shown.
       for (const [roomId, other] of rooms) if (other.acting && hasEnded(other.acting)) rooms.delete(roomId);
     };
     void load();

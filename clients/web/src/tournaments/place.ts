@@ -1,19 +1,18 @@
-// Taking part in a tournament: joining it, and what this device remembers of the place it has taken. How its games are played is in
-// participation.ts.
+// Joining a tournament, and the place that this device stores. Playing is in participation.ts.
 
 import { CALL_LIMIT_MS, tournamentApi } from "../api/client";
 import { ParticipantKind } from "../gen/chefshat/v1/room_pb";
 import { canonical } from "../lobby/seat";
 import { recallObject, remember } from "../store";
 
-/** A place in a tournament that this device has taken. */
+/** A place of this device in a tournament. */
 export interface HeldPlace {
   ticket: string;
   participant: number;
   name: string;
 }
 
-/** The place that this device has in a tournament, if any. */
+/** This device's place in a tournament, if any. */
 export function heldPlace(tournamentId: string): HeldPlace | null {
   return recallObject(`tournament.${tournamentId}`, ({ ticket, participant, name }) =>
     typeof ticket === "string" && typeof participant === "number" && typeof name === "string"
@@ -22,7 +21,7 @@ export function heldPlace(tournamentId: string): HeldPlace | null {
   );
 }
 
-/** Joins as a person. Gives the tournament's id. */
+/** Joins as a person. Returns the tournament's id. */
 export async function takePlace(tournamentId: string, code: string, name: string): Promise<string> {
   const joined = await tournamentApi.joinTournament(
     { tournamentId, joinCode: canonical(code), name: name.trim(), kind: ParticipantKind.HUMAN },

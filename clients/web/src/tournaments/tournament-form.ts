@@ -1,5 +1,5 @@
-// What the form for a new tournament holds, and the settings that it asks for: the form of play, who takes part, when it begins, and the
-// fields of every game (lobby/game-form.ts). Values without a page: how they are asked for is in NewTournament.tsx. Bounds are the server's.
+// The form for a new tournament and its settings: format, participants, start, and the fields of
+// every game (lobby/game-form.ts). Drawn by NewTournament.tsx. The bounds are the server's.
 
 import type { MessageInitShape } from "@bufbuild/protobuf";
 import { ParticipantKind } from "../gen/chefshat/v1/room_pb";
@@ -16,17 +16,17 @@ import {
 } from "../lobby/game-form";
 import { type Bounds, type NumberProblem, secondsProblem, wholeProblem } from "../lobby/problems";
 
-/** The form; numbers as they were typed. */
+/** The form; numbers as typed. */
 export interface TournamentForm extends GameForm {
   name: string;
   format: "knockout" | "roundRobin" | "swiss";
-  /** Seats of a table. */
+  /** Seats per table. */
   players: "2" | "3" | "4" | "5" | "6";
-  /** Empty: as many as the format suggests. */
+  /** Empty for as many as the format suggests. */
   rounds: string;
   gamesPerPairing: string;
   deals: "independent" | "same" | "rotated";
-  /** How many take part of each built-in agent, by its name. */
+  /** Number of each built-in agent, by name. */
   builtIn: Readonly<Record<string, string>>;
   people: boolean;
   agents: boolean;
@@ -38,7 +38,7 @@ export interface TournamentForm extends GameForm {
   maxCalls: string;
   maxParallel: string;
   filler: string;
-  /** Whether agents and robots have the times of all, or their own. */
+  /** Whether agents and robots have their own times. */
   otherClocks: boolean;
   agentSeconds: string;
   robotSeconds: string;
@@ -50,14 +50,14 @@ export interface TournamentForm extends GameForm {
 /** Names of the fields. */
 export type TournamentField = keyof TournamentForm;
 
-/** Why a field cannot be sent. */
+/** Why a field is invalid. */
 export type Problem = NumberProblem | OwnProblem;
 export type OwnProblem = "nameMissing" | "tooMany" | "nobody" | "notASeed";
 
-/** Most participants of a tournament that the protocol has room for. */
+/** Most participants of a tournament in the protocol. */
 const MAX_PARTICIPANTS = 1024;
 
-/** A form to begin with: a knockout for people and agents that its organiser begins. */
+/** The initial form: a knockout for people and agents that its organiser starts. */
 export function newTournament(agents: readonly string[]): TournamentForm {
   return {
     ...newGame(),
@@ -86,22 +86,28 @@ export function newTournament(agents: readonly string[]): TournamentForm {
   };
 }
 
-/** The form with another format. A knockout is for tables of four; points of another number of seats fit no more. */
+/**
+ * Changes the format. A knockout has tables of four; points for another number of seats are
+ * cleared.
+ */
 export function withFormat(form: TournamentForm, format: TournamentForm["format"]): TournamentForm {
   return format === "knockout" ? { ...withTable(form, "4"), format, rounds: "" } : { ...form, format };
 }
 
-/** The form with tables of another size. */
+/** Changes the number of seats per table. */
 export function withTable(form: TournamentForm, players: TournamentForm["players"]): TournamentForm {
   return { ...form, players, points: players === form.players ? form.points : "" };
 }
 
-/** The form without spectators where games are dealt alike: nobody may watch there, and what was typed for it before is not asked for. */
+/**
+ * The form without spectators if deals are shared: they are not allowed then, and the fields for
+ * them are ignored.
+ */
 function asWatched(form: TournamentForm): TournamentForm {
   return { ...form, spectators: form.spectators && form.deals === "independent" };
 }
 
-/** What can be seen to be wrong before it is sent. */
+/** Problems that can be found before submitting. */
 export function problemsOf(form: TournamentForm): Partial<Record<TournamentField, Problem>> {
   const problems: Partial<Record<TournamentField, Problem | undefined>> = gameProblems(
     asWatched(form),
@@ -133,20 +139,20 @@ function isCount(typed: string): boolean {
   return wholeProblem(typed, [0, MAX_PARTICIPANTS]) === undefined;
 }
 
-/** Whether what was typed for a built-in agent is no number of participants; nothing typed is none. */
+/** Whether the typed number of a built-in agent is invalid; empty is valid. */
 export function isNoCount(typed: string): boolean {
   return typed.trim() !== "" && !isCount(typed);
 }
 
-/** How many built-in agents take part, as far as numbers were typed. */
+/** Number of built-in agents, as far as valid numbers were typed. */
 export function builtIns(form: TournamentForm): number {
   return Object.values(form.builtIn).reduce((sum, count) => sum + (isCount(count) ? Number(count) : 0), 0);
 }
 
-/** The settings that a form asks for; it must have no problems. */
+/** The settings of a form without problems. */
 export function settingsOf(form: TournamentForm): MessageInitShape<typeof TournamentSettingsSchema> {
   const { spectators, ...policy } = policyOf(asWatched(form));
-  // Where games are dealt alike, the server does not take it as said that nobody may watch.
+  // With shared deals the server requires that spectators are turned off explicitly.
   const watched = form.deals === "independent" ? { spectators } : {};
   const clocks = form.otherClocks
     ? [
@@ -176,7 +182,7 @@ export function settingsOf(form: TournamentForm): MessageInitShape<typeof Tourna
   };
 }
 
-/** The fields by the names that the protocol has for what is typed in them. */
+/** The fields by their names in the protocol. */
 export const TOURNAMENT_FIELDS: Record<string, TournamentField> = {
   ...GAME_FIELDS,
   name: "name",
@@ -206,7 +212,7 @@ const DEALS = {
   rotated: TournamentDeals.ROTATED,
 };
 
-/** Kinds that may join; none are named if all may. */
+/** Kinds that may join; none are listed if all may. */
 function kindsOf(form: TournamentForm): ParticipantKind[] {
   const { people, agents, robots } = form;
   if (people && agents && robots) return [];

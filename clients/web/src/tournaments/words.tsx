@@ -1,4 +1,4 @@
-// What a tournament is and where it stands, in words, with a sign beside the word that does not need its colour.
+// A tournament in words: format, state, how it is played.
 
 import { ParticipantKind } from "../gen/chefshat/v1/room_pb";
 import { type Tournament, TournamentDeals, TournamentFormat, TournamentState } from "../gen/chefshat/v1/tournament_pb";
@@ -21,7 +21,7 @@ export function TournamentStateChip({ tournament }: { tournament: Tournament }) 
   }
 }
 
-/** Form, size and how far it has come, in a line. */
+/** Format, size and progress, in one line. */
 export function inShort(tournament: Tournament): string {
   const words = t().tournaments;
   const parts = [formatWord(tournament)];
@@ -31,13 +31,16 @@ export function inShort(tournament: Tournament): string {
   return parts.join(" · ");
 }
 
-/** When it was made: of two with one name that tells them apart. */
+/** When it was created, which tells apart tournaments of the same name. */
 export function madeWords({ createdAtMs }: Tournament): string {
   const dates = new Intl.DateTimeFormat(dateLocale(), { dateStyle: "medium", timeStyle: "short" });
   return t().tournaments.made(dates.format(Number(createdAtMs)));
 }
 
-/** How it will be played, as far as it is known before it begins: when that is, how often one plays, how much time people have. */
+/**
+ * How it will be played, as far as known before the start: when it starts, how many games, how much
+ * time people have.
+ */
 export function playWords(tournament: Tournament): string[] {
   const words = t().tournaments.play;
   const { settings } = tournament;
@@ -55,7 +58,7 @@ export function playWords(tournament: Tournament): string[] {
   return parts;
 }
 
-/** Whether people may join: with rotated deals only those may who remember nothing. */
+/** Whether people may join: with rotated deals only stateless agents may. */
 export function isForPeople({ settings }: Tournament): boolean {
   const kinds = settings?.kinds ?? [];
   if (settings?.deals === TournamentDeals.ROTATED) return false;
@@ -68,7 +71,7 @@ export function isForAgents({ settings }: Tournament): boolean {
   return kinds.length === 0 || kinds.includes(ParticipantKind.AGENT);
 }
 
-/** What has to be known of the deals; undefined if every game is dealt anew. */
+/** What is special about the deals; undefined if every game is dealt anew. */
 export function dealsWords(tournament: Tournament): string | undefined {
   const words = t().tournaments.deals;
   switch (tournament.settings?.deals) {
@@ -81,7 +84,7 @@ export function dealsWords(tournament: Tournament): string | undefined {
   }
 }
 
-/** Who plays whom, in a word. */
+/** The format in a word. */
 export function formatWord(tournament: Tournament): string {
   const words = t().tournaments.formats;
   switch (tournament.settings?.format) {

@@ -1,4 +1,4 @@
-// A short Shift that teaches the rules: the lessons one after the other at a table of its own, without a server.
+// The tutorial: lessons at a table without a server, which teach the rules in a short Shift.
 
 import { useEffect, useState } from "preact/hooks";
 import { DecisionKind } from "../gen/chefshat/v1/decision_pb";
@@ -21,10 +21,10 @@ import { TableView } from "../table/view/TableView";
 import { firstTable, GIFTS, givenBy, LESSONS, type Lesson, nextEvent } from "./lessons";
 import css from "./Tutorial.module.css";
 
-/** From one event of the script to the next, so that they can be followed. */
+/** Delay between the events of the script, milliseconds. */
 const PACE_MS = 850;
 
-/** Where the reader stands: the lesson, and what of the one before is still to happen. */
+/** The reader's progress: the lesson, and the events of the previous one still to come. */
 interface Progress {
   readonly lesson: number;
   readonly table: TableState;
@@ -98,7 +98,7 @@ export function TutorialPage() {
   );
 }
 
-/** A first game of one's own, without the way over the lobby. */
+/** Starts a first game directly, without the lobby. */
 function PlayNow() {
   const { busy, fault, run } = useAttempt();
   return (
@@ -111,7 +111,10 @@ function PlayNow() {
   );
 }
 
-/** The lesson's decision, in the form of a real one. Cards given already have left the hand, though nobody has received them yet. */
+/**
+ * The lesson's decision in the form of a real one. Given cards have left the hand, although nobody
+ * has received them yet.
+ */
 function openDecision({ lesson, table, actions }: Progress, asked: NonNullable<Lesson["decision"]>): OpenDecision {
   const given = givenBy(actions).map((face): Card => ({ kind: "face", face }));
   const hand = without(table.seats[0]?.hand ?? [], given);

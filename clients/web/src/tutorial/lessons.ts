@@ -1,5 +1,7 @@
-// The script of the tutorial: a Shift with small hands in which every decision teaches one rule, and the exchange after it. It is data: the
-// events are those of the protocol and go through the same model as a real game's. The words are in the texts, by the lesson's name.
+// The script of the tutorial: a Shift with small hands in which every decision teaches one rule,
+// and the exchange after it. Its events are those of the protocol and are applied by the same model
+// as a real game. The texts are in i18n, by the name of the lesson.
+// same model as a real game's. The words are in the texts, by the lesson's name.
 
 import { create, type MessageInitShape } from "@bufbuild/protobuf";
 import { DecisionKind } from "../gen/chefshat/v1/decision_pb";
@@ -13,12 +15,12 @@ import { emptyTable, type SeatState, type TableState } from "../table/model/stat
 
 type Kind = NonNullable<MessageInitShape<typeof GameEventSchema>["kind"]>;
 
-/** One lesson: what is said, what may be done, what happens then. */
+/** A lesson: its text, the expected decision, and what follows. */
 export interface Lesson {
   readonly name: keyof Texts["tutorial"]["lessons"];
-  /** The decision to be made; without one the reader goes on by a button. */
+  /** The expected decision; without one the reader continues with a button. */
   readonly decision?: { readonly kind: DecisionKind; readonly moves: readonly Move[] };
-  /** What happens after it, given all actions taken so far. */
+  /** The events after it, given all actions so far. */
   readonly follows: (actions: readonly number[]) => readonly Kind[];
 }
 
@@ -29,11 +31,11 @@ const GRETA = 1;
 const ROLF = 2;
 const GUSTAV = 3;
 
-/** The reader's hand at the beginning. Every seat has as many cards. */
+/** The reader's initial hand. Every seat has as many cards. */
 const HAND = [3, 5, 5, 8, 8, 10, 11, 11, JOKER];
 /** The hand of the second Shift, before the exchange. */
 const SECOND_HAND = [4, 6, 6, 7, 9, 10, 10, 11, 11];
-/** What the Dishwasher gives then. */
+/** The Dishwasher's gift. */
 const GIFT = [1, 3];
 
 const play = (seat: number, quantity: number, face: number, cardsLeft: number, jokers = 0): Kind => {
@@ -158,7 +160,7 @@ export function firstTable(you: string): TableState {
   return { ...emptyTable(seats), phase: "dealt", shift: 1, played: Array<number>(FACES + 1).fill(0) };
 }
 
-/** An event of the script as the next one of a table. */
+/** Creates an event of the script as the next one of a table. */
 export function nextEvent(table: TableState, kind: Kind): GameEvent {
   return create(GameEventSchema, { sequence: BigInt(table.nextSequence), kind });
 }

@@ -1,4 +1,5 @@
-// The lobby in a real browser: from one page to the other, a room made and joined by its invitation, what is refused said in words.
+// The lobby in a real browser: from one page to the other, a room made and joined by its
+// invitation, what is refused said in words.
 
 import { expect, test } from "vitest";
 import { sitDown } from "./play";

@@ -1,5 +1,6 @@
-// A tournament from its making to its end without a command line: its organiser makes it on the page, invites, begins it; a person joins from
-// another browser and plays; and what is refused is marked at its field.
+// A tournament from its making to its end without a command line: its organiser makes it on the
+// page, invites, begins it; a person joins from another browser and plays; and what is refused is
+// marked at its field.
 
 import { expect, test } from "vitest";
 import { byClicks, playOn } from "./play";

@@ -1,5 +1,5 @@
-// Every page by itself: no serious fault for those who cannot see or who use the keyboard, by light and by dark; no scrolling sideways on a
-// phone; and what the first page loads.
+// Every page by itself: no serious fault for those who cannot see or who use the keyboard, by light
+// and by dark; no scrolling sideways on a phone; and what the first page loads.
 
 import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";

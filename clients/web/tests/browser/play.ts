@@ -1,5 +1,6 @@
-// What a person does at the table: sits down, waits for a decision, takes it with the mouse or with the keyboard alone. Which cards are
-// picked does not matter to the tests: the rarest face last, so that the Shift is not over at once.
+// What a person does at the table: sits down, waits for a decision, takes it with the mouse or with
+// the keyboard alone. Which cards are picked does not matter to the tests: the rarest face last, so
+// that the Shift is not over at once.
 
 import type { Page } from "playwright-core";
 import { type Server, until } from "./stage";
@@ -15,7 +16,10 @@ export async function sitDown(page: Page, server: Server, code: string, name: st
   await page.waitForURL(/\/rooms\//);
 }
 
-/** Waits for a decision that is not the one before; gives its number, or undefined once the game is over. */
+/**
+ * Waits for a decision that is not the one before; gives its number, or undefined once the game is
+ * over.
+ */
 export async function nextDecision(page: Page, before?: string): Promise<string | undefined> {
   const found = await page.waitForFunction((before) => {
     if (document.querySelector('[data-part~="result"] a[href^="/replay/"]')) return "over";
@@ -29,7 +33,10 @@ export async function nextDecision(page: Page, before?: string): Promise<string 
 /** A way to take the open decision. */
 export type Way = (page: Page) => Promise<void>;
 
-/** Plays to the end of the game; gives the number of decisions taken. `each` is done while a decision is open. */
+/**
+ * Plays to the end of the game; gives the number of decisions taken. `each` is done while a
+ * decision is open.
+ */
 export async function playOn(page: Page, way: Way, each?: (taken: number) => Promise<void>): Promise<number> {
   let taken = 0;
   for (let id = await nextDecision(page); id !== undefined; id = await nextDecision(page, id)) {
@@ -96,7 +103,10 @@ export async function tabTo(page: Page, wanted: (on: Focus) => boolean, key = "T
 /** What the hand is called, which has the focus itself after a decision, on none of its cards. */
 export const HAND = "Your hand";
 
-/** Takes the decision with the keyboard: along the hand with the arrow keys, a card with the space bar, Enter to play. */
+/**
+ * Takes the decision with the keyboard: along the hand with the arrow keys, a card with the space
+ * bar, Enter to play.
+ */
 export const byKeys: Way = async (page) => {
   if (await page.locator('[data-action="decline"]').isVisible()) {
     await tabTo(page, (on) => on.action === "decline");

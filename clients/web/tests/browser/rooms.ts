@@ -1,5 +1,6 @@
-// Rooms and agents for browser tests: rooms made over the protocol, so that a test has the rules and opponents it needs, and agents that
-// are programs of their own and connect as anybody's would. What people do on the page is in play.ts.
+// Rooms and agents for browser tests: rooms made over the protocol, so that a test has the rules
+// and opponents it needs, and agents that are programs of their own and connect as anybody's would.
+// What people do on the page is in play.ts.
 
 import { spawn } from "node:child_process";
 import { existsSync, readFileSync } from "node:fs";
@@ -30,7 +31,10 @@ interface Wanted {
   /** The second Shift to begin with instead of a first deal: a hand for each seat, by face, a joker being one more than the faces. The top face
    * of the last hand that has it is the Golden card; in the Shift before the first seat was last. */
   hands?: readonly (readonly number[])[];
-  /** A game that counts for the leaderboard, and so is dealt by chance; otherwise the deals are always the same. */
+  /**
+   * A game that counts for the leaderboard, and so is dealt by chance; otherwise the deals are
+   * always the same.
+   */
   rated?: boolean;
   policy?: Partial<Pick<RoomPolicy, "paceMs" | "spectatorDelayDecisions" | "spectatorsSeeHands">>;
 }

@@ -1,5 +1,5 @@
-// People at a table: whole Shifts with the mouse and with the keyboard alone, through a reload and through the end of the server, and
-// two people with two agents in one room.
+// People at a table: whole Shifts with the mouse and with the keyboard alone, through a reload and
+// through the end of the server, and two people with two agents in one room.
 
 import type { Page } from "playwright-core";
 import { expect, test } from "vitest";
@@ -41,7 +41,8 @@ test("a person plays a whole Shift with the keyboard alone, and hears every turn
   await page.keyboard.type("Rosa");
   await page.keyboard.press("Enter");
   const taken = await playOn(page, byKeys, async (already) => {
-    // From its second decision on a player is in the hand or at the buttons, never thrown back to the top of the page.
+    // From its second decision on a player is in the hand or at the buttons, never thrown back to
+    // the top of the page.
     if (already > 0) await expect.poll(async () => (await focus(page)).label).not.toBe("");
   });
   await expectEnd(page, roomId, taken);

@@ -1,4 +1,5 @@
-// Screens from a small phone to a large desk: what a player needs to decide is seen at once, without scrolling and under nothing else.
+// Screens from a small phone to a large desk: what a player needs to decide is seen at once,
+// without scrolling and under nothing else.
 
 import type { Page } from "playwright-core";
 import { expect, test } from "vitest";
@@ -134,7 +135,10 @@ async function expectSeenNow(page: Page, parts: readonly string[]): Promise<void
   await expect.poll(() => unseen(page, parts), { message }).toEqual([]);
 }
 
-/** Parts that are not there, not wholly in the window of a page that has not been scrolled, or covered in the middle. */
+/**
+ * Parts that are not there, not wholly in the window of a page that has not been scrolled, or
+ * covered in the middle.
+ */
 async function unseen(page: Page, parts: readonly string[]): Promise<string[]> {
   return page.evaluate((parts) => {
     scrollTo(0, 0);
@@ -148,7 +152,8 @@ async function unseen(page: Page, parts: readonly string[]): Promise<string[]> {
         const inside = box.left >= -1 && box.top >= -1 && box.right <= right && box.bottom <= bottom;
         const at = document.elementFromPoint(box.left + box.width / 2, box.top + box.height / 2);
         const free = at !== null && (element.contains(at) || at.contains(element));
-        // What the board shows may have the result over it, and the cards of a hand lie on each other.
+        // What the board shows may have the result over it, and the cards of a hand lie on each
+        // other.
         const seen = inside && (free || element.matches('[data-part~="board"], [data-part~="hand-stack"]'));
         return seen ? [] : [`${part} ${index}: ${Math.round(box.top)} to ${Math.round(box.bottom)}`];
       });

@@ -1,4 +1,5 @@
-// What a browser test stands on: a server of its own with the built page, and a browser that may be given several people.
+// What a browser test stands on: a server of its own with the built page, and a browser that may be
+// given several people.
 
 import { type ChildProcess, spawn } from "node:child_process";
 import { mkdtempSync, rmSync } from "node:fs";
@@ -33,7 +34,10 @@ export class Server {
     return `http://${this.address}`;
   }
 
-  /** Ends the server as if its machine had lost power, and starts it again on the same port with what it had kept. */
+  /**
+   * Ends the server as if its machine had lost power, and starts it again on the same port with
+   * what it had kept.
+   */
   async restart(): Promise<void> {
     await ended(this.process, "SIGKILL");
     this.process = (await serve(this.dataDir, this.address)).child;
@@ -68,7 +72,10 @@ export async function startBrowser(): Promise<Browser> {
   return chromium.launch({ executablePath: CHROMIUM, args: FLAGS });
 }
 
-/** A person's page, in English unless told otherwise; whatever the page throws or logs as an error goes into `faults`. */
+/**
+ * A person's page, in English unless told otherwise; whatever the page throws or logs as an error
+ * goes into `faults`.
+ */
 export async function person(
   browser: Browser,
   options: BrowserContextOptions = {},

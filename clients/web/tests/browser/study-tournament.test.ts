@@ -1,5 +1,6 @@
-// A study in a tournament by its links: a participant agrees, joins under the name that the link says, and in every game sees what it says; the
-// times measured at the page go with the decisions, and the questionnaire comes when the whole tournament is over, as often as the link is opened.
+// A study in a tournament by its links: a participant agrees, joins under the name that the link
+// says, and in every game sees what it says; the times measured at the page go with the decisions,
+// and the questionnaire comes when the whole tournament is over, as often as the link is opened.
 
 import { expect, test } from "vitest";
 import { TournamentFormat } from "../../src/gen/chefshat/v1/tournament_pb";

@@ -1,5 +1,6 @@
-// A study by its links: the host makes them, a participant agrees, fills in a questionnaire, plays under the name and in the seat that the
-// link says, sees what the link says, and the times measured at the page go with the decisions. And what a link cannot do.
+// A study by its links: the host makes them, a participant agrees, fills in a questionnaire, plays
+// under the name and in the seat that the link says, sees what the link says, and the times
+// measured at the page go with the decisions. And what a link cannot do.
 
 import { readFileSync } from "node:fs";
 import { expect, test } from "vitest";
@@ -57,7 +58,8 @@ test("a participant's link leads from the consent to the table, and to the quest
   const after = page.getByRole("link", { name: "Apri il questionario" });
   expect(await after.getAttribute("href")).toBe(`https://forms.example/after?id=P07&room=${roomId}`);
   expect(await page.locator("html").getAttribute("lang")).toBe("it");
-  // The link leads back to it, also once the table was left for another page, until everything is forgotten.
+  // The link leads back to it, also once the table was left for another page, until everything is
+  // forgotten.
   await page.goto(link.href);
   await page.waitForURL(/\/rooms\//);
   await after.waitFor();
@@ -123,7 +125,8 @@ test("what a study leaves out is left out from its first page to the end of the 
   const { code } = await newRoom(server, { seats: ["person", "agent", "random", "random"] });
   const { page, faults } = await person(browser);
   const hide = "log lookup expressions played pages";
-  // From the first moment at which something is left out on, whether anything of it was ever shown again.
+  // From the first moment at which something is left out on, whether anything of it was ever shown
+  // again.
   await page.addInitScript(() => {
     let last: string | undefined;
     const look = () => {
@@ -311,7 +314,8 @@ test("a link without a name asks whose the seat is that this device has, and a s
   await page.goto(link);
   await page.getByRole("button", { name: "Continue as Ada" }).click();
   await page.getByText("(you)").waitFor();
-  // To the page a ticket that the server does not know any more is the same as one that it has never known.
+  // To the page a ticket that the server does not know any more is the same as one that it has
+  // never known.
   await page.evaluate(() => {
     for (const [name, kept] of Object.entries(localStorage)) {
       if (!name.startsWith("chefshat.seat.")) continue;

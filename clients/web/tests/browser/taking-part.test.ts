@@ -1,5 +1,6 @@
-// A person in a tournament: joins on its page, is seated in each of its games there, through a reload and the end of the server, and is back
-// at the standings. And the same tournament as a wall shows it.
+// A person in a tournament: joins on its page, is seated in each of its games there, through a
+// reload and the end of the server, and is back at the standings. And the same tournament as a wall
+// shows it.
 
 import { expect, test } from "vitest";
 import { TournamentFormat } from "../../src/gen/chefshat/v1/tournament_pb";
@@ -9,7 +10,10 @@ import { browser, person, server, useStage } from "./stage";
 
 useStage();
 
-/** A tournament of one Shift a game that begins when so many have joined, with one person if not said; its id and join code. */
+/**
+ * A tournament of one Shift a game that begins when so many have joined, with one person if not
+ * said; its id and join code.
+ */
 async function newTournament(rounds: number, startWhenJoined = 4): Promise<{ id: string; code: string }> {
   const { tournament, joinCode } = await clientsOf(server).tournaments.createTournament({
     settings: {
@@ -41,7 +45,8 @@ test("a person joins, plays every game of the tournament and sees the final stan
   await page.getByLabel("Your name").fill("Rosa");
   await page.getByRole("button", { name: "Join the tournament" }).click();
 
-  // The first game begins here by itself, and comes back to the same decision after a reload and after the end of the server.
+  // The first game begins here by itself, and comes back to the same decision after a reload and
+  // after the end of the server.
   let interrupted = 0;
   await playOn(page, byClicks, async (already) => {
     if (already !== 1 && already !== 2) return;

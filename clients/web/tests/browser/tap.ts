@@ -1,4 +1,5 @@
-// What a page is told, byte by byte: a tap between a browser and the server that keeps every answer's body, and the messages in it.
+// What a page is told, byte by byte: a tap between a browser and the server that keeps every
+// answer's body, and the messages in it.
 
 import { createServer, type Server as HttpServer, request } from "node:http";
 import type { AddressInfo } from "node:net";
@@ -6,7 +7,10 @@ import type { DescMessage, MessageShape } from "@bufbuild/protobuf";
 import { fromBinary } from "@bufbuild/protobuf";
 import type { Server } from "./stage";
 
-/** The frames of gRPC-web begin with a byte of flags, of which this one marks the trailers, and four bytes of length. */
+/**
+ * The frames of gRPC-web begin with a byte of flags, of which this one marks the trailers, and four
+ * bytes of length.
+ */
 const TRAILERS = 0x80;
 const HEAD_BYTES = 5;
 

@@ -1,4 +1,5 @@
-// The page of a tournament, left open from before its beginning to its end: it follows without being loaded again.
+// The page of a tournament, left open from before its beginning to its end: it follows without
+// being loaded again.
 
 import { expect, test } from "vitest";
 import { TournamentFormat } from "../../src/gen/chefshat/v1/tournament_pb";

@@ -1,4 +1,5 @@
-// A spectator's page, and what reaches it: the bytes of every answer are looked through for cards that nobody may see before the end.
+// A spectator's page, and what reaches it: the bytes of every answer are looked through for cards
+// that nobody may see before the end.
 
 import { expect, test } from "vitest";
 import type { GameEvent } from "../../src/gen/chefshat/v1/event_pb";
@@ -14,7 +15,10 @@ let tap: Tap;
 
 useStage();
 
-/** A game of two Shifts, watched from before its first card to its end: what the page was sent, and whether it ever showed an open hand. */
+/**
+ * A game of two Shifts, watched from before its first card to its end: what the page was sent, and
+ * whether it ever showed an open hand.
+ */
 async function watched(policy: { spectatorsSeeHands?: boolean; spectatorDelayDecisions?: number }) {
   tap = await Tap.before(server);
   try {
@@ -63,7 +67,8 @@ test("a spectator's page is sent no hidden card before the end of the game", asy
   expect(cases.at(-1)).toBe("gameEnded");
   expect(tellingOfHidden(events)).toEqual([]);
   expect(messages.filter(({ snapshot }) => snapshot?.observation)).toEqual([]);
-  // Nothing that this page's protocol does not know, and no other call but for the description of the room, which has no cards.
+  // Nothing that this page's protocol does not know, and no other call but for the description of
+  // the room, which has no cards.
   expect(messages.filter((message) => message.$unknown || message.events.some((event) => event.$unknown))).toEqual([]);
   expect([...called].filter((path) => path !== WATCH && path !== GET_ROOM)).toEqual([]);
   expect(openHand).toBe(false);

@@ -1,4 +1,5 @@
-// English texts that several parts of the page use: the frame, kinds of participants, words of the game.
+// English texts that several parts of the page use: the frame, kinds of participants, words of the
+// game.
 
 import { ordinals, plurals } from "../plural";
 

@@ -1,4 +1,5 @@
-// What can go wrong in a call, in English: by the server's reason, for reasons that a person at the page can meet.
+// What can go wrong in a call, in English: by the server's reason, for reasons that a person at the
+// page can meet.
 
 export const faults = {
   notReached: "The server does not answer. It may be restarting; try again in a moment.",

@@ -1,4 +1,5 @@
-// Italian texts that several parts of the page use: the frame, kinds of participants, words of the game.
+// Italian texts that several parts of the page use: the frame, kinds of participants, words of the
+// game.
 
 import type { Texts } from "../en";
 import { ordinals, plurals } from "../plural";

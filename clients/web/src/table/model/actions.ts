@@ -1,7 +1,7 @@
-// Actions and their numbers: the numbering of the rules, which depends on the number of faces F alone, and masks of legal actions.
-// Which actions are legal is for the server to say; nothing here decides it.
+// Actions and their indices, which depend on the number of faces F alone, and masks of legal
+// actions. The server decides which actions are legal.
 
-/** What an action means. */
+/** The meaning of an action. */
 export type Move =
   | { readonly kind: "play"; readonly face: number; readonly quantity: number; readonly jokers: number }
   | { readonly kind: "loneJoker" }
@@ -11,12 +11,12 @@ export type Move =
   | { readonly kind: "decline" }
   | { readonly kind: "declare" };
 
-/** T: the number of actions of a turn, the last of them passing (standard 200). */
+/** T: the number of actions of a turn, including passing (200 with the default deck). */
 export function turnActions(faces: number): number {
   return (3 * faces * (faces + 1)) / 2 + 2;
 }
 
-/** The number of a move. */
+/** The index of a move. */
 export function actionOf(move: Move, faces: number): number {
   const turns = turnActions(faces);
   switch (move.kind) {
@@ -37,7 +37,7 @@ export function actionOf(move: Move, faces: number): number {
   }
 }
 
-/** What an action means; undefined for a number beyond the last. */
+/** The meaning of an index; undefined for one beyond the last. */
 export function moveOf(action: number, faces: number): Move | undefined {
   const turns = turnActions(faces);
   if (action === turns - 2) return { kind: "loneJoker" };
@@ -60,7 +60,7 @@ export function legalActions(mask: Uint8Array): number[] {
   );
 }
 
-/** A mask of these actions, in the form of a decision request. */
+/** A mask of actions, in the form of a decision request. */
 export function maskOf(actions: readonly number[], faces: number): Uint8Array {
   const mask = new Uint8Array(Math.ceil((turnActions(faces) + faces + 3) / 8));
   for (const action of actions) mask[action >> 3] = (mask[action >> 3] ?? 0) | (1 << (action & 7));

@@ -1,5 +1,4 @@
-// Cards as values: hands, boards and gifts are lists of cards in one fixed order. Nothing here knows of rules beyond that order, of
-// seats, or of how a card looks.
+// Cards as values: hands, boards and gifts are lists of cards in one fixed order.
 
 /** An ingredient by its face from 1, the Golden card of the top face, or a joker. */
 export type Card =
@@ -14,7 +13,7 @@ export function faceOf(card: Card): number | undefined {
   return card.kind === "joker" ? undefined : card.face;
 }
 
-/** Cards from their numbers ascending (F+1 is a joker), the Golden card first of its face. */
+/** Cards from face numbers, sorted (F+1 is a joker), the Golden card first of its face. */
 export function cardsFromNumbers(numbers: readonly number[], golden: boolean, faces: number): Card[] {
   let goldenLeft = golden;
   return [...numbers]
@@ -29,7 +28,7 @@ export function cardsFromNumbers(numbers: readonly number[], golden: boolean, fa
     });
 }
 
-/** Cards from F+1 counts, as observations hold them: index f-1 counts face f, index F the jokers. */
+/** Cards from F+1 counts, as in observations: index f-1 counts face f, index F the jokers. */
 export function cardsFromCounts(counts: ArrayLike<number>, golden: boolean, faces: number): Card[] {
   const numbers = Array.from(counts).flatMap((count, index) => Array<number>(count).fill(index + 1));
   return cardsFromNumbers(numbers, golden, faces);
@@ -43,12 +42,15 @@ export function playedCards(face: number, quantity: number, jokers: number, gold
   return [...plain, ...Array<Card>(jokers).fill(JOKER)];
 }
 
-/** How many cards of a face are among these; without a face: how many jokers. */
+/** The number of cards of a face; of jokers if the face is undefined. */
 export function countOf(cards: readonly Card[], face: number | undefined): number {
   return cards.filter((card) => faceOf(card) === face).length;
 }
 
-/** The cards without those that are taken. Where the Golden card and a plain one would do, the plain one goes, unless Golden is asked for. */
+/**
+ * Removes cards. A plain card goes before the Golden card of its face, unless the Golden card is
+ * named.
+ */
 export function without(cards: readonly Card[], taken: readonly Card[]): Card[] {
   const left = [...cards];
   for (const card of taken) {
@@ -60,7 +62,7 @@ export function without(cards: readonly Card[], taken: readonly Card[]): Card[] 
   return left;
 }
 
-/** Both lists as one, in order. */
+/** Both lists merged, in order. */
 export function together(cards: readonly Card[], added: readonly Card[]): Card[] {
   const rank = (card: Card) => (faceOf(card) ?? Number.MAX_SAFE_INTEGER) * 2 - (card.kind === "golden" ? 1 : 0);
   return [...cards, ...added].sort((left, right) => rank(left) - rank(right));

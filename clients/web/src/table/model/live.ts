@@ -1,5 +1,5 @@
-// What the holder of a seat knows: the table, the decision that is open for the seat, and how the seat is attached. A pure function from one
-// update of the server to the next such value; the stream itself is in session.ts.
+// What the holder of a seat knows: the table, the open decision, and how the seat is attached. A
+// pure function applies each update of the server; the stream is in session.ts.
 
 import {
   AnswerStatus,
@@ -18,13 +18,13 @@ import type { Requirement } from "./requirement";
 import { applyObservation, applySnapshot } from "./snapshot";
 import type { TableState } from "./state";
 
-/** A decision that is open for the seat. */
+/** The seat's open decision. */
 export interface OpenDecision {
   readonly id: bigint;
   readonly kind: DecisionKind;
   /** Legal actions, ascending. */
   readonly legal: readonly number[];
-  /** The hand it is decided from, in order. */
+  /** The hand before the decision, in order. */
   readonly hand: readonly Card[];
   /** At a turn: what a play must be. */
   readonly requirement: Requirement | undefined;
@@ -32,11 +32,11 @@ export interface OpenDecision {
   readonly gift: Pick<GiftRequirement, "number" | "total" | "receiver"> | undefined;
   /** The special action that may be declared. */
   readonly special: SpecialAction;
-  /** Milliseconds that were left of the decision's own time when the request came. */
+  /** Milliseconds left for the decision when the request arrived. */
   readonly timeLeftMs: number;
-  /** Milliseconds that were left in the bank when the request came. */
+  /** Milliseconds left in the time bank when the request arrived. */
   readonly bankLeftMs: number;
-  /** When the request came, on the page's own clock. */
+  /** Arrival time of the request, by the page's clock. */
   readonly receivedAtMs: number;
   /** Invalid attempts left; undefined if unlimited. */
   readonly attemptsLeft: number | undefined;
@@ -48,13 +48,13 @@ export type Attachment =
   | { readonly kind: "attached" }
   | { readonly kind: "superseded" }
   | { readonly kind: "over" }
-  /** The seat was given back, by whoever has its ticket: this page never asks to be detached otherwise. */
+  /** Someone with the ticket gave the seat up: this page never asks to be detached otherwise. */
   | { readonly kind: "left" }
   | { readonly kind: "refused"; readonly reason: string; readonly message: string };
 
 export interface LiveState {
   readonly table: TableState;
-  /** The seat; undefined before it is attached for the first time. */
+  /** The seat; undefined before the first attachment. */
   readonly own: number | undefined;
   readonly decision: OpenDecision | undefined;
   readonly attachment: Attachment;
@@ -66,14 +66,15 @@ export function startLive(table: TableState, own?: number): LiveState {
   return { table, own, decision: undefined, attachment: { kind: "none" }, substituted: false };
 }
 
-/** The state after an update; `nowMs` is the page's own clock. */
+/** The state after an update; `nowMs` is the page's clock. */
 export function applyUpdate(live: LiveState, update: SeatUpdate, nowMs: number): LiveState {
   const told = update.update;
   switch (told.case) {
     case "attached": {
       const own = told.value.seat;
       const table = { ...live.table, roomId: told.value.roomId, gameId: told.value.gameId };
-      // What was open may have been closed while nobody listened; if not, it is put again.
+      // The open decision may have been closed while the stream was down; if not, the server sends
+      // it again.
       return { ...live, own, table, decision: undefined, attachment: { kind: "attached" } };
     }
     case "events":
@@ -124,7 +125,10 @@ function withEvent(live: LiveState, event: GameEvent): LiveState {
   return { ...live, table, substituted, decision: closes(event, live) ? undefined : live.decision };
 }
 
-/** Whether an event says that the seat's open decision has been taken: by itself, by the clock or by a substitute. */
+/**
+ * Whether an event closes the seat's open decision: it was answered, timed out, or taken by a
+ * substitute.
+ */
 function closes(event: GameEvent, live: LiveState): boolean {
   const { own, decision } = live;
   const kind = event.kind;
@@ -150,8 +154,8 @@ function closes(event: GameEvent, live: LiveState): boolean {
 function withDecision(live: LiveState, request: DecisionRequest, nowMs: number): LiveState {
   const { observation: seen } = request;
   const before = live.table;
-  // At a turn everything that happened has been told, so that the observation is the whole truth. Gifts of an exchange that is not complete
-  // have left the observed hand already: their event is still to come.
+  // At a turn every event has arrived, so the observation is complete. In an unfinished exchange,
+  // gifts have left the observed hand but their event is still to come.
   const turn = request.kind === DecisionKind.TURN;
   const table = !seen
     ? before
@@ -175,13 +179,16 @@ function withDecision(live: LiveState, request: DecisionRequest, nowMs: number):
   return { ...live, table, decision };
 }
 
-/** The points put in, which a game that begins in the middle has before its first event tells any. */
+/** Adds the points, which a game that starts in the middle has before its first event. */
 function withPoints(table: TableState, seen: Observation): TableState {
   const seats = table.seats.map((seat) => ({ ...seat, points: Number(seen.points[seat.seat] ?? seat.points) }));
   return { ...table, seats };
 }
 
-/** The observation put in, without losing what only events tell: what was played with the Golden card, what has just been received. */
+/**
+ * Applies the observation, but keeps what only events tell: the Golden card on the board, the cards
+ * just received.
+ */
 function applyBoard(table: TableState, seen: Observation, own: number | undefined): TableState {
   const next = applyObservation(table, seen, own);
   const seats = next.seats.map((seat) => ({ ...seat, received: table.seats[seat.seat]?.received ?? seat.received }));

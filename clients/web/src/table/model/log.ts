@@ -1,9 +1,10 @@
-// Which lines of the log are worth a reader's or a hearer's while: a connection that comes and goes takes one line, and what a study leaves out
-// is left out. What the lines say is in words.ts, how long is waited before a coming or going is read out in ../presence.ts.
+// Selects the lines of the log that are shown and read out: a flapping connection takes one line,
+// and a study may hide expressions. The wording is in words.ts, the delay of connection changes in
+// ../presence.ts.
 
 import type { Happening, LogLine } from "./state";
 
-/** What happens to a seat's connection. */
+/** Events about a seat's connection. */
 const PRESENCE = ["lost", "back", "substituted"] as const;
 
 /** A line about a seat's connection. */
@@ -16,15 +17,16 @@ export function isPresence(line: LogLine): line is PresenceLine {
   return (PRESENCE as readonly string[]).includes(line.happening.kind);
 }
 
-/** The lines to be shown or read out; without `expressions` nothing of who showed what. */
+/** The lines to show or read out; without `expressions`, no shown expressions. */
 export function worthSaying(log: readonly LogLine[], expressions: boolean): LogLine[] {
-  // Seats about which a later line says how their connection is.
+  // Seats whose connection a later line describes.
   const told = new Set<number>();
   const lines: LogLine[] = [];
   for (const line of log.toReversed()) {
     if (!expressions && line.happening.kind === "expressed") continue;
     if (isPresence(line)) {
-      // Gone and back, perhaps again and again, is one line as long as nothing was decided for the seat meanwhile: how it ended.
+      // Consecutive changes of a connection are one line, the last, as long as nothing was decided
+      // for the seat in between.
       if (told.has(line.happening.seat)) continue;
       told.add(line.happening.seat);
     } else {
@@ -36,7 +38,7 @@ export function worthSaying(log: readonly LogLine[], expressions: boolean): LogL
   return lines.reverse();
 }
 
-/** Whose decision a happening was, if it was one. */
+/** The seat whose decision an event reports, if it reports one. */
 function decidedBy(happening: Happening): number | undefined {
   switch (happening.kind) {
     case "played":

@@ -1,15 +1,18 @@
-// The look-up table of a decision, as in the paper's figure of possible actions: every play by face, quantity and jokers, and what is to be
-// said of it for one hand at one moment. A value; how it is drawn is in view/LookupTable.tsx.
+// The look-up table of a decision, as in the paper's figure of possible actions: every play by
+// face, quantity and jokers, with its state for one hand at one turn. Drawn by
+// view/LookupTable.tsx.
 
 import { actionOf, type Move } from "./actions";
 import type { Card } from "./cards";
 import { allows, holds, type Requirement } from "./requirement";
 import type { TableState } from "./state";
 
-/** Whether the rules allow an action now, whatever the hand is, and whether the hand holds its cards, whatever lies on the board. */
+/**
+ * Whether an action is allowed at this turn with any hand, and whether the hand holds its cards.
+ */
 export type CellState = "legal" | "notInHand" | "notAllowed" | "impossible";
 
-/** One action of the table. */
+/** An action in the table. */
 export interface Cell {
   readonly move: Move;
   readonly action: number;
@@ -17,13 +20,13 @@ export interface Cell {
 }
 
 export interface Lookup {
-  /** Plays of each face from face 1: of each quantity from 1, without a joker, with one, and so on. */
+  /** Plays by face from 1, by quantity from 1, by jokers from 0. */
   readonly plays: readonly (readonly (readonly Cell[])[])[];
-  /** A joker alone (where the deck has jokers) and passing. */
+  /** A lone joker (if the deck has jokers) and passing. */
   readonly others: readonly Cell[];
 }
 
-/** The table of an open turn. */
+/** The table of a turn. */
 export function lookupOf(
   { faces, jokers }: Pick<TableState, "faces" | "jokers">,
   requirement: Requirement,

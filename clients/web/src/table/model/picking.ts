@@ -1,11 +1,11 @@
-// Picking cards of a hand until they are a legal action: what a click on a card does, which cards can be picked now, and why the others
-// cannot. It chooses among the legal actions that the server sent; rules are known here only to give a reason in words.
+// Picking cards until they form a legal action: the effect of a click, which cards can be picked,
+// and why the others cannot. Chooses among the legal actions from the server.
 
 import { type Move, moveOf } from "./actions";
 import { type Card, countOf, faceOf } from "./cards";
 import { isOpening, type Requirement } from "./requirement";
 
-/** Positions in the hand that are picked. */
+/** Indices of the picked cards in the hand. */
 export type Picked = ReadonlySet<number>;
 
 /** Why a card cannot be picked. */
@@ -17,12 +17,12 @@ export type Reason =
   | { readonly kind: "jokerAlone" }
   | { readonly kind: "other" };
 
-/** Legal moves of a decision. */
+/** The legal moves of a decision. */
 export function legalMoves(actions: readonly number[], faces: number): Move[] {
   return actions.flatMap((action) => moveOf(action, faces) ?? []);
 }
 
-/** The cards that a move takes out of a hand: of which face how many, and how many jokers. */
+/** The cards that a move takes: the face, how many of it, and how many jokers. */
 interface Needs {
   readonly face: number | undefined;
   readonly quantity: number;
@@ -43,7 +43,7 @@ function needsOf(move: Move): Needs | undefined {
   }
 }
 
-/** Whether a move takes these cards, and perhaps more. */
+/** Whether a move takes at least these cards. */
 function includes(move: Move, cards: readonly Card[]): boolean {
   const needs = needsOf(move);
   if (!needs) return false;
@@ -56,7 +56,7 @@ function includes(move: Move, cards: readonly Card[]): boolean {
   );
 }
 
-/** Whether a move takes these cards and no more. */
+/** Whether a move takes exactly these cards. */
 function isExactly(move: Move, cards: readonly Card[]): boolean {
   const needs = needsOf(move);
   return needs !== undefined && includes(move, cards) && needs.quantity + needs.jokers === cards.length;
@@ -66,19 +66,22 @@ function cardsAt(hand: readonly Card[], picked: Picked): Card[] {
   return [...picked].flatMap((index) => hand[index] ?? []);
 }
 
-/** The legal move that the picked cards are. */
+/** The legal move formed by the picked cards. */
 export function pickedMove(hand: readonly Card[], picked: Picked, moves: readonly Move[]): Move | undefined {
   const cards = cardsAt(hand, picked);
   return cards.length === 0 ? undefined : moves.find((move) => isExactly(move, cards));
 }
 
-/** Whether a card can be picked: with those picked, or in their place. */
+/** Whether a card can be picked, with those already picked or in their place. */
 export function canPick(hand: readonly Card[], index: number, moves: readonly Move[]): boolean {
   const card = hand[index];
   return card !== undefined && moves.some((move) => includes(move, [card]));
 }
 
-/** How many more cards the picked ones need at least to be a legal move; 0 if they are one, undefined if they cannot become one. */
+/**
+ * The fewest cards to add for a legal move: 0 if the picked cards form one, undefined if no legal
+ * move contains them.
+ */
 export function missing(hand: readonly Card[], picked: Picked, moves: readonly Move[]): number | undefined {
   const cards = cardsAt(hand, picked);
   const sizes = moves
@@ -89,8 +92,9 @@ export function missing(hand: readonly Card[], picked: Picked, moves: readonly M
 }
 
 /**
- * What is picked after a click on a card. A picked card is put back. Another joins those picked where a legal move has them all; else it takes
- * their place, together with what the smallest legal move with it needs. `goldenFirst` where the play must include the Golden card.
+ * The picked cards after a click. A picked card is put back. Any other card joins those picked if a
+ * legal move contains them all; otherwise it replaces them, together with the rest of the smallest
+ * legal move with it. `goldenFirst` if the play must include the Golden card.
  */
 export function toggle(
   hand: readonly Card[],
@@ -109,7 +113,10 @@ export function toggle(
   return inOrder(hand, smallest(hand, index, moves), goldenFirst);
 }
 
-/** The picks of the smallest legal move with a card, with the fewest jokers. A joker waits for the card it goes with. */
+/**
+ * The picks of the smallest legal move with a card, with the fewest jokers. A joker waits for the
+ * card it goes with.
+ */
 function smallest(hand: readonly Card[], index: number, moves: readonly Move[]): Picked {
   const card = hand[index];
   if (!card || (card.kind === "joker" && !moves.some((move) => isExactly(move, [card])))) return new Set([index]);
@@ -121,7 +128,7 @@ function smallest(hand: readonly Card[], index: number, moves: readonly Move[]):
   return best ? pickFor(hand, best, [index]) : new Set([index]);
 }
 
-/** Positions of the cards that a move takes. */
+/** Indices of the cards that a move takes. */
 export function picksOf(hand: readonly Card[], move: Move): Picked {
   const needs = needsOf(move);
   return needs ? pickFor(hand, needs, []) : new Set();
@@ -142,7 +149,10 @@ function pickFor(hand: readonly Card[], needs: Needs, first: readonly number[]):
   return picked;
 }
 
-/** Picks the Golden card before the plain cards of its face, or after them: a move names the face alone, and that is the order they go in. */
+/**
+ * Picks the Golden card before or after the plain cards of its face: a move names only the face,
+ * and this is the order in which its cards go.
+ */
 function inOrder(hand: readonly Card[], picked: Picked, goldenFirst: boolean): Picked {
   const golden = hand.findIndex(({ kind }) => kind === "golden");
   const top = hand[golden] && faceOf(hand[golden]);

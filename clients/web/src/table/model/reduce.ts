@@ -1,5 +1,5 @@
-// How an event changes what a viewer knows of a table: one pure function, the same for a seat's own stream, for spectators and for
-// records. It follows the game and decides nothing: what the rules forbid never comes as an event.
+// Applies events to what a viewer knows of a table: one pure function for a seat's stream,
+// spectators and records. It trusts the server that every event follows the rules.
 
 import type { GameEvent, Play } from "../../gen/chefshat/v1/event_pb";
 import { DecisionSource } from "../../gen/chefshat/v1/event_pb";
@@ -25,7 +25,7 @@ const CAUSES: Record<DecisionSource, Cause> = {
   [DecisionSource.RECORDED]: "recorded",
 };
 
-/** The table after an event. An event that it has seen already leaves it as it is. */
+/** The table after an event. An event that was already applied changes nothing. */
 export function applyEvent(table: TableState, event: GameEvent): TableState {
   const sequence = Number(event.sequence);
   if (sequence < table.nextSequence) return table;
@@ -34,7 +34,7 @@ export function applyEvent(table: TableState, event: GameEvent): TableState {
   return { ...changed, log, nextSequence: sequence + 1 };
 }
 
-/** The table after events in order. */
+/** The table after a list of events. */
 export function applyEvents(table: TableState, events: readonly GameEvent[]): TableState {
   return events.reduce(applyEvent, table);
 }
@@ -139,7 +139,7 @@ function change(table: TableState, event: GameEvent, sequence: number): Change {
     }
     case "serverRestarted":
       return [table, { kind: "restarted" }];
-    // An event of a later version of the protocol: its number counts, its content is not known here.
+    // An event of a later protocol version: it is counted, but its content is unknown.
     case undefined:
       return [table, undefined];
   }
@@ -217,7 +217,10 @@ function play(table: TableState, { seat, face, quantity, jokers, cardsLeft, sour
   ];
 }
 
-/** Whether cards of the top face include the Golden card: it opens the Shift under the standard opening, and else goes last. */
+/**
+ * Whether a play of the top face includes the Golden card: it goes first in the standard opening,
+ * and last otherwise.
+ */
 function playsGolden(table: TableState, hand: readonly Card[] | undefined, quantity: number): boolean {
   if (table.turn === 1 && table.rules?.opening !== Opening.ANY_TOP_FACE) return true;
   const held = hand?.some(({ kind }) => kind === "golden") ?? false;

@@ -1,5 +1,6 @@
-// What a play must be at a turn. The server says it with every decision of the reader's own seat; for the turns of others, which spectators and
-// replays show, it follows from the board, as the protocol's comment on PlayRequirement says.
+// What a play must be at a turn. The server sends it with each decision of the reader's own seat.
+// For the turns of others, which spectators and replays show, it follows from the board as
+// described at PlayRequirement in the protocol.
 
 import type { PlayRequirement } from "../../gen/chefshat/v1/decision_pb";
 import { Opening } from "../../gen/chefshat/v1/rules_pb";
@@ -7,7 +8,7 @@ import type { Move } from "./actions";
 import { type Card, countOf, faceOf } from "./cards";
 import type { TableState } from "./state";
 
-/** The fields of the protocol that say which plays are allowed. */
+/** The fields of the protocol that determine which plays are allowed. */
 export type Requirement = Pick<
   PlayRequirement,
   "lowestFace" | "highestFace" | "fewestCards" | "goldenCard" | "loneJoker"
@@ -26,7 +27,7 @@ export function publicRequirement({ turn, faces, board, rules }: TableState): Re
   };
 }
 
-/** Whether a requirement is that of a Shift's first turn. */
+/** Whether this is the first turn of a Shift. */
 export function isOpening({ lowestFace }: Requirement): boolean {
   return lowestFace > 1;
 }

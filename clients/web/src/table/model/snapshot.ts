@@ -1,12 +1,12 @@
-// What a viewer knows of a table from a Snapshot or an observation, in place of the events so far. Who acts next and what happened
-// before is not in them.
+// What a viewer knows of a table from a snapshot or an observation, in place of the events so far.
+// Neither says whose turn it is or what happened before.
 
 import type { Observation } from "../../gen/chefshat/v1/decision_pb";
 import type { Snapshot } from "../../gen/chefshat/v1/play_service_pb";
 import { cardsFromCounts, playedCards } from "./cards";
 import { fromRules, seatFromParticipant, type TableState } from "./state";
 
-/** The table as a snapshot shows it to the holder of a seat, or to a spectator. */
+/** The table of a snapshot, for the holder of a seat or a spectator. */
 export function applySnapshot(table: TableState, snapshot: Snapshot, own: number | undefined): TableState {
   const nextSequence = Number(snapshot.nextSequence);
   const { gameStarted: start, observation } = snapshot;
@@ -17,7 +17,7 @@ export function applySnapshot(table: TableState, snapshot: Snapshot, own: number
   return applyObservation(begun, observation, own);
 }
 
-/** The table with everything that an observation says put in. */
+/** The table with everything in an observation. */
 export function applyObservation(table: TableState, seen: Observation, own: number | undefined): TableState {
   const { faces } = table;
   const alone = seen.boardFace > faces;
@@ -48,7 +48,7 @@ export function applyObservation(table: TableState, seen: Observation, own: numb
   };
 }
 
-/** Whether an observation is one of the Shift's first turn, or from before it. */
+/** Whether an observation is of the Shift's first turn, or from before it. */
 function isFirstTurn({ pizza, played, passed }: Observation): boolean {
   return pizza <= 1 && played.every((count) => count === 0) && passed.every((out) => out === 0);
 }

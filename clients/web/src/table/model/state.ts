@@ -1,21 +1,22 @@
-// What one viewer knows of a table at one moment: who sits there, what each seat shows, the board, what happened last. A plain value made
-// from the protocol's messages by reduce.ts and snapshot.ts; what the viewer may not see is not in it. No view, no clock, no network.
+// What one viewer knows of a table at one moment: seats, board, last events. A plain value built
+// from the protocol's messages by reduce.ts and snapshot.ts, without anything the viewer may not
+// see.
 
 import type { Room, RoomPolicy } from "../../gen/chefshat/v1/room_pb";
 import { AbortReason, type Participant, ParticipantKind } from "../../gen/chefshat/v1/room_pb";
 import { PassScope, Role, type RuleSet, type SpecialAction } from "../../gen/chefshat/v1/rules_pb";
 import type { Card } from "./cards";
 
-/** Most happenings that are kept. */
+/** Length of the log, events. */
 export const MAX_LOG = 120;
 
-/** Where the game stands. */
+/** The phase of the game. */
 export type Phase = "waiting" | "dealt" | "pizza" | "shiftOver" | "gameOver" | "aborted";
 
-/** Why it was not the seat's own agent that decided; "agent" if it was. */
+/** Who or what made a decision; "agent" for the seat's own participant. */
 export type Cause = "agent" | "timeout" | "invalid" | "disconnected" | "substitute" | "recorded";
 
-/** One thing that happened, as the viewer may see it. */
+/** An event as the viewer may see it. */
 export type Happening =
   | { readonly kind: "dealt"; readonly shift: number }
   | { readonly kind: "played"; readonly seat: number; readonly cards: readonly Card[]; readonly cause: Cause }
@@ -28,7 +29,7 @@ export type Happening =
       readonly giver: number;
       readonly receiver: number;
       readonly count: number;
-      /** Empty where the viewer may not know. */
+      /** Empty if the viewer may not know. */
       readonly cards: readonly Card[];
     }
   | { readonly kind: "shiftOver"; readonly shift: number; readonly winner: number }
@@ -37,40 +38,40 @@ export type Happening =
   | { readonly kind: "substituted"; readonly seat: number; readonly agent: string }
   | { readonly kind: "restarted" | "gameStarted" | "gameOver" | "aborted" };
 
-/** A happening and the number of the event that brought it. */
+/** An event and its sequence number. */
 export interface LogLine {
   readonly sequence: number;
   readonly happening: Happening;
 }
 
-/** What one seat shows. */
+/** The state of a seat. */
 export interface SeatState {
   readonly seat: number;
   /** Empty while the seat is free. */
   readonly name: string;
   readonly kind: ParticipantKind;
   readonly reservedFor: ParticipantKind;
-  /** Name of the built-in agent that fills the seat, or empty. */
+  /** Name of the built-in agent in the seat, or empty. */
   readonly builtIn: string;
   readonly connected: boolean;
-  /** Name of the built-in agent that plays for a lost participant, or empty. */
+  /** Name of the built-in agent that plays for a disconnected participant, or empty. */
   readonly substitute: string;
   readonly role: Role;
   readonly points: number;
   readonly cardsLeft: number;
-  /** The cards, where the viewer may see them. */
+  /** The cards, if the viewer may see them. */
   readonly hand: readonly Card[] | undefined;
   readonly passed: boolean;
   /** Place in this Shift from 1; 0 while the seat holds cards. */
   readonly place: number;
-  /** What the seat did last in this pizza. */
+  /** The seat's last action in this pizza. */
   readonly lastMove: readonly Card[] | "pass" | undefined;
-  /** What the seat received in this Shift's exchange, where the viewer may know. */
+  /** Cards received in this Shift's exchange, if the viewer may know. */
   readonly received: readonly Card[];
   readonly expression: { readonly label: string; readonly sequence: number } | undefined;
 }
 
-/** How a Shift ended. */
+/** The result of a Shift. */
 export interface ShiftResult {
   readonly shift: number;
   /** Seats by place. */
@@ -82,7 +83,7 @@ export interface ShiftResult {
   readonly adjudicated: boolean;
 }
 
-/** One line of the final table. */
+/** A line of the final standings. */
 export interface StandingLine {
   readonly seat: number;
   readonly points: number;
@@ -101,30 +102,32 @@ export interface TableState {
   readonly rules: RuleSet | undefined;
   readonly policy: RoomPolicy | undefined;
   readonly passScope: PassScope;
-  /** From 1; 0 before the first. */
+  /** From 1; 0 before the first Shift. */
   readonly shift: number;
-  /** Pizza of the Shift from 1; 0 before the Shift's first play or pass. */
+  /** Pizza of the Shift from 1; 0 before the first play or pass. */
   readonly pizza: number;
-  /** Number of the turn of the Shift that is open, from 1. */
+  /** The open turn of the Shift, from 1. */
   readonly turn: number;
   readonly seats: readonly SeatState[];
   readonly board: readonly Card[];
-  /** Who played what is on the board. */
+  /** The seat that played the cards on the board. */
   readonly boardBy: number | undefined;
-  /** What has gone onto the pizza: the face of every card played, F+1 for a joker. It stays to be seen until the next pizza is begun. */
+  /**
+   * The face of every card played on the pizza, F+1 for a joker. Kept until the next pizza starts.
+   */
   readonly toppings: readonly number[];
-  /** Whose turn it is, where the viewer can tell. */
+  /** The seat whose turn it is, if the viewer can tell. */
   readonly next: number | undefined;
-  /** Cards played in this Shift: F+1 counts. */
+  /** Cards played in this Shift, F+1 counts. */
   readonly played: readonly number[];
   readonly log: readonly LogLine[];
-  /** How the last Shift ended. */
+  /** The result of the last Shift. */
   readonly result: ShiftResult | undefined;
-  /** Why the game was given up, if it was. */
+  /** Why the game was aborted. */
   readonly abortReason: AbortReason;
-  /** The final table, best first; empty before the end. */
+  /** The final standings, best first; empty before the end. */
   readonly standings: readonly StandingLine[];
-  /** Number of the next event of the game. */
+  /** Sequence number of the next event. */
   readonly nextSequence: number;
 }
 
@@ -149,7 +152,7 @@ export function seatFromParticipant(participant: Participant): SeatState {
   };
 }
 
-/** What a rule set says of the deck and of passing. */
+/** The parts of a rule set that the table shows. */
 export function fromRules(rules: RuleSet | undefined) {
   const faces = rules?.faces ?? 11;
   return { rules, faces, jokers: rules?.jokers ?? 2, passScope: rules?.passScope ?? PassScope.PIZZA };
@@ -181,7 +184,7 @@ export function emptyTable(seats: readonly SeatState[] = []): TableState {
   };
 }
 
-/** A table as its room shows it, before its first event. */
+/** The table of a room, before its first event. */
 export function tableFromRoom(room: Room): TableState {
   return {
     ...emptyTable(room.seats.map(seatFromParticipant)),
@@ -193,7 +196,7 @@ export function tableFromRoom(room: Room): TableState {
   };
 }
 
-/** Whether a seat is a participant's rather than free. */
+/** Whether a participant has the seat. */
 export function isTaken(seat: SeatState): boolean {
   return seat.builtIn !== "" || seat.kind !== ParticipantKind.UNSPECIFIED;
 }

@@ -1,5 +1,5 @@
-// The reader's decision: buttons for what is picked, for passing, giving, declaring; what is missing; the clock. A button that cannot be used now
-// stays where it is and says why, so that the keyboard's focus is never lost.
+// The reader's decision: buttons to play, pass, give and declare, a hint, and the clock. A button
+// that cannot be used now stays where it is, so that the keyboard focus is not lost.
 
 import type { ComponentChildren } from "preact";
 import { DecisionKind } from "../../gen/chefshat/v1/decision_pb";
@@ -22,15 +22,15 @@ interface ActionBarProps {
   decision: OpenDecision | undefined;
   moves: readonly Move[];
   picked: Picked;
-  /** The legal move that the picked cards are. */
+  /** The legal move formed by the picked cards. */
   move: Move | undefined;
-  /** An answer is on its way. */
+  /** An answer is being sent. */
   sending: boolean;
-  /** A reason or trouble that is to be seen instead of the standing hint. */
+  /** A reason or error shown in place of the hint. */
   remark: string;
-  /** Whether less is allowed than the rules would: a lesson. */
+  /** Whether a lesson allows less than the rules do. */
   taught: boolean;
-  /** Milliseconds of a whole decision; 0: no clock. */
+  /** Milliseconds of a full decision; 0 for no clock. */
   wholeMs: number;
   onAnswer: (action: number) => void;
   onPutBack: () => void;
@@ -84,7 +84,7 @@ export function ActionBar(props: ActionBarProps) {
   );
 }
 
-/** The card that will be given: the Golden one only where no plain one is left. */
+/** The card that will be given. */
 function giftWord({ decision, picked }: ActionBarProps, move: Move): string {
   const [index] = picked;
   const card = index === undefined ? undefined : decision?.hand[index];

@@ -1,4 +1,4 @@
-// The middle of the table: the pizza that is being made, with everything that has gone onto it, and on it the cards that lie on the board.
+// The middle of the table: the pizza with everything played on it, and the cards on the board.
 
 import type { ComponentChildren } from "preact";
 import { t } from "../../i18n";
@@ -8,12 +8,12 @@ import type { TableState } from "../model/state";
 import { distinctName, playWords } from "../words";
 import css from "./Board.module.css";
 
-/** Most toppings that are drawn. */
+/** Most toppings drawn. */
 const MOST_TOPPINGS = 44;
-/** Turns from one topping to the next by the golden angle, so that they never lie in a row. */
+/** The golden angle between toppings keeps them from lining up. */
 const GOLDEN_ANGLE = Math.PI * (3 - Math.sqrt(5));
 
-/** The board; `children` are said on it instead of what lies there. */
+/** The board; `children` replace its text. */
 export function Board({ table, children }: { table: TableState; children?: ComponentChildren }) {
   const words = t().table.board;
   const { board } = table;
@@ -47,7 +47,7 @@ function boardWords(table: TableState): string {
   return boardBy === undefined ? playWords(board) : words.by(playWords(board), distinctName(table, boardBy));
 }
 
-/** An ingredient on the pizza, somewhere between the cards and the crust. */
+/** An ingredient on the pizza, between the cards and the crust. */
 function Topping({ name, index }: { name: string; index: number }) {
   const angle = index * GOLDEN_ANGLE + 0.6;
   const radius = 0.72 + 0.12 * Math.sin(index * 2.3);

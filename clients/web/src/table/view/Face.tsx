@@ -1,4 +1,5 @@
-// Drawings of the expressions that a person can show with one click. Others, from robots and agents, are shown by their label alone.
+// Drawings of the expressions that a person can show with one click. Other expressions, of robots
+// and agents, are shown by their label.
 
 import type { Label } from "../expressions";
 import css from "./Tools.module.css";
@@ -13,7 +14,7 @@ const FEATURES: Record<Label, string> = {
   sadness: "M12 18l8-4M36 18l-8-4M16 22v3M32 22v3M15 36c4-7 14-7 18 0",
 };
 
-/** The face of an expression; decoration beside its word. */
+/** The face of an expression; decorative. */
 export function Face({ label }: { label: Label }) {
   return (
     <svg

@@ -1,5 +1,6 @@
-// The reader's own cards, to be picked. All cards can be reached with the arrow keys; those that cannot be picked now say why instead. The row
-// itself can have the focus too, on no card: it is there after a play, until an arrow key chooses a card.
+// The reader's cards. The arrow keys reach every card; a card that cannot be picked says why. The
+// row itself can have the focus too, on no card: it does after a play, until an arrow key chooses a
+// card.
 
 import type { RefObject } from "preact";
 import { useState } from "preact/hooks";
@@ -12,7 +13,7 @@ import { cardWord } from "../words";
 import css from "./Hand.module.css";
 
 interface HandProps {
-  /** The row, for those who put the focus there. */
+  /** The row, for focusing it. */
   row: RefObject<HTMLDivElement | null>;
   cards: readonly CardValue[];
   picked: Picked;
@@ -22,27 +23,30 @@ interface HandProps {
   refusal: (index: number) => string | undefined;
   /** A card was clicked or chosen by key. */
   onToggle: (index: number) => void;
-  /** Enter was pressed: plays what is picked if that can be played. Says whether it did. */
+  /** Enter was pressed. Plays the picked cards if possible, and returns whether it did. */
   onPlay: () => boolean;
   /** Escape was pressed. */
   onPutBack: () => void;
-  /** Why a card cannot be picked is to be seen for a while. */
+  /** A card was refused for a reason to be shown. */
   onRefused: (reason: string) => void;
   label: string;
 }
 
-/** How much of a card stays to be seen beside the next one of its stack, as a share of its width; hand.css says the same. */
+/**
+ * Visible share of a card's width beside the next one of its stack; Hand.module.css has the same
+ * value.
+ */
 const STRIP = 0.5;
 
-/** Up to so many widths of a card a hand lies in one row on a phone. */
+/** Largest width of a hand in one row on a phone, in card widths. */
 const ONE_ROW_UNITS = 7.5;
 
-/** How wide stacks beside each other are, in widths of a card and without the gaps. */
+/** Width of stacks side by side without gaps, in card widths. */
 function widthOf(runs: readonly (readonly CardValue[])[]): number {
   return runs.reduce((width, stack) => width + 1 + (stack.length - 1) * STRIP, 0);
 }
 
-/** The wider of the two rows that stacks lie in where they are split most evenly. */
+/** The wider of two rows when the stacks are split most evenly. */
 function fullerHalf(runs: readonly (readonly CardValue[])[]): readonly (readonly CardValue[])[] {
   const splits = runs.map((_, index) => {
     const [upper, lower] = [runs.slice(0, index), runs.slice(index)];
@@ -70,7 +74,7 @@ export function Hand(props: HandProps) {
     announce(reason);
   };
   const onKeyDown = (event: KeyboardEvent) => {
-    // On no card: the next one to the right is that which stands where the last one went from.
+    // On no card: start where the last card left the hand.
     const onNone = event.target === row.current;
     const pick = () => (onNone ? announce(t().table.hand.help) : choose(current));
     const steps: Record<string, () => void> = {
@@ -89,7 +93,7 @@ export function Hand(props: HandProps) {
     const step = steps[event.key];
     if (!step || event.ctrlKey || event.metaKey || event.altKey) return;
     event.preventDefault();
-    // A key held down picks and plays no more than once.
+    // A held key picks and plays only once.
     if (!event.repeat || event.key.startsWith("Arrow")) step();
   };
 

@@ -1,4 +1,4 @@
-// What happened at the table, the newest at the end. It is read out line by line by the announcer, not by this list.
+// The history of the table, newest last. The announcer reads it out line by line, not this list.
 
 import { hidden } from "../../experiment/hiding";
 import { t } from "../../i18n";
@@ -12,7 +12,7 @@ export function Log({ table }: { table: TableState }) {
   return (
     <section class={`${css.log} sheet`} data-part="log" aria-label={t().table.log.title}>
       <h2>{t().table.log.title}</h2>
-      {/* biome-ignore lint/a11y/noNoninteractiveTabindex: what scrolls must be reached with the keyboard */}
+      {/* biome-ignore lint/a11y/noNoninteractiveTabindex: a scrollable region must be reachable by keyboard */}
       <div class={css.lines} tabIndex={0}>
         <ol>
           {worthSaying(table.log, !hidden.value.includes("expressions")).map((line) => {

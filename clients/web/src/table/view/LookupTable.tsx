@@ -1,5 +1,5 @@
-// The look-up table of a turn as a table: faces down, numbers of cards across, with none, one or two jokers. Every cell says by a sign as well
-// as by colour what it is.
+// The look-up table of a turn: rows are faces, columns are quantities, each with no, one or two
+// jokers. Every cell has a sign besides its colour.
 
 import { t } from "../../i18n";
 import { Drawing, faceDrawing } from "../../parts/Drawing";
@@ -12,7 +12,7 @@ const STATES: readonly CellState[] = ["legal", "notInHand", "notAllowed", "impos
 
 interface LookupTableProps {
   lookup: Lookup;
-  /** The action that was taken, where that is known. */
+  /** The action that was taken, if known. */
   taken?: number | undefined;
 }
 
@@ -26,7 +26,7 @@ export function LookupTable({ lookup, taken }: LookupTableProps) {
       <p>
         <strong>{words.count(legal)}</strong> <span class="soft small">{words.groups}</span>
       </p>
-      {/* biome-ignore lint/a11y/noNoninteractiveTabindex: what scrolls must be reached with the keyboard */}
+      {/* biome-ignore lint/a11y/noNoninteractiveTabindex: a scrollable region must be reachable by keyboard */}
       <section class={css.scroll} tabIndex={0} aria-label={words.caption}>
         <table>
           <caption class="visually-hidden">{words.caption}</caption>
@@ -61,7 +61,7 @@ export function LookupTable({ lookup, taken }: LookupTableProps) {
               </tr>
             ))}
           </tbody>
-          {/* What is no play of a face has a row of its own below all faces. */}
+          {/* Actions that are not a play of a face have rows of their own at the end. */}
           <tbody class={css.others}>
             {lookup.others.map((cell) => (
               <tr key={cell.action}>

@@ -1,4 +1,5 @@
-// What the table waits for: whose decision is open and what a play must be, to be read from afar.
+// What the table waits for: whose decision is open and what a play must be, large enough to read
+// from afar.
 
 import { DecisionKind } from "../../gen/chefshat/v1/decision_pb";
 import { SpecialAction } from "../../gen/chefshat/v1/rules_pb";
@@ -12,15 +13,15 @@ import css from "./Now.module.css";
 
 interface NowProps {
   table: TableState;
-  /** The reader's seat, if there is one. */
+  /** The reader's seat, if any. */
   own: number | undefined;
   /** The reader's own open decision. */
   decision: Pick<OpenDecision, "kind" | "requirement" | "gift" | "special"> | undefined;
-  /** Whose decision is open, as far as the reader may know. */
+  /** The seat whose decision is open, if the reader may know. */
   next: number | undefined;
-  /** Of which kind that decision is; undefined: a turn. */
+  /** The kind of that decision; undefined for a turn. */
   kind?: DecisionKind | undefined;
-  /** Whether the open turn may be a pass. */
+  /** Whether passing is legal at the open turn. */
   mayPass?: boolean;
 }
 
@@ -117,7 +118,7 @@ function Tile({ sign = "", number, text }: { sign?: string; number: number; text
   );
 }
 
-/** To whom a card is given. */
+/** Who receives the card. */
 export function giftWords(table: TableState, decision: Pick<OpenDecision, "gift"> | undefined): string {
   const words = t().table.now;
   const { gift } = decision ?? {};

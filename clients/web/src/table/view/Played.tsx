@@ -1,4 +1,5 @@
-// How many cards of each face have been played in this Shift, of how many in the deck: each face fills up, and turns dark once all are out.
+// The cards of each face played in this Shift, out of those in the deck. A face fills up, and turns
+// dark once all are played.
 
 import { t } from "../../i18n";
 import type { TableState } from "../model/state";

@@ -1,4 +1,4 @@
-// How a Shift or the game ended, over the pizza: everybody by place, with points, and the ways on from there.
+// The result of a Shift or game, over the pizza: places, points, and next steps.
 
 import type { ComponentChildren } from "preact";
 import { t } from "../../i18n";
@@ -11,13 +11,16 @@ import css from "./Result.module.css";
 interface ResultProps {
   table: TableState;
   own: number | undefined;
-  /** Ways on once the game is over; not in a replay. */
+  /** Whether to show links after the game; not in a replay. */
   links?: boolean;
   /** The next step, before all links. */
   onward?: ComponentChildren;
 }
 
-/** The result that is to be seen now: of the game once it is over, of the last Shift until the next one is under way. */
+/**
+ * The result to show: the game's once it is over, otherwise the last Shift's until the next one
+ * starts.
+ */
 export function Result({ table, own, links = true, onward }: ResultProps) {
   const ways = links && <Ways table={table} onward={onward} />;
   if (table.phase === "gameOver") return <GameResult table={table} own={own} ways={ways} />;
@@ -28,7 +31,7 @@ export function Result({ table, own, links = true, onward }: ResultProps) {
   return null;
 }
 
-/** One main step, and links. A game without a result has no record. */
+/** The main step, and links. An aborted game has no replay. */
 function Ways({ table, onward }: Pick<ResultProps, "table" | "onward">) {
   const words = t().table.result;
   const ended = table.phase === "gameOver";
@@ -109,7 +112,7 @@ function GameResult({ table, own, ways }: EndProps & Pick<ResultProps, "own">) {
   );
 }
 
-/** A game without a result: why, and the way on. */
+/** A game without a result: the reason, and a link. */
 function Aborted({ table, ways }: EndProps) {
   const words = t().table;
   return (

@@ -1,4 +1,4 @@
-// What one seat shows: who sits there and what it is, its role, points and cards, what it did last, what it has expressed.
+// A seat: name and kind, role, points, cards, last action, expression.
 
 import { DecisionKind } from "../../gen/chefshat/v1/decision_pb";
 import { ParticipantKind } from "../../gen/chefshat/v1/room_pb";
@@ -15,10 +15,13 @@ import { cardWord, expressionWord, nameOf, playWords, presenceWords, roleWord } 
 import { Face } from "./Face";
 import css from "./SeatPanel.module.css";
 
-/** Backs that are drawn of a hidden hand; the number beside them counts. */
+/** Most card backs drawn for a hidden hand; the number beside them is exact. */
 const MOST_BACKS = 17;
 
-/** An expression is shown if it is one of so many last events: who comes back to a table does not see an old one as new. */
+/**
+ * Number of last events within which an expression is shown, so that a reload does not show an old
+ * one.
+ */
 const FRESH = 10;
 
 const ROLE_DRAWINGS: Record<Role, string> = {
@@ -33,13 +36,13 @@ const ROLE_DRAWINGS: Record<Role, string> = {
 interface SeatPanelProps {
   table: TableState;
   seat: SeatState;
-  /** Whether it is the reader's own. */
+  /** Whether this is the reader's seat. */
   own?: boolean;
-  /** Whether the open decision is its own, as far as the reader may know. */
+  /** Whether its decision is open, if the reader may know. */
   deciding: boolean;
-  /** What kind of decision, where that is known. */
+  /** The kind of that decision, if known. */
   kind?: DecisionKind | undefined;
-  /** Whether its cards are drawn here; the reader's own lie open in the hand. */
+  /** Whether to draw its cards; the reader's own are in the hand. */
   cards?: boolean;
 }
 
@@ -93,7 +96,7 @@ export function SeatPanel({ table, seat, own = false, deciding, kind, cards = tr
   );
 }
 
-/** For whom a free seat is kept. */
+/** Whom a free seat is reserved for. */
 function freeWords({ reservedFor }: SeatState): string {
   if (reservedFor === ParticipantKind.UNSPECIFIED) return t().table.freeSeat;
   return t().lobby.seats.reservedFor(kindWord(reservedFor));
@@ -143,7 +146,7 @@ function Chip({ table, seat, state, kind }: ChipProps) {
   return null;
 }
 
-/** The place in the game, once that is over. */
+/** The place in the game, once it is over. */
 function gamePlace(table: TableState, seat: SeatState): number | undefined {
   return table.standings.find((line) => line.seat === seat.seat)?.place;
 }
@@ -180,7 +183,7 @@ function Cards({ seat }: { seat: SeatState }) {
   );
 }
 
-/** An expression, shown for a while. */
+/** An expression, shown for a few seconds. */
 function Bubble({ label }: { label: string }) {
   return (
     <p class={css.bubble} data-part="bubble">

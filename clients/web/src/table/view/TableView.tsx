@@ -1,5 +1,6 @@
-// The whole table: the other seats, the pizza, what happened and what is asked for, the reader's own hand and decision. It draws what it is given
-// and gives back actions; where a table comes from (a seat, a spectator's stream, a record, the tutorial) is not its concern.
+// The table: the other seats, the pizza, history and requirements, the reader's hand and decision.
+// It renders a table from any source (a seat, a spectator's stream, a record, the tutorial) and
+// reports actions.
 
 import type { ComponentChildren } from "preact";
 import { useEffect, useRef, useState } from "preact/hooks";
@@ -27,30 +28,30 @@ import { Expressions, type ShownTurn, Tools } from "./Tools";
 
 interface TableViewProps {
   table: TableState;
-  /** The reader's seat; undefined: all seats are others'. */
+  /** The reader's seat; undefined if all seats are others'. */
   own: number | undefined;
   /** The reader's open decision. */
   decision?: OpenDecision | undefined;
-  /** Whose decision is open, where the table itself cannot tell: in a replay. */
+  /** The seat whose decision is open, where the table cannot tell: in a replay. */
   next?: number | undefined;
-  /** What kind of decision that is. */
+  /** The kind of that decision. */
   nextKind?: DecisionKind | undefined;
   sending?: boolean;
-  /** What went wrong last, in words. */
+  /** The last error, in words. */
   trouble?: string;
-  /** Something to be said above everything: a lost connection, a lesson. */
+  /** Shown above everything: a lost connection, a lesson. */
   banner?: ComponentChildren;
-  /** Said instead of the rules' own reason why a card cannot be picked. */
+  /** Replaces the reason why a card cannot be picked. */
   refusal?: string | undefined;
-  /** Leave out the clock: nobody waits. */
+  /** Hides the clock: nobody waits. */
   untimed?: boolean;
-  /** It is a record being looked at: nobody is "you", and the end leads nowhere. */
+  /** A record is shown: no seat is "you", and no links follow the end. */
   replayed?: boolean;
-  /** The name of the room or record. */
+  /** Name of the room or record. */
   caption?: string;
-  /** The next step once the game is over, before the links. */
+  /** The next step after the game, before the links. */
   onward?: ComponentChildren;
-  /** Beside the table's own tools. */
+  /** Additional tools of the table. */
   tools?: ComponentChildren;
   /** Below the table: the controls of a replay. */
   children?: ComponentChildren;
@@ -60,13 +61,13 @@ interface TableViewProps {
 
 const NOTHING: Picked = new Set();
 
-/** Where the game stands is broken between its parts, neither before a number nor before a dot. */
+/** The heading wraps only between its parts, not before a number or dot. */
 const INSIDE = / (?=[\d·])/g;
 const NO_BREAK = "\u00a0";
 
 export function TableView(props: TableViewProps) {
   const { table, own, decision, sending = false } = props;
-  // What is picked is picked for one decision: at the next one it is nothing, from the first moment on.
+  // Picks belong to one decision: the next one starts without picks.
   const [choice, setChoice] = useState<{ id: bigint | undefined; picked: Picked }>({ id: undefined, picked: NOTHING });
   const picked = decision && choice.id === decision.id ? choice.picked : NOTHING;
   const setPicked = (picked: Picked) => setChoice({ id: decision?.id, picked });
@@ -78,7 +79,8 @@ export function TableView(props: TableViewProps) {
   const keepFocus = useKeptFocus(row);
 
   const mine = own === undefined ? undefined : table.seats[own];
-  // A card that was given has left the hand, though the table's own hand has it until the exchange is complete and told.
+  // A given card has left the hand, although the table's hand keeps it until the exchange is
+  // complete.
   const gave = useRef<{ of: unknown; hand: readonly Card[] } | undefined>(undefined);
   const left = gave.current && gave.current.of === mine?.hand ? gave.current.hand : mine?.hand;
   const hand = decision?.hand ?? left ?? [];
@@ -161,7 +163,7 @@ export function TableView(props: TableViewProps) {
             kind={kind}
             cards={false}
           />
-          {/* Before the hand, so that from the cards the buttons are one tab further. */}
+          {/* Before the hand, so that the buttons are one Tab after the cards. */}
           {props.onExpress && <Expressions onExpress={props.onExpress} />}
           <div class={css.ownCards} data-part="own-cards">
             <Hand
@@ -214,11 +216,14 @@ interface SeatsProps {
   own: number | undefined;
   next: number | undefined;
   kind: DecisionKind | undefined;
-  /** The row below the pizza, where the reader has no seat. */
+  /** The row below the pizza, if the reader has no seat. */
   lower?: boolean;
 }
 
-/** The other seats in a row, in the order of play from the reader's left. Without a seat of the reader's own they go clockwise around the pizza. */
+/**
+ * The other seats in the order of play from the reader's left. Without a seat of the reader's they
+ * go clockwise around the pizza.
+ */
 function Seats({ table, own, next, kind, lower = false }: SeatsProps) {
   const players = table.seats.length;
   const below = own === undefined ? Math.max(1, Math.floor(players / 2)) : 0;

@@ -1,4 +1,4 @@
-// What stands beside the table's heading: sound, the look-up table, and the expressions that can be shown with one click.
+// The tools beside the table's heading: look-up table and sound; and the expressions.
 
 import type { ComponentChildren } from "preact";
 import { useState } from "preact/hooks";
@@ -15,18 +15,18 @@ import { Face } from "./Face";
 import { LookupTable } from "./LookupTable";
 import css from "./Tools.module.css";
 
-/** A turn as the look-up table shows it. */
+/** A turn for the look-up table. */
 export interface ShownTurn {
   readonly table: TableState;
   readonly decision: Pick<OpenDecision, "hand" | "legal"> & { readonly requirement: Requirement };
 }
 
 interface ToolsProps {
-  /** The last turn of the reader's own. */
+  /** The reader's last turn. */
   turn: ShownTurn | undefined;
-  /** Whether there are turns of the reader's own at all. */
+  /** Whether the reader has turns at all. */
   lookup: boolean;
-  /** More of them, from the page that the table is on. */
+  /** Additional tools. */
   children?: ComponentChildren;
 }
 

@@ -1,6 +1,6 @@
-// A room before its game: who has which seat, what each of the others waits for, and how those come in who are still to come. A join code is
-// not said here: who made the room has its invitation below. The game begins by itself. Who is connected is no event of a room that waits, so
-// it is asked for.
+// A room before its game: the seats, what is missing, and how others can join. The game starts
+// automatically. The room's creator sees the invitation below. Connections are no events of a
+// waiting room, so the room is polled.
 
 import type { ComponentChildren } from "preact";
 import { CALL_LIMIT_MS, roomApi } from "../../api/client";
@@ -17,12 +17,12 @@ import { nameOf } from "../words";
 import { Board } from "./Board";
 import css from "./WaitingRoom.module.css";
 
-/** How often it is asked who is connected, milliseconds. */
+/** Polling interval, milliseconds. */
 const EVERY_MS = 2000;
 
-/** Toppings that a pizza gets for each seat that is taken. */
+/** Toppings on the pizza per taken seat. */
 const TOPPINGS_OF_A_SEAT = 4;
-/** Ingredients that look well on it, by face. */
+/** Ingredients drawn on it, by face. */
 const TOPPINGS = [10, 9, 6, 7, 8, 11];
 
 interface WaitingRoomProps {
@@ -74,12 +74,12 @@ export function WaitingRoom({ table, own, banner }: WaitingRoomProps) {
   );
 }
 
-/** Whether the game could begin as far as this seat is concerned. */
+/** Whether the seat is ready for the game. */
 function isThere({ connected, builtIn }: SeatState): boolean {
   return connected || builtIn !== "";
 }
 
-/** One seat: who has it and whether it is ready, or what it waits for. */
+/** A seat: its participant and whether it is ready, or what it waits for. */
 function WaitingSeat({ table, seat, own }: { table: TableState; seat: SeatState; own: boolean }) {
   const words = t().table.room;
   const taken = isTaken(seat);
@@ -115,13 +115,13 @@ function WaitingSeat({ table, seat, own }: { table: TableState; seat: SeatState;
 
 interface WaysProps {
   roomId: string;
-  /** Whether the room is one of a tournament's. */
+  /** Whether the room belongs to a tournament. */
   tournament: boolean;
   /** Whether the reader has a seat. */
   seated: boolean;
 }
 
-/** How those come in who are still to come, as far as the reader may know. */
+/** How others can join, as far as the reader may know. */
 function Ways({ roomId, tournament, seated }: WaysProps) {
   const words = t().table.room;
   const way = tournament ? words.assigned : hostedRoom(roomId) ? words.invite : seated ? words.invited : words.byCode;

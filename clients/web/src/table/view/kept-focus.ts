@@ -1,11 +1,12 @@
-// The keyboard's focus in a part of the page that changes under it. A card that is played and a button whose decision is taken go away, and the
-// browser would throw who had the focus there back to the beginning of the page. It goes to a place of refuge instead, which does nothing by
-// itself: never to another card or button, which the next key would then use although nobody chose it.
+// Keeps the keyboard focus in a part of the page whose elements disappear: when a focused card or
+// button goes away, the browser would move the focus to the start of the page. It moves to a refuge
+// instead that does nothing by itself: never to another card or button, which the next key would
+// activate.
 
 import type { RefObject } from "preact";
 import { useLayoutEffect, useRef } from "preact/hooks";
 
-/** Keeps the focus in the part that the two listeners are put on; it falls back to `refuge`. */
+/** Keeps the focus in the part with these two listeners; falls back to `refuge`. */
 export function useKeptFocus(refuge: RefObject<HTMLElement | null>) {
   const inside = useRef(false);
   useLayoutEffect(() => {
