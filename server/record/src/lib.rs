@@ -11,4 +11,6 @@ pub mod pseudonym;
 pub mod replay;
 pub mod summary;
 pub mod table;
+#[cfg(feature = "testing")]
+pub mod testing;
 pub mod whole;

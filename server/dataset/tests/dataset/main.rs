@@ -10,9 +10,8 @@ mod choice;
 mod expressions;
 mod files;
 mod folder;
+mod golden;
 mod gym;
-#[path = "../../../record/tests/record/made.rs"]
-mod made;
 mod missing;
 mod rows;
 
@@ -27,7 +26,7 @@ use chefshat_record::jsonl;
 use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::made::Making;
+use chefshat_record::testing::TestGame;
 
 /// Games whose records lie in a folder, and a place for datasets.
 struct Stage {
@@ -96,7 +95,7 @@ fn rules(shifts: u32) -> RuleSet {
 
 /// A game of two Shifts, with a number of its own.
 fn a_record(number: u8) -> Vec<v1::RecordLine> {
-    let making = Making::dealt(rules(2), number, u64::from(number));
+    let making = TestGame::dealt(rules(2), number, u64::from(number));
     let mut lines = making.record(|_| v1::DecisionSource::Agent);
     rename(&mut lines, number);
     lines

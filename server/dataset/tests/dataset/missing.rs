@@ -4,59 +4,24 @@ use chefshat_dataset::{Export, ExportError, Filter, Layout};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 use chefshat_record::branch::branch_of;
 use chefshat_record::table::import;
+use chefshat_record::testing::{Observed, TestGame, transcript};
 use serde_json::Value;
 
 use super::{Stage, a_record, rename, renumbered, rules};
-use crate::made::Making;
 
 /// Turns of a game at a real table that were written down: few enough to leave open what others held.
 const TOLD_TURNS: usize = 20;
 
-/// A game as somebody wrote it down who saw the hand of seat 0 alone, and left early.
+/// A real table of which only the hand of seat 0 and the first turns were observed.
 fn a_real_table() -> Vec<v1::RecordLine> {
-    let lines = Making::dealt(rules(1), 8, 8).record(|_| v1::DecisionSource::Agent);
-    let mut text = String::from("shift,seat,what,value\n,,rules,paper target_shifts=1\n");
-    for seat in 0..4 {
-        text.push_str(&format!(",{seat},human,player {seat}\n"));
-    }
-    let cards = |cards: &[u32], golden: bool| {
-        let mut golden = golden;
-        let words = cards.iter().map(|card| match card {
-            12 => "J".to_owned(),
-            11 if std::mem::take(&mut golden) => "G".to_owned(),
-            card => card.to_string(),
-        });
-        words.collect::<Vec<_>>().join(" ")
+    let rules = rules(1);
+    let lines = TestGame::dealt(rules, 8, 8).record(|_| v1::DecisionSource::Agent);
+    let observed = Observed {
+        hands: 1,
+        turns: TOLD_TURNS,
+        ..Observed::TURNS
     };
-    let mut turns = 0;
-    for line in &lines {
-        if turns == TOLD_TURNS {
-            break;
-        }
-        let Some(Line::Event(v1::GameEvent {
-            kind: Some(kind), ..
-        })) = &line.line
-        else {
-            continue;
-        };
-        turns += usize::from(matches!(kind, Kind::Play(_) | Kind::Pass(_)));
-        match kind {
-            Kind::ShiftStarted(started) => {
-                let hand = &started.hands[0];
-                let told = cards(&hand.cards, hand.golden);
-                text.push_str(&format!("1,0,hand,{told}\n"));
-            }
-            Kind::Play(play) => {
-                let mut played = vec![play.face; play.quantity as usize];
-                played.extend(vec![12; play.jokers as usize]);
-                let told = cards(&played, false);
-                text.push_str(&format!("1,{},plays,{told}\n", play.seat));
-            }
-            Kind::Pass(pass) => text.push_str(&format!("1,{},passes,\n", pass.seat)),
-            _ => {}
-        }
-    }
-    import(text.as_bytes()).unwrap()
+    import(transcript(&rules, &lines, observed).as_bytes()).unwrap()
 }
 
 #[test]
@@ -186,12 +151,12 @@ const TAKEN_OVER: u64 = 100;
 
 #[test]
 fn decisions_taken_over_are_nobodys_here() {
-    let mut before = Making::dealt(rules(3), 7, 3).record(|_| v1::DecisionSource::Agent);
+    let mut before = TestGame::dealt(rules(3), 7, 3).record(|_| v1::DecisionSource::Agent);
     rename(&mut before, 7);
     let branch = branch_of(&before, TAKEN_OVER).unwrap();
-    let making = Making {
+    let making = TestGame {
         branch: Some(&branch),
-        ..Making::dealt(rules(3), 8, 4)
+        ..TestGame::dealt(rules(3), 8, 4)
     };
     let mut after = making.record(|_| v1::DecisionSource::Agent);
     rename(&mut after, 8);

@@ -9,7 +9,7 @@ use chefshat_record::players::{PlayerError, recorded_player};
 use chefshat_record::replay::{replay, walk};
 use chefshat_record::table::import;
 
-use super::made::{Making, count};
+use chefshat_record::testing::{TestGame, taken_over};
 
 /// Lines before the game begins: the header, and four seats taken.
 const SEATED: usize = 5;
@@ -24,7 +24,7 @@ fn standard() -> RuleSet {
 }
 
 fn record() -> Vec<v1::RecordLine> {
-    Making::dealt(standard(), 7, 1).record(|_| AGENT)
+    TestGame::dealt(standard(), 7, 1).record(|_| AGENT)
 }
 
 /// The recorded game before each of its decisions.
@@ -101,9 +101,9 @@ fn a_branch_of_a_branch_knows_which_seed_dealt_what() {
     };
     let point = shift_of(&course(&first), 2) + 5;
     let branch = branch_of(&first, point as u64).unwrap();
-    let second = Making {
+    let second = TestGame {
         branch: Some(&branch),
-        ..Making::dealt(standard(), 9, 2)
+        ..TestGame::dealt(standard(), 9, 2)
     }
     .record(|_| AGENT);
     replay(&second).unwrap();
@@ -120,7 +120,7 @@ fn a_branch_of_a_branch_knows_which_seed_dealt_what() {
         course.len() - 1,
     ] {
         let again = branch_of(&second, at as u64).unwrap();
-        assert_eq!(count(&again), at as u64);
+        assert_eq!(taken_over(&again), at as u64);
         assert_eq!(
             played_up(&again, course[at].0.seed()),
             course[at].0,
@@ -141,9 +141,9 @@ fn given_hands_are_taken_over() {
     let rules = standard();
     let dealt = *Game::new(rules, Seed([50; 32]), |_| {}).hands();
     let script = Script::first_shift(dealt);
-    let making = Making {
+    let making = TestGame {
         script: Some(script.clone()),
-        ..Making::dealt(rules, 7, 3)
+        ..TestGame::dealt(rules, 7, 3)
     };
     let lines = making.record(|_| AGENT);
     replay(&lines).unwrap();
@@ -221,7 +221,7 @@ fn an_aborted_game_can_be_gone_on_with() {
         .0;
     let aborted_later = aborted(lines.clone(), fiftieth);
     let branch = branch_of(&aborted_later, 50).unwrap();
-    assert_eq!(count(&branch), 50);
+    assert_eq!(taken_over(&branch), 50);
     assert_eq!(branch.later_deals, Some(Seed([7; 32])));
     // Given up before the deal: there is nothing to take over.
     assert_eq!(
@@ -235,7 +235,7 @@ fn a_player_is_what_its_seat_knew_and_did() {
     use v1::DecisionSource::{Agent, Disconnected, Invalid, Substitute, Timeout};
     let sources = [Agent, Timeout, Invalid, Disconnected, Substitute];
     let source = |decision: u64| sources[decision as usize % sources.len()];
-    let lines = Making::dealt(standard(), 7, 1).record(source);
+    let lines = TestGame::dealt(standard(), 7, 1).record(source);
     let course = course(&lines);
     let mut all = 0;
     for seat in 0..4 {
@@ -283,7 +283,7 @@ fn written_down(hands: &[u32]) -> Vec<v1::RecordLine> {
         exchange: false,
         ..RuleSetSpec::default()
     };
-    let lines = Making::dealt(spec.validate().unwrap(), 3, 5).record(|_| AGENT);
+    let lines = TestGame::dealt(spec.validate().unwrap(), 3, 5).record(|_| AGENT);
     let mut text = String::from(
         "shift,seat,what,value\n\
          ,,rules,paper players=2 faces=4 jokers=1 target_shifts=2 exchange=off special_actions=off\n\

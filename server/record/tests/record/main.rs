@@ -8,7 +8,6 @@
 mod branches;
 mod damage;
 mod files;
-pub(crate) mod made;
 mod outcome;
 mod table;
 mod verify;

@@ -7,7 +7,7 @@ use chefshat_proto::v1::{self, DecisionSource, record_line::Line};
 use chefshat_record::jsonl;
 use chefshat_record::outcome::{Identity, Outcome, OutcomeError, Unrated, outcome};
 
-use super::made::Making;
+use chefshat_record::testing::TestGame;
 
 fn rules() -> RuleSet {
     let spec = RuleSetSpec {
@@ -24,7 +24,7 @@ fn fixture(name: &str) -> Vec<v1::RecordLine> {
 
 /// The record of a game that a server dealt, all of whose seats decided themselves.
 fn dealt() -> Vec<v1::RecordLine> {
-    let mut lines = Making::dealt(rules(), 7, 3).record(|_| DecisionSource::Agent);
+    let mut lines = TestGame::dealt(rules(), 7, 3).record(|_| DecisionSource::Agent);
     header(&mut lines).origin = v1::GameOrigin::Dealt.into();
     lines
 }
@@ -161,7 +161,7 @@ fn a_game_that_all_played_themselves_is_rated() {
 #[test]
 fn lost_decisions_count_and_those_of_others_do_not() {
     let record = |source: fn(u64) -> DecisionSource| {
-        let mut lines = Making::dealt(rules(), 7, 3).record(source);
+        let mut lines = TestGame::dealt(rules(), 7, 3).record(source);
         header(&mut lines).origin = v1::GameOrigin::Dealt.into();
         let decisions = lines.iter().filter_map(|line| match &line.line {
             Some(Line::Decision(decision)) => Some(decision.source()),

@@ -6,138 +6,11 @@ mod refused;
 
 use std::fmt::Write as _;
 
-use chefshat_engine::{RuleSet, RuleSetSpec, Stop};
+use chefshat_engine::{RuleSetSpec, Stop};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 use chefshat_record::replay::replay;
 use chefshat_record::table::import;
-
-use super::made::Making;
-
-/// What of a game is written down.
-#[derive(Debug, Clone, Copy)]
-struct Told {
-    /// Seats whose hands are, one bit for each.
-    hands: u32,
-    /// Seats whose gifts are, one bit for each.
-    gifts: u32,
-    /// Whether declined special actions are.
-    declines: bool,
-    /// How many turns are.
-    turns: usize,
-}
-
-const NOTHING: Told = Told {
-    hands: 0,
-    gifts: 0,
-    declines: false,
-    turns: usize::MAX,
-};
-const EVERYTHING: Told = Told {
-    hands: u32::MAX,
-    gifts: u32::MAX,
-    declines: true,
-    turns: usize::MAX,
-};
-
-fn rules_text(rules: &RuleSet) -> String {
-    let spec = rules.spec();
-    let on = |on| if on { "on" } else { "off" };
-    let mut text = format!(
-        "paper players={} faces={} jokers={} exchange={} special_actions={}",
-        spec.players,
-        spec.faces,
-        spec.jokers,
-        on(spec.exchange),
-        on(spec.special_actions)
-    );
-    match spec.stop {
-        Stop::Points(points) => write!(text, " target_points={points}"),
-        Stop::Shifts(shifts) => write!(text, " target_shifts={shifts}"),
-    }
-    .unwrap();
-    let points: Vec<String> = spec.points.iter().map(u32::to_string).collect();
-    write!(text, " points={}", points.join("/")).unwrap();
-    if spec.opening == chefshat_engine::Opening::AnyTopFace {
-        text.push_str(" opening=any_top_face");
-    }
-    if spec.opening_pass {
-        text.push_str(" opening_pass=allowed");
-    }
-    if spec.pass_scope == chefshat_engine::PassScope::Turn {
-        text.push_str(" pass_scope=turn");
-    }
-    text
-}
-
-fn cards_text(cards: &[u32], golden: bool, faces: u32) -> String {
-    let mut golden = golden;
-    let words: Vec<String> = cards
-        .iter()
-        .map(|card| match *card {
-            card if card > faces => "J".to_owned(),
-            card if card == faces && std::mem::take(&mut golden) => "G".to_owned(),
-            card => card.to_string(),
-        })
-        .collect();
-    words.join(" ")
-}
-
-/// The game of a record as somebody might have written it down who saw only a part of it.
-fn transcript(rules: &RuleSet, lines: &[v1::RecordLine], told: Told) -> String {
-    let faces = u32::from(rules.faces());
-    let mut text = String::from("shift,seat,what,value\n");
-    writeln!(text, ",,rules,{}", rules_text(rules)).unwrap();
-    for seat in 0..rules.players() {
-        writeln!(text, ",{seat},human,player {seat}").unwrap();
-    }
-    let (mut shift, mut turns, mut rows) = (0, 0, String::new());
-    for line in lines {
-        if turns >= told.turns {
-            break;
-        }
-        match line.line.as_ref().unwrap() {
-            Line::Decision(decision) if told.declines && decision.text == "decline" => {
-                writeln!(rows, "{shift},{},declines,", decision.seat).unwrap();
-            }
-            Line::Event(event) => match event.kind.as_ref().unwrap() {
-                Kind::ShiftStarted(started) => {
-                    shift = started.shift;
-                    for hand in &started.hands {
-                        if told.hands >> hand.seat & 1 == 1 {
-                            let cards = cards_text(&hand.cards, hand.golden, faces);
-                            writeln!(rows, "{shift},{},hand,{cards}", hand.seat).unwrap();
-                        }
-                    }
-                }
-                Kind::SpecialActionDeclared(declared) => {
-                    writeln!(rows, "{shift},{},declares,", declared.seat).unwrap();
-                }
-                Kind::CardsExchanged(exchanged) if told.gifts >> exchanged.giver & 1 == 1 => {
-                    let cards = cards_text(&exchanged.cards, exchanged.golden, faces);
-                    writeln!(rows, "{shift},{},gives,{cards}", exchanged.giver).unwrap();
-                }
-                Kind::Play(play) => {
-                    turns += 1;
-                    let mut cards = vec![play.face; play.quantity as usize];
-                    cards.extend(vec![faces + 1; play.jokers as usize]);
-                    let cards = cards_text(&cards, false, faces);
-                    writeln!(rows, "{shift},{},plays,{cards}", play.seat).unwrap();
-                }
-                Kind::Pass(pass) => {
-                    turns += 1;
-                    writeln!(rows, "{shift},{},passes,", pass.seat).unwrap();
-                }
-                Kind::SeatFinished(finished) => {
-                    let place = finished.place;
-                    writeln!(rows, "{shift},{},finishes,{place}", finished.seat).unwrap();
-                }
-                _ => {}
-            },
-            _ => {}
-        }
-    }
-    text + &rows
-}
+use chefshat_record::testing::{Observed, TestGame, transcript};
 
 fn spec(players: u8, faces: u8, shifts: u32) -> RuleSetSpec {
     RuleSetSpec {
@@ -184,14 +57,14 @@ fn whatever_is_told_of_a_game_becomes_a_record_that_replays() {
         spec(4, 4, 6),
         spec(3, 4, 6),
     ];
-    let some = |hands, gifts| Told {
+    let some = |hands, gifts| Observed {
         hands,
         gifts,
-        ..NOTHING
+        ..Observed::TURNS
     };
     let tellings = [
-        NOTHING,
-        EVERYTHING,
+        Observed::TURNS,
+        Observed::EVERYTHING,
         some(1, 3),
         some(0b101, 0),
         some(0, 0b1111),
@@ -201,7 +74,7 @@ fn whatever_is_told_of_a_game_becomes_a_record_that_replays() {
     for spec in specs {
         let rules = spec.validate().unwrap();
         for chance in 0..2 {
-            let played = Making::dealt(rules, 7 + chance, chance.into())
+            let played = TestGame::dealt(rules, 7 + chance, chance.into())
                 .record(|_| v1::DecisionSource::Agent);
             for told in tellings {
                 let text = transcript(&rules, &played, told);
@@ -219,7 +92,7 @@ fn whatever_is_told_of_a_game_becomes_a_record_that_replays() {
 #[test]
 fn a_game_that_was_broken_off_is_told_as_far_as_it_went() {
     let rules = spec(4, 11, 3).validate().unwrap();
-    let played = Making::dealt(rules, 5, 9).record(|_| v1::DecisionSource::Agent);
+    let played = TestGame::dealt(rules, 5, 9).record(|_| v1::DecisionSource::Agent);
     let turns = course(&played)
         .iter()
         .filter(|event| event.starts_with("Play(") || event.starts_with("Pass("))
@@ -227,10 +100,10 @@ fn a_game_that_was_broken_off_is_told_as_far_as_it_went() {
     assert!(turns > 100, "{turns} turns");
     for hands in [0, 0b1000] {
         for turns in (0..turns).step_by(7) {
-            let told = Told {
+            let told = Observed {
                 hands,
                 turns,
-                ..NOTHING
+                ..Observed::TURNS
             };
             let text = transcript(&rules, &played, told);
             let record = import(text.as_bytes())
@@ -297,8 +170,8 @@ fn the_documented_transcript_becomes_a_record() {
 /// The second Shift of a game in which everything was written down, told as if nothing before it had been watched.
 fn from_the_second_shift() -> (String, Vec<v1::RecordLine>) {
     let rules = spec(4, 11, 2).validate().unwrap();
-    let played = Making::dealt(rules, 11, 2).record(|_| v1::DecisionSource::Agent);
-    let whole = transcript(&rules, &played, EVERYTHING);
+    let played = TestGame::dealt(rules, 11, 2).record(|_| v1::DecisionSource::Agent);
+    let whole = transcript(&rules, &played, Observed::EVERYTHING);
     let (_, second) = whole.split_once("\n2,").unwrap();
     let ended = played.iter().find_map(|line| match &line.line {
         Some(Line::Event(event)) => match &event.kind {

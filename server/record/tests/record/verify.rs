@@ -8,7 +8,7 @@ use chefshat_record::branch::branch_of;
 use chefshat_record::jsonl;
 use chefshat_record::replay::{replay, walk};
 
-use super::made::Making;
+use chefshat_record::testing::TestGame;
 
 fn rules(shifts: u32) -> RuleSet {
     let spec = RuleSetSpec {
@@ -23,7 +23,7 @@ fn scripted() -> Vec<v1::RecordLine> {
     let rules = rules(5);
     let dealt = Game::new(rules, Seed([9; 32]), |_| {});
     let order = [2, 0, 3, 1].map(Seat::new);
-    let making = Making {
+    let making = TestGame {
         script: Some(Script {
             shift: 3,
             hands: *dealt.hands(),
@@ -31,18 +31,18 @@ fn scripted() -> Vec<v1::RecordLine> {
             scores: BySeat::from_slice(&[6, 2, 8, 2]).unwrap(),
             drawn: None,
         }),
-        ..Making::dealt(rules, 7, 3)
+        ..TestGame::dealt(rules, 7, 3)
     };
     making.record(|_| v1::DecisionSource::Agent)
 }
 
 /// A game that branches in the middle of another.
 fn branched() -> Vec<v1::RecordLine> {
-    let before = Making::dealt(rules(3), 7, 3).record(|_| v1::DecisionSource::Agent);
+    let before = TestGame::dealt(rules(3), 7, 3).record(|_| v1::DecisionSource::Agent);
     let branch = branch_of(&before, 100).unwrap();
-    let making = Making {
+    let making = TestGame {
         branch: Some(&branch),
-        ..Making::dealt(rules(3), 8, 4)
+        ..TestGame::dealt(rules(3), 8, 4)
     };
     making.record(|_| v1::DecisionSource::Agent)
 }

@@ -9,7 +9,7 @@ use chefshat_render::{Eyes, Film, GifWriter, Painter, Palette, Scene, When, figu
 use resvg::tiny_skia::Pixmap;
 
 use super::{chronicle, film, rules};
-use crate::made::Making;
+use chefshat_record::testing::TestGame;
 
 /// Pixels that the pictures of these tests are wide: few, because nobody looks at them.
 const WIDTH: u32 = 320;
@@ -98,7 +98,7 @@ fn a_picture_is_the_same_every_time() {
 /// Whoever changes a drawing on purpose looks at it, then puts the new text in the place of the old.
 #[test]
 fn the_drawings_are_those_that_were_looked_at() {
-    let lines = Making::dealt(rules(2, 4), 6, 2).record(|_| v1::DecisionSource::Agent);
+    let lines = TestGame::dealt(rules(2, 4), 6, 2).record(|_| v1::DecisionSource::Agent);
     let painter = Painter::new();
     let film = Film::new(&lines, Eyes::Seat(0)).unwrap();
     let table = painter.table(&film.at(When::Decision(2)).unwrap().scene);

@@ -2,18 +2,18 @@
 
 use std::time::Duration;
 
-use chefshat_engine::TakenOver;
 use chefshat_engine::{
-    Action, BySeat, Cards, DecisionKind, Game, RuleSetSpec, Script, Seat, SeatOrder, Seed,
-    SpecialAction, Stop, Viewer,
+    Action, BySeat, Cards, DecisionKind, Game, RuleSet, RuleSetSpec, Script, Seat, SeatOrder, Seed,
+    SpecialAction, Stop, TakenOver, Viewer,
 };
-use chefshat_proto::v1::{self, record_line::Line};
+use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 use chefshat_record::branch::Branch;
 use chefshat_record::replay::walk;
+use chefshat_record::table::import;
+use chefshat_record::testing::{Observed, TestGame, transcript};
 use chefshat_render::{Card, Eyes, Film, Frame, Hand, Happening, Now, Painter, Scene, When};
 
 use super::{chronicle, film, fixture, rules, scene};
-use crate::made::Making;
 
 /// Of so many scenes one is drawn where all are looked at.
 const DRAWN: usize = 9;
@@ -222,9 +222,9 @@ fn a_film_may_begin_with_what_its_viewer_does_not_know_of() {
         scores: BySeat::filled(3, 0),
         drawn: None,
     };
-    let making = Making {
+    let making = TestGame {
         script: Some(script),
-        ..Making::dealt(rules, 1, 2)
+        ..TestGame::dealt(rules, 1, 2)
     };
     let lines = making.record(|_| v1::DecisionSource::Agent);
     let all = Film::new(&lines, Eyes::All).unwrap();
@@ -288,10 +288,10 @@ fn with_and_without_special_actions(players: u8, seed: u8) -> [Vec<v1::RecordLin
             taken_over: vec![TakenOver { seed, actions }],
             later_deals: None,
         };
-        let making = Making {
+        let making = TestGame {
             branch: Some(&branch),
             seed,
-            ..Making::dealt(rules, 0, 0)
+            ..TestGame::dealt(rules, 0, 0)
         };
         making.record(|_| v1::DecisionSource::Recorded)
     })
@@ -352,4 +352,50 @@ fn hands_that_nobody_wrote_down_are_drawn_as_unknown() {
     expected.push("card-unknown".to_owned());
     assert_eq!(scene.seats[1].hand, Hand::Unknown(rules.hand_size()));
     assert_eq!(drawn(&Painter::new().table(&scene)), expected);
+}
+
+/// The number of times the Golden card is drawn in a hand of a game at a real table.
+fn golden_drawn(rules: &RuleSet, played: &[v1::RecordLine], observed: Observed) -> usize {
+    let record = import(transcript(rules, played, observed).as_bytes()).unwrap();
+    let film = Film::new(&record, Eyes::All).unwrap();
+    let seats = film.frames().iter().flat_map(|frame| &frame.scene.seats);
+    seats
+        .filter(|seat| {
+            matches!(&seat.hand, Hand::Open(cards) if cards.iter().any(|card| matches!(card, Card::Golden(_))))
+        })
+        .count()
+}
+
+#[test]
+fn the_golden_card_is_drawn_only_where_its_holder_is_known() {
+    let any_top_face = RuleSetSpec {
+        stop: Stop::Shifts(1),
+        ..RuleSetSpec::preset("original2020").unwrap()
+    };
+    let rules = any_top_face.validate().unwrap();
+    let played = TestGame::dealt(rules, 7, 1).record(|_| v1::DecisionSource::Agent);
+    assert_eq!(golden_drawn(&rules, &played, Observed::TURNS), 0);
+    let holder = played.iter().find_map(|line| match &line.line {
+        Some(Line::Event(event)) => match &event.kind {
+            Some(Kind::ShiftStarted(started)) => started.hands.iter().find(|hand| hand.golden),
+            _ => None,
+        },
+        _ => None,
+    });
+    let holder = holder.unwrap().seat;
+    for seat in 0..4 {
+        let observed = Observed {
+            hands: 1 << seat,
+            ..Observed::TURNS
+        };
+        assert_eq!(golden_drawn(&rules, &played, observed) > 0, seat == holder);
+    }
+    // The opener of the standard game holds it.
+    let rules = RuleSetSpec {
+        stop: Stop::Shifts(1),
+        ..RuleSetSpec::default()
+    };
+    let rules = rules.validate().unwrap();
+    let played = TestGame::dealt(rules, 7, 1).record(|_| v1::DecisionSource::Agent);
+    assert!(golden_drawn(&rules, &played, Observed::TURNS) > 0);
 }

@@ -8,8 +8,6 @@
 mod drawing;
 mod hidden;
 mod look_up;
-#[path = "../../../record/tests/record/made.rs"]
-mod made;
 
 use std::path::Path;
 

@@ -1,39 +1,46 @@
-//! Records made for tests: a game is played by random choices, and written down as a server writes it.
+//! Records for tests: games played by random choices and recorded as a server records them, and transcripts of them.
+#![allow(
+    clippy::unwrap_used,
+    missing_docs,
+    reason = "test support: panics where a test fails"
+)]
 
+mod transcript;
+
+pub use transcript::{Observed, transcript};
+
+use crate::branch::Branch;
+use crate::convert::{By, action_space, event_kind, rules_to_proto, script_to_proto, seat_number};
 use chefshat_engine::{ActionId, BySeat, DecisionKind, Event, Game, RuleSet, Script, Seed};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
-use chefshat_record::branch::Branch;
-use chefshat_record::convert::{
-    By, action_space, event_kind, rules_to_proto, script_to_proto, seat_number,
-};
 
-/// Invalid attempts after which the default is taken.
+/// Invalid attempts after which the default decision is taken.
 const ATTEMPTS: u32 = 10;
 
-/// How a game is to be made.
-pub(crate) struct Making<'a> {
-    pub(crate) rules: RuleSet,
-    pub(crate) seed: Seed,
-    pub(crate) script: Option<Script>,
-    pub(crate) branch: Option<&'a Branch>,
-    /// What makes the random choices.
-    pub(crate) chance: u64,
+/// A game to play and record.
+pub struct TestGame<'a> {
+    pub rules: RuleSet,
+    pub seed: Seed,
+    pub script: Option<Script>,
+    pub branch: Option<&'a Branch>,
+    /// Seeds the players' random choices.
+    pub choices: u64,
 }
 
-impl Making<'_> {
-    /// A game that is simply dealt.
-    pub(crate) fn dealt(rules: RuleSet, seed: u8, chance: u64) -> Self {
-        Making {
+impl TestGame<'_> {
+    /// A game dealt from `seed` in every byte.
+    pub fn dealt(rules: RuleSet, seed: u8, choices: u64) -> Self {
+        TestGame {
             rules,
             seed: Seed([seed; 32]),
             script: None,
             branch: None,
-            chance,
+            choices,
         }
     }
 
-    /// The record of the game. `source` says how the decision of a number, from 0, came about.
-    pub(crate) fn record(&self, source: impl Fn(u64) -> v1::DecisionSource) -> Vec<v1::RecordLine> {
+    /// Plays the game. `source` gives the source of each decision by its index in the game.
+    pub fn record(&self, source: impl Fn(u64) -> v1::DecisionSource) -> Vec<v1::RecordLine> {
         let mut lines = Lines {
             lines: vec![Line::Header(self.header())],
             events: 0,
@@ -60,13 +67,13 @@ impl Making<'_> {
             .branch
             .map_or(self.seed, |branch| branch.taken_over[0].seed);
         let mut events = Vec::new();
-        let note = |event| events.push(event);
+        let push = |event| events.push(event);
         let mut game = match &self.script {
-            None => Game::new(self.rules, first, note),
-            Some(script) => Game::scripted(self.rules, first, script, note).unwrap(),
+            None => Game::new(self.rules, first, push),
+            Some(script) => Game::scripted(self.rules, first, script, push).unwrap(),
         };
-        self.tell(&mut lines, &mut events, v1::DecisionSource::Agent);
-        let mut chance = self.chance;
+        self.push_events(&mut lines, &mut events, v1::DecisionSource::Agent);
+        let mut random = self.choices;
         let mut numbers = BySeat::filled(self.rules.players(), 0);
         let mut substituted = BySeat::filled(self.rules.players(), false);
         let mut decisions: u64 = 0;
@@ -77,10 +84,10 @@ impl Making<'_> {
             let (action, source) = match taken_over.get(index) {
                 Some((_, action)) => (*action, v1::DecisionSource::Recorded),
                 None => {
-                    chance = chance
+                    random = random
                         .wrapping_mul(6364136223846793005)
                         .wrapping_add(1442695040888963407);
-                    let pick = (chance >> 33) as usize % legal.len();
+                    let pick = (random >> 33) as usize % legal.len();
                     match source(decisions) {
                         source @ (v1::DecisionSource::Agent | v1::DecisionSource::Substitute) => {
                             (legal.nth(pick).unwrap(), source)
@@ -128,7 +135,7 @@ impl Making<'_> {
                 ..v1::DecisionRecord::default()
             }));
             game.apply(action, |event| events.push(event)).unwrap();
-            self.tell(&mut lines, &mut events, source);
+            self.push_events(&mut lines, &mut events, source);
         }
         if let Line::Header(header) = &mut lines.lines[0] {
             for (seat, substituted) in header.seats.iter_mut().zip(substituted.values()) {
@@ -155,13 +162,14 @@ impl Making<'_> {
             events: lines.events,
             decisions,
         }));
-        let whole = lines.lines.into_iter();
-        whole
+        lines
+            .lines
+            .into_iter()
             .map(|line| v1::RecordLine { line: Some(line) })
             .collect()
     }
 
-    fn tell(&self, lines: &mut Lines, events: &mut Vec<Event>, source: v1::DecisionSource) {
+    fn push_events(&self, lines: &mut Lines, events: &mut Vec<Event>, source: v1::DecisionSource) {
         let by = By {
             source,
             decision_time_us: 0,
@@ -179,7 +187,7 @@ impl Making<'_> {
                 .map(|script| script_to_proto(script, self.rules.faces())),
             branched_from: self.branch.map(|branch| v1::BranchPoint {
                 game_id: "0123456789abcdef0123456789abcdef".into(),
-                decisions: count(branch),
+                decisions: taken_over(branch),
                 same_deals: false,
             }),
             taken_over: (self.branch.iter().flat_map(|branch| &branch.taken_over))
@@ -229,10 +237,7 @@ impl Making<'_> {
             ..v1::RecordHeader::default()
         }
     }
-}
 
-impl Making<'_> {
-    /// What everybody is told when the game begins.
     fn started(&self) -> v1::GameStarted {
         let header = self.header();
         v1::GameStarted {
@@ -248,8 +253,8 @@ impl Making<'_> {
     }
 }
 
-/// Decisions that a game takes over.
-pub(crate) fn count(branch: &Branch) -> u64 {
+/// The number of decisions taken over.
+pub fn taken_over(branch: &Branch) -> u64 {
     branch
         .taken_over
         .iter()
