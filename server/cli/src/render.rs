@@ -9,8 +9,8 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use chefshat_proto::v1;
+use chefshat_record::atomic_file::AtomicFile;
 use chefshat_record::jsonl;
-use chefshat_record::whole::WholeFile;
 use chefshat_render::{Eyes, Film, Frame, Painter, When, figure_at};
 use clap::{Args, ValueEnum};
 use serde_json::json;
@@ -255,7 +255,7 @@ impl Render {
             Kind::Svg => painter.outlined(&svg, width)?.into_bytes(),
             _ => painter.png(&pixels)?,
         };
-        let mut file = WholeFile::create(&self.out)?;
+        let mut file = AtomicFile::create(&self.out)?;
         file.write_all(&bytes)?;
         file.finish()?;
         Ok(Written {

@@ -1,12 +1,15 @@
 //! The folder of a dataset: made beside its place, whole or not at all, and moved there when it is complete. What may be replaced by it is
 //! decided in `earlier`.
 
+use std::ffi::{OsStr, OsString};
 use std::io;
 use std::path::{Path, PathBuf};
 
+use tempfile::TempDir;
+
 use super::earlier::EarlierDataset;
 use super::files::FileSummary;
-use chefshat_record::whole::sync_folder_of;
+use chefshat_record::atomic_file::sync_folder_of;
 
 /// The file that lists the SHA-256 of the others, in the form that `sha256sum --check` reads.
 pub(super) const CHECKSUMS: &str = "SHA256SUMS";
@@ -44,9 +47,8 @@ pub enum FolderError {
 /// A folder in the making. What was made is removed again unless it is put in its place.
 pub(super) struct NewFolder {
     target: PathBuf,
-    parts: PathBuf,
+    parts: TempDir,
     replace: bool,
-    in_place: bool,
 }
 
 impl NewFolder {
@@ -64,26 +66,24 @@ impl NewFolder {
             .file_name()
             .ok_or_else(|| FolderError::NoName(target.to_path_buf()))?;
         check_target(target, replace)?;
-        let parts = beside(target, name, "part");
-        std::fs::create_dir_all(&parts).map_err(|source| FolderError::Io {
-            path: parts.clone(),
+        let parts = create_beside(target, name).map_err(|source| FolderError::Io {
+            path: target.to_path_buf(),
             source,
         })?;
         Ok(Self {
             target: target.to_path_buf(),
             parts,
             replace,
-            in_place: false,
         })
     }
 
     /// Where files are written for now.
     pub(super) fn path(&self) -> &Path {
-        &self.parts
+        self.parts.path()
     }
 
     /// Writes the list of checksums and puts the folder in its place.
-    pub(super) fn put_in_place(mut self, files: &[FileSummary]) -> Result<(), FolderError> {
+    pub(super) fn put_in_place(self, files: &[FileSummary]) -> Result<(), FolderError> {
         let target = self.target.clone();
         let io = |source| FolderError::Io {
             path: target.clone(),
@@ -93,15 +93,15 @@ impl NewFolder {
             .iter()
             .map(|file| format!("{}  {}\n", file.sha256, file.path))
             .collect();
-        let sums_path = self.parts.join(CHECKSUMS);
+        let sums_path = self.parts.path().join(CHECKSUMS);
         std::fs::write(&sums_path, sums).map_err(io)?;
         std::fs::File::open(&sums_path)
             .and_then(|file| file.sync_all())
             .map_err(io)?;
         // Somebody may have used the place meanwhile.
         check_target(&self.target, self.replace)?;
-        let name = self.target.file_name().expect("checked at the beginning");
-        let old = beside(&self.target, name, "old");
+        let parts = self.parts.path();
+        let old = parts.with_extension("old");
         let replaced = self.target.exists();
         let mut earlier = None;
         if replaced {
@@ -112,14 +112,13 @@ impl NewFolder {
                 Err(error)
             })?;
         }
-        if let Err(error) = std::fs::rename(&self.parts, &self.target) {
+        if let Err(error) = std::fs::rename(parts, &self.target) {
             if replaced {
                 // As it was; if even that fails, the old folder still lies beside.
                 let _ = std::fs::rename(&old, &self.target);
             }
             return Err(io(error));
         }
-        self.in_place = true;
         match earlier {
             Some(earlier) => earlier.remove().map_err(io)?,
             None if replaced => std::fs::remove_dir(&old).map_err(io)?,
@@ -128,15 +127,6 @@ impl NewFolder {
         // Not every file system can sync a folder, and the files in it are safe already.
         let _ = sync_folder_of(&self.target);
         Ok(())
-    }
-}
-
-impl Drop for NewFolder {
-    fn drop(&mut self) {
-        if !self.in_place {
-            // What was written is worth nothing, and its removal may fail for the same reason as the writing.
-            let _ = std::fs::remove_dir_all(&self.parts);
-        }
     }
 }
 
@@ -173,10 +163,18 @@ fn is_empty(folder: &Path) -> Result<bool, FolderError> {
     Ok(entries.next().is_none())
 }
 
-/// A hidden name beside the target that no other process uses.
-fn beside(target: &Path, name: &std::ffi::OsStr, what: &str) -> PathBuf {
-    let mut hidden = std::ffi::OsString::from(".");
-    hidden.push(name);
-    hidden.push(format!(".{}.{what}", std::process::id()));
-    target.with_file_name(hidden)
+/// Creates a hidden folder `.NAME.RANDOM.part` beside the target, and the folders above them.
+fn create_beside(target: &Path, name: &OsStr) -> io::Result<TempDir> {
+    let mut prefix = OsString::from(".");
+    prefix.push(name);
+    prefix.push(".");
+    let parent = match target.parent() {
+        Some(parent) if parent != Path::new("") => parent,
+        _ => Path::new("."),
+    };
+    std::fs::create_dir_all(parent)?;
+    tempfile::Builder::new()
+        .prefix(&prefix)
+        .suffix(".part")
+        .tempdir_in(parent)
 }

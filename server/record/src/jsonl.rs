@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use chefshat_proto::v1::{RecordLine, record_line::Line};
 
-use crate::whole::{WholeFile, WriteError};
+use crate::atomic_file::{AtomicFile, WriteError};
 pub use lists::{Excess, excess};
 
 /// Version of the form that this crate writes, and the newest that it reads.
@@ -97,7 +97,7 @@ pub fn write(path: &Path, lines: &[RecordLine]) -> Result<(), RecordFileError> {
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder).map_err(|source| io_error(path, source))?;
     }
-    let mut file = WholeFile::create(path)?;
+    let mut file = AtomicFile::create(path)?;
     for line in lines {
         serde_json::to_writer(&mut file, line).map_err(|error| io_error(path, error.into()))?;
         file.write_all(b"\n")?;

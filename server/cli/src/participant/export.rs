@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
+use chefshat_record::atomic_file::AtomicFile;
 use chefshat_record::pseudonym::OwnSeats;
 use chefshat_record::replay::replay;
 use chefshat_record::summary::summary;
-use chefshat_record::whole::WholeFile;
 use chefshat_tournament::Change;
 use clap::Args;
 use serde_json::{Value, json};
@@ -81,7 +81,7 @@ impl Export {
             )
             .into());
         }
-        let mut file = WholeFile::create(&self.out)?;
+        let mut file = AtomicFile::create(&self.out)?;
         let head = json!({ "participant": { "format_version": 1, "name": self.who.name, "server_version": env!("CARGO_PKG_VERSION") } });
         for line in std::iter::once(&head).chain(&sheet.lines) {
             file.write_all(line.to_string().as_bytes())?;

@@ -6,7 +6,7 @@ use std::process::{Child, ChildStdin, Command, Stdio};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use chefshat_record::whole::WholeFile;
+use chefshat_record::atomic_file::AtomicFile;
 use chefshat_render::{Frame, GifWriter, Painter, Palette, Pixels};
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
@@ -51,7 +51,7 @@ impl<'a> Reel<'a> {
 
     /// Writes the film as a GIF; says its size.
     pub(super) fn gif(&self, path: &Path) -> Result<(u32, u32), CommandError> {
-        let mut file = WholeFile::create(path)?;
+        let mut file = AtomicFile::create(path)?;
         let sample = self.sample()?;
         let size = sample
             .first()
@@ -74,7 +74,7 @@ impl<'a> Reel<'a> {
         let (first, _) = self.frames.first().ok_or("there is nothing to show")?;
         let first = self.paint(first)?;
         let size = (first.width(), first.height());
-        let file = WholeFile::create(path)?;
+        let file = AtomicFile::create(path)?;
         let mut ffmpeg = Ffmpeg::start(program, size, file.part())?;
         let shown = self.show(|picture, shown_for| {
             let times = shown_for.as_secs_f64() * f64::from(PICTURES_A_SECOND);

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use chefshat_client::v1;
-use chefshat_record::whole::WholeFile;
+use chefshat_record::atomic_file::AtomicFile;
 use csv::{Terminator, WriterBuilder};
 
 use super::super::CommandError;
@@ -59,7 +59,7 @@ fn write(
     header: &[String],
     rows: impl IntoIterator<Item = Vec<String>>,
 ) -> Result<(), CommandError> {
-    let mut file = WholeFile::create(path)?;
+    let mut file = AtomicFile::create(path)?;
     let mut writer = WriterBuilder::new()
         .terminator(terminator)
         .from_writer(&mut file);

@@ -1,10 +1,10 @@
-//! Finding records, and files that appear whole or not at all.
+//! Finding records; atomic files.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
+use chefshat_record::atomic_file::AtomicFile;
 use chefshat_record::files::{FindError, find_records};
-use chefshat_record::whole::WholeFile;
 
 fn names(folder: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(folder).unwrap();
@@ -59,24 +59,50 @@ fn records_are_files_and_those_of_folders() {
 }
 
 #[test]
-fn a_file_is_there_whole_or_not_at_all() {
+fn an_unfinished_file_leaves_the_target_unchanged() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("file");
     std::fs::write(&path, "before").unwrap();
-    let mut given_up = WholeFile::create(&path).unwrap();
-    given_up.write_all(b"half").unwrap();
-    assert_eq!(names(folder.path()), ["file", "file.part"]);
-    drop(given_up);
+    let mut abandoned = AtomicFile::create(&path).unwrap();
+    abandoned.write_all(b"half").unwrap();
+    let part = abandoned.part().file_name().unwrap().to_str().unwrap();
+    assert!(part.starts_with("file.") && part.ends_with(".part"));
+    assert_eq!(names(folder.path()), ["file", part]);
+    drop(abandoned);
     assert_eq!(names(folder.path()), ["file"]);
     assert_eq!(std::fs::read(&path).unwrap(), b"before");
-    let mut file = WholeFile::create(&path).unwrap();
+    let mut file = AtomicFile::create(&path).unwrap();
     write!(file, "af").unwrap();
     file.write_all(b"ter").unwrap();
     assert_eq!(std::fs::read(&path).unwrap(), b"before");
     file.finish().unwrap();
     assert_eq!(names(folder.path()), ["file"]);
     assert_eq!(std::fs::read(&path).unwrap(), b"after");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt as _;
+        let plain = folder.path().join("plain");
+        std::fs::write(&plain, "").unwrap();
+        let mode = |path: &Path| std::fs::metadata(path).unwrap().permissions().mode();
+        assert_eq!(mode(&path), mode(&plain));
+    }
     let nowhere = folder.path().join("no/folder");
-    let error = WholeFile::create(&nowhere).unwrap_err().to_string();
+    let error = AtomicFile::create(&nowhere).unwrap_err().to_string();
     assert!(error.starts_with(&nowhere.display().to_string()), "{error}");
+}
+
+#[test]
+fn writers_of_one_file_do_not_disturb_each_other() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("file");
+    let mut first = AtomicFile::create(&path).unwrap();
+    first.write_all(b"first").unwrap();
+    let mut second = AtomicFile::create(&path).unwrap();
+    second.write_all(b"second").unwrap();
+    drop(AtomicFile::create(&path).unwrap());
+    first.finish().unwrap();
+    assert_eq!(std::fs::read(&path).unwrap(), b"first");
+    second.finish().unwrap();
+    assert_eq!(std::fs::read(&path).unwrap(), b"second");
+    assert_eq!(names(folder.path()), ["file"]);
 }

@@ -1,0 +1,109 @@
+//! A file that replaces its target atomically: written beside it, synced, then renamed.
+
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use tempfile::NamedTempFile;
+
+/// A failed write. The target is unchanged.
+#[derive(Debug, thiserror::Error)]
+#[error("{path}: {source}")]
+pub struct WriteError {
+    /// The target.
+    pub path: PathBuf,
+    /// The error of the file system.
+    pub source: io::Error,
+}
+
+/// A file being written. Dropping it before [`finish`](Self::finish) leaves the target unchanged and removes what was written.
+#[derive(Debug)]
+pub struct AtomicFile {
+    path: PathBuf,
+    file: BufWriter<NamedTempFile>,
+}
+
+impl AtomicFile {
+    /// Opens a new file `NAME.RANDOM.part` in the folder of `path`. Writers of the same path do not disturb each other: the last to finish wins.
+    ///
+    /// # Errors
+    /// The file cannot be created.
+    pub fn create(path: &Path) -> Result<Self, WriteError> {
+        let mut prefix = path.file_name().unwrap_or_default().to_owned();
+        prefix.push(".");
+        let file = tempfile::Builder::new()
+            .prefix(&prefix)
+            .suffix(".part")
+            // By the standard library, so that its permissions are those of any new file.
+            .make_in(folder_of(path), |part| File::create_new(part))
+            .map_err(|source| WriteError {
+                path: path.to_path_buf(),
+                source,
+            })?;
+        Ok(Self {
+            path: path.to_path_buf(),
+            file: BufWriter::new(file),
+        })
+    }
+
+    /// The path of the unfinished file, for another program to write to.
+    pub fn part(&self) -> &Path {
+        self.file.get_ref().path()
+    }
+
+    /// Writes bytes.
+    ///
+    /// # Errors
+    /// The write failed.
+    pub fn write_all(&mut self, bytes: &[u8]) -> Result<(), WriteError> {
+        self.file.write_all(bytes).map_err(|source| WriteError {
+            path: self.path.clone(),
+            source,
+        })
+    }
+
+    /// Syncs the file, renames it to the target and syncs the folder.
+    ///
+    /// # Errors
+    /// The file system refused.
+    pub fn finish(self) -> Result<(), WriteError> {
+        let Self { path, file } = self;
+        let finish = || {
+            let file = file.into_inner().map_err(io::IntoInnerError::into_error)?;
+            file.as_file().sync_all()?;
+            file.persist(&path)?;
+            sync_folder_of(&path)
+        };
+        finish().map_err(|source| WriteError {
+            path: path.clone(),
+            source,
+        })
+    }
+}
+
+impl Write for AtomicFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.file.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+fn folder_of(path: &Path) -> &Path {
+    let folder = path.parent().filter(|folder| *folder != Path::new(""));
+    folder.unwrap_or(Path::new("."))
+}
+
+/// Makes the entry of a file or folder in its parent folder durable.
+///
+/// # Errors
+/// The parent folder cannot be opened or synced.
+pub fn sync_folder_of(path: &Path) -> io::Result<()> {
+    // Other systems neither need it nor can open a folder.
+    if cfg!(unix) {
+        File::open(folder_of(path))?.sync_all()?;
+    }
+    Ok(())
+}
