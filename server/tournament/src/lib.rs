@@ -3,8 +3,8 @@
 //! no input or output, no thread here; rooms, connections and storage are the server's affair.
 //!
 //! ```
-//! use chefshat_arena::AgentKind;
-//! use chefshat_arena::tournament::{Change, Deals, Ended, Entrant, EntrantKind, Format, SeatPlayed, Settings, State, Tournament};
+//! use chefshat_agents::AgentKind;
+//! use chefshat_tournament::{Change, Deals, Ended, Entrant, EntrantKind, Format, SeatPlayed, Settings, State, Tournament};
 //!
 //! let mut tournament = Tournament::new(Settings {
 //!     format: Format::Swiss,

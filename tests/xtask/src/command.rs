@@ -3,11 +3,38 @@
 use std::ffi::OsStr;
 use std::process::{Command, Stdio};
 
-use crate::steps::Failure;
+use crate::failure::Failure;
+use crate::places::Places;
 
 /// A program with the same Cargo that started this one, if it is Cargo.
 pub(crate) fn cargo() -> Command {
     Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
+}
+
+/// A module run by the Python package's interpreter, in the package's folder, with every cache in the build folder.
+pub(crate) fn python_command(places: &Places, module: &str) -> Command {
+    let mut command = with_environment(places, Command::new(places.python()));
+    command
+        .args(["-m", module])
+        .current_dir(places.python_package());
+    command.env("RUFF_CACHE_DIR", places.own.join("ruff"));
+    command.env("MYPY_CACHE_DIR", places.own.join("mypy"));
+    // Most of the time of the learning tests goes into compiling; what was compiled once is kept.
+    command.env("JAX_COMPILATION_CACHE_DIR", places.own.join("jax"));
+    command.env("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0");
+    command.env("JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES", "-1");
+    command
+}
+
+/// Tells tests where the server, the other languages and the protocol are.
+pub(crate) fn with_environment(places: &Places, mut command: Command) -> Command {
+    command.env("CHEFSHAT_BIN", places.chefshat());
+    command.env("CHEFSHAT_PYTHON", places.python());
+    command.env("CHEFSHAT_NODE_DIR", places.node());
+    command.env("CHEFSHAT_PROTO", places.root.join("proto"));
+    // Python would otherwise write its caches among the sources, also where a Rust test starts it.
+    command.env("PYTHONPYCACHEPREFIX", places.own.join("pycache"));
+    command
 }
 
 /// Runs to the end; anything but success is a failure that names the command line.

@@ -2,17 +2,21 @@
 
 use std::process::Command;
 
-use crate::command::{self, cargo};
+use crate::command::{self, cargo, python_command};
+use crate::failure::Failure;
 use crate::places::{NO_PYTHON_PACKAGE, NO_WEB_PACKAGE, Places};
 use crate::setup;
-use crate::steps::{Failure, Steps};
-use crate::test::python_command;
+use crate::steps::Steps;
 use crate::web;
+use crate::{arrows, circles};
 
 /// Runs all checks, cheapest first.
 pub(crate) fn run(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
     let fmt = ["fmt", "--all", "--check"];
     steps.program("cargo fmt", in_root(places, cargo()).args(fmt))?;
+
+    steps.run("arrows between crates", || arrows::check(places))?;
+    steps.run("circles between files", || circles::check(places))?;
 
     steps.run("set up checkers", || setup::tools(places))?;
     steps.program("buf lint", tool(places, "buf").args(["lint", "proto"]))?;

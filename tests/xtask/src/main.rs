@@ -3,7 +3,10 @@
 //! The command line lives here. What is run lives in [`lint`], [`test`] and [`web`], what must be there first in [`setup`]. Nothing here
 //! knows a crate of the project: this program only starts others and must build when they do not.
 
+mod arrows;
+mod circles;
 mod command;
+mod failure;
 mod lint;
 mod places;
 mod setup;
@@ -13,10 +16,11 @@ mod web;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand, ValueEnum};
+use clap::{Parser, Subcommand};
 
 use crate::places::Places;
 use crate::steps::Steps;
+use crate::test::Language;
 
 /// Set up, test and lint everything in every language.
 #[derive(Parser)]
@@ -40,19 +44,6 @@ enum Task {
     /// Check format, lints, protocol, licences and images.
     Lint,
     /// Build the page for people, which the server gives out on its port.
-    Web,
-}
-
-/// A language whose tests can be run alone.
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Language {
-    /// Engine, server, Rust SDK and whole-system tests.
-    Rust,
-    /// The package in clients/python.
-    Python,
-    /// The agent in clients/node.
-    Node,
-    /// The page for people in clients/web, in a browser as well.
     Web,
 }
 

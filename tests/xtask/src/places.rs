@@ -3,7 +3,7 @@
 use std::env;
 use std::path::{Path, PathBuf};
 
-use crate::steps::Failure;
+use crate::failure::Failure;
 
 /// Why steps are skipped where [`Places::has_python_package`] is false.
 pub(crate) const NO_PYTHON_PACKAGE: &str = "there is no clients/python/pyproject.toml";

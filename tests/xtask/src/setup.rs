@@ -7,8 +7,8 @@ use std::path::Path;
 use std::process::Command;
 
 use crate::command::{cargo, read, run, succeeds};
+use crate::failure::Failure;
 use crate::places::Places;
-use crate::steps::Failure;
 
 /// Version of cargo-deny that deny.toml is written for.
 const CARGO_DENY: &str = "0.20.2";

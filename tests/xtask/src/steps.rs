@@ -1,28 +1,11 @@
 //! The steps of a task: announced, timed, summed up at the end. Which steps there are is not decided here.
 
-use std::fmt;
 use std::fmt::Write as _;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
 use crate::command;
-
-/// Why a task stopped, in words for the person who started it.
-#[derive(Debug)]
-pub(crate) struct Failure(String);
-
-impl Failure {
-    /// A failure that says this.
-    pub(crate) fn new(message: impl Into<String>) -> Self {
-        Self(message.into())
-    }
-}
-
-impl fmt::Display for Failure {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0)
-    }
-}
+use crate::failure::Failure;
 
 /// How a step ended.
 enum Outcome {

@@ -3,13 +3,28 @@
 
 use std::process::Command;
 
-use crate::Language;
-use crate::command::cargo;
+use clap::ValueEnum;
+
+use crate::command::{cargo, python_command, with_environment};
+use crate::failure::Failure;
 use crate::lint;
 use crate::places::{NO_NODE_PACKAGE, NO_PYTHON_PACKAGE, NO_WEB_PACKAGE, Places};
 use crate::setup;
-use crate::steps::{Failure, Steps};
+use crate::steps::Steps;
 use crate::web;
+
+/// A language whose tests can be run alone.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Language {
+    /// Engine, server, Rust SDK and whole-system tests.
+    Rust,
+    /// The package in clients/python.
+    Python,
+    /// The agent in clients/node.
+    Node,
+    /// The page for people in clients/web, in a browser as well.
+    Web,
+}
 
 /// Sets up and runs the tests of one language, or of all.
 pub(crate) fn run(
@@ -85,31 +100,5 @@ pub(crate) fn run(
 fn cargo_command(places: &Places) -> Command {
     let mut command = with_environment(places, cargo());
     command.current_dir(&places.root);
-    command
-}
-
-/// A module run by the Python package's interpreter, in the package's folder, with every cache in the build folder.
-pub(crate) fn python_command(places: &Places, module: &str) -> Command {
-    let mut command = with_environment(places, Command::new(places.python()));
-    command
-        .args(["-m", module])
-        .current_dir(places.python_package());
-    command.env("RUFF_CACHE_DIR", places.own.join("ruff"));
-    command.env("MYPY_CACHE_DIR", places.own.join("mypy"));
-    // Most of the time of the learning tests goes into compiling; what was compiled once is kept.
-    command.env("JAX_COMPILATION_CACHE_DIR", places.own.join("jax"));
-    command.env("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0");
-    command.env("JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES", "-1");
-    command
-}
-
-/// Tells tests where the server, the other languages and the protocol are.
-pub(crate) fn with_environment(places: &Places, mut command: Command) -> Command {
-    command.env("CHEFSHAT_BIN", places.chefshat());
-    command.env("CHEFSHAT_PYTHON", places.python());
-    command.env("CHEFSHAT_NODE_DIR", places.node());
-    command.env("CHEFSHAT_PROTO", places.root.join("proto"));
-    // Python would otherwise write its caches among the sources, also where a Rust test starts it.
-    command.env("PYTHONPYCACHEPREFIX", places.own.join("pycache"));
     command
 }

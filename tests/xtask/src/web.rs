@@ -4,10 +4,11 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
+use crate::command::with_environment;
+use crate::failure::Failure;
 use crate::places::{NO_WEB_PACKAGE, Places};
 use crate::setup::{self, at};
-use crate::steps::{Failure, Steps};
-use crate::test::with_environment;
+use crate::steps::Steps;
 
 /// Sets up the page's package and builds the page.
 pub(crate) fn run(places: &Places, steps: &mut Steps) -> Result<(), Failure> {

@@ -311,3 +311,31 @@ fn batches_that_make_no_sense_are_refused() {
     );
     assert_eq!(refused(&[Random; 4], 0), BatchError::NoGames);
 }
+
+#[test]
+fn greedy_beats_random_and_random_is_fair() {
+    let rules = standard();
+    let random = [Random; 4];
+    let fair = Batch::new(rules, &random, 1_000, 1).unwrap().run(|_| {});
+    for seat in fair.seats.seats() {
+        let (won, place) = (fair.seats[seat].games_won, fair.mean_place(seat));
+        assert!(
+            (180..320).contains(&won),
+            "seat {seat} won {won} of 1000 games"
+        );
+        assert!(
+            (2.4..2.6).contains(&place),
+            "seat {seat}: mean place {place}"
+        );
+    }
+    for favourite in fair.seats.seats() {
+        let mut agents = random;
+        agents[favourite.index()] = Greedy;
+        let table = Batch::new(rules, &agents, 200, 1).unwrap().run(|_| {});
+        let won = table.seats[favourite].games_won;
+        assert!(
+            won > 180,
+            "greedy on seat {favourite} won {won} of 200 games"
+        );
+    }
+}

@@ -5,15 +5,15 @@ use std::num::NonZeroU32;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use chefshat_agents::{AgentKind, Listener, game_seed};
+use chefshat_agents::{AgentKind, Listener, Network, game_seed};
 use chefshat_engine::{BySeat, Cards, Event, RuleSet, RuleSetSpec, Seat, Stop};
 use chefshat_simulation::{Comparison, Contender, Duplicate, DuplicateError, SeatPlan};
 use rayon::ThreadPoolBuilder;
+use safetensors::Dtype;
+use safetensors::tensor::{TensorView, serialize};
 
 use AgentKind::{Greedy, Random, RandomUnmasked};
 use SeatPlan::{Half, One};
-
-use crate::network_file::NetworkFile;
 
 fn rules_for(players: u8) -> RuleSet {
     let spec = RuleSetSpec {
@@ -40,10 +40,31 @@ fn compared(a: AgentKind, b: AgentKind, plan: SeatPlan, players: u8, deals: u64)
         .run(|_| {})
 }
 
-/// A player of turns by a fixed order of preference: the highest number first, which sheds high faces and jokers with them.
+/// A network that plays turns by a fixed order of preference: the highest action first, which sheds high faces and jokers.
 fn careless() -> Contender {
-    let outputs: Vec<f32> = (0..200u8).map(|index| f32::from(index % 199)).collect();
-    Contender::Network(Arc::new(NetworkFile::preferring(&outputs).network()))
+    let metadata = [
+        ("format", "chefshat-network-1"),
+        ("input", "classic"),
+        ("output", "turns"),
+        ("output_activation", "none"),
+        ("masked", "true"),
+        ("players", "4"),
+        ("faces", "11"),
+        ("jokers", "2"),
+    ];
+    let bytes =
+        |numbers: Vec<f32>| -> Vec<u8> { numbers.into_iter().flat_map(f32::to_le_bytes).collect() };
+    let weights = bytes(vec![0.0; 200 * 228]);
+    let bias = bytes((0..200u8).map(|index| f32::from(index % 199)).collect());
+    let tensor =
+        |shape: &[usize], bytes| TensorView::new(Dtype::F32, shape.to_vec(), bytes).unwrap();
+    let tensors = [
+        ("layer0.weight", tensor(&[200, 228], &weights)),
+        ("layer0.bias", tensor(&[200], &bias)),
+    ];
+    let metadata = metadata.map(|(key, text)| (key.to_owned(), text.to_owned()));
+    let file = serialize(tensors, Some(metadata.into())).unwrap();
+    Contender::Network(Arc::new(Network::from_bytes(&file).unwrap()))
 }
 
 #[test]
@@ -257,4 +278,14 @@ fn what_cannot_be_compared_is_refused() {
         let expected = format!("{who} was trained for 4 players, 11 faces and hands of 17 cards");
         assert!(refused.to_string().starts_with(&expected), "{refused}");
     }
+}
+
+#[test]
+fn the_trained_agent_is_stronger_than_greedy() {
+    let contenders = [AgentKind::Trained, Greedy].map(Contender::Kind);
+    let rules = RuleSetSpec::default().validate().unwrap();
+    let shifts = NonZeroU32::new(4).unwrap();
+    let comparison = Duplicate::new(rules, shifts, contenders, Half, 40, 0);
+    let points = comparison.unwrap().run(|_| {}).points;
+    assert!(points.interval95().low > 0.5, "{points:?}");
 }

@@ -5,35 +5,24 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use chefshat_agents::AgentKind;
 use chefshat_engine::{RuleSet, RuleSetSpec};
 use chefshat_simulation::tournament::{OfflineProblem, play_offline};
-use chefshat_tournament::{Deals, Format, State, Tournament};
+use chefshat_tournament::{Deals, Format, Settings, State, Tournament};
 use rayon::ThreadPoolBuilder;
 
-use crate::support::{begun, entrant, settings};
+use crate::support::{begun, settings};
 
 fn rules() -> RuleSet {
     RuleSetSpec::default().validate().unwrap()
 }
 
-/// A tournament that greedy agents (the even numbers) and random ones have joined, begun.
+/// A tournament of greedy agents (even numbers) and random ones that has begun.
 fn field(format: Format, deals: Deals, participants: usize) -> Tournament {
-    let mut settings = settings(format);
-    settings.deals = deals;
-    settings.games_per_pairing = 2;
-    let mut tournament = Tournament::new(settings).unwrap();
-    for number in 0..participants {
-        let mut entrant = entrant(&format!("agent {number}"));
-        entrant.built_in = Some(if number % 2 == 0 {
-            AgentKind::Greedy
-        } else {
-            AgentKind::Random
-        });
-        let change = tournament.join(entrant).unwrap();
-        tournament.fold(&change);
-    }
-    for change in tournament.begin().unwrap() {
-        tournament.fold(&change);
-    }
-    tournament
+    let settings = Settings {
+        deals,
+        games_per_pairing: 2,
+        ..settings(format)
+    };
+    let agents = [Some(AgentKind::Greedy), Some(AgentKind::Random)];
+    begun(settings, agents.into_iter().cycle().take(participants))
 }
 
 fn play(tournament: &mut Tournament, seed: u64, threads: usize) -> usize {
@@ -85,19 +74,12 @@ fn threads_make_no_difference_and_the_seed_does() {
 #[test]
 fn duplicate_deals_are_the_same_cards() {
     // Agents that draw nothing, the same in all seats: rotating them through a deal changes who, not what happens.
-    let mut settings = settings(Format::RoundRobin);
-    settings.deals = Deals::Rotated;
-    settings.rounds = Some(2);
-    let mut tournament = Tournament::new(settings).unwrap();
-    for number in 0..4 {
-        let mut entrant = entrant(&format!("agent {number}"));
-        entrant.built_in = Some(AgentKind::Greedy);
-        let change = tournament.join(entrant).unwrap();
-        tournament.fold(&change);
-    }
-    for change in tournament.begin().unwrap() {
-        tournament.fold(&change);
-    }
+    let settings = Settings {
+        deals: Deals::Rotated,
+        rounds: Some(2),
+        ..settings(Format::RoundRobin)
+    };
+    let mut tournament = begun(settings, [Some(AgentKind::Greedy); 4]);
     play(&mut tournament, 3, 2);
     let places = |game: usize| {
         let result = tournament.games()[game].result().unwrap();
@@ -122,7 +104,7 @@ fn duplicate_deals_are_the_same_cards() {
 
 #[test]
 fn what_cannot_be_played_offline_is_refused() {
-    let mut with_people = begun(settings(Format::Swiss), 4);
+    let mut with_people = begun(settings(Format::Swiss), [None; 4]);
     let refused = play_offline(&mut with_people, rules(), 0, || {});
     assert_eq!(refused, Err(OfflineProblem::NotBuiltIn(0)));
     let spec = RuleSetSpec {

@@ -5,9 +5,11 @@ use chefshat_agents::AgentKind;
 use chefshat_engine::{RuleSet, RuleSetSpec, Stop};
 use chefshat_simulation::tournament::play_offline;
 use chefshat_tournament::{
-    Change, Deals, Entrant, EntrantKind, Format, GameResult, SURE, Scored, SeatPlayed, SeatResult,
-    Settings, Tournament, order_confidence,
+    Change, Deals, Format, GameResult, SURE, Scored, SeatPlayed, SeatResult, Settings, Tournament,
+    order_confidence,
 };
+
+use crate::support::{begun, settings};
 
 const POINTS: [f64; 4] = [5.0, 3.0, 1.0, 0.0];
 
@@ -106,54 +108,27 @@ fn rules() -> RuleSet {
     spec.validate().unwrap()
 }
 
-/// A Swiss tournament of these agents, begun, with the same deals at all tables.
-fn begun(agents: &[AgentKind]) -> Tournament {
-    begun_with(agents, Deals::SameAtAllTables, 3)
-}
-
-fn begun_with(agents: &[AgentKind], deals: Deals, draw: u8) -> Tournament {
+/// A Swiss tournament of these agents that has begun.
+fn swiss(agents: &[AgentKind], deals: Deals, draw: u8) -> Tournament {
     let settings = Settings {
-        format: Format::Swiss,
-        players: 4,
-        points: vec![5, 3, 1, 0],
         rounds: Some(6),
         games_per_pairing: 20,
         deals,
         max_participants: 24,
-        start_when_joined: None,
-        no_show_ms: 1000,
-        max_calls: 2,
-        max_parallel: 64,
         draw_seed: [draw; 32],
-        filler: AgentKind::Random,
+        ..settings(Format::Swiss)
     };
-    let mut tournament = Tournament::new(settings).unwrap();
-    for (number, agent) in agents.iter().enumerate() {
-        let entrant = Entrant {
-            name: format!("{} {number}", agent.name()),
-            kind: EntrantKind::Agent,
-            built_in: Some(*agent),
-            filler: false,
-            stateless: true,
-            max_games: 1,
-        };
-        let joined = tournament.join(entrant).unwrap();
-        tournament.fold(&joined);
-    }
-    for change in tournament.begin().unwrap() {
-        tournament.fold(&change);
-    }
-    tournament
+    begun(settings, agents.iter().copied().map(Some))
 }
 
 #[test]
-fn whoever_had_easier_tables_is_not_called_better_for_it() {
+fn easier_opponents_do_not_make_a_participant_look_better() {
     use AgentKind::{Greedy, Random, Trained};
     let agents: Vec<AgentKind> = [Trained, Greedy, Random].repeat(8);
     let (mut pairs, mut sure) = (0, 0);
     for deals in [Deals::Independent, Deals::SameAtAllTables] {
         for draw in 0..4 {
-            let mut tournament = begun_with(&agents, deals, draw);
+            let mut tournament = swiss(&agents, deals, draw);
             play_offline(&mut tournament, rules(), 4, || {}).unwrap();
             for pair in tournament.order_confidence() {
                 // Two of one kind play alike, whoever they met.
@@ -174,7 +149,7 @@ fn unlike_neighbours_are_told_apart_and_equal_ones_are_not() {
     let agents = [
         Trained, Trained, Greedy, Greedy, Greedy, Random, Random, Random,
     ];
-    let mut tournament = begun(&agents);
+    let mut tournament = swiss(&agents, Deals::SameAtAllTables, 3);
     play_offline(&mut tournament, rules(), 4, || {}).unwrap();
     let standings = tournament.standings();
     let neighbours = tournament.order_confidence();
@@ -209,7 +184,7 @@ fn unlike_neighbours_are_told_apart_and_equal_ones_are_not() {
 
 #[test]
 fn games_that_somebody_did_not_play_are_not_rated() {
-    let mut tournament = begun(&[AgentKind::Greedy; 4]);
+    let mut tournament = swiss(&[AgentKind::Greedy; 4], Deals::SameAtAllTables, 3);
     let seats = |forfeited: bool, substituted: bool| {
         let seat = |participant: usize| SeatResult {
             participant,
