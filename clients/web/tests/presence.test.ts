@@ -2,19 +2,19 @@
 
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { isPresence, worthSaying } from "../src/table/model/log";
-import type { Happening, LogLine } from "../src/table/model/state";
+import type { LogEntry, LogLine } from "../src/table/model/state";
 import { SETTLED_MS, tellPresence } from "../src/table/presence";
 
 beforeEach(() => void vi.useFakeTimers());
 afterEach(() => void vi.useRealTimers());
 
-const lost = (seat: number): Happening => ({ kind: "lost", seat });
-const back = (seat: number): Happening => ({ kind: "back", seat });
-const replaced = (seat: number): Happening => ({ kind: "substituted", seat, agent: "greedy" });
-const passed = (seat: number): Happening => ({ kind: "passed", seat, cause: "agent" });
-const joy = (seat: number): Happening => ({ kind: "expressed", seat, label: "joy" });
+const lost = (seat: number): LogEntry => ({ kind: "lost", seat });
+const back = (seat: number): LogEntry => ({ kind: "back", seat });
+const replaced = (seat: number): LogEntry => ({ kind: "substituted", seat, agent: "greedy" });
+const passed = (seat: number): LogEntry => ({ kind: "passed", seat, cause: "agent" });
+const joy = (seat: number): LogEntry => ({ kind: "expressed", seat, label: "joy" });
 
-test.each<[string, Happening[], number[]]>([
+test.each<[string, LogEntry[], number[]]>([
   ["gone and back", [lost(1), back(1)], [1]],
   ["gone, replaced and back", [lost(1), replaced(1), back(1)], [2]],
   ["again and again while others play", [lost(1), passed(2), back(1), passed(3), lost(1), back(1)], [1, 3, 5]],
@@ -22,10 +22,10 @@ test.each<[string, Happening[], number[]]>([
   ["away while it was decided for the seat", [lost(1), passed(1), back(1)], [0, 1, 2]],
   ["gone for good", [passed(1), lost(1), passed(2)], [0, 1, 2]],
   ["an expression between", [lost(1), joy(1), back(1)], [1, 2]],
-])("in the log, %s", (_, happenings, kept) => {
-  const log = happenings.map((happening, sequence): LogLine => ({ sequence, happening }));
+])("in the log, %s", (_, entries, kept) => {
+  const log = entries.map((entry, sequence): LogLine => ({ sequence, entry }));
   expect(worthSaying(log, true).map(({ sequence }) => sequence)).toEqual(kept);
-  const quiet = kept.filter((sequence) => happenings[sequence]?.kind !== "expressed");
+  const quiet = kept.filter((sequence) => entries[sequence]?.kind !== "expressed");
   expect(worthSaying(log, false).map(({ sequence }) => sequence)).toEqual(quiet);
 });
 
@@ -33,12 +33,12 @@ test.each<[string, Happening[], number[]]>([
  * Lets things happen, each so long after the one before; gives what was said until everything had
  * settled.
  */
-function heard(steps: readonly (readonly [afterMs: number, happening: Happening])[]): Happening[] {
-  const said: Happening[] = [];
-  const teller = tellPresence(({ happening }) => said.push(happening));
-  steps.forEach(([afterMs, happening], sequence) => {
+function heard(steps: readonly (readonly [afterMs: number, entry: LogEntry])[]): LogEntry[] {
+  const said: LogEntry[] = [];
+  const teller = tellPresence(({ entry }) => said.push(entry));
+  steps.forEach(([afterMs, entry], sequence) => {
     vi.advanceTimersByTime(afterMs);
-    const line: LogLine = { sequence, happening };
+    const line: LogLine = { sequence, entry };
     if (!isPresence(line)) throw new Error("not about a connection");
     teller.hear(line);
   });
@@ -49,7 +49,7 @@ function heard(steps: readonly (readonly [afterMs: number, happening: Happening]
 const SOON = SETTLED_MS / 4;
 const LATE = SETTLED_MS * 2;
 
-test.each<[string, [number, Happening][], Happening[]]>([
+test.each<[string, [number, LogEntry][], LogEntry[]]>([
   ["a change that lasts is said", [[0, lost(1)]], [lost(1)]],
   [
     "one that does not is not",
@@ -108,7 +108,7 @@ test.each<[string, [number, Happening][], Happening[]]>([
 test("who leaves the table is told nothing any more", () => {
   const said = vi.fn();
   const teller = tellPresence(said);
-  const line: LogLine = { sequence: 1, happening: lost(1) };
+  const line: LogLine = { sequence: 1, entry: lost(1) };
   if (isPresence(line)) teller.hear(line);
   teller.stop();
   vi.advanceTimersByTime(LATE);

@@ -1,10 +1,10 @@
-// A record as a film: every decision can be seen before it is taken, and nobody's eyes see more
+// A record as a film: every decision can be seen before it is taken, and nobody's perspective see more
 // than they may.
 
 import { expect, test } from "vitest";
 import { DecisionKind } from "../src/gen/chefshat/v1/decision_pb";
-import { decidingFor, seenWith } from "../src/replay/eyes";
 import { type Film, type Frame, filmOf } from "../src/replay/frames";
+import { decidingFor, seenFrom } from "../src/replay/perspective";
 import { legalActions } from "../src/table/model/actions";
 import { applyEvent } from "../src/table/model/reduce";
 import { RECORDS, recorded } from "./record";
@@ -32,21 +32,21 @@ test.each(RECORDS)("%s: every decision is open once, at a table where it is that
   expect(film.at(film.length - 1).table.phase).toBe("gameOver");
 });
 
-test.each(RECORDS)("%s: eyes see their own hand and no other, and no gift between others", (name) => {
+test.each(RECORDS)("%s: perspective see their own hand and no other, and no gift between others", (name) => {
   for (const frame of framesOf(filmOf(recorded(name)))) {
-    for (const eyes of [0, 1, "none"] as const) {
-      const { seats, log } = seenWith(frame.table, eyes);
+    for (const perspective of [0, 1, "none"] as const) {
+      const { seats, log } = seenFrom(frame.table, perspective);
       for (const { seat, hand, received } of seats) {
-        if (seat === eyes) continue;
+        if (seat === perspective) continue;
         expect(hand).toBeUndefined();
         expect(received).toEqual([]);
       }
-      for (const { happening } of log) {
-        if (happening.kind !== "gave" || happening.giver === eyes || happening.receiver === eyes) continue;
-        expect(happening.cards).toEqual([]);
+      for (const { entry } of log) {
+        if (entry.kind !== "gave" || entry.giver === perspective || entry.receiver === perspective) continue;
+        expect(entry.cards).toEqual([]);
       }
-      if (frame.open?.kind === DecisionKind.SPECIAL_ACTION && frame.open.seat !== eyes) {
-        expect(decidingFor(frame, eyes)).toBeUndefined();
+      if (frame.open?.kind === DecisionKind.SPECIAL_ACTION && frame.open.seat !== perspective) {
+        expect(decidingFor(frame, perspective)).toBeUndefined();
       }
     }
   }

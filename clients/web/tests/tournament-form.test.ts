@@ -11,7 +11,7 @@ import {
   TournamentSchema,
   TournamentSettingsSchema,
 } from "../src/gen/chefshat/v1/tournament_pb";
-import { refusedField } from "../src/lobby/filling";
+import { refusedField } from "../src/lobby/form-state";
 import { tournamentIn } from "../src/lobby/JoinForm";
 import { fieldFor } from "../src/tournaments/Organiser";
 import {

@@ -5,7 +5,7 @@ import { signal } from "@preact/signals";
 import type { Room } from "../gen/chefshat/v1/room_pb";
 import { MAX_NAME } from "../lobby/room-form";
 import { requestLike } from "../lobby/room-like";
-import { hostedRoom, makeRoom } from "../lobby/seat";
+import { createRoom, hostedRoom } from "../lobby/seat";
 import { recallObject, remember } from "../store";
 
 /** Longest time that a room can wait for its players, milliseconds. */
@@ -69,7 +69,7 @@ export async function makeOwnRooms(
     for (const name of participants) {
       // Read each time: another tab may be creating rooms too.
       if (ownRooms(roomId).some((one) => one.name === name)) continue;
-      const { room: own, joinCode } = await makeRoom(requestLike(room, ownName(room.name, name), waitingTimeMs));
+      const { room: own, joinCode } = await createRoom(requestLike(room, ownName(room.name, name), waitingTimeMs));
       keep(roomId, [...ownRooms(roomId), { name, roomId: own.roomId, joinCode, search: searchFor(name) }]);
       tell(true);
     }

@@ -10,6 +10,7 @@ import { KeptLinks } from "../experiment/StudyLinks";
 import { type Room, RoomState } from "../gen/chefshat/v1/room_pb";
 import { t } from "../i18n";
 import { ButtonLink } from "../parts/Button";
+import { ConfirmButton } from "../parts/ConfirmButton";
 import { Notice } from "../parts/Notice";
 import { pathOf } from "../router";
 import css from "./Doorway.module.css";
@@ -19,7 +20,6 @@ import { JoinForm } from "./JoinForm";
 import { RoomStateChip, rulesInShort } from "./RoomCard";
 import { isForAgents, isOpen } from "./rooms";
 import { Seats } from "./Seats";
-import { Sure } from "./Sure";
 import { closeRoom, hostedRoom } from "./seat";
 
 /** Polling interval of the room, milliseconds. */
@@ -63,9 +63,9 @@ export function Doorway({ roomId }: { roomId: string }) {
       {waiting && <WayIn room={room} />}
       {!(waiting && isOpen(room)) && <KeptLinks roomId={roomId} />}
       {[RoomState.WAITING, RoomState.PLAYING].includes(room.state) && hostedRoom(roomId) && (
-        <Sure label={words.close} act={() => closeRoom(roomId)}>
+        <ConfirmButton label={words.close} act={() => closeRoom(roomId)}>
           {room.state === RoomState.WAITING ? words.closeSure : words.closePlaying}
-        </Sure>
+        </ConfirmButton>
       )}
     </div>
   );

@@ -1,5 +1,5 @@
 // The frame of a form that creates something on the server: title, name, folded part and submit
-// button. The state of the form is in filling.ts.
+// button. The state of the form is in state.ts.
 
 import type { ComponentChildren } from "preact";
 import { type Offered, useOffered } from "../api/server";
@@ -7,7 +7,7 @@ import { Button } from "../parts/Button";
 import { TextField } from "../parts/Field";
 import { Notice } from "../parts/Notice";
 import css from "./FormPage.module.css";
-import type { Filling } from "./filling";
+import type { FormState } from "./form-state";
 import { MAX_NAME } from "./room-form";
 
 /** The page; `children` renders the form once the server's offer is known. */
@@ -23,7 +23,7 @@ export function FormPage({ title, children }: { title: string; children: (offere
 }
 
 interface FormFrameProps {
-  filling: Filling<{ name: string }, "name">;
+  state: FormState<{ name: string }, "name">;
   words: { name: string; namePlaceholder: string; more: string; submit: string };
   /** Fields below the name. */
   first: ComponentChildren;
@@ -34,15 +34,15 @@ interface FormFrameProps {
 }
 
 /** The form. */
-export function FormFrame({ filling, words, first, children, folded }: FormFrameProps) {
+export function FormFrame({ state, words, first, children, folded }: FormFrameProps) {
   return (
-    <form class={css.form} data-part="new-room-form" onSubmit={filling.submit} noValidate>
+    <form class={css.form} data-part="new-room-form" onSubmit={state.submit} noValidate>
       <FormPart>
         <TextField
           label={words.name}
-          value={filling.form.name}
-          onText={(name) => filling.change({ name })}
-          fault={filling.faults.name}
+          value={state.form.name}
+          onText={(name) => state.change({ name })}
+          fault={state.faults.name}
           maxLength={MAX_NAME}
           autoComplete="off"
           placeholder={words.namePlaceholder}
@@ -52,17 +52,17 @@ export function FormFrame({ filling, words, first, children, folded }: FormFrame
       {children}
       <details
         class={`sheet ${css.part}`}
-        open={filling.unfolded}
-        onToggle={(event) => filling.unfold(event.currentTarget.open)}
+        open={state.unfolded}
+        onToggle={(event) => state.unfold(event.currentTarget.open)}
       >
         <summary>
           <h2>{words.more}</h2>
         </summary>
         {folded}
       </details>
-      {filling.refusal && <Notice kind="fault">{filling.refusal}</Notice>}
+      {state.refusal && <Notice kind="fault">{state.refusal}</Notice>}
       <div>
-        <Button look="main" type="submit" busy={filling.busy}>
+        <Button look="main" type="submit" busy={state.busy}>
           {words.submit}
         </Button>
       </div>

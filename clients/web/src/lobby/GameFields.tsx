@@ -6,7 +6,7 @@ import type { RuleSet } from "../gen/chefshat/v1/rules_pb";
 import { t } from "../i18n";
 import { CheckField, SelectField, TextField } from "../parts/Field";
 import css from "./FormPage.module.css";
-import type { FieldFaults } from "./filling";
+import type { FieldFaults } from "./form-state";
 import { type GameField, type GameForm, withPreset } from "./game-form";
 import { LARGEST, type NumberProblem } from "./problems";
 

@@ -6,12 +6,12 @@ import { t } from "../i18n";
 import { SelectField } from "../parts/Field";
 import { navigate } from "../router";
 import { FormFrame, FormPage, FormPart } from "./FormPage";
-import { type FieldFaults, useFilling } from "./filling";
+import { type FieldFaults, useFormState } from "./form-state";
 import { ClockFields, FaultFields, RuleFields, WatchFields, wordsOfProblems } from "./GameFields";
 import { gameProblems } from "./game-form";
 import { type FieldName, newForm, ROOM_FIELDS, type RoomForm, requestOf } from "./room-form";
 import { SeatFields } from "./SeatFields";
-import { makeRoom } from "./seat";
+import { createRoom } from "./seat";
 
 /** The props of each part of the form. */
 export interface FormProps {
@@ -27,15 +27,15 @@ export function NewRoom() {
 
 function RoomFormView({ offered }: { offered: Offered }) {
   const words = t().lobby.make;
-  const filling = useFilling(() => newForm(offered.agents), {
+  const state = useFormState(() => newForm(offered.agents), {
     check: (form) => wordsOfProblems<FieldName>(gameProblems(form, form.seats.length)),
     fields: ROOM_FIELDS,
     send: async (form) => {
-      const { room } = await makeRoom(requestOf(form));
+      const { room } = await createRoom(requestOf(form));
       navigate({ page: "room", roomId: room.roomId });
     },
   });
-  const { form, faults, change } = filling;
+  const { form, faults, change } = state;
   const parts = { form, faults, change };
   const aborts = ["allLost", "anyLost", "never"] as const;
   const folded = (
@@ -56,12 +56,7 @@ function RoomFormView({ offered }: { offered: Offered }) {
     </>
   );
   return (
-    <FormFrame
-      filling={filling}
-      words={words}
-      first={<SeatFields {...parts} agents={offered.agents} />}
-      folded={folded}
-    >
+    <FormFrame state={state} words={words} first={<SeatFields {...parts} agents={offered.agents} />} folded={folded}>
       <FormPart title={words.clock}>
         <ClockFields {...parts} />
       </FormPart>

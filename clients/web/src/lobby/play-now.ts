@@ -5,14 +5,14 @@ import { serverInfo } from "../api/server";
 import { t } from "../i18n";
 import { navigate } from "../router";
 import { quickGame } from "./room-form";
-import { makeRoom, takeSeat } from "./seat";
+import { createRoom, takeSeat } from "./seat";
 
 /** Creates the game and navigates to it. Without a name the person is a guest. */
 export async function playNow(name: string): Promise<void> {
   const words = t().lobby.quick;
   const { builtInAgents } = await serverInfo();
   const player = name.trim() || words.guest;
-  const { joinCode } = await makeRoom(quickGame(words.roomOf(player), builtInAgents));
+  const { joinCode } = await createRoom(quickGame(words.roomOf(player), builtInAgents));
   const { roomId } = await takeSeat(joinCode, player);
   navigate({ page: "room", roomId });
 }

@@ -7,7 +7,7 @@ import { GameOrigin, type Participant, type Room, RoomPolicySchema } from "../ge
 import type { CreateRoomRequestSchema } from "../gen/chefshat/v1/room_service_pb";
 import { navigate } from "../router";
 import { MAX_NAME } from "./room-form";
-import { makeRoom, takeSeat } from "./seat";
+import { createRoom, takeSeat } from "./seat";
 
 /** Why a room cannot be repeated exactly; null if it can. */
 export function notToBeRepeated(room: Room): "seed" | "hands" | null {
@@ -43,7 +43,7 @@ function seatLike(seat: Participant) {
 export async function playAgain(roomId: string, name: string, seat: number): Promise<void> {
   const { room } = await roomApi.getRoom({ roomId }, { timeoutMs: CALL_LIMIT_MS });
   if (!room) throw new Error("the server did not say which room it is");
-  const { joinCode } = await makeRoom(requestLike(room, room.name));
+  const { joinCode } = await createRoom(requestLike(room, room.name));
   const again = await takeSeat(joinCode, name, seat);
   navigate({ page: "room", roomId: again.roomId });
 }

@@ -84,7 +84,7 @@ export async function takeSeat(code: string, name: string, seat?: number): Promi
 }
 
 /** Creates a room and stores its secrets. */
-export async function makeRoom(
+export async function createRoom(
   request: MessageInitShape<typeof CreateRoomRequestSchema>,
 ): Promise<{ room: Room; joinCode: string }> {
   const made = await roomApi.createRoom(request, { timeoutMs: CALL_LIMIT_MS });

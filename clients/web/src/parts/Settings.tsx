@@ -1,12 +1,11 @@
 // The settings of this device: language, theme, and deleting what is stored. Settings of a single
 // page (sound, replay speed) are on that page.
 
-import { useState } from "preact/hooks";
 import { type Language, language, languages, setLanguage, t } from "../i18n";
 
 import { forgetAll } from "../store";
 import { setTheme, type Theme, theme } from "../theme";
-import { Button } from "./Button";
+import { ConfirmButton } from "./ConfirmButton";
 import { Dialog } from "./Dialog";
 import { SelectField } from "./Field";
 import css from "./Layout.module.css";
@@ -39,22 +38,14 @@ export function Settings({ onClose }: { onClose: () => void }) {
 /** Deletes everything that is stored, after a confirmation: seats are lost with it. */
 function Forget() {
   const words = t().common.settings;
-  const [sure, setSure] = useState(false);
-  const forget = () => {
+  const forget = async () => {
     forgetAll();
     // A page that stays open would store again what it still has in memory.
     location.assign("/");
   };
-  if (!sure) {
-    return <Button onClick={() => setSure(true)}>{words.forget}</Button>;
-  }
   return (
-    <div>
-      <p>{words.forgetSure}</p>
-      <Button onClick={forget}>{words.forgetDo}</Button>{" "}
-      <Button look="quiet" onClick={() => setSure(false)}>
-        {t().common.cancel}
-      </Button>
-    </div>
+    <ConfirmButton label={words.forget} confirm={words.forgetDo} look="plain" act={forget}>
+      {words.forgetSure}
+    </ConfirmButton>
   );
 }

@@ -5,8 +5,8 @@ import { SelectField } from "../parts/Field";
 import { Icon } from "../parts/Icon";
 import toolsCss from "../table/view/Tools.module.css";
 import { nameOf } from "../table/words";
-import type { Eyes } from "./eyes";
 import type { Film, Frame } from "./frames";
+import type { Perspective } from "./perspective";
 import replayCss from "./Replay.module.css";
 
 /** Playback speeds; at 1, MOMENT_MS per moment. */
@@ -22,14 +22,25 @@ interface ControlsProps {
   at: number;
   playing: boolean;
   speed: Speed;
-  eyes: Eyes;
+  perspective: Perspective;
   onGo: (at: number) => void;
   onPlaying: (playing: boolean) => void;
   onSpeed: (speed: Speed) => void;
-  onEyes: (eyes: Eyes) => void;
+  onPerspective: (perspective: Perspective) => void;
 }
 
-export function Controls({ film, frame, at, playing, speed, eyes, onGo, onPlaying, onSpeed, onEyes }: ControlsProps) {
+export function Controls({
+  film,
+  frame,
+  at,
+  playing,
+  speed,
+  perspective,
+  onGo,
+  onPlaying,
+  onSpeed,
+  onPerspective,
+}: ControlsProps) {
   const words = t().replay;
   const last = film.length - 1;
   const shift = film.shifts.findLast((start) => start.frame <= at);
@@ -86,8 +97,8 @@ export function Controls({ film, frame, at, playing, speed, eyes, onGo, onPlayin
           onPick={(picked) => onSpeed(SPEEDS.find((value) => String(value) === picked) ?? 1)}
         />
         <SelectField
-          label={words.eyes}
-          value={String(eyes)}
+          label={words.perspective}
+          value={String(perspective)}
           options={[
             { value: "all", label: words.allHands },
             ...frame.table.seats.map(({ seat }) => ({
@@ -96,7 +107,7 @@ export function Controls({ film, frame, at, playing, speed, eyes, onGo, onPlayin
             })),
             { value: "none", label: words.asSpectator },
           ]}
-          onPick={(picked) => onEyes(picked === "all" || picked === "none" ? picked : Number(picked))}
+          onPick={(picked) => onPerspective(picked === "all" || picked === "none" ? picked : Number(picked))}
         />
       </div>
     </section>

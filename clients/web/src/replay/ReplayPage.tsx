@@ -7,7 +7,7 @@ import type { PageProps } from "../app";
 import { DecisionKind, type DecisionRequest } from "../gen/chefshat/v1/decision_pb";
 import type { DecisionRecord, RecordLine } from "../gen/chefshat/v1/record_pb";
 import { t } from "../i18n";
-import { Faulty } from "../parts/Faulty";
+import { ErrorPage } from "../parts/ErrorPage";
 import { useAnnounced } from "../table/following";
 import { legalActions, moveOf } from "../table/model/actions";
 import { lookupOf } from "../table/model/lookup";
@@ -17,8 +17,8 @@ import { LookupTable } from "../table/view/LookupTable";
 import { TableView } from "../table/view/TableView";
 import { distinctName, moveWords } from "../table/words";
 import { Controls, type Speed } from "./Controls";
-import { decidingFor, type Eyes, seenWith } from "./eyes";
 import { type Film, filmOf } from "./frames";
+import { decidingFor, type Perspective, seenFrom } from "./perspective";
 import css from "./Replay.module.css";
 
 /** Duration of a moment at speed 1, milliseconds. */
@@ -46,9 +46,9 @@ export function ReplayPage({ route }: PageProps<"replay">) {
     void load();
     return () => leaving.abort();
   }, [gameId]);
-  if (fault) return <Faulty title={t().replay.title} words={fault} />;
+  if (fault) return <ErrorPage title={t().replay.title} words={fault} />;
   if (!film) return <p class="soft">{t().common.loading}</p>;
-  if (film.length === 0) return <Faulty title={t().replay.title} words={t().replay.empty} />;
+  if (film.length === 0) return <ErrorPage title={t().replay.title} words={t().replay.empty} />;
   return <Playback film={film} />;
 }
 
@@ -56,7 +56,7 @@ function Playback({ film }: { film: Film }) {
   const [at, setAt] = useState(() => firstFrame(film));
   const [playing, setPlaying] = useState(false);
   const [speed, setSpeed] = useState<Speed>(1);
-  const [eyes, setEyes] = useState<Eyes>("all");
+  const [perspective, setPerspective] = useState<Perspective>("all");
   const last = film.length - 1;
   useEffect(() => {
     if (!playing) return;
@@ -69,16 +69,16 @@ function Playback({ film }: { film: Film }) {
   }, [playing, at, speed, last]);
 
   const frame = useMemo(() => film.at(at), [film, at]);
-  const table = seenWith(frame.table, eyes);
-  const next = decidingFor(frame, eyes);
+  const table = seenFrom(frame.table, perspective);
+  const next = decidingFor(frame, perspective);
   useAnnounced(table, undefined, undefined);
   const go = (to: number) => setAt(Math.max(0, Math.min(last, to)));
   const open = next === undefined ? undefined : frame.open;
-  const known = open && (eyes === "all" || eyes === open.seat);
+  const known = open && (perspective === "all" || perspective === open.seat);
   return (
     <TableView
       table={table}
-      own={typeof eyes === "number" ? eyes : undefined}
+      own={typeof perspective === "number" ? perspective : undefined}
       next={next}
       nextKind={open?.kind}
       caption={film.header?.roomName ?? ""}
@@ -90,7 +90,7 @@ function Playback({ film }: { film: Film }) {
         at={at}
         playing={playing}
         speed={speed}
-        eyes={eyes}
+        perspective={perspective}
         onGo={(to) => {
           setPlaying(false);
           go(to);
@@ -100,7 +100,7 @@ function Playback({ film }: { film: Film }) {
           setPlaying(start);
         }}
         onSpeed={setSpeed}
-        onEyes={setEyes}
+        onPerspective={setPerspective}
       />
       {known && <Decision table={frame.table} open={open} />}
     </TableView>

@@ -18,7 +18,7 @@ import { HostInvite } from "../lobby/Invite";
 import { LeaveButton, LeaveDialog } from "../lobby/Leaving";
 import { giveUpSeat, heldSeat, hostedRoom, leaveSeat } from "../lobby/seat";
 import { Button } from "../parts/Button";
-import { Faulty } from "../parts/Faulty";
+import { ErrorPage } from "../parts/ErrorPage";
 import { Notice } from "../parts/Notice";
 import { isTaken, type SeatState, type TableState, tableFromRoom } from "./model/state";
 import { Seated } from "./Seated";
@@ -88,7 +88,7 @@ export function RoomPage({ route }: PageProps<"room">) {
     return (
       <>
         {after}
-        <Faulty title={t().table.title} words={fault} />
+        <ErrorPage title={t().table.title} words={fault} />
         <KeptLinks roomId={roomId} />
       </>
     );

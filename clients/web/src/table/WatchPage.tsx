@@ -4,7 +4,7 @@ import { useEffect, useState } from "preact/hooks";
 import { wordsOf } from "../api/faults";
 import type { PageProps } from "../app";
 import { t } from "../i18n";
-import { Faulty } from "../parts/Faulty";
+import { ErrorPage } from "../parts/ErrorPage";
 import { Notice } from "../parts/Notice";
 import { useAnnounced } from "./following";
 import { type Spectating, startSpectating } from "./spectating";
@@ -26,7 +26,7 @@ function Watched({ spectating }: { spectating: Spectating }) {
   const table = spectating.table.value;
   const { link, fault } = spectating.following;
   useAnnounced(table, undefined, undefined);
-  if (link.value === "failed" && fault.value) return <Faulty title={t().table.title} words={wordsOf(fault.value)} />;
+  if (link.value === "failed" && fault.value) return <ErrorPage title={t().table.title} words={wordsOf(fault.value)} />;
   if (table.seats.length === 0) return <p class="soft">{t().common.loading}</p>;
   const banner = link.value === "lost" ? <Notice kind="fault">{t().table.link.lost}</Notice> : null;
   if (table.phase === "waiting") return <WaitingRoom table={table} own={undefined} banner={banner} />;

@@ -6,7 +6,7 @@ import type { PresenceLine } from "./model/log";
 /** How long a change must last before it is announced, milliseconds. */
 export const SETTLED_MS = 2000;
 
-type Presence = PresenceLine["happening"]["kind"];
+type Presence = PresenceLine["entry"]["kind"];
 
 export interface PresenceTeller {
   /** Takes in an event of a seat's connection. */
@@ -22,7 +22,7 @@ export function tellPresence(say: (line: PresenceLine) => void): PresenceTeller 
   const waiting = new Map<number, ReturnType<typeof setTimeout>>();
   return {
     hear: (line) => {
-      const { seat, kind } = line.happening;
+      const { seat, kind } = line.entry;
       // A first event implies the opposite state before it.
       if (!stood.has(seat)) stood.set(seat, kind === "lost" ? "back" : "lost");
       clearTimeout(waiting.get(seat));

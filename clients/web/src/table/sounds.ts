@@ -67,8 +67,8 @@ export function play(sound: Sound): void {
 }
 
 /** The sound of an event. */
-export function soundOf({ happening }: LogLine): Sound | undefined {
-  switch (happening.kind) {
+export function soundOf({ entry }: LogLine): Sound | undefined {
+  switch (entry.kind) {
     case "played":
       return "play";
     case "passed":
@@ -76,7 +76,7 @@ export function soundOf({ happening }: LogLine): Sound | undefined {
     case "pizzaDone":
     case "finished":
     case "shiftOver":
-      return happening.kind;
+      return entry.kind;
     case "gameOver":
       return "shiftOver";
     default:

@@ -7,7 +7,7 @@ import { isLabel } from "./expressions";
 import type { Move } from "./model/actions";
 import { type Card, faceOf } from "./model/cards";
 import type { Reason } from "./model/picking";
-import type { Happening, LogLine, SeatState, TableState } from "./model/state";
+import type { LogEntry, LogLine, SeatState, TableState } from "./model/state";
 
 /** A seat's name, or its number while it is free. */
 export function nameOf(table: TableState, seat: number): string {
@@ -77,47 +77,47 @@ export interface SaidLine {
 }
 
 /** An event, in words. */
-export function happeningWords(table: TableState, happening: Happening): SaidLine {
+export function happeningWords(table: TableState, entry: LogEntry): SaidLine {
   const words = t().table.log;
   const because = (cause: keyof typeof words.causes) => (words.causes[cause] ? ` (${words.causes[cause]})` : "");
-  switch (happening.kind) {
+  switch (entry.kind) {
     case "dealt":
-      return { seat: undefined, text: words.dealt(happening.shift) };
+      return { seat: undefined, text: words.dealt(entry.shift) };
     case "played":
-      return { seat: happening.seat, text: words.plays(playWords(happening.cards)) + because(happening.cause) };
+      return { seat: entry.seat, text: words.plays(playWords(entry.cards)) + because(entry.cause) };
     case "passed":
-      return { seat: happening.seat, text: words.passes + because(happening.cause) };
+      return { seat: entry.seat, text: words.passes + because(entry.cause) };
     case "finished":
-      return { seat: happening.seat, text: words.finishes(t().common.place(happening.place)) };
+      return { seat: entry.seat, text: words.finishes(t().common.place(entry.place)) };
     case "pizzaDone":
-      return { seat: undefined, text: words.pizzaDone(happening.pizza, distinctName(table, happening.nextLeader)) };
+      return { seat: undefined, text: words.pizzaDone(entry.pizza, distinctName(table, entry.nextLeader)) };
     case "declared": {
-      const fight = happening.action === SpecialAction.FOOD_FIGHT;
-      return { seat: happening.seat, text: fight ? words.foodFight : words.dinner };
+      const fight = entry.action === SpecialAction.FOOD_FIGHT;
+      return { seat: entry.seat, text: fight ? words.foodFight : words.dinner };
     }
     case "gave": {
-      const what = giftWords(happening.cards, happening.count);
-      return { seat: happening.giver, text: words.gives(what, distinctName(table, happening.receiver)) };
+      const what = giftWords(entry.cards, entry.count);
+      return { seat: entry.giver, text: words.gives(what, distinctName(table, entry.receiver)) };
     }
     case "shiftOver":
-      return { seat: undefined, text: words.shiftOver(happening.shift, distinctName(table, happening.winner)) };
+      return { seat: undefined, text: words.shiftOver(entry.shift, distinctName(table, entry.winner)) };
     case "expressed":
-      return { seat: happening.seat, text: words.shows(expressionWord(happening.label)) };
+      return { seat: entry.seat, text: words.shows(expressionWord(entry.label)) };
     case "substituted":
-      return { seat: happening.seat, text: words.substituted(happening.agent) };
+      return { seat: entry.seat, text: words.substituted(entry.agent) };
     case "seated":
     case "left":
     case "lost":
     case "back":
-      return { seat: happening.seat, text: words[happening.kind] };
+      return { seat: entry.seat, text: words[entry.kind] };
     default:
-      return { seat: undefined, text: words[happening.kind] };
+      return { seat: undefined, text: words[entry.kind] };
   }
 }
 
 /** A line as it is read out. */
-export function spokenLine(table: TableState, { happening }: LogLine): string {
-  const { seat, text } = happeningWords(table, happening);
+export function spokenLine(table: TableState, { entry }: LogLine): string {
+  const { seat, text } = happeningWords(table, entry);
   return seat === undefined ? `${text}.` : `${distinctName(table, seat)} ${text}.`;
 }
 

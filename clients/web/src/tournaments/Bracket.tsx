@@ -4,8 +4,8 @@
 import type { Tournament, TournamentGame } from "../gen/chefshat/v1/tournament_pb";
 import { t } from "../i18n";
 import css from "./Bracket.module.css";
-import { type BracketRound, type BracketSeat, type BracketTable, bracket, isOver, nameOf } from "./course";
 import { GameLink } from "./GameLink";
+import { type BracketRound, type BracketSeat, type BracketTable, bracket, isOver, nameOf } from "./structure";
 
 interface BracketProps {
   tournament: Tournament;

@@ -4,9 +4,9 @@
 import type { Tournament } from "../gen/chefshat/v1/tournament_pb";
 import { t } from "../i18n";
 import { KindBadge } from "../parts/KindBadge";
-import { nameOf } from "./course";
 import css from "./Entrants.module.css";
 import { PersonName } from "./PersonName";
+import { nameOf } from "./structure";
 
 interface EntrantsProps {
   tournament: Tournament;

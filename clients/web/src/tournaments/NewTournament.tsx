@@ -5,13 +5,13 @@ import type { Offered } from "../api/server";
 import { t } from "../i18n";
 import { FormFrame, FormPage, FormPart } from "../lobby/FormPage";
 import formCss from "../lobby/FormPage.module.css";
-import { useFilling } from "../lobby/filling";
+import { useFormState } from "../lobby/form-state";
 import { ClockFields, FaultFields, RuleFields, Typed, WatchFields, wordsOfProblem } from "../lobby/GameFields";
 import type { NumberProblem } from "../lobby/problems";
 import { CheckField, SelectField } from "../parts/Field";
 import { navigate } from "../router";
 import { Choices } from "./Choices";
-import { makeTournament } from "./hosting";
+import { createTournament } from "./hosting";
 import { FormatFields, type FormProps, StartFields, WhoFields } from "./TournamentFields";
 import {
   newTournament,
@@ -34,20 +34,20 @@ function problemWords(problem: Problem): string {
 
 function TournamentFormView({ offered }: { offered: Offered }) {
   const words = t().organise;
-  const filling = useFilling(() => newTournament(offered.agents), {
+  const state = useFormState(() => newTournament(offered.agents), {
     check: (form) =>
       Object.fromEntries(Object.entries(problemsOf(form)).map(([field, problem]) => [field, problemWords(problem)])),
     fields: TOURNAMENT_FIELDS,
     send: async (form) => {
-      const tournamentId = await makeTournament(settingsOf(form));
+      const tournamentId = await createTournament(settingsOf(form));
       navigate({ page: "tournament", tournamentId });
     },
   });
-  const { form, faults, change } = filling;
+  const { form, faults, change } = state;
   const parts: FormProps = { form, faults, change };
   return (
     <FormFrame
-      filling={filling}
+      state={state}
       words={words}
       first={<FormatFields {...parts} />}
       folded={<Folded {...parts} offered={offered} />}

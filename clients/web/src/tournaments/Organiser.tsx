@@ -4,12 +4,12 @@ import { StudyLinks } from "../experiment/StudyLinks";
 import { type Tournament, TournamentFormat, TournamentState } from "../gen/chefshat/v1/tournament_pb";
 import { t } from "../i18n";
 import { Invite } from "../lobby/Invite";
-import { Sure } from "../lobby/Sure";
 import { useAttempt } from "../parts/attempt";
 import { Button } from "../parts/Button";
+import { ConfirmButton } from "../parts/ConfirmButton";
 import { Notice } from "../parts/Notice";
-import { isEnded } from "./course";
 import { closeTournament, hostedTournament, invitationTo, startTournament } from "./hosting";
+import { isEnded } from "./structure";
 import css from "./Tournaments.module.css";
 import { isForAgents, isForPeople } from "./words";
 
@@ -40,9 +40,9 @@ export function Organiser({ tournament }: { tournament: Tournament }) {
           {isForPeople(tournament) && <StudyLinks address={address} />}
         </>
       )}
-      <Sure label={words.close} confirm={words.closeDo} act={() => closeTournament(tournamentId)}>
+      <ConfirmButton label={words.close} confirm={words.closeDo} act={() => closeTournament(tournamentId)}>
         {open ? words.closeOpen : words.closePlaying}
-      </Sure>
+      </ConfirmButton>
     </section>
   );
 }
@@ -69,7 +69,7 @@ function Begin({ tournament }: { tournament: Tournament }) {
   );
 }
 
-/** Number of participants after filling up: a knockout to a power of two, others to one table. */
+/** Number of participants after state up: a knockout to a power of two, others to one table. */
 export function fieldFor({ participants, settings }: Tournament): number {
   const joined = participants.length;
   const table = settings?.rules?.players ?? 4;

@@ -14,10 +14,10 @@ import { Button } from "../parts/Button";
 import { Notice } from "../parts/Notice";
 import { type Acting, asksForTimes } from "../table/acting";
 import { Seated } from "../table/Seated";
-import { gameOf, isEnded } from "./course";
 import type { Heard } from "./following";
 import { type Participation as Part, startParticipation } from "./participation";
 import type { HeldPlace } from "./place";
+import { gameOf, isEnded } from "./structure";
 
 interface ParticipationProps {
   held: HeldPlace;

@@ -8,9 +8,9 @@ import {
   TournamentGameState,
 } from "../gen/chefshat/v1/tournament_pb";
 import { t } from "../i18n";
-import { nameOf, type PlayedTable, playedRounds } from "./course";
 import { GameLink } from "./GameLink";
 import css from "./Rounds.module.css";
+import { nameOf, type PlayedTable, playedRounds } from "./structure";
 import wallCss from "./Wall.module.css";
 
 interface RoundsProps {

@@ -11,9 +11,9 @@ import {
 import { decimal, t } from "../i18n";
 import { KindBadge } from "../parts/KindBadge";
 import { ratingWords } from "../people/rating";
-import { gradeOf, isEnded, meanScore, nameOf, participantOf } from "./course";
 import { PersonName } from "./PersonName";
 import css from "./Standings.module.css";
+import { gradeOf, isEnded, meanScore, nameOf, participantOf } from "./structure";
 
 /** Number of lines up to which each has room for two rows, in the wall view. */
 const FEW = 5;

@@ -3,7 +3,7 @@
 import { useId } from "preact/hooks";
 import { t } from "../i18n";
 import formCss from "../lobby/FormPage.module.css";
-import type { FieldFaults } from "../lobby/filling";
+import type { FieldFaults } from "../lobby/form-state";
 import { Typed } from "../lobby/GameFields";
 import { CheckField, SelectField, TextField } from "../parts/Field";
 import fieldCss from "../parts/Field.module.css";

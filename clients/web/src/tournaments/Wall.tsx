@@ -8,12 +8,12 @@ import { t } from "../i18n";
 import { Drawing } from "../parts/Drawing";
 import { pathOf } from "../router";
 import { Bracket } from "./Bracket";
-import { bracket, playedRounds } from "./course";
 import { Entrants } from "./Entrants";
 import { useFit } from "./fit";
 import { type Heard, useGames } from "./following";
 import { TablesOnWall } from "./Rounds";
 import { Standings } from "./Standings";
+import { bracket, playedRounds } from "./structure";
 import css from "./Wall.module.css";
 import { inShort, playWords, TournamentStateChip } from "./words";
 

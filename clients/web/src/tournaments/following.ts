@@ -8,7 +8,7 @@ import { type Following, follow } from "../api/follow";
 import { allPages } from "../api/pages";
 import { usePolled } from "../api/poll";
 import type { OrderConfidence, Tournament, TournamentGame, TournamentStanding } from "../gen/chefshat/v1/tournament_pb";
-import { isEnded, mergedGames } from "./course";
+import { isEnded, mergedGames } from "./structure";
 
 /** The data of the stream. */
 export interface Heard {

@@ -21,7 +21,7 @@ export function hostedTournament(tournamentId: string): HostedTournament | null 
 }
 
 /** Creates a tournament and stores its secrets; returns its id. */
-export async function makeTournament(settings: MessageInitShape<typeof TournamentSettingsSchema>): Promise<string> {
+export async function createTournament(settings: MessageInitShape<typeof TournamentSettingsSchema>): Promise<string> {
   const { tournament, joinCode, ownerToken } = await tournamentApi.createTournament(
     { settings },
     { timeoutMs: CALL_LIMIT_MS },

@@ -225,7 +225,7 @@ test("where its room is closed before a game, a study has no last questionnaire,
   await page.goto(`${server.url}/rooms/${gone}`);
   await page.getByText("This room no longer exists.").waitFor();
   expect(await page.locator("html").getAttribute("data-hide")).toBe("pages");
-  expect(await page.locator('[data-part~="faulty"]').getByRole("link").count()).toBe(0);
+  expect(await page.locator('[data-part~="error-page"]').getByRole("link").count()).toBe(0);
 });
 
 test("the host of a room makes links for its participants", async () => {

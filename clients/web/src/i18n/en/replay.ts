@@ -13,7 +13,7 @@ export const replay = {
   decisionOf: (decision: number, all: number) => `${decision} of ${all} decisions taken`,
   shift: "Shift",
   speed: "Speed",
-  eyes: "Cards shown",
+  perspective: "Cards shown",
   allHands: "all hands",
   as: (name: string) => `as ${name}`,
   asSpectator: "as a spectator",

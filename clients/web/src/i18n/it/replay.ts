@@ -15,7 +15,7 @@ export const replay: Texts["replay"] = {
   decisionOf: (decision, all) => `${decision} di ${all} decisioni prese`,
   shift: "Shift",
   speed: "Velocità",
-  eyes: "Carte visibili",
+  perspective: "Carte visibili",
   allHands: "tutte le mani",
   as: (name) => `come ${name}`,
   asSpectator: "come spettatore",

@@ -2,19 +2,19 @@
 // and a study may hide expressions. The wording is in words.ts, the delay of connection changes in
 // ../presence.ts.
 
-import type { Happening, LogLine } from "./state";
+import type { LogEntry, LogLine } from "./state";
 
 /** Events about a seat's connection. */
 const PRESENCE = ["lost", "back", "substituted"] as const;
 
 /** A line about a seat's connection. */
 export interface PresenceLine extends LogLine {
-  readonly happening: Happening & { readonly kind: (typeof PRESENCE)[number] };
+  readonly entry: LogEntry & { readonly kind: (typeof PRESENCE)[number] };
 }
 
 /** Whether a line is about a seat's connection. */
 export function isPresence(line: LogLine): line is PresenceLine {
-  return (PRESENCE as readonly string[]).includes(line.happening.kind);
+  return (PRESENCE as readonly string[]).includes(line.entry.kind);
 }
 
 /** The lines to show or read out; without `expressions`, no shown expressions. */
@@ -23,14 +23,14 @@ export function worthSaying(log: readonly LogLine[], expressions: boolean): LogL
   const told = new Set<number>();
   const lines: LogLine[] = [];
   for (const line of log.toReversed()) {
-    if (!expressions && line.happening.kind === "expressed") continue;
+    if (!expressions && line.entry.kind === "expressed") continue;
     if (isPresence(line)) {
       // Consecutive changes of a connection are one line, the last, as long as nothing was decided
       // for the seat in between.
-      if (told.has(line.happening.seat)) continue;
-      told.add(line.happening.seat);
+      if (told.has(line.entry.seat)) continue;
+      told.add(line.entry.seat);
     } else {
-      const seat = decidedBy(line.happening);
+      const seat = decidedBy(line.entry);
       if (seat !== undefined) told.delete(seat);
     }
     lines.push(line);
@@ -39,14 +39,14 @@ export function worthSaying(log: readonly LogLine[], expressions: boolean): LogL
 }
 
 /** The seat whose decision an event reports, if it reports one. */
-function decidedBy(happening: Happening): number | undefined {
-  switch (happening.kind) {
+function decidedBy(entry: LogEntry): number | undefined {
+  switch (entry.kind) {
     case "played":
     case "passed":
     case "declared":
-      return happening.seat;
+      return entry.seat;
     case "gave":
-      return happening.giver;
+      return entry.giver;
     default:
       return undefined;
   }

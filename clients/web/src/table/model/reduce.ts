@@ -8,7 +8,7 @@ import { type Card, cardsFromNumbers, countOf, faceOf, playedCards, together, wi
 import {
   type Cause,
   fromRules,
-  type Happening,
+  type LogEntry,
   MAX_LOG,
   type SeatState,
   seatFromParticipant,
@@ -29,8 +29,8 @@ const CAUSES: Record<DecisionSource, Cause> = {
 export function applyEvent(table: TableState, event: GameEvent): TableState {
   const sequence = Number(event.sequence);
   if (sequence < table.nextSequence) return table;
-  const [changed, happening] = change(table, event, sequence);
-  const log = happening ? [...changed.log, { sequence, happening }].slice(-MAX_LOG) : changed.log;
+  const [changed, entry] = change(table, event, sequence);
+  const log = entry ? [...changed.log, { sequence, entry }].slice(-MAX_LOG) : changed.log;
   return { ...changed, log, nextSequence: sequence + 1 };
 }
 
@@ -39,7 +39,7 @@ export function applyEvents(table: TableState, events: readonly GameEvent[]): Ta
   return events.reduce(applyEvent, table);
 }
 
-type Change = readonly [TableState, Happening | undefined];
+type Change = readonly [TableState, LogEntry | undefined];
 
 function change(table: TableState, event: GameEvent, sequence: number): Change {
   const kind = event.kind;

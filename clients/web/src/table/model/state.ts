@@ -17,7 +17,7 @@ export type Phase = "waiting" | "dealt" | "pizza" | "shiftOver" | "gameOver" | "
 export type Cause = "agent" | "timeout" | "invalid" | "disconnected" | "substitute" | "recorded";
 
 /** An event as the viewer may see it. */
-export type Happening =
+export type LogEntry =
   | { readonly kind: "dealt"; readonly shift: number }
   | { readonly kind: "played"; readonly seat: number; readonly cards: readonly Card[]; readonly cause: Cause }
   | { readonly kind: "passed"; readonly seat: number; readonly cause: Cause }
@@ -41,7 +41,7 @@ export type Happening =
 /** An event and its sequence number. */
 export interface LogLine {
   readonly sequence: number;
-  readonly happening: Happening;
+  readonly entry: LogEntry;
 }
 
 /** The state of a seat. */

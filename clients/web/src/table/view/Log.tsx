@@ -16,7 +16,7 @@ export function Log({ table }: { table: TableState }) {
       <div class={css.lines} tabIndex={0}>
         <ol>
           {worthSaying(table.log, !hidden.value.includes("expressions")).map((line) => {
-            const { seat, text } = happeningWords(table, line.happening);
+            const { seat, text } = happeningWords(table, line.entry);
             return (
               <li key={line.sequence} class={seat === undefined ? css.aside : ""}>
                 {seat !== undefined && (

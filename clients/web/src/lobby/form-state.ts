@@ -19,7 +19,7 @@ export interface FormUse<Form, Name extends string> {
 }
 
 /** The state of a form. */
-export interface Filling<Form, Name extends string> {
+export interface FormState<Form, Name extends string> {
   form: Form;
   faults: FieldFaults<Name>;
   change: (changed: Partial<Form>) => void;
@@ -34,10 +34,10 @@ export interface Filling<Form, Name extends string> {
 }
 
 /** A form that starts with the values of `begin`. */
-export function useFilling<Form extends object, Name extends string>(
+export function useFormState<Form extends object, Name extends string>(
   begin: () => Form,
   use: FormUse<Form, Name>,
-): Filling<Form, Name> {
+): FormState<Form, Name> {
   const [form, setForm] = useState(begin);
   const [faults, setFaults] = useState<FieldFaults<Name>>({});
   const [refusal, setRefusal] = useState<string | null>(null);

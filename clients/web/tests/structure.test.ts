@@ -10,7 +10,7 @@ import {
   TournamentSchema,
   TournamentState,
 } from "../src/gen/chefshat/v1/tournament_pb";
-import { bracket, gradeOf, mergedGames, playedRounds } from "../src/tournaments/course";
+import { bracket, gradeOf, mergedGames, playedRounds } from "../src/tournaments/structure";
 
 interface Told {
   game: number;

@@ -6,16 +6,18 @@ import type { TableState } from "../table/model/state";
 import type { Frame } from "./frames";
 
 /** All hands, no hands, or the hand of a seat. */
-export type Eyes = "all" | "none" | number;
+export type Perspective = "all" | "none" | number;
 
 /** The table from a perspective. */
-export function seenWith(table: TableState, eyes: Eyes): TableState {
-  if (eyes === "all") return table;
-  const seats = table.seats.map((seat) => (seat.seat === eyes ? seat : { ...seat, hand: undefined, received: [] }));
+export function seenFrom(table: TableState, perspective: Perspective): TableState {
+  if (perspective === "all") return table;
+  const seats = table.seats.map((seat) =>
+    seat.seat === perspective ? seat : { ...seat, hand: undefined, received: [] },
+  );
   const log = table.log.map((line) => {
-    const { happening } = line;
-    if (happening.kind !== "gave" || happening.giver === eyes || happening.receiver === eyes) return line;
-    return { ...line, happening: { ...happening, cards: [] } };
+    const { entry } = line;
+    if (entry.kind !== "gave" || entry.giver === perspective || entry.receiver === perspective) return line;
+    return { ...line, entry: { ...entry, cards: [] } };
   });
   return { ...table, seats, log };
 }
@@ -24,9 +26,9 @@ export function seenWith(table: TableState, eyes: Eyes): TableState {
  * The seat whose decision is open, if the perspective may know: only a seat itself knows that it
  * may declare a special action.
  */
-export function decidingFor({ open, table }: Frame, eyes: Eyes): number | undefined {
+export function decidingFor({ open, table }: Frame, perspective: Perspective): number | undefined {
   if (!open) return undefined;
-  if (open.kind === DecisionKind.SPECIAL_ACTION && eyes !== "all" && eyes !== open.seat) return undefined;
+  if (open.kind === DecisionKind.SPECIAL_ACTION && perspective !== "all" && perspective !== open.seat) return undefined;
   // After the last play of a game nobody decides.
   return table.phase === "gameOver" || table.phase === "aborted" ? undefined : open.seat;
 }

@@ -8,9 +8,9 @@ import { Notice } from "./Notice";
 import css from "./Notice.module.css";
 
 /** The error page. */
-export function Faulty({ title, words }: { title: string; words: string }) {
+export function ErrorPage({ title, words }: { title: string; words: string }) {
   return (
-    <section class={css.faulty} data-part="faulty">
+    <section class={css.errorPage} data-part="error-page">
       <h1>{title}</h1>
       <Notice kind="fault">{words}</Notice>
       {!hidden.value.includes("pages") && (

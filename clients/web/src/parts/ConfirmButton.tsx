@@ -4,23 +4,25 @@
 import type { ComponentChildren } from "preact";
 import { useEffect, useRef, useState } from "preact/hooks";
 import { t } from "../i18n";
-import { useAttempt } from "../parts/attempt";
-import { Button } from "../parts/Button";
-import { Notice } from "../parts/Notice";
-import css from "./Sure.module.css";
+import { useAttempt } from "./attempt";
+import { Button, type ButtonLook } from "./Button";
+import css from "./ConfirmButton.module.css";
+import { Notice } from "./Notice";
 
-interface SureProps {
+interface ConfirmButtonProps {
   /** Label of the button. */
   label: string;
   /** Label of the confirmation; `label` by default. */
   confirm?: string;
+  /** How prominent the button is at first; quiet by default. */
+  look?: ButtonLook;
   act: () => Promise<void>;
   /** The consequence, shown with the confirmation. */
   children: ComponentChildren;
 }
 
 /** The button. */
-export function Sure({ label, confirm = label, act, children }: SureProps) {
+export function ConfirmButton({ label, confirm = label, look = "quiet", act, children }: ConfirmButtonProps) {
   const [asked, setAsked] = useState(false);
   const { busy, fault, run, reset } = useAttempt();
   const whole = useRef<HTMLDivElement>(null);
@@ -35,7 +37,7 @@ export function Sure({ label, confirm = label, act, children }: SureProps) {
     reset();
   };
   return (
-    <div class={css.sure} ref={whole}>
+    <div class={css.confirm} ref={whole}>
       {asked ? (
         <>
           <span data-part="question" tabIndex={-1}>
@@ -49,7 +51,7 @@ export function Sure({ label, confirm = label, act, children }: SureProps) {
           </Button>
         </>
       ) : (
-        <Button look="quiet" onClick={() => setAsked(true)}>
+        <Button look={look} onClick={() => setAsked(true)}>
           {label}
         </Button>
       )}

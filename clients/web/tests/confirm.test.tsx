@@ -5,7 +5,7 @@ import { render } from "preact";
 import { act } from "preact/test-utils";
 import { afterEach, beforeEach, expect, test } from "vitest";
 import { startLanguage } from "../src/i18n";
-import { Sure } from "../src/lobby/Sure";
+import { ConfirmButton } from "../src/parts/ConfirmButton";
 
 let root: HTMLElement;
 let calls: { done: () => void; failed: (why: Error) => void }[];
@@ -18,9 +18,9 @@ beforeEach(async () => {
   const perform = () => new Promise<void>((done, failed) => calls.push({ done, failed }));
   await act(() =>
     render(
-      <Sure label="Close…" confirm="Do it" act={perform}>
+      <ConfirmButton label="Close…" confirm="Do it" act={perform}>
         It ends for everybody.
-      </Sure>,
+      </ConfirmButton>,
       root,
     ),
   );
