@@ -1,5 +1,4 @@
-// The button that asks once more: where the focus goes, that it acts once, and what it says when it
-// could not.
+// The confirm button: focus, a single action, and errors.
 
 import { render } from "preact";
 import { act } from "preact/test-utils";
@@ -34,7 +33,7 @@ afterEach(async () => {
 const button = (words: string) => [...root.querySelectorAll("button")].find(({ textContent }) => textContent === words);
 const press = (words: string) => act(() => button(words)?.click());
 
-test("the question has the focus, and the button has it back", async () => {
+test("the question gets the focus, and then the button", async () => {
   await press("Close…");
   expect(document.activeElement?.textContent).toBe("It ends for everybody.");
   await press("Cancel");
@@ -42,7 +41,7 @@ test("the question has the focus, and the button has it back", async () => {
   expect(calls).toHaveLength(0);
 });
 
-test("pressed twice it acts once", async () => {
+test("pressed twice, it acts once", async () => {
   await press("Close…");
   await press("Do it");
   await press("Do it");
@@ -50,7 +49,7 @@ test("pressed twice it acts once", async () => {
   expect(button("Do it")?.disabled).toBe(true);
 });
 
-test("what went wrong is said until it is tried again or left alone", async () => {
+test("an error is shown until the next attempt or cancellation", async () => {
   await press("Close…");
   await press("Do it");
   await act(async () => calls[0]?.failed(new Error("no")));

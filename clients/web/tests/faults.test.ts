@@ -1,5 +1,5 @@
-// What a failed call says to a person: our own words for known reasons, the server's for others,
-// and something when nothing came back.
+// Error messages: translated for known reasons, the server's for others, and a default when there
+// was no response.
 
 import { create } from "@bufbuild/protobuf";
 import { Code, ConnectError } from "@connectrpc/connect";
@@ -20,17 +20,17 @@ function refusal(reason: string, message: string, metadata: Record<string, strin
   return error;
 }
 
-test("a known reason has words of our own", () => {
+test("a known reason has a translated message", () => {
   expect(inWords(refusal("ROOM_FULL", "no seat is free"))).toBe(en.faults.byReason.ROOM_FULL);
 });
 
-test("an unknown reason is said in the server's words, with its field", () => {
+test("an unknown reason has the server's message, with its field", () => {
   const error = refusal("RULE_SET_REFUSED", "faces: 99 is not in 4..=15", { field: "faces" });
   expect(inWords(error)).toBe("faces: 99 is not in 4..=15");
   expect(faultOf(error).metadata).toEqual({ field: "faces" });
 });
 
-test("a server that is not there comes back perhaps, a refusal does not", () => {
+test("an unreachable server is retried, a refusal is not", () => {
   const away = new TypeError("Failed to fetch");
   expect(inWords(away)).toBe(en.faults.notReached);
   expect(isPassing(faultOf(away))).toBe(true);

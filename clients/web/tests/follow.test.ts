@@ -1,5 +1,5 @@
-// Following a stream: it is opened again when it is lost or silent, and left when it says that it
-// is over or fails for good.
+// Following a stream: it is reopened when lost or silent, and closed when it ends or fails for
+// good.
 
 import { Code, ConnectError } from "@connectrpc/connect";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
@@ -12,13 +12,13 @@ afterEach(() => {
   vi.useRealTimers();
 });
 
-/** A stream that gives these messages, then throws or ends. */
+/** A stream of these messages that then throws or ends. */
 async function* stream(messages: readonly string[], thrown?: unknown): AsyncGenerator<string> {
   yield* messages;
   if (thrown) throw thrown;
 }
 
-test("a lost stream is opened again until it says that it is over", async () => {
+test("a lost stream is reopened until it ends", async () => {
   const away = new ConnectError("away", Code.Unavailable);
   const streams = [stream(["a"], away), stream([], away), stream(["b"]), stream(["c", "end", "never"])];
   let opened = 0;
@@ -38,7 +38,7 @@ test("a lost stream is opened again until it says that it is over", async () => 
   expect(following.link.value).toBe("ended");
 });
 
-test("a fault that trying again does not mend ends it", async () => {
+test("an error that a retry does not fix ends the stream", async () => {
   let opened = 0;
   const following = follow(
     () => {
@@ -53,7 +53,7 @@ test("a fault that trying again does not mend ends it", async () => {
   expect(opened).toBe(1);
 });
 
-test("a stream on which nothing is heard any more is given up and opened again", async () => {
+test("a silent stream is reopened", async () => {
   let opened = 0;
   const following = follow(
     async function* (abort) {

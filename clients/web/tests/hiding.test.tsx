@@ -1,5 +1,4 @@
-// What a study leaves out stays left out while one part of the page goes and another comes,
-// whichever is first.
+// Hidden parts stay hidden while pages change, whichever order they come and go in.
 
 import { render } from "preact";
 import { act } from "preact/test-utils";
@@ -20,7 +19,7 @@ const said = () => document.documentElement.dataset.hide;
 
 afterEach(() => expect([said(), hidden.value]).toEqual([undefined, []]));
 
-test("the next part comes before the one before it goes", () => {
+test("the next part arrives before the previous one leaves", () => {
   const first = leaveOut(["log"]);
   const second = leaveOut(["log"]);
   first();
@@ -28,7 +27,7 @@ test("the next part comes before the one before it goes", () => {
   second();
 });
 
-test("the next part comes after the one before it has gone", () => {
+test("the next part arrives after the previous one left", () => {
   const first = leaveOut(["log"]);
   first();
   expect(said()).toBeUndefined();
@@ -37,13 +36,13 @@ test("the next part comes after the one before it has gone", () => {
   second();
 });
 
-test("two parts at once leave out what either wants, each thing once", () => {
+test("two parts at once hide the union of their wishes", () => {
   const both = [leaveOut(["log"]), leaveOut(["pages", "log"])];
   expect(hidden.value).toEqual(["log", "pages"]);
   for (const done of both) done();
 });
 
-test("a page that is drawn anew under another key goes on leaving out", () => {
+test("a page rendered again with another key keeps hiding", () => {
   function Page() {
     useHiding(study);
     return null;

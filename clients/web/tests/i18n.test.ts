@@ -1,5 +1,4 @@
-// Every language has the same texts as English; and the language is picked in the order that is
-// promised.
+// Every language has the same texts as English, and the language is chosen in the documented order.
 
 import { describe, expect, test } from "vitest";
 import { firstKnown } from "../src/i18n";
@@ -14,7 +13,7 @@ function paths(texts: object, above = ""): string[] {
   );
 }
 
-/** The paths of texts that say nothing. */
+/** The paths of empty texts. */
 function silent(texts: object, above = ""): string[] {
   return Object.entries(texts).flatMap(([name, text]) => {
     if (typeof text === "string") return text.trim() === "" ? [`${above}${name}`] : [];
@@ -28,7 +27,7 @@ test("Italian has the texts that English has", () => {
   expect(paths(en).length).toBeGreaterThan(100);
 });
 
-test("what says something in English says something in Italian", () => {
+test("no Italian text is empty unless the English one is", () => {
   expect(silent(italian)).toEqual(silent(en));
 });
 

@@ -1,4 +1,4 @@
-// Lists: all pages are asked for, up to a bound; which seats the links of a study are for.
+// Paginated lists and their bounds, and the seats for a study.
 
 import { create } from "@bufbuild/protobuf";
 import { beforeAll, expect, test } from "vitest";
@@ -49,11 +49,11 @@ test.each([
   },
 );
 
-test("what is not counted to its end says so", () => {
+test("an incomplete count says so", () => {
   expect([countWords(12, true), countWords(12, false)]).toEqual(["12+", "12"]);
 });
 
-test("links are for seats that people can take, and stay with those who have sat down", () => {
+test("links are for seats that people can take, and stay with participants who have joined", () => {
   const seats = [
     create(ParticipantSchema, { name: "P02" }),
     create(ParticipantSchema, { builtInAgent: "greedy" }),

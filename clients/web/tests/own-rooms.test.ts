@@ -1,5 +1,4 @@
-// Rooms for the participants of a study, each like one that stands: who they are, what is asked
-// for, and the table of their links.
+// Separate rooms for the participants of a study: the names, the requests, and the list of links.
 
 import { create } from "@bufbuild/protobuf";
 import { afterEach, expect, test, vi } from "vitest";
@@ -44,12 +43,12 @@ test.each([
   expect(participantsIn(typed)).toEqual(names);
 });
 
-test("of too many participants one more than there may be is named", () => {
+test("an excess of participants is cut off after one more than the maximum", () => {
   expect(participantsIn("P1-P5000").length).toBe(MAX_PARTICIPANTS + 1);
   expect(participantsIn("A1-A90\nB1-B90").length).toBe(MAX_PARTICIPANTS + 1);
 });
 
-test("a room like another has its rules, times and agents, and free seats for all others", () => {
+test("a repeated room has the same rules, times and agents, and free seats otherwise", () => {
   const asked = create(CreateRoomRequestSchema, requestLike(room, "Lab · P07", 86_400_000));
   expect(asked.name).toBe("Lab · P07");
   expect(asked.rules).toEqual(room.rules);
@@ -68,7 +67,7 @@ test("a room like another has its rules, times and agents, and free seats for al
   ]);
 });
 
-test("a branch goes on from the same point, and says so where a game cannot be dealt again", () => {
+test("a branch continues from the same point, and a game that cannot be dealt again says so", () => {
   const branched = create(RoomSchema, { branchedFrom: { gameId: "g", decisions: 9n } });
   const asked = create(CreateRoomRequestSchema, requestLike(branched, ""));
   expect([asked.rules, asked.start.case]).toEqual([undefined, "branch"]);
@@ -77,7 +76,7 @@ test("a branch goes on from the same point, and says so where a game cannot be d
   expect(notToBeRepeated(create(RoomSchema, { origin: GameOrigin.SCRIPTED }))).toBe("hands");
 });
 
-test("what was made before one is refused is kept, and the rest is made when it is tried again", async () => {
+test("rooms created before an error are kept, and the rest are created on the next attempt", async () => {
   let left = 2;
   vi.spyOn(roomApi, "createRoom").mockImplementation(async ({ name }) => {
     left -= 1;
@@ -96,14 +95,14 @@ test("what was made before one is refused is kept, and the rest is made when it 
   await make("");
   expect(jobs.value.get("like")).toMatchObject({ busy: false, fault: undefined });
   expect(left).toBe(4);
-  // What the link of each says stays what it was when it was made.
+  // Each link keeps the settings from when it was created.
   expect(ownRooms("like").map(({ search }) => search)).toEqual(["?name=P1&hide=log", "?name=P2&hide=log", "?name=P3"]);
   expect(ownRooms("like")[2]).toMatchObject({ name: "P3", roomId: "of Lab · P3", joinCode: "code of Lab · P3" });
   expect(hostedRoom("of Lab · P3")?.ownerToken).toBe("o");
   expect(ownRooms("another")).toEqual([]);
 });
 
-test("a form that is left and opened again while rooms are being made makes none twice", async () => {
+test("closing and reopening the form while rooms are created creates none twice", async () => {
   const made: string[] = [];
   let goOn = () => {};
   const first = new Promise<void>((resolve) => {
@@ -123,7 +122,7 @@ test("a form that is left and opened again while rooms are being made makes none
   expect(ownRooms("like").map(({ name }) => name)).toEqual(["P1", "P2"]);
 });
 
-test("the room of a participant has a name that is not too long, with theirs in it", async () => {
+test("a participant's room has a name of valid length with theirs in it", async () => {
   const names: string[] = [];
   vi.spyOn(roomApi, "createRoom").mockImplementation(async ({ name = "" }) => {
     names.push(name);
@@ -137,7 +136,7 @@ test("the room of a participant has a name that is not too long, with theirs in 
   expect(isTooLong("x".repeat(MAX_NAME + 1))).toBe(true);
 });
 
-test("links are a table that any program reads", () => {
+test("links are a valid CSV table", () => {
   const link = (name: string) => ({ name, address: "https://a.example/join/X?name=1", roomId: "r" });
   expect(tableOf([link("P07"), link('Ann, "A"')])).toBe(
     'name,link,room_id\r\nP07,https://a.example/join/X?name=1,r\r\n"Ann, ""A""",https://a.example/join/X?name=1,r\r\n',

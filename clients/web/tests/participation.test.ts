@@ -1,5 +1,5 @@
-// Taking part in a tournament: a game whose room cannot be asked for is asked for again, ever more
-// slowly, and only while the place is this page's.
+// Taking part in a tournament: failed requests of a room are repeated with growing delays, only
+// while the place belongs to this page.
 
 import { create, type MessageInitShape } from "@bufbuild/protobuf";
 import { Code, ConnectError } from "@connectrpc/connect";
@@ -27,9 +27,7 @@ afterEach(() => {
   vi.restoreAllMocks();
 });
 
-/**
- * A stream that says these things at these times, milliseconds from its beginning, and stays open.
- */
+/** A stream that sends messages at these times, in milliseconds from its start, and stays open. */
 function streaming(said: readonly (readonly [atMs: number, update: Told])[]) {
   return vi.spyOn(playApi, "watch").mockImplementation(async function* () {
     let nowMs = 0;
@@ -44,7 +42,7 @@ function streaming(said: readonly (readonly [atMs: number, update: Told])[]) {
 
 const away = new ConnectError("away", Code.Unavailable);
 
-test("a room is asked for until it is there, over the one stream", async () => {
+test("the request of a room is repeated until it succeeds, on one stream", async () => {
   const watch = streaming([
     [0, entered],
     [0, seated],
@@ -60,7 +58,7 @@ test("a room is asked for until it is there, over the one stream", async () => {
   part.stop();
 });
 
-test("who has been superseded asks no more and does not take the place back", async () => {
+test("a superseded page stops its requests and does not take the place back", async () => {
   const watch = streaming([
     [0, entered],
     [0, seated],
@@ -79,7 +77,7 @@ test("who has been superseded asks no more and does not take the place back", as
   part.stop();
 });
 
-test("a room that is gone is not asked for again", async () => {
+test("the request of a room that is gone is not repeated", async () => {
   streaming([
     [0, entered],
     [0, seated],

@@ -1,4 +1,4 @@
-// What a participant did in its games, and what they add up to.
+// A participant's games and their totals.
 
 import { create } from "@bufbuild/protobuf";
 import { expect, test } from "vitest";
@@ -14,7 +14,7 @@ import { setLanguage } from "../src/i18n";
 import { ownGame, sum, unratedBecause } from "../src/people/games";
 import { ratingRange, ratingWords } from "../src/people/rating";
 
-/** A game of Rosa, two built-in agents called greedy, and somebody who took the agent's name. */
+/** A game of Rosa, two built-in agents called greedy, and someone who took the agent's name. */
 function record(state: RoomState, places: number[]) {
   return create(RecordSummarySchema, {
     state,
@@ -48,7 +48,7 @@ test("games without a result do not count", () => {
   expect(sum([])).toEqual({ games: 0, wins: 0, meanPlace: 0 });
 });
 
-test("a rating is said with how far it may be off, in the digits of the language", async () => {
+test("a rating has its uncertainty, in the number format of the language", async () => {
   const rating = { mean: 30, deviation: 2.5, games: 7 } as Parameters<typeof ratingWords>[0];
   expect(ratingWords(rating)).toBe("30.0 ± 4.9");
   await setLanguage("it");
@@ -57,7 +57,7 @@ test("a rating is said with how far it may be off, in the digits of the language
   expect(ratingRange(rating)).toEqual({ from: 25.1, to: 34.9 });
 });
 
-test("a game that counts for no rating says why", () => {
+test("an unrated game says why", () => {
   const rated = create(RecordSummarySchema, {
     state: RoomState.FINISHED,
     origin: GameOrigin.DEALT,

@@ -1,5 +1,5 @@
-// Asking again and again: at once, at the interval, more slowly after faults, not while hidden, and
-// never after the page has gone.
+// Polling: at once, at the interval, less often after errors, not while hidden, and never after the
+// page is gone.
 
 import { Code, ConnectError } from "@connectrpc/connect";
 import { render } from "preact";
@@ -36,7 +36,7 @@ async function pass(ms: number) {
   });
 }
 
-test("the newest answer is shown, asked for at once and at the interval", async () => {
+test("the latest response is shown, requested at once and at the interval", async () => {
   let answer = 0;
   await shown(async () => ++answer);
   await pass(0);
@@ -47,7 +47,7 @@ test("the newest answer is shown, asked for at once and at the interval", async 
   expect(seen?.value).toBe(2);
 });
 
-test("a fault keeps what was known and asks more slowly until it has passed", async () => {
+test("after an error the last response stays, and requests slow down until one succeeds", async () => {
   let asked = 0;
   await shown(async () => {
     asked += 1;
@@ -63,7 +63,7 @@ test("a fault keeps what was known and asks more slowly until it has passed", as
   expect(seen).toEqual({ value: 3, fault: null });
 });
 
-test("nothing is asked while the page is hidden; when it is seen again, at once", async () => {
+test("a hidden page makes no request, and makes one at once when it is shown again", async () => {
   const hidden = vi.spyOn(document, "hidden", "get").mockReturnValue(true);
   let asked = 0;
   await shown(async () => ++asked);
@@ -75,7 +75,7 @@ test("nothing is asked while the page is hidden; when it is seen again, at once"
   expect(seen?.value).toBe(1);
 });
 
-test("who looks away and back while an answer is awaited does not ask twice", async () => {
+test("hiding and showing the page during a request does not repeat it", async () => {
   let asked = 0;
   await shown(() => new Promise(() => (asked += 1)));
   document.dispatchEvent(new Event("visibilitychange"));
@@ -83,7 +83,7 @@ test("who looks away and back while an answer is awaited does not ask twice", as
   expect(asked).toBe(1);
 });
 
-test("a page that has gone asks no more, and what was under way is called off", async () => {
+test("a page that is gone stops polling and aborts its request", async () => {
   let signal: AbortSignal | undefined;
   let asked = 0;
   await shown(async (given) => {

@@ -1,4 +1,4 @@
-// Connections that come and go: one line in the log, and read out once for each change that lasted.
+// Flapping connections: one line in the log, and one announcement for each change that lasts.
 
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { isPresence, worthSaying } from "../src/table/model/log";
@@ -30,8 +30,8 @@ test.each<[string, LogEntry[], number[]]>([
 });
 
 /**
- * Lets things happen, each so long after the one before; gives what was said until everything had
- * settled.
+ * Applies changes, each after a delay in milliseconds; returns the announcements once everything
+ * has settled.
  */
 function heard(steps: readonly (readonly [afterMs: number, entry: LogEntry])[]): LogEntry[] {
   const said: LogEntry[] = [];
@@ -105,7 +105,7 @@ test.each<[string, [number, LogEntry][], LogEntry[]]>([
   expect(heard(steps)).toEqual(said);
 });
 
-test("who leaves the table is told nothing any more", () => {
+test("after leaving the table nothing is announced", () => {
   const said = vi.fn();
   const teller = tellPresence(said);
   const line: LogLine = { sequence: 1, entry: lost(1) };

@@ -1,5 +1,5 @@
-// Recorded games of the whole project's fixtures, as the protocol's messages, and what a viewer of
-// the game would have been told.
+// The recorded games of the repository's fixtures, and the events that a viewer would have
+// received.
 
 import { readFileSync } from "node:fs";
 import { create, fromJson, type JsonValue } from "@bufbuild/protobuf";
@@ -17,7 +17,7 @@ export function recorded(name: (typeof RECORDS)[number]): RecordLine[] {
   return lines.map((line) => fromJson(RecordLineSchema, JSON.parse(line) as JsonValue));
 }
 
-/** An event as a seat is told it, or a spectator where no seat is named. */
+/** An event as a seat receives it, or a spectator if no seat is given. */
 export function seenBy(event: GameEvent, seat: number | undefined): GameEvent {
   const { kind } = event;
   switch (kind.case) {

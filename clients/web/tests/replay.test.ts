@@ -1,5 +1,4 @@
-// A record as a film: every decision can be seen before it is taken, and nobody's perspective see more
-// than they may.
+// A record as a film: every decision is open once, and no perspective reveals hidden cards.
 
 import { expect, test } from "vitest";
 import { DecisionKind } from "../src/gen/chefshat/v1/decision_pb";
@@ -9,7 +8,7 @@ import { legalActions } from "../src/table/model/actions";
 import { applyEvent } from "../src/table/model/reduce";
 import { RECORDS, recorded } from "./record";
 
-/** All moments of a film, in order. */
+/** All moments of a film. */
 function framesOf(film: Film): Frame[] {
   return Array.from({ length: film.length }, (_, number) => film.at(number));
 }
@@ -32,7 +31,7 @@ test.each(RECORDS)("%s: every decision is open once, at a table where it is that
   expect(film.at(film.length - 1).table.phase).toBe("gameOver");
 });
 
-test.each(RECORDS)("%s: perspective see their own hand and no other, and no gift between others", (name) => {
+test.each(RECORDS)("%s: a seat's perspective has its own hand only, and no gift between others", (name) => {
   for (const frame of framesOf(filmOf(recorded(name)))) {
     for (const perspective of [0, 1, "none"] as const) {
       const { seats, log } = seenFrom(frame.table, perspective);
@@ -52,32 +51,29 @@ test.each(RECORDS)("%s: perspective see their own hand and no other, and no gift
   }
 });
 
-test.each(RECORDS)(
-  "%s: whichever moment is looked at after which, its table is that of all events from the beginning",
-  (name) => {
-    const lines = recorded(name);
-    // Every table is kept, so that each is what the one before and its event make.
-    const film = filmOf(lines, 1);
-    const events = lines.flatMap(({ line }) => (line.case === "event" ? [line.value] : []));
-    let table = events.slice(0, 1).reduce(applyEvent, film.at(0).table);
-    const tables = Array.from({ length: film.length }, (_, number) => {
-      table = events
-        .filter(({ sequence }) => Number(sequence) < film.at(number).table.nextSequence)
-        .reduce(applyEvent, table);
-      return table;
-    });
-    expect(tables.at(-1)?.nextSequence).toBe(Number(events.at(-1)?.sequence) + 1);
-    for (const keptEvery of [2, 7, 200, 100_000]) {
-      const sparse = filmOf(lines, keptEvery);
-      expect(sparse.length).toBe(film.length);
-      // To and fro through all of them: 101 is a prime and divides neither length.
-      for (let step = 0; step < sparse.length; step += 1) {
-        const number = (step * 101) % sparse.length;
-        const frame = sparse.at(number);
-        expect(frame.table).toEqual(tables[number]);
-        expect(frame.open).toBe(film.at(number).open);
-        expect(frame.decisions).toBe(film.at(number).decisions);
-      }
+test.each(RECORDS)("%s: in any order, the table of a moment is the result of all events before it", (name) => {
+  const lines = recorded(name);
+  // Storing every table makes each one the result of the previous one and its event.
+  const film = filmOf(lines, 1);
+  const events = lines.flatMap(({ line }) => (line.case === "event" ? [line.value] : []));
+  let table = events.slice(0, 1).reduce(applyEvent, film.at(0).table);
+  const tables = Array.from({ length: film.length }, (_, number) => {
+    table = events
+      .filter(({ sequence }) => Number(sequence) < film.at(number).table.nextSequence)
+      .reduce(applyEvent, table);
+    return table;
+  });
+  expect(tables.at(-1)?.nextSequence).toBe(Number(events.at(-1)?.sequence) + 1);
+  for (const keptEvery of [2, 7, 200, 100_000]) {
+    const sparse = filmOf(lines, keptEvery);
+    expect(sparse.length).toBe(film.length);
+    // Visits all moments out of order: 101 is prime and divides neither length.
+    for (let step = 0; step < sparse.length; step += 1) {
+      const number = (step * 101) % sparse.length;
+      const frame = sparse.at(number);
+      expect(frame.table).toEqual(tables[number]);
+      expect(frame.open).toBe(film.at(number).open);
+      expect(frame.decisions).toBe(film.at(number).decisions);
     }
-  },
-);
+  }
+});

@@ -1,4 +1,4 @@
-// What the form for a new room asks the server for, and which of its fields it does not understand.
+// The request of the form for a new room, and its invalid fields.
 
 import { create } from "@bufbuild/protobuf";
 import { expect, test } from "vitest";
@@ -12,7 +12,7 @@ const AGENTS = ["random", "greedy", "trained"];
 const form = (changed: Partial<RoomForm> = {}): RoomForm => ({ ...newForm(AGENTS), ...changed });
 const asked = (changed: Partial<RoomForm> = {}) => create(CreateRoomRequestSchema, requestOf(form(changed)));
 
-test("a new form seats a person against the strongest agents there are", () => {
+test("a new form has a person against the strongest agents", () => {
   expect(asked().seats.map(({ filledBy }) => filledBy.value)).toEqual([
     ParticipantKind.HUMAN,
     "trained",
@@ -23,7 +23,7 @@ test("a new form seats a person against the strongest agents there are", () => {
   expect(few.seats.slice(1).map(({ filledBy }) => filledBy.value)).toEqual(["random", "random", "random"]);
 });
 
-test("clocks are asked for in milliseconds, own ones with a comma as well", () => {
+test("clocks are sent in milliseconds, and custom ones accept a decimal comma", () => {
   const own = asked({ clock: "own", decisionSeconds: "2,5", bankSeconds: "30", paceSeconds: "0.25" }).policy;
   expect([own?.decisionTimeMs, own?.bankMs, own?.paceMs]).toEqual([2500, 30_000, 250]);
   expect(asked({ spectators: false, spectatorDelay: "soon" }).policy?.spectatorDelayDecisions).toBe(0);
@@ -31,12 +31,12 @@ test("clocks are asked for in milliseconds, own ones with a comma as well", () =
   expect([relaxed?.decisionTimeMs, relaxed?.bankMs]).toEqual([60_000, 300_000]);
 });
 
-test("points are read from a list, and left to the rules when there is none", () => {
+test("points are parsed from a list, and left to the rules if it is empty", () => {
   expect(asked({ points: " 3, 2;1 0 " }).rules?.points).toEqual([3, 2, 1, 0]);
   expect(asked({ points: "" }).rules?.points).toEqual([]);
 });
 
-test("a preset fills every field that it has", () => {
+test("a preset sets all its fields", () => {
   const preset = create(RuleSetSchema, {
     preset: "original2020",
     players: 4,
@@ -56,7 +56,7 @@ test("a preset fills every field that it has", () => {
   expect(rules).toEqual(preset);
 });
 
-test("other numbers of seats keep the first ones and forget points that no longer fit", () => {
+test("another number of seats keeps the first ones and clears points that no longer fit", () => {
   const changed = withPlayers(form({ points: "5, 3, 1, 0" }), 6);
   expect(changed.seats.length).toBe(6);
   expect(changed.seats.slice(0, 4)).toEqual(form().seats);
@@ -92,6 +92,6 @@ test.each<[Partial<RoomForm>, object]>([
   expect(gameProblems(form(changed), 4)).toEqual(problems);
 });
 
-test("the name of a quick game is as long as names may be", () => {
+test("the name of a quick game has a valid length", () => {
   expect(Array.from(quickGame("🍕".repeat(80), AGENTS).name ?? "").length).toBe(MAX_NAME);
 });

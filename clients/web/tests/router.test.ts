@@ -1,4 +1,4 @@
-// Addresses and routes are each other's inverse, and what names nothing is a page of its own.
+// Parsing and formatting addresses.
 
 import { expect, test } from "vitest";
 import { pathOf, type Route, routeOf } from "../src/router";
@@ -19,15 +19,15 @@ const ROUTES: [string, Route][] = [
   ["/tutorial", { page: "tutorial" }],
 ];
 
-test.each(ROUTES)("%s is one route and back", (path, route) => {
+test.each(ROUTES)("%s is parsed and formatted", (path, route) => {
   expect(routeOf(path)).toEqual(route);
   expect(pathOf(route)).toBe(path);
 });
 
-test.each(["/nowhere", "/rooms/1/2", "/lobby/x"])("%s names nothing", (path) => {
+test.each(["/nowhere", "/rooms/1/2", "/lobby/x"])("%s is unknown", (path) => {
   expect(routeOf(path)).toEqual({ page: "unknown" });
 });
 
-test("a badly encoded part stands for itself", () => {
+test("a badly encoded part is kept as it is", () => {
   expect(routeOf("/people/%E0%A4%A")).toEqual({ page: "person", name: "%E0%A4%A" });
 });

@@ -1,5 +1,5 @@
-// What this device remembers of its seats and rooms survives a reload and nonsense; join codes are
-// read as people type them.
+// Stored seats and rooms survive a reload and invalid data; join codes are accepted as people type
+// them.
 
 import { beforeEach, expect, test } from "vitest";
 import { codeIn } from "../src/lobby/JoinForm";
@@ -10,7 +10,7 @@ beforeEach(forgetAll);
 
 const HELD = { ticket: "secret", seat: 2, name: "Rosa" };
 
-test("a seat is known until it is given up", () => {
+test("a seat is stored until it is given up", () => {
   remember("seat.room1", JSON.stringify(HELD));
   remember("code.BCDF2345", "room1");
   expect(heldSeat("room1")).toEqual(HELD);
@@ -24,7 +24,7 @@ test("a seat is known until it is given up", () => {
   expect(roomOfCode("BCDF2345")).toBeNull();
 });
 
-test.each(["", "null", "3", "[]", "{", '{"ticket":1}'])("%j is no seat and no room", (kept) => {
+test.each(["", "null", "3", "[]", "{", '{"ticket":1}'])("%j is neither a seat nor a room", (kept) => {
   remember("seat.room1", kept);
   remember("hosted.room1", kept);
   expect(heldSeat("room1")).toBeNull();
@@ -45,7 +45,7 @@ test.each([
   expect(codeIn(typed)).toEqual({ code, search });
 });
 
-test("everything that is remembered can be forgotten, and nothing else is touched", () => {
+test("everything stored can be deleted, and nothing else is", () => {
   localStorage.setItem("another", "page's");
   remember("name", "Rosa");
   expect([...remembered().keys()]).toEqual(["name"]);

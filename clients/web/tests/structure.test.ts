@@ -1,5 +1,4 @@
-// How the games of a tournament hang together: rounds and tables, a bracket with who went on, what
-// is known from two sources.
+// The structure of a tournament's games: rounds and tables, a bracket, and games from two sources.
 
 import { create } from "@bufbuild/protobuf";
 import { expect, test } from "vitest";
@@ -40,7 +39,7 @@ function game({ game, round, table, order, counted = true }: Told): TournamentGa
   });
 }
 
-/** A knockout of eight: the first round is over, the final goes on. */
+/** A knockout of eight: the first round is over, the final is running. */
 const first = [
   game({ game: 0, round: 1, table: 1, order: [3, 1, 0, 2] }),
   game({ game: 1, round: 1, table: 2, order: [4, 7, 6, 5] }),
@@ -64,7 +63,7 @@ test.each([
   expect(knockout(games, state)).toEqual(expected);
 });
 
-test("a table of a later round says which tables lead to it", () => {
+test("a table of a later round names the tables that lead to it", () => {
   const participants = Array.from({ length: 16 }, (_, participant) => ({ participant }));
   const tournament = create(TournamentSchema, { participants, state: TournamentState.PLAYING });
   const rounds = bracket(tournament, [game({ game: 0, round: 1, table: 1, order: [0, 1, 2, 3] })]);
@@ -78,7 +77,7 @@ test("a table of a later round says which tables lead to it", () => {
   ]);
 });
 
-test("games are told apart by round and table, in order", () => {
+test("games are grouped by round and table, in order", () => {
   const second = game({ game: 3, round: 1, table: 1, order: [0, 1, 2, 3] });
   const rounds = playedRounds([final, second, ...first]);
   expect(rounds.map(({ round, tables }) => [round, tables.map((table) => table.games.map((one) => one.game))])).toEqual(
@@ -89,7 +88,7 @@ test("games are told apart by round and table, in order", () => {
   );
 });
 
-test("what was heard takes the place of what was listed, but never of a result", () => {
+test("games from the stream replace listed ones, but never a result", () => {
   const states = (games: TournamentGame[]) => games.map(({ state }) => state);
   expect(states(mergedGames([running], [final]))).toEqual([TournamentGameState.COUNTED]);
   expect(states(mergedGames([final], [running]))).toEqual([TournamentGameState.COUNTED]);

@@ -1,4 +1,4 @@
-// The link of a study: what it says is read as it was written, and nothing else gets in with it.
+// A study's link is parsed as it was written, and cannot carry anything else.
 
 import { expect, test } from "vitest";
 import {
@@ -75,7 +75,7 @@ test.each([
   expect(filledIn(address, blanks)).toBe(expected);
 });
 
-test("a study is kept with its room, and times are sent only where it asks for them", () => {
+test("a study is stored with its room, and times are sent only if it asks for them", () => {
   rememberStudy("one", full);
   rememberStudy("two", { ...full, times: false });
   expect(studyIn("one")).toEqual(full);
@@ -93,7 +93,7 @@ test.each([
   expect(holderOf(study, "P07")).toBe(holder);
 });
 
-test("of a study that is over the questionnaire is kept for the link that led to it, until everything is forgotten", () => {
+test("the questionnaire of a finished study is kept for its link until everything is deleted", () => {
   remember("code.BCDF2345", "room");
   for (const name of ["P07", "P08"]) {
     rememberStudy("room", { ...full, name });

@@ -1,5 +1,4 @@
-// The style sheets beside the parts: every class that a part names is in its sheet, and every class
-// of a sheet is used.
+// CSS modules: every class that a component uses exists, and every class is used.
 
 import { readdirSync, readFileSync } from "node:fs";
 import { dirname, join, resolve } from "node:path";
@@ -10,7 +9,7 @@ const files = readdirSync(SRC, { recursive: true, encoding: "utf8" });
 const read = (name: string) => readFileSync(join(SRC, name), "utf8");
 const camel = (name: string) => name.replaceAll(/-([a-z0-9])/g, (_, letter: string) => letter.toUpperCase());
 
-/** Classes by sheet, as parts name them. */
+/** Classes by module, in camel case. */
 const sheets = new Map(
   files
     .filter((name) => name.endsWith(".module.css"))
@@ -32,14 +31,14 @@ for (const name of files.filter((file) => file.endsWith(".tsx"))) {
       if (!sheets.get(sheet)?.has(found)) unknown.push(`${name}: ${found}`);
       used.get(sheet)?.add(found);
     }
-    // By a value, such as the kind of a card: any class may be meant.
+    // Access by a value, such as the kind of a card, may use any class.
     if (text.includes(`${local}[`)) for (const any of sheets.get(sheet) ?? []) used.get(sheet)?.add(any);
   }
 }
 
-test("a part names no class that its sheet lacks", () => expect(unknown).toEqual([]));
+test("every class that a component uses exists", () => expect(unknown).toEqual([]));
 
-test("a sheet has no class that no part uses", () => {
+test("every class is used", () => {
   const unused = [...sheets].flatMap(([sheet, classes]) =>
     [...classes]
       .filter((found) => !used.get(sheet)?.has(found))
@@ -49,7 +48,7 @@ test("a sheet has no class that no part uses", () => {
   expect(unused).toEqual([]);
 });
 
-test("a place that a sheet or a test names is one that a part has", () => {
+test("every data-part in a style sheet or test exists", () => {
   const parts = new Set(
     files
       .filter((name) => name.endsWith(".tsx"))

@@ -1,5 +1,4 @@
-// A seat's own stream: what each update does to the open decision, to how the seat is attached, and
-// to the table.
+// A seat's stream: the effect of each update on the open decision, the attachment and the table.
 
 import { create, type MessageInitShape } from "@bufbuild/protobuf";
 import { describe, expect, test } from "vitest";
@@ -70,7 +69,7 @@ const result = (id: bigint, status: AnswerStatus): Init => {
 describe("an open decision", () => {
   const open = told(start(), decision(7n));
 
-  test("knows what is legal, the hand and the time", () => {
+  test("has the legal actions, the hand and the time", () => {
     expect(open.decision).toMatchObject({ id: 7n, legal: [0, PASS], timeLeftMs: 9000, receivedAtMs: 1000 });
     expect(legalMoves(open.decision?.legal ?? [], 11).at(-1)).toEqual({ kind: "pass" });
     expect(open.decision?.hand.map((card) => card.kind)).toEqual(["face", "golden", "face", "joker"]);
@@ -102,13 +101,13 @@ describe("an open decision", () => {
     expect(told(open, result(7n, AnswerStatus.INVALID)).decision?.attemptsLeft).toBe(9);
   });
 
-  test("of an exchange leaves the table's hand to the events", () => {
+  test("in an exchange, leaves the table's hand to the events", () => {
     const giving = told(start(), decision(8n, { kind: DecisionKind.EXCHANGE }));
     expect(giving.decision?.hand).toHaveLength(4);
     expect(giving.table.seats[OWN]?.hand).toHaveLength(9);
   });
 
-  test("has what the server says that a play or a gift must be", () => {
+  test("has the server's requirements for a play or a gift", () => {
     const playRequirement = { lowestFace: 1, highestFace: 4, fewestCards: 2, goldenCard: false, loneJoker: false };
     const turn = told(start(), decision(7n, { playRequirement }));
     expect(turn.decision?.requirement).toMatchObject(playRequirement);
@@ -123,7 +122,7 @@ describe("an open decision", () => {
   });
 });
 
-test("the seat knows how it is attached, and by whom it is played", () => {
+test("the seat's attachment and substitution are known", () => {
   expect(start().attachment).toEqual({ kind: "attached" });
   const other = told(start(), { case: "detached", value: { reason: DetachReason.SUPERSEDED } });
   expect(other.attachment).toEqual({ kind: "superseded" });
@@ -140,12 +139,12 @@ test("the seat knows how it is attached, and by whom it is played", () => {
   );
 });
 
-test("who connects again in the middle of a game ends with the same table", () => {
+test("reconnecting in the middle of a game leads to the same table", () => {
   const all = recorded("fixed").flatMap(({ line }) => (line.case === "event" ? [seenBy(line.value, 1)] : []));
   const gameId = "389c0885c0fb41a76b7ff2acb2626d27";
   const attached: Init = { case: "attached", value: { seat: 1, gameId } };
   const whole = told(startLive(emptyTable()), attached, { case: "events", value: { events: all } });
-  // The second connection brings some events again.
+  // The second connection repeats some events.
   const half = told(startLive(emptyTable()), attached, { case: "events", value: { events: all.slice(0, 60) } });
   const resumed = told(half, attached, { case: "events", value: { events: all.slice(55) } });
   expect(resumed.table).toEqual(whole.table);

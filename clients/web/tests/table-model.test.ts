@@ -1,5 +1,5 @@
-// The model of the table against recorded games: after every event it must agree with what the
-// server's engine wrote down, at every decision with the mask of legal actions.
+// The model of the table against recorded games: after every event it agrees with the server's
+// engine, at every decision with the mask of legal actions.
 
 import { create, type MessageInitShape } from "@bufbuild/protobuf";
 import { describe, expect, test } from "vitest";
@@ -17,10 +17,7 @@ import { applySnapshot } from "../src/table/model/snapshot";
 import { emptyTable, type TableState } from "../src/table/model/state";
 import { RECORDS, recorded, seenBy } from "./record";
 
-/**
- * Plays a record back and shows every decision with the table as it stood; gives the table at the
- * end.
- */
+/** Replays a record and calls `look` with each decision and its table; returns the final table. */
 function follow(
   name: (typeof RECORDS)[number],
   viewer: number | "all" | undefined,
@@ -46,7 +43,7 @@ describe.each(RECORDS)("the recorded game %s", (name) => {
     for (const { seat, points } of end.value.standings) expect(table.seats[seat]?.points).toBe(Number(points));
   });
 
-  test("lets every legal action, and no other, be found in the open hands", () => {
+  test("finds exactly the legal actions in the open hands", () => {
     let decisions = 0;
     follow(name, "all", ({ seat, kind, actionMask, action }, table) => {
       if (kind !== DecisionKind.TURN) return;
@@ -54,8 +51,7 @@ describe.each(RECORDS)("the recorded game %s", (name) => {
       const hand = table.seats[seat]?.hand ?? [];
       const legal = new Set(legalActions(actionMask));
       expect(legal).toContain(action);
-      // By the rules alone, as the words of the page know them: what the turn asks for, and what
-      // the hand holds.
+      // From the public requirement and the hand alone.
       const requirement = publicRequirement(table);
       const { plays, others } = lookupOf(table, requirement, hand, legal);
       for (const { move, action: number, state } of [...plays.flat(2), ...others]) {
@@ -70,7 +66,7 @@ describe.each(RECORDS)("the recorded game %s", (name) => {
     expect(decisions).toBeGreaterThan(50);
   });
 
-  test("tells whose turn it is", () => {
+  test("knows whose turn it is", () => {
     let told = 0;
     follow(name, undefined, ({ seat, kind }, table) => {
       if (kind !== DecisionKind.TURN || table.turn === 1) return;
@@ -101,7 +97,7 @@ describe.each(RECORDS)("the recorded game %s", (name) => {
     });
   });
 
-  test("gives every card that cannot be picked a reason, and every one that can a way into a legal play", () => {
+  test("gives a reason for every card that cannot be picked, and a legal play for every other", () => {
     let refused = 0;
     let ways = 0;
     follow(name, "all", ({ seat, kind, actionMask }, table) => {
@@ -119,7 +115,7 @@ describe.each(RECORDS)("the recorded game %s", (name) => {
           expect(pickedMove(hand, picked, moves)).toBeDefined();
           ways += 1;
         }
-        // The Golden card goes before the plain one that was clicked.
+        // The Golden card may be picked in place of the plain one that was clicked.
         if (picked.has(index)) expect(toggle(hand, picked, index, moves).has(index)).toBe(false);
       });
     });
@@ -128,7 +124,7 @@ describe.each(RECORDS)("the recorded game %s", (name) => {
   });
 });
 
-/** A table on which the first turn of a Shift is open, with the first seat's hand known. */
+/** A table at the first turn of a Shift, with the first seat's hand known. */
 function opening(rules: MessageInitShape<typeof RuleSetSchema>, cards: number[]): TableState {
   const events: NonNullable<MessageInitShape<typeof GameEventSchema>["kind"]>[] = [
     { case: "gameStarted", value: { rules, seats: [{ seat: 0 }, { seat: 1 }] } },
@@ -140,7 +136,7 @@ function opening(rules: MessageInitShape<typeof RuleSetSchema>, cards: number[])
   );
 }
 
-/** The table after the first or second seat plays elevens. */
+/** The table after a seat plays elevens. */
 function playElevens(table: TableState, seat: number, quantity: number): TableState {
   const kind = { case: "play", value: { seat, face: 11, quantity, cardsLeft: 1 } } as const;
   return applyEvent(table, create(GameEventSchema, { sequence: BigInt(table.nextSequence), kind }));
@@ -175,7 +171,7 @@ describe("the Golden card", () => {
   });
 });
 
-test("a viewer who comes in the middle of a Shift does not take the next turn for its first", () => {
+test("a viewer who joins in the middle of a Shift does not take the next turn for its first", () => {
   const observation = { shift: 1, pizza: 3, played: [0, 0, 2], passed: [0, 0], cardsLeft: [3, 3] };
   const bytes = Object.fromEntries(
     Object.entries(observation).map(([name, value]) => [name, Array.isArray(value) ? Uint8Array.from(value) : value]),
@@ -187,14 +183,14 @@ test("a viewer who comes in the middle of a Shift does not take the next turn fo
   expect(playElevens(table, 1, 2).board).toEqual([ELEVEN, ELEVEN]);
 });
 
-test("an event that was seen before changes nothing", () => {
+test("an event that was already applied changes nothing", () => {
   const [first, second] = recorded("fixed").flatMap(({ line }) => (line.case === "event" ? [line.value] : []));
   if (!first || !second) throw new Error("the fixture has no events");
   const table = applyEvent(applyEvent(emptyTable(), first), second);
   expect(applyEvent(table, first)).toBe(table);
 });
 
-test("the numbers of actions are those of the rules", () => {
+test("the indices of actions follow the rules", () => {
   expect(turnActions(11)).toBe(200);
   expect(moveOf(0, 11)).toEqual({ kind: "play", face: 1, quantity: 1, jokers: 0 });
   expect(moveOf(199, 11)).toEqual({ kind: "pass" });

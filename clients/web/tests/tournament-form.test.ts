@@ -1,5 +1,4 @@
-// What the form for a new tournament asks the server for, what it does not send, and where a
-// refusal belongs.
+// The request of the form for a new tournament, and its invalid fields.
 
 import { create } from "@bufbuild/protobuf";
 import { Code } from "@connectrpc/connect";
@@ -31,22 +30,22 @@ const form = (changed: Partial<TournamentForm> = {}): TournamentForm => ({
 });
 const asked = (changed: Partial<TournamentForm> = {}) => create(TournamentSettingsSchema, settingsOf(form(changed)));
 
-test("a form as it begins asks for a knockout that its organiser begins, open to everybody", () => {
+test("the initial form is a knockout for everyone that its organiser starts", () => {
   const settings = asked({ name: " Spring cup " });
   expect([settings.name, settings.format, settings.rounds]).toEqual(["Spring cup", TournamentFormat.KNOCKOUT, 0]);
   expect([settings.kinds, settings.builtInAgents, settings.startWhenJoined]).toEqual([[], [], 0]);
   expect([settings.rules?.players, settings.noShowTimeMs, settings.policy?.spectators]).toEqual([4, 60_000, true]);
-  // These are the tournament's to say.
+  // The tournament sets these.
   expect([settings.policy?.abort, settings.policy?.waitingTimeMs]).toEqual([0, undefined]);
 });
 
-test("built-in agents are named as often as they take part", () => {
+test("built-in agents are listed as often as they take part", () => {
   const settings = asked({ builtIn: { random: "2", greedy: " 1 ", trained: "" }, start: "joined", startWhen: "5" });
   expect(settings.builtInAgents).toEqual(["random", "random", "greedy"]);
   expect(settings.startWhenJoined).toBe(5);
 });
 
-test("who may join, their clocks and the seeds are as they were picked and typed", () => {
+test("kinds, clocks and seeds are sent as picked and typed", () => {
   const settings = asked({
     robots: false,
     otherClocks: true,
@@ -64,18 +63,18 @@ test("who may join, their clocks and the seeds are as they were picked and typed
   ]);
 });
 
-test("where tables are dealt alike, nobody is said to watch", () => {
+test("with shared deals spectators are turned off", () => {
   const settings = asked({ deals: "same", spectatorsSeeHands: true });
   expect(settings.deals).toBe(TournamentDeals.SAME_AT_ALL_TABLES);
   expect([settings.policy?.spectators, settings.policy?.spectatorsSeeHands]).toEqual([undefined, false]);
-  // What was typed before is not asked for any more, and so cannot be wrong.
+  // Values typed before are ignored, and so cannot be invalid.
   const typed: Partial<TournamentForm> = { deals: "rotated", spectatorDelay: "soon" };
   expect(problemsOf(form(typed))).toEqual({});
   expect(asked(typed).policy?.spectatorDelayDecisions).toBe(0);
   expect(problemsOf(form({ spectatorDelay: "soon" }))).toEqual({ spectatorDelay: "notANumber" });
 });
 
-test("a knockout is for tables of four, whose rounds nobody chooses", () => {
+test("a knockout has tables of four and no choice of rounds", () => {
   const before = withTable(form({ format: "swiss", rounds: "9", points: "5, 3, 1, 0" }), "6");
   expect(before.points).toBe("");
   expect(asked(before).rounds).toBe(9);

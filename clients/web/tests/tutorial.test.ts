@@ -1,5 +1,5 @@
-// The script of the tutorial keeps the rules it teaches: every lesson can be done with the cards
-// that are there, and counts add up.
+// The tutorial's script follows the rules: every lesson can be done with the cards at hand, and
+// counts add up.
 
 import { expect, test } from "vitest";
 import { actionOf } from "../src/table/model/actions";
@@ -7,7 +7,7 @@ import { applyEvent } from "../src/table/model/reduce";
 import { allows, holds, publicRequirement } from "../src/table/model/requirement";
 import { firstTable, LESSONS, nextEvent } from "../src/tutorial/lessons";
 
-test("every lesson asks for something that the rules allow, and leads to the next", () => {
+test("every lesson asks for a legal action, and leads to the next", () => {
   let table = firstTable("You");
   let turns = 0;
   const actions: number[] = [];

@@ -1,5 +1,5 @@
-// The lobby in a real browser: from one page to the other, a room made and joined by its
-// invitation, what is refused said in words.
+// The lobby in a real browser: creating a room, joining by invitation, form errors, leaving,
+// settings.
 
 import { expect, test } from "vitest";
 import { sitDown } from "./play";
@@ -11,7 +11,7 @@ const MANY = 14;
 
 useStage();
 
-test("a room is made, and who opens its invitation takes the seat kept for a person", async () => {
+test("a room is created, and a guest with its invitation takes the seat reserved for a person", async () => {
   const host = await person(browser);
   await host.page.goto(`${server.url}/`);
   await host.page.getByRole("link", { name: "Create a room…" }).click();
@@ -32,13 +32,13 @@ test("a room is made, and who opens its invitation takes the seat kept for a per
   await guest.page.getByRole("button", { name: "Sit down" }).click();
   await guest.page.waitForURL(/\/rooms\//);
 
-  // The seat shows up at the host's door without a reload, labelled as a person's.
+  // The seat appears on the host's page without a reload, labelled as a person's.
   const seat = host.page.getByRole("listitem").filter({ hasText: "Rosa" });
   await seat.getByText("person", { exact: true }).waitFor();
   expect([...host.faults, ...guest.faults]).toEqual([]);
 });
 
-test("of many rooms the newest are shown, and more when they are asked for", async () => {
+test("the newest rooms are shown first, and more on request", async () => {
   const { page } = await person(browser);
   for (let number = 1; number <= MANY; number += 1)
     await newRoom(server, { name: `Table ${number}`, seats: ["person", "person", "random", "random"] });
@@ -54,7 +54,7 @@ test("of many rooms the newest are shown, and more when they are asked for", asy
   expect(await cards.count()).toBeGreaterThanOrEqual(MANY);
 });
 
-test("what cannot be accepted is marked at its field, all of it at once", async () => {
+test("all invalid fields are marked at once", async () => {
   const { page } = await person(browser);
   await page.goto(`${server.url}/new`);
   await page.getByText("Rules, errors and spectators").click();
@@ -69,7 +69,8 @@ test("what cannot be accepted is marked at its field, all of it at once", async 
   await page.getByText("Enter whole numbers of 0 or more, separated by commas").waitFor();
   expect(await invalid()).toBe(3);
   await page.waitForFunction(() => document.activeElement === document.querySelector('[aria-invalid="true"]'));
-  // What only the server can tell is marked as well: so few cards cannot be dealt to so many.
+  // Errors that only the server can find are marked too: six hands cannot be dealt from so few
+  // cards.
   await page.getByLabel("Players").selectOption("6");
   await page.getByLabel("Faces").fill("4");
   await page.getByLabel("Jokers").fill("0");
@@ -78,7 +79,7 @@ test("what cannot be accepted is marked at its field, all of it at once", async 
   await expect.poll(() => page.getByLabel("Faces").getAttribute("aria-invalid")).toBe("true");
 });
 
-test("a wrong code and an address that names nothing are answered in words", async () => {
+test("a wrong code and an unknown address are explained", async () => {
   const { page } = await person(browser, { locale: "it-IT" });
   await page.goto(`${server.url}/join/22222222`);
   await page.getByText("Questo codice non corrisponde a nessuna stanza").waitFor();
@@ -87,7 +88,7 @@ test("a wrong code and an address that names nothing are answered in words", asy
   await page.getByRole("heading", { name: "Questa pagina non esiste" }).waitFor();
 });
 
-test("an invitation says which room it is for, and which names are taken there", async () => {
+test("an invitation shows its room and the names taken there", async () => {
   const { code } = await newRoom(server, { name: "Sunday table", seats: ["person", "person", "greedy", "random"] });
   const [ada, other] = [await person(browser), await person(browser)];
   await sitDown(ada.page, server, code, "Ada");
@@ -104,13 +105,13 @@ test("an invitation says which room it is for, and which names are taken there",
   expect([...ada.faults, ...other.faults]).toEqual([]);
 });
 
-test("who leaves before the game gives the seat back, during it is told what becomes of it, and who made the room can end it", async () => {
+test("leaving frees the seat before the game, explains what happens during it, and lets the room's creator end it", async () => {
   const host = await person(browser);
   await host.page.goto(`${server.url}/new`);
   await host.page.getByLabel("Name of the room").fill("To be left");
   await host.page.getByLabel("Seat 1").selectOption({ label: "Free for a person" });
   await host.page.getByRole("button", { name: "Create the room" }).click();
-  // No seat is free for an agent; and this address is this machine's alone.
+  // No seat is free for an agent, and the address works on this machine only.
   await host.page.getByText("This address works on this machine only.").waitFor();
   expect(await host.page.getByText("For an agent, in a terminal").count()).toBe(0);
   await host.page.getByLabel("Your name").fill("Mia");
@@ -142,7 +143,7 @@ test("who leaves before the game gives the seat back, during it is told what bec
   expect([...host.faults, ...guest.faults]).toEqual([]);
 });
 
-test("the dialog of leaving stays open when the game begins meanwhile", async () => {
+test("the leave dialog stays open when the game starts meanwhile", async () => {
   const { code } = await newRoom(server, { seats: ["person", "person", "random", "random"] });
   const [ada, ben] = [await person(browser), await person(browser)];
   await sitDown(ada.page, server, code, "Ada");
@@ -157,7 +158,7 @@ test("the dialog of leaving stays open when the game begins meanwhile", async ()
   expect([...ada.faults, ...ben.faults]).toEqual([]);
 });
 
-test("Back and Forward show a page scrolled as it was left", async () => {
+test("Back, Forward and a reload restore the scroll position", async () => {
   for (let number = 1; number <= MANY; number += 1)
     await newRoom(server, { seats: ["person", "person", "random", "random"] });
   const { page, faults } = await person(browser, { viewport: { width: 390, height: 844 } });
@@ -182,7 +183,7 @@ test("Back and Forward show a page scrolled as it was left", async () => {
   expect(faults).toEqual([]);
 });
 
-test("a seat that is given back elsewhere leaves its page with the way in", async () => {
+test("a page whose seat was given up elsewhere offers to join again", async () => {
   const { code } = await newRoom(server, { name: "Given back", seats: ["person", "person", "random", "random"] });
   const { page, faults } = await person(browser);
   await sitDown(page, server, code, "Ada");
@@ -198,7 +199,7 @@ test("a seat that is given back elsewhere leaves its page with the way in", asyn
   expect(faults).toEqual([]);
 });
 
-test("language and look are chosen and kept", async () => {
+test("language and theme are chosen and stored", async () => {
   const { page } = await person(browser);
   await page.goto(`${server.url}/`);
   await page.getByRole("button", { name: "Settings" }).click();

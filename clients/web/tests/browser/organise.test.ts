@@ -1,6 +1,5 @@
-// A tournament from its making to its end without a command line: its organiser makes it on the
-// page, invites, begins it; a person joins from another browser and plays; and what is refused is
-// marked at its field.
+// A tournament on the page alone: its organiser creates it, invites and starts it, a person joins
+// in another browser and plays; errors are marked at their fields.
 
 import { expect, test } from "vitest";
 import { byClicks, playOn } from "./play";
@@ -8,7 +7,7 @@ import { browser, person, server, useStage } from "./stage";
 
 useStage();
 
-test("a tournament is made on the page, joined from another, filled up, begun, played to its end", async () => {
+test("a tournament is created, joined from another browser, filled up, started and played to its end", async () => {
   const host = await person(browser);
   await host.page.goto(`${server.url}/tournaments`);
   await host.page.getByRole("link", { name: "Create a tournament…" }).click();
@@ -31,7 +30,7 @@ test("a tournament is made on the page, joined from another, filled up, begun, p
 
   const guest = await person(browser);
   await guest.page.goto(invitation);
-  // Nobody but the organiser's device begins or closes it.
+  // Only the organiser's device can start or close it.
   await guest.page.getByRole("button", { name: "Join the tournament" }).waitFor();
   expect(await guest.page.getByRole("button", { name: "Start the tournament" }).count()).toBe(0);
   await guest.page.getByLabel("Your name").fill("Rosa");
@@ -42,7 +41,7 @@ test("a tournament is made on the page, joined from another, filled up, begun, p
   const entrants = host.page.locator('[data-part~="entrants"] li');
   await expect.poll(() => entrants.count()).toBe(3);
   await entrants.filter({ hasText: "Rosa" }).getByText("person", { exact: true }).waitFor();
-  // The secret outlasts a reload.
+  // The secret survives a reload.
   await host.page.reload();
   await host.page.getByRole("button", { name: "Start the tournament" }).click();
   await host.page.getByText("in progress").first().waitFor();
@@ -58,7 +57,7 @@ test("a tournament is made on the page, joined from another, filled up, begun, p
   expect([...host.faults, ...guest.faults]).toEqual([]);
 });
 
-test("what is refused is marked at its field, by the page and by the server", async () => {
+test("invalid fields are marked, by the page and by the server", async () => {
   const { page } = await person(browser);
   await page.goto(`${server.url}/tournaments/new`);
   const submit = page.getByRole("button", { name: "Create the tournament" });
@@ -71,7 +70,7 @@ test("what is refused is marked at its field, by the page and by the server", as
   await page.getByText("Must be between 1 and 1000.").waitFor();
   expect(await page.getByLabel("Rounds", { exact: true }).getAttribute("aria-invalid")).toBe("true");
   await page.getByLabel("Rounds", { exact: true }).fill("3");
-  // So few cards cannot be dealt to so many, as the server alone can tell.
+  // Only the server can tell that six hands cannot be dealt from so few cards.
   await page.getByLabel("Players per table").selectOption("6");
   await page.getByLabel("Faces").fill("4");
   await page.getByLabel("Jokers").fill("0");
@@ -84,7 +83,7 @@ test("what is refused is marked at its field, by the page and by the server", as
   expect(await page.getByLabel("Rounds", { exact: true }).getAttribute("aria-invalid")).toBe("false");
 });
 
-test("it begins by itself, its code alone leads to it, and its organiser closes it after a second question", async () => {
+test("a tournament starts automatically, is found by its code, and is closed by its organiser after a confirmation", async () => {
   const host = await person(browser);
   await host.page.goto(`${server.url}/tournaments/new`);
   await host.page.getByLabel("Name of the tournament").fill("Open league");

@@ -1,5 +1,5 @@
-// Every page by itself: no serious fault for those who cannot see or who use the keyboard, by light
-// and by dark; no scrolling sideways on a phone; and what the first page loads.
+// Every page: no serious accessibility error in the light and the dark theme, no horizontal
+// scrolling on a phone; and the size of the first page.
 
 import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";
@@ -16,14 +16,14 @@ const PHONE = { width: 360, height: 740 };
 const COMPUTER = { width: 1280, height: 800 };
 const MOST_FIRST_PAGE_BYTES = 200_000;
 
-/** A page whose device holds a seat at a table; there it must decide. */
+/** A page whose device holds a seat at a table with an open decision. */
 let seated: Page;
 let gameId: string;
 let tournamentId: string;
-/** A tournament that has not begun, which the device made. */
+/** A tournament created by the device that has not started. */
 let ownId: string;
 let rooms: { table: string; waiting: string };
-/** The join code of a room in which the device has no seat. */
+/** Join code of a room in which the device has no seat. */
 let code: string;
 
 useStage();
@@ -56,14 +56,14 @@ beforeAll(async () => {
   await seated.locator('[data-part~="organiser"]').waitFor();
   ownId = new URL(seated.url()).pathname.split("/").at(-1) ?? "";
   await seated.goto(`${server.url}/rooms/${rooms.table}`);
-  // Some turns on, so that there is something on the board and in the log.
+  // A few turns later, so that the board and the log have content.
   for (let turn = 0, id = await nextDecision(seated); turn < 2; turn += 1) {
     await byClicks(seated);
     id = await nextDecision(seated, id);
   }
 });
 
-/** Every page: its address, and what is there once it has drawn itself. */
+/** Every page: its address, and an element that is there once it is rendered. */
 const PAGES: Record<string, { path: () => string; ready: string; opened?: string }> = {
   lobby: { path: () => "/", ready: '[data-part~="lobby-rooms"] li' },
   "new room": {
@@ -121,9 +121,9 @@ test.each(Object.keys(PAGES))("%s: accessible by light and by dark, and nothing 
   await page.emulateMedia({ colorScheme: "dark" });
   expect(await serious(page, { runOnly: ["color-contrast"] })).toEqual([]);
   await page.setViewportSize(PHONE);
-  // The page takes some pictures to follow the window.
+  // The page adapts to the new size over a few frames.
   await expect.poll(() => tooWide(page)).toEqual([]);
-  // Italian words are longer.
+  // Italian texts are longer.
   await page.goto(`${server.url}${path()}${path().includes("?") ? "&" : "?"}lang=it`);
   await page.locator(ready).first().waitFor();
   expect(await page.locator("html").getAttribute("lang")).toBe("it");
@@ -152,7 +152,7 @@ test.each(["en-GB", "it-IT"])("the first page, in %s, loads less than 200 kB", a
   expect(bytes).toBeLessThan(MOST_FIRST_PAGE_BYTES);
 });
 
-/** The faults that make a page hard or impossible to use for somebody. */
+/** The accessibility errors with a serious or critical impact. */
 async function serious(page: Page, options: RunOptions = {}): Promise<string[]> {
   const found = await page.evaluate(
     async (options) => {
@@ -167,7 +167,7 @@ async function serious(page: Page, options: RunOptions = {}): Promise<string[]> 
     .flatMap(({ id, nodes }) => nodes.map(({ target, failureSummary }) => `${id}: ${target} ${failureSummary}`));
 }
 
-/** What makes the page scroll sideways. */
+/** The elements that make the page scroll horizontally. */
 async function tooWide(page: Page): Promise<string[]> {
   return page.evaluate(() => {
     const { scrollWidth, clientWidth } = document.documentElement;

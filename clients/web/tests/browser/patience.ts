@@ -1,7 +1,6 @@
-// How long tests wait. They wait for states, never for time: this is only when they give up.
+// Timeouts of the tests. Tests wait for states; this is only when they give up.
 
 /**
- * Milliseconds after which a state that was waited for counts as missing, however busy the machine
- * is.
+ * Milliseconds after which a state that was waited for counts as missing, on the busiest machine.
  */
 export const PATIENCE_MS = 120_000;

@@ -1,14 +1,13 @@
-// What a person does at the table: sits down, waits for a decision, takes it with the mouse or with
-// the keyboard alone. Which cards are picked does not matter to the tests: the rarest face last, so
-// that the Shift is not over at once.
+// A player at the table: takes a seat, waits for decisions, takes them with the mouse or the
+// keyboard alone. Picks the rarest face last, so that the Shift is not over at once.
 
 import type { Page } from "playwright-core";
 import { type Server, until } from "./stage";
 
-/** Most keys that are pressed to get from one place of a page to another. */
+/** Most key presses from one element to another. */
 const MOST_TABS = 60;
 
-/** Opens an invitation and takes a seat under a name. */
+/** Opens an invitation and takes a seat. */
 export async function sitDown(page: Page, server: Server, code: string, name: string): Promise<void> {
   await page.goto(`${server.url}/join/${code}`);
   await page.getByLabel("Your name").fill(name);
@@ -16,10 +15,7 @@ export async function sitDown(page: Page, server: Server, code: string, name: st
   await page.waitForURL(/\/rooms\//);
 }
 
-/**
- * Waits for a decision that is not the one before; gives its number, or undefined once the game is
- * over.
- */
+/** Waits for a decision other than `before`. Returns its id, or undefined once the game is over. */
 export async function nextDecision(page: Page, before?: string): Promise<string | undefined> {
   const found = await page.waitForFunction((before) => {
     if (document.querySelector('[data-part~="result"] a[href^="/replay/"]')) return "over";
@@ -34,8 +30,8 @@ export async function nextDecision(page: Page, before?: string): Promise<string 
 export type Way = (page: Page) => Promise<void>;
 
 /**
- * Plays to the end of the game; gives the number of decisions taken. `each` is done while a
- * decision is open.
+ * Plays to the end of the game. Returns the number of decisions taken. `each` runs while a decision
+ * is open.
  */
 export async function playOn(page: Page, way: Way, each?: (taken: number) => Promise<void>): Promise<number> {
   let taken = 0;
@@ -67,7 +63,7 @@ export const byClicks: Way = async (page) => {
   await ready.click();
 };
 
-/** What has the keyboard's focus. */
+/** The focused element. */
 export interface Focus {
   label: string;
   action: string;
@@ -76,7 +72,7 @@ export interface Focus {
   pressed: boolean;
 }
 
-/** What has the keyboard's focus now; nothing may lose it to the whole document. */
+/** The element with the keyboard focus; empty label if the document has it. */
 export async function focus(page: Page): Promise<Focus> {
   return page.evaluate(() => {
     const on = document.activeElement;
@@ -91,7 +87,7 @@ export async function focus(page: Page): Promise<Focus> {
   });
 }
 
-/** Presses Tab, or Shift and Tab, until what has the focus is what is looked for. */
+/** Presses a key until the focus is on a wanted element. */
 export async function tabTo(page: Page, wanted: (on: Focus) => boolean, key = "Tab"): Promise<void> {
   for (let pressed = 0; pressed < MOST_TABS; pressed += 1) {
     if (wanted(await focus(page))) return;
@@ -100,12 +96,12 @@ export async function tabTo(page: Page, wanted: (on: Focus) => boolean, key = "T
   throw new Error(`not to be reached with ${key}; the focus is on "${(await focus(page)).label}"`);
 }
 
-/** What the hand is called, which has the focus itself after a decision, on none of its cards. */
+/** Label of the hand, which has the focus itself after a decision. */
 export const HAND = "Your hand";
 
 /**
- * Takes the decision with the keyboard: along the hand with the arrow keys, a card with the space
- * bar, Enter to play.
+ * Takes the decision with the keyboard: arrow keys along the hand, the space bar picks a card,
+ * Enter plays.
  */
 export const byKeys: Way = async (page) => {
   if (await page.locator('[data-action="decline"]').isVisible()) {

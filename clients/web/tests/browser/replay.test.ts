@@ -1,4 +1,4 @@
-// A replay in a browser: at any decision it shows what the record says.
+// A replay in a browser shows what the record contains.
 
 import type { Page } from "playwright-core";
 import { beforeAll, expect, test } from "vitest";
@@ -19,7 +19,7 @@ beforeAll(async () => {
   lines = await recordOf(server, gameId);
 });
 
-test("scrubbing shows the hands and the choice that the record has at that decision", async () => {
+test("scrubbing shows the recorded hands and decision", async () => {
   const { page, faults } = await person(browser);
   await page.goto(`${server.url}/replay/${gameId}`);
   const slider = page.getByLabel("Position in the game");
@@ -30,7 +30,7 @@ test("scrubbing shows the hands and the choice that the record has at that decis
   const last = Number(await slider.getAttribute("max"));
   for (const share of [0.1, 0.35, 0.6, 0.85]) {
     await slider.fill(String(Math.round(share * last)));
-    // From the end of a pizza or a Shift on to where somebody decides.
+    // From the end of a pizza or Shift to the next decision.
     while ((await possible.count()) === 0) await page.getByRole("button", { name: "One step forward" }).click();
     const taken = Number((await slider.getAttribute("aria-valuetext"))?.split(" ")[0]);
     const { hands, decision } = before(taken + 1);
@@ -48,7 +48,7 @@ test("scrubbing shows the hands and the choice that the record has at that decis
   expect(faults).toEqual([]);
 });
 
-test("an address names a decision, and playing goes on from there", async () => {
+test("an address with a decision starts the replay there", async () => {
   const { page } = await person(browser);
   await page.goto(`${server.url}/replay/${gameId}?decision=12`);
   const slider = page.getByLabel("Position in the game");
@@ -59,7 +59,7 @@ test("an address names a decision, and playing goes on from there", async () => 
   await expect.poll(taken).toBeGreaterThanOrEqual(14);
 });
 
-/** The hands, faces ascending, when a decision is open, and the decision, from the record alone. */
+/** The sorted hands when a decision is open, and the decision, from the record. */
 function before(number: number): { hands: number[][]; decision: DecisionRecord } {
   let hands: number[][] = [];
   let decisions = 0;
@@ -91,10 +91,10 @@ function before(number: number): { hands: number[][]; decision: DecisionRecord }
   throw new Error(`the record has no decision ${number}`);
 }
 
-/** How a record writes a joker: one more than the faces. */
+/** A joker in a record: one more than the number of faces. */
 const JOKER = 12;
 
-/** The hands that the page shows open, by seat, as those hear them who do not see. */
+/** The open hands on the page, by seat, as a screen reader hears them. */
 async function shownHands(page: Page): Promise<number[][]> {
   const seats = page.locator("[data-seat]");
   const shown: number[][] = [];

@@ -1,6 +1,5 @@
-// Rooms and agents for browser tests: rooms made over the protocol, so that a test has the rules
-// and opponents it needs, and agents that are programs of their own and connect as anybody's would.
-// What people do on the page is in play.ts.
+// Rooms and agents for browser tests. Rooms are created over the protocol, so that a test controls
+// rules and opponents; agents are separate processes. Players' actions are in play.ts.
 
 import { spawn } from "node:child_process";
 import { existsSync, readFileSync } from "node:fs";
@@ -14,32 +13,32 @@ import { RoomService } from "../../src/gen/chefshat/v1/room_service_pb";
 import { TournamentService } from "../../src/gen/chefshat/v1/tournament_service_pb";
 import { type Server, until } from "./stage";
 
-/** Clients of a server's services, as a program in Node has them. */
+/** Clients of a server's services, for Node. */
 export function clientsOf(server: Server) {
   const transport = createGrpcWebTransport({ baseUrl: server.url });
   return { rooms: createClient(RoomService, transport), tournaments: createClient(TournamentService, transport) };
 }
 
-/** What a test wants of a room. */
+/** The options of a room. */
 interface Wanted {
   name?: string;
-  /** Who has each seat: a built-in agent by name, or free for a person or an agent. */
+  /** Each seat: a built-in agent by name, or reserved for a person or an agent. */
   seats: readonly string[];
   shifts?: number;
   /** Fewer than 11 for a short Shift. */
   faces?: number;
-  /** The second Shift to begin with instead of a first deal: a hand for each seat, by face, a joker being one more than the faces. The top face
-   * of the last hand that has it is the Golden card; in the Shift before the first seat was last. */
-  hands?: readonly (readonly number[])[];
   /**
-   * A game that counts for the leaderboard, and so is dealt by chance; otherwise the deals are
-   * always the same.
+   * Starts with the second Shift and these hands instead of a first deal. Jokers are one more than
+   * the faces. The last hand with the top face holds the Golden card; the first seat finished last
+   * in the previous Shift.
    */
+  hands?: readonly (readonly number[])[];
+  /** Whether the game is rated and so dealt at random; otherwise its deals are fixed. */
   rated?: boolean;
   policy?: Partial<Pick<RoomPolicy, "paceMs" | "spectatorDelayDecisions" | "spectatorsSeeHands">>;
 }
 
-/** A room of some Shifts without hurry. */
+/** Creates a room for a few Shifts with an hour per decision. */
 export async function newRoom(
   server: Server,
   wanted: Wanted,
@@ -68,7 +67,7 @@ function filledBy(who: string) {
   return { case: "builtInAgent" as const, value: who };
 }
 
-/** Runs a command of the program and gives its exit code once it has ended. */
+/** Runs a command of the program and returns its exit code. */
 export function program(...args: readonly string[]): Promise<number | null> {
   const child = spawn(process.env.CHEFSHAT_BIN ?? "", args, { stdio: "ignore" });
   return new Promise((resolve, reject) => {
@@ -77,18 +76,18 @@ export function program(...args: readonly string[]): Promise<number | null> {
   });
 }
 
-/** An agent that plays one game; gives its exit code, 0 if the game came to its end. */
+/** Runs an agent for one game. Returns its exit code, 0 if the game ended normally. */
 export function agent(server: Server, kind: string, code: string, name: string): Promise<number | null> {
   return program("agent", kind, "--server", server.url, "--code", code, "--name", name, "--seed", "1");
 }
 
-/** The game that a room played or plays. */
+/** The id of a room's game. */
 export async function gameOf(server: Server, roomId: string): Promise<string> {
   const { room } = await clientsOf(server).rooms.getRoom({ roomId });
   return room?.gameId ?? "";
 }
 
-/** The record of a game that is over, once the server has written it. */
+/** The record of a finished game, once the server has written it. */
 export async function recordOf(server: Server, gameId: string): Promise<RecordLine[]> {
   const path = join(server.dataDir, "records", `${gameId}.jsonl`);
   await until(() => existsSync(path));

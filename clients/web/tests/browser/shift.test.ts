@@ -1,5 +1,5 @@
-// People at a table: whole Shifts with the mouse and with the keyboard alone, through a reload and
-// through the end of the server, and two people with two agents in one room.
+// People at a table: complete Shifts with the mouse and with the keyboard alone, through a reload
+// and a server crash, and two people with two agents in one room.
 
 import type { Page } from "playwright-core";
 import { expect, test } from "vitest";
@@ -11,7 +11,7 @@ const OPPONENTS = ["greedy", "random", "greedy"];
 
 useStage();
 
-test("a person plays a whole Shift by clicking, reloads in the middle and goes on", async () => {
+test("a person plays a complete Shift by clicking, and continues after a reload", async () => {
   const { roomId, code } = await newRoom(server, { seats: ["person", ...OPPONENTS], faces: 9 });
   const { page, faults } = await person(browser);
   await sitDown(page, server, code, "Rosa");
@@ -29,7 +29,7 @@ test("a person plays a whole Shift by clicking, reloads in the middle and goes o
   expect(faults).toEqual([]);
 });
 
-test("a person plays a whole Shift with the keyboard alone, and hears every turn", async () => {
+test("a person plays a complete Shift with the keyboard alone, and hears every turn", async () => {
   const { roomId, code } = await newRoom(server, { seats: ["person", ...OPPONENTS], faces: 9 });
   const { page, faults } = await person(browser);
   const heard: string[] = [];
@@ -41,8 +41,8 @@ test("a person plays a whole Shift with the keyboard alone, and hears every turn
   await page.keyboard.type("Rosa");
   await page.keyboard.press("Enter");
   const taken = await playOn(page, byKeys, async (already) => {
-    // From its second decision on a player is in the hand or at the buttons, never thrown back to
-    // the top of the page.
+    // From the second decision on, the focus is in the hand or on the buttons, never at the top of
+    // the page.
     if (already > 0) await expect.poll(async () => (await focus(page)).label).not.toBe("");
   });
   await expectEnd(page, roomId, taken);
@@ -54,7 +54,7 @@ test("a person plays a whole Shift with the keyboard alone, and hears every turn
   expect(faults).toEqual([]);
 });
 
-test("Food Fight and both gifts of the Chef are decided by keys, and no card goes that was not chosen", async () => {
+test("Food Fight and both gifts of the Chef are decided by keyboard, and no card is given that was not chosen", async () => {
   const { roomId, code } = await newRoom(server, {
     seats: ["person", ...OPPONENTS],
     faces: 7,
@@ -90,7 +90,7 @@ test("Food Fight and both gifts of the Chef are decided by keys, and no card goe
   await page.getByRole("heading", { name: "You give card 2 of 2" }).waitFor();
   const second = await nextDecision(page, first);
   await inNoCard();
-  // The next card is the one to the right of where the last one was.
+  // The arrow key starts at the position of the card just given.
   await page.keyboard.press("ArrowRight");
   expect((await focus(page)).card).toBe("5");
   await page.keyboard.press("Enter");
@@ -114,7 +114,7 @@ test("Food Fight and both gifts of the Chef are decided by keys, and no card goe
   expect(faults).toEqual([]);
 });
 
-test("a game goes on when the server is ended and started again in the middle", async () => {
+test("a game resumes after a server crash", async () => {
   const { roomId, code } = await newRoom(server, { seats: ["person", ...OPPONENTS], faces: 7 });
   const { page } = await person(browser);
   await sitDown(page, server, code, "Rosa");
@@ -153,7 +153,7 @@ test("two people in two browsers and two agents play in one room to its end", as
   }
 });
 
-/** In the page: passes on everything that is said to those who listen. */
+/** Runs in the page: forwards every announcement. */
 function listen(): void {
   const { hear } = globalThis as unknown as { hear(text: string): void };
   new MutationObserver((changes) => {
@@ -162,7 +162,7 @@ function listen(): void {
   }).observe(document, { subtree: true, childList: true, characterData: true });
 }
 
-/** What the page shows of the open decision and of what came before it. */
+/** The open decision as the page shows it, and what led to it. */
 async function seen(page: Page): Promise<Record<"decision" | "hand" | "heading" | "points", unknown>> {
   return {
     decision: await page.locator("[data-decision]").getAttribute("data-decision"),
@@ -174,7 +174,7 @@ async function seen(page: Page): Promise<Record<"decision" | "hand" | "heading" 
   };
 }
 
-/** The game is over and said to be so, and its record knows every decision as the person's own. */
+/** The game is over, and its record has every decision as the person's own. */
 async function expectEnd(page: Page, roomId: string, taken: number): Promise<void> {
   await page.getByRole("heading", { name: "The game is over", level: 1 }).waitFor();
   const record = await recordOf(server, await gameOf(server, roomId));

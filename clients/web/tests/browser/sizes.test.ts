@@ -1,5 +1,5 @@
-// Screens from a small phone to a large desk: what a player needs to decide is seen at once,
-// without scrolling and under nothing else.
+// Screens from a small phone to a large desktop: everything needed for a decision is visible
+// without scrolling.
 
 import type { Page } from "playwright-core";
 import { expect, test } from "vitest";
@@ -23,7 +23,7 @@ const SIZES = [
   [2560, 1440],
 ] as const;
 
-/** The longest name, and one that cannot be broken. */
+/** The longest name, without a place to break it. */
 const LONG = "W".repeat(64);
 
 const EVERYBODY = [
@@ -41,7 +41,7 @@ const CHOICE = [
   "[data-action=pass]",
 ];
 
-/** The game that was played to its end. */
+/** Id of the game that was played to its end. */
 let gameId: string;
 
 useStage();
@@ -49,7 +49,7 @@ useStage();
 test("a turn, and the end of the game, at every size", async () => {
   const { roomId, code } = await newRoom(server, { name: LONG, seats: ["person", "greedy", "random", "greedy"] });
   const { page, faults } = await person(browser);
-  // As if the room had been made here, so that the game can be played again.
+  // As if the room had been created on this device, so that the game can be played again.
   await page.addInitScript(([name, secrets]) => localStorage.setItem(name, secrets), [
     `chefshat.hosted.${roomId}`,
     JSON.stringify({ joinCode: code, ownerToken: "-" }),
@@ -84,7 +84,7 @@ test("a turn, and the end of the game, at every size", async () => {
   expect(faults).toEqual([]);
 });
 
-test("a replay: its controls cover no seat of a desk's screen, and nothing is wider than the screen", async () => {
+test("a replay: its controls cover no seat on a desktop, and nothing is wider than the screen", async () => {
   const { page } = await person(browser);
   await page.goto(`${server.url}/replay/${gameId}?lang=it`);
   const slider = page.locator('[data-part~="replay-slider"] input');
@@ -97,7 +97,7 @@ test("a replay: its controls cover no seat of a desk's screen, and nothing is wi
       const wider = () => page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
       await expect.poll(wider, { message: `${width} × ${height} at ${at}` }).toBeLessThanOrEqual(0);
     }
-    // A smaller screen is scrolled.
+    // A smaller screen may scroll.
     if (width < 1000) continue;
     await slider.fill("3");
     await expectSeenNow(page, [
@@ -110,7 +110,7 @@ test("a replay: its controls cover no seat of a desk's screen, and nothing is wi
   }
 });
 
-test.each(["en", "it"])("the tutorial in %s, its words included, at every size", async (language) => {
+test.each(["en", "it"])("the tutorial in %s, with its text, at every size", async (language) => {
   const { page } = await person(browser);
   await page.goto(`${server.url}/tutorial?lang=${language}`);
   await page.locator('[data-part~="lesson"] [data-part~="button"]').waitFor();
@@ -122,7 +122,7 @@ test.each(["en", "it"])("the tutorial in %s, its words included, at every size",
   ]);
 });
 
-/** At every size nothing of what is named is outside of the window, or under something else. */
+/** At every size, none of these parts is outside the window or covered. */
 async function expectSeen(page: Page, parts: readonly string[]): Promise<void> {
   for (const [width, height] of SIZES) {
     await page.setViewportSize({ width, height });
@@ -135,14 +135,11 @@ async function expectSeenNow(page: Page, parts: readonly string[]): Promise<void
   await expect.poll(() => unseen(page, parts), { message }).toEqual([]);
 }
 
-/**
- * Parts that are not there, not wholly in the window of a page that has not been scrolled, or
- * covered in the middle.
- */
+/** Parts that are missing, outside the window of an unscrolled page, or covered at their centre. */
 async function unseen(page: Page, parts: readonly string[]): Promise<string[]> {
   return page.evaluate((parts) => {
     scrollTo(0, 0);
-    // A pixel for what rounding does.
+    // One pixel for rounding.
     const [right, bottom] = [innerWidth + 1, innerHeight + 1];
     return parts.flatMap((part) => {
       const found = [...document.querySelectorAll(part)];
@@ -152,8 +149,7 @@ async function unseen(page: Page, parts: readonly string[]): Promise<string[]> {
         const inside = box.left >= -1 && box.top >= -1 && box.right <= right && box.bottom <= bottom;
         const at = document.elementFromPoint(box.left + box.width / 2, box.top + box.height / 2);
         const free = at !== null && (element.contains(at) || at.contains(element));
-        // What the board shows may have the result over it, and the cards of a hand lie on each
-        // other.
+        // The result may cover the board, and the cards of a hand overlap.
         const seen = inside && (free || element.matches('[data-part~="board"], [data-part~="hand-stack"]'));
         return seen ? [] : [`${part} ${index}: ${Math.round(box.top)} to ${Math.round(box.bottom)}`];
       });

@@ -1,5 +1,4 @@
-// What a browser test stands on: a server of its own with the built page, and a browser that may be
-// given several people.
+// The setup of a browser test: a server with the built page, and a browser for several people.
 
 import { type ChildProcess, spawn } from "node:child_process";
 import { mkdtempSync, rmSync } from "node:fs";
@@ -22,40 +21,37 @@ export class Server {
     readonly address: string,
   ) {}
 
-  /** Starts the server that CHEFSHAT_BIN names, on a free port and a data folder of its own. */
+  /** Starts the server CHEFSHAT_BIN on a free port, with a data folder of its own. */
   static async start(): Promise<Server> {
     const dataDir = mkdtempSync(join(tmpdir(), "chefshat-web-"));
     const { child, address } = await serve(dataDir, "127.0.0.1:0");
     return new Server(child, dataDir, address);
   }
 
-  /** Where the page is. */
+  /** Address of the page. */
   get url(): string {
     return `http://${this.address}`;
   }
 
-  /**
-   * Ends the server as if its machine had lost power, and starts it again on the same port with
-   * what it had kept.
-   */
+  /** Kills the server and starts it again on the same port with the same data. */
   async restart(): Promise<void> {
     await ended(this.process, "SIGKILL");
     this.process = (await serve(this.dataDir, this.address)).child;
   }
 
-  /** Ends the server and takes away what it kept. */
+  /** Stops the server and deletes its data. */
   async stop(): Promise<void> {
     await ended(this.process, "SIGKILL");
     rmSync(this.dataDir, { recursive: true, force: true });
   }
 }
 
-/** The server of a file of tests, between its `useStage` and its end. */
+/** The server of a test file. */
 export let server: Server;
-/** The browser of a file of tests. */
+/** The browser of a test file. */
 export let browser: Browser;
 
-/** Gives a file of tests a server and a browser of its own: to be called at its top. */
+/** Sets up a server and a browser for a test file. Call it at the top level. */
 export function useStage(): void {
   beforeAll(async () => {
     server = await Server.start();
@@ -67,14 +63,13 @@ export function useStage(): void {
   });
 }
 
-/** A browser; each person in it has a context of its own. */
+/** A browser; each person has a context of their own. */
 export async function startBrowser(): Promise<Browser> {
   return chromium.launch({ executablePath: CHROMIUM, args: FLAGS });
 }
 
 /**
- * A person's page, in English unless told otherwise; whatever the page throws or logs as an error
- * goes into `faults`.
+ * A person's page, in English by default. Page errors and console errors are collected in `faults`.
  */
 export async function person(
   browser: Browser,

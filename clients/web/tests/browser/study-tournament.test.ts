@@ -1,6 +1,6 @@
-// A study in a tournament by its links: a participant agrees, joins under the name that the link
-// says, and in every game sees what it says; the times measured at the page go with the decisions,
-// and the questionnaire comes when the whole tournament is over, as often as the link is opened.
+// A study in a tournament: a participant consents, joins with the name in the link, and has the
+// study's settings in every game; decision times are recorded, and the questionnaire follows after
+// the tournament, each time the link is opened.
 
 import { expect, test } from "vitest";
 import { TournamentFormat } from "../../src/gen/chefshat/v1/tournament_pb";
@@ -8,13 +8,13 @@ import { byClicks, playOn } from "./play";
 import { clientsOf, recordOf } from "./rooms";
 import { browser, person, server, useStage } from "./stage";
 
-/** As docs/playing.md names it. */
+/** As in docs/playing.md. */
 const PERSON_TIME_KEY = "person_decision_time_ms";
 const ROUNDS = 2;
 
 useStage();
 
-test("a participant's link holds for every game of the tournament", async () => {
+test("a participant's link applies to every game of the tournament", async () => {
   const { tournaments } = clientsOf(server);
   const { tournament, joinCode } = await tournaments.createTournament({
     settings: {
@@ -64,7 +64,7 @@ test("a participant's link holds for every game of the tournament", async () => 
   expect(await questionnaire.first().getAttribute("href")).toBe(after);
   await page.getByRole("button", { name: "Torna alla classifica" }).click();
   await page.getByRole("heading", { name: "Classifica finale" }).waitFor();
-  // The standings lead nowhere, as the link says.
+  // The study hides the links of the standings.
   await expect.poll(() => page.locator("main a").count()).toBe(1);
 
   await page.goto(`${server.url}/?lang=it`);
@@ -86,7 +86,7 @@ test("a participant's link holds for every game of the tournament", async () => 
   expect(faults).toEqual([]);
 });
 
-test("the organiser makes links, each for one participant; at one device one after the other", async () => {
+test("the organiser creates links, which participants use in turn on one device", async () => {
   const { page, faults } = await person(browser);
   await page.goto(`${server.url}/tournaments/new`);
   await page.getByLabel("Name of the tournament").fill("Links");
@@ -99,7 +99,7 @@ test("the organiser makes links, each for one participant; at one device one aft
 
   for (const [index, name] of ["P01", "P02"].entries()) {
     await page.goto(links[index] ?? "");
-    // The place of the one before is not lost without a question.
+    // The previous participant's place is not given up without a question.
     if (index > 0) {
       await page.getByText("If someone else joins here, P01 cannot play any more games.").waitFor();
       await page.getByRole("button", { name: `Take part as ${name}` }).click();
@@ -108,7 +108,7 @@ test("the organiser makes links, each for one participant; at one device one aft
     await page.getByRole("button", { name: "Join the tournament" }).click();
     await page.locator('[data-part~="entrants"] [aria-current]').filter({ hasText: name }).waitFor();
   }
-  // A link that names nobody asks who is there.
+  // A link without a name asks who is using the device.
   await page.goto((links[0] ?? "").replace("name=P01&", ""));
   await page.getByRole("button", { name: "Continue as P02" }).click();
   await page.locator('[data-part~="entrants"] [aria-current]').filter({ hasText: "P02" }).waitFor();

@@ -1,6 +1,6 @@
-// A study by its links: the host makes them, a participant agrees, fills in a questionnaire, plays
-// under the name and in the seat that the link says, sees what the link says, and the times
-// measured at the page go with the decisions. And what a link cannot do.
+// A study by its links: the host creates them; a participant consents, fills in a questionnaire,
+// and plays with the name, seat and settings of the link; decision times are recorded. Also what a
+// link cannot do.
 
 import { readFileSync } from "node:fs";
 import { expect, test } from "vitest";
@@ -9,10 +9,10 @@ import { byClicks, playOn } from "./play";
 import { agent, clientsOf, gameOf, newRoom, recordOf } from "./rooms";
 import { browser, person, server, useStage } from "./stage";
 
-/** As docs/playing.md names it. */
+/** As in docs/playing.md. */
 const PERSON_TIME_KEY = "person_decision_time_ms";
 
-/** What a study can leave out, as it is drawn at the table. */
+/** The parts that a study can hide. */
 const PARTS = [
   '[data-part~="header-nav"]',
   '[data-part~="log"]',
@@ -25,7 +25,7 @@ const PARTS = [
 
 useStage();
 
-test("a participant's link leads from the consent to the table, and to the questionnaire after it", async () => {
+test("a participant's link leads from the consent to the table, and then to the questionnaire", async () => {
   const { roomId, code } = await newRoom(server, { seats: ["greedy", "random", "person", "random"] });
   const link = new URL(`${server.url}/join/${code}`);
   link.search = new URLSearchParams({
@@ -41,7 +41,7 @@ test("a participant's link leads from the consent to the table, and to the quest
   const { page, faults } = await person(browser);
   await page.goto(link.href);
   await page.getByText("Partecipi come P07.").waitFor();
-  // What the link says is text, whatever it looks like.
+  // The link's text is not interpreted as HTML.
   await page.getByText("<b>Puoi smettere</b> quando vuoi.").waitFor();
   await page.getByRole("button", { name: "Ho letto e acconsento" }).click();
   const before = page.getByRole("link", { name: "Apri il questionario" });
@@ -58,8 +58,8 @@ test("a participant's link leads from the consent to the table, and to the quest
   const after = page.getByRole("link", { name: "Apri il questionario" });
   expect(await after.getAttribute("href")).toBe(`https://forms.example/after?id=P07&room=${roomId}`);
   expect(await page.locator("html").getAttribute("lang")).toBe("it");
-  // The link leads back to it, also once the table was left for another page, until everything is
-  // forgotten.
+  // The link leads back to the questionnaire, even after leaving the table, until everything stored
+  // is deleted.
   await page.goto(link.href);
   await page.waitForURL(/\/rooms\//);
   await after.waitFor();
@@ -92,20 +92,20 @@ test("a participant's link leads from the consent to the table, and to the quest
   expect(faults).toEqual([]);
 });
 
-test("who does not agree does not sit down", async () => {
+test("a participant who does not consent cannot join", async () => {
   const { code } = await newRoom(server, { seats: ["greedy", "random", "person", "random"] });
   const { page } = await person(browser);
   await page.goto(`${server.url}/join/${code}?name=P08&consent=Read+this.`);
   await page.getByRole("button", { name: "I do not agree" }).click();
   await page.getByText("You are not taking part. Nothing was stored; you can close this page.").waitFor();
   expect(await page.evaluate(() => localStorage.length)).toBe(0);
-  // It was a slip: without loading the page again.
+  // The participant can reconsider without reloading.
   await page.getByRole("button", { name: "Read it again" }).click();
   await page.getByRole("button", { name: "I have read this and agree" }).click();
   await page.getByRole("button", { name: "Sit down at the table" }).waitFor();
 });
 
-test("each part that a study can leave out is seen where none is left out", async () => {
+test("without hiding, every part that a study can hide is visible", async () => {
   const { code } = await newRoom(server, { seats: ["person", "random", "random", "random"] });
   const { page, faults } = await person(browser);
   const seen = new Set<string>();
@@ -121,12 +121,11 @@ test("each part that a study can leave out is seen where none is left out", asyn
   expect(faults).toEqual([]);
 });
 
-test("what a study leaves out is left out from its first page to the end of the game, also after a reload", async () => {
+test("hidden parts stay hidden from the first page to the end of the game, also after a reload", async () => {
   const { code } = await newRoom(server, { seats: ["person", "agent", "random", "random"] });
   const { page, faults } = await person(browser);
   const hide = "log lookup expressions played pages";
-  // From the first moment at which something is left out on, whether anything of it was ever shown
-  // again.
+  // Records whether a hidden part is shown again at any time after it was first hidden.
   await page.addInitScript(() => {
     let last: string | undefined;
     const look = () => {
@@ -169,7 +168,7 @@ test("what a study leaves out is left out from its first page to the end of the 
   expect(faults).toEqual([]);
 });
 
-test("who opens their link where another has the seat is asked, and by their link nobody sits down twice", async () => {
+test("a link on a device with another participant's seat asks first, and no link takes two seats", async () => {
   const { roomId, code } = await newRoom(server, { seats: ["greedy", "person", "person", "person"] });
   const named = async () => {
     const { room } = await clientsOf(server).rooms.getRoom({ roomId });
@@ -186,7 +185,7 @@ test("who opens their link where another has the seat is asked, and by their lin
   await page.getByRole("button", { name: "Continue as P01" }).click();
   await page.waitForURL(table);
   expect(await named()).toEqual(["P01"]);
-  // While their seat is open in another page, too.
+  // While their seat is open in another tab too.
   const second = await page.context().newPage();
   await second.goto(link("P02"));
   await second.getByRole("button", { name: "Give up P01’s seat and take part as P02" }).click();
@@ -208,7 +207,7 @@ test("who opens their link where another has the seat is asked, and by their lin
   expect([...faults, ...other.faults]).toEqual([]);
 });
 
-test("where its room is closed before a game, a study has no last questionnaire, and where it is gone, no ways to other pages", async () => {
+test("a room closed before its game has no last questionnaire, and a room that is gone keeps links hidden", async () => {
   const { roomId, code, ownerToken } = await newRoom(server, { seats: ["greedy", "person", "person", "random"] });
   const { page } = await person(browser);
   const asked = new URLSearchParams({ name: "P01", hide: "pages", after: "https://forms.example/" });
@@ -228,7 +227,7 @@ test("where its room is closed before a game, a study has no last questionnaire,
   expect(await page.locator('[data-part~="error-page"]').getByRole("link").count()).toBe(0);
 });
 
-test("the host of a room makes links for its participants", async () => {
+test("the host of a room creates links for its participants", async () => {
   const { page, faults } = await person(browser);
   await page.goto(`${server.url}/new`);
   await page.getByLabel("Seat 1").selectOption({ label: "Free for a person" });
@@ -245,7 +244,7 @@ test("the host of a room makes links for its participants", async () => {
   expect(faults).toEqual([]);
 });
 
-test("each participant gets a room of their own like the one at hand, with all links in one list", async () => {
+test("each participant gets a separate room like the current one, with all links in one list", async () => {
   const { page, faults } = await person(browser);
   await page.goto(`${server.url}/new`);
   await page.getByLabel("Name of the room").fill("Lab");
@@ -276,7 +275,7 @@ test("each participant gets a room of their own like the one at hand, with all l
     expect(room?.seats.map(({ builtInAgent }) => builtInAgent)).toEqual(["", "trained", "greedy", "random"]);
     expect(link).toContain(`name=${name}&hide=log`);
   }
-  // They stay listed, and none is made twice.
+  // They stay listed, and none is created twice.
   await page.reload();
   await page.getByText("Links for a study").click();
   await page.getByLabel("They play").selectOption("own");
@@ -284,7 +283,7 @@ test("each participant gets a room of their own like the one at hand, with all l
   await page.getByLabel("Participants, one per line").fill(`P01-P04\n${"x".repeat(65)}`);
   await page.getByText("A name can have at most 64 characters").waitFor();
   await page.getByRole("button", { name: "Create 1 room" }).waitFor();
-  // Also once the room at hand is closed.
+  // Also once the room they copy is closed.
   await page.getByRole("button", { name: "Close the room" }).click();
   await page.getByRole("button", { name: "Close the room" }).click();
   await page.getByRole("heading", { name: "Sit down" }).waitFor({ state: "detached" });
@@ -300,7 +299,7 @@ test("each participant gets a room of their own like the one at hand, with all l
   expect([...faults, ...participant.faults]).toEqual([]);
 });
 
-test("a link without a name asks whose the seat is that this device has, and a seat that was vacated keeps nobody from the room", async () => {
+test("a link without a name asks who holds this device's seat, and a vacated seat does not block the room", async () => {
   const { code } = await newRoom(server, { seats: ["greedy", "person", "person", "random"] });
   const { page, faults } = await person(browser);
   const link = `${server.url}/join/${code}?times=1`;
@@ -314,8 +313,7 @@ test("a link without a name asks whose the seat is that this device has, and a s
   await page.goto(link);
   await page.getByRole("button", { name: "Continue as Ada" }).click();
   await page.getByText("(you)").waitFor();
-  // To the page a ticket that the server does not know any more is the same as one that it has
-  // never known.
+  // To the page, a ticket that the server has forgotten is the same as one it never knew.
   await page.evaluate(() => {
     for (const [name, kept] of Object.entries(localStorage)) {
       if (!name.startsWith("chefshat.seat.")) continue;

@@ -1,6 +1,5 @@
-// A person in a tournament: joins on its page, is seated in each of its games there, through a
-// reload and the end of the server, and is back at the standings. And the same tournament as a wall
-// shows it.
+// A person in a tournament: joins on its page, plays each of its games there through a reload and a
+// server crash, and returns to the standings. Also the wall view of the tournament.
 
 import { expect, test } from "vitest";
 import { TournamentFormat } from "../../src/gen/chefshat/v1/tournament_pb";
@@ -11,8 +10,8 @@ import { browser, person, server, useStage } from "./stage";
 useStage();
 
 /**
- * A tournament of one Shift a game that begins when so many have joined, with one person if not
- * said; its id and join code.
+ * Creates a tournament of one Shift per game that starts with a number of participants, by default
+ * with one person. Returns its id and join code.
  */
 async function newTournament(rounds: number, startWhenJoined = 4): Promise<{ id: string; code: string }> {
   const { tournament, joinCode } = await clientsOf(server).tournaments.createTournament({
@@ -45,8 +44,8 @@ test("a person joins, plays every game of the tournament and sees the final stan
   await page.getByLabel("Your name").fill("Rosa");
   await page.getByRole("button", { name: "Join the tournament" }).click();
 
-  // The first game begins here by itself, and comes back to the same decision after a reload and
-  // after the end of the server.
+  // The first game starts automatically, and returns to the same decision after a reload and a
+  // server crash.
   let interrupted = 0;
   await playOn(page, byClicks, async (already) => {
     if (already !== 1 && already !== 2) return;
@@ -61,7 +60,7 @@ test("a person joins, plays every game of the tournament and sees the final stan
   });
   expect(interrupted).toBe(2);
 
-  // The second one takes the place of the first one's result, or is gone to from the standings.
+  // The second game replaces the first one's result, or is opened from the standings.
   const second = page.getByText("Friday league · round 2, table 1");
   await second.waitFor();
   await playOn(page, byClicks);
@@ -76,7 +75,7 @@ test("a person joins, plays every game of the tournament and sees the final stan
   await wall.page.getByRole("table").getByText("Rosa").waitFor();
 });
 
-test("a code that is wrong and a name that is taken are answered in words", async () => {
+test("a wrong code and a taken name are explained", async () => {
   const { id, code } = await newTournament(1);
   const { page } = await person(browser, { locale: "it-IT" });
   await page.goto(`${server.url}/tournaments/${id}?code=22222222`);
@@ -89,7 +88,7 @@ test("a code that is wrong and a name that is taken are answered in words", asyn
   await page.getByText("Qualcun altro ha già questo nome.").waitFor();
 });
 
-test("a code that is typed a second time leads back to the place that it has taken", async () => {
+test("entering a code again leads back to the place taken with it", async () => {
   const { id, code } = await newTournament(1, 8);
   const { page, faults } = await person(browser);
   const typed = async () => {

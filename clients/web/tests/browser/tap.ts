@@ -1,5 +1,5 @@
-// What a page is told, byte by byte: a tap between a browser and the server that keeps every
-// answer's body, and the messages in it.
+// A proxy between a browser and the server that records the body of every response, and parses its
+// messages.
 
 import { createServer, type Server as HttpServer, request } from "node:http";
 import type { AddressInfo } from "node:net";
@@ -8,26 +8,26 @@ import { fromBinary } from "@bufbuild/protobuf";
 import type { Server } from "./stage";
 
 /**
- * The frames of gRPC-web begin with a byte of flags, of which this one marks the trailers, and four
- * bytes of length.
+ * A gRPC-web frame starts with a byte of flags, of which this one marks trailers, and four bytes of
+ * length.
  */
 const TRAILERS = 0x80;
 const HEAD_BYTES = 5;
 
-/** What came back for one request. */
+/** The response to a request. */
 interface Answer {
   readonly path: string;
   readonly parts: Buffer[];
 }
 
-/** A tap in front of a server. */
+/** The proxy. */
 export class Tap {
-  /** All answers so far, those that are still coming too. */
+  /** All responses so far, including unfinished ones. */
   readonly answers: Answer[] = [];
 
   private constructor(private readonly http: HttpServer) {}
 
-  /** Begins to listen on a free port. */
+  /** Starts listening on a free port. */
   static async before(server: Server): Promise<Tap> {
     const [host, port] = server.address.split(":");
     const http = createServer((asked, answered) => {
@@ -50,17 +50,17 @@ export class Tap {
     return tap;
   }
 
-  /** Where a page finds the server through the tap. */
+  /** Address of the page behind the proxy. */
   get url(): string {
     return `http://127.0.0.1:${(this.http.address() as AddressInfo).port}`;
   }
 
-  /** The services and methods that were called. */
+  /** The methods that were called. */
   get called(): Set<string> {
     return new Set(this.answers.map(({ path }) => path).filter((path) => path.startsWith("/chefshat.v1.")));
   }
 
-  /** The messages of all answers of a method, in order, whole ones only. */
+  /** The complete messages of all responses of a method, in order. */
   messages<Desc extends DescMessage>(method: string, schema: Desc): MessageShape<Desc>[] {
     return this.answers
       .filter(({ path }) => path === method)

@@ -1,5 +1,5 @@
-// The page of a tournament, left open from before its beginning to its end: it follows without
-// being loaded again.
+// The page of a tournament, open from before the start to the end, updates without a reload; and
+// the wall view.
 
 import { expect, test } from "vitest";
 import { TournamentFormat } from "../../src/gen/chefshat/v1/tournament_pb";
@@ -29,7 +29,7 @@ test("a tournament's page follows it from the first participant to the final sta
   await page.goto(`${server.url}/tournaments/${tournament.tournamentId}`);
   await page.getByRole("heading", { name: "Spring cup" }).waitFor();
   const rows = page.locator('[data-part~="standings"] tbody tr');
-  // Before its beginning nobody has a place.
+  // Before the start nobody has a place.
   await expect.poll(() => page.locator('[data-part~="entrants"] li').count()).toBe(3);
   expect(await rows.count()).toBe(0);
   expect(await page.getByText("Gustav").count()).toBe(0);
@@ -54,7 +54,7 @@ test.each([
   ["two tables", TournamentFormat.SWISS, 8, 0.035],
   ["a bracket", TournamentFormat.KNOCKOUT, 8, 0.03],
   ["many tables", TournamentFormat.SWISS, 40, 0.025],
-])("a wall with %s is as large as the screen, and nothing of it out of sight", async (_, format, count, least) => {
+])("the wall view with %s fills the screen, and nothing is cut off", async (_, format, count, least) => {
   const { tournaments } = clientsOf(server);
   const make = async (startWhenJoined: number) => {
     const settings = {
@@ -93,7 +93,7 @@ test.each([
             written: box.textContent !== "",
           })),
         );
-      // The size is found anew when the style or the type comes after what is written.
+      // The size is computed again when a style sheet or font loads later.
       await expect.poll(async () => (await measured())[0]?.size).toBeGreaterThan(least * height);
       const full = Array<object>(id === over ? 2 : 1).fill({ fits: true, written: true });
       await expect.poll(measured).toMatchObject(full);

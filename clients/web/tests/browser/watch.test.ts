@@ -1,5 +1,4 @@
-// A spectator's page, and what reaches it: the bytes of every answer are looked through for cards
-// that nobody may see before the end.
+// A spectator's page and every byte it receives: no hidden card before the end of the game.
 
 import { expect, test } from "vitest";
 import type { GameEvent } from "../../src/gen/chefshat/v1/event_pb";
@@ -16,8 +15,8 @@ let tap: Tap;
 useStage();
 
 /**
- * A game of two Shifts, watched from before its first card to its end: what the page was sent, and
- * whether it ever showed an open hand.
+ * A game of two Shifts, watched from start to end: the messages the page received, and whether it
+ * ever showed an open hand.
  */
 async function watched(policy: { spectatorsSeeHands?: boolean; spectatorDelayDecisions?: number }) {
   tap = await Tap.before(server);
@@ -48,7 +47,7 @@ async function watched(policy: { spectatorsSeeHands?: boolean; spectatorDelayDec
   }
 }
 
-/** The events that tell of a card that lies hidden. */
+/** The events that reveal a hidden card. */
 function tellingOfHidden(events: readonly GameEvent[]): GameEvent[] {
   return events.filter(({ kind, rewards }) => {
     if (rewards.length > 0) return true;
@@ -57,7 +56,7 @@ function tellingOfHidden(events: readonly GameEvent[]): GameEvent[] {
   });
 }
 
-test("a spectator's page is sent no hidden card before the end of the game", async () => {
+test("a spectator's page receives no hidden card before the end of the game", async () => {
   const { openHand, called, messages } = await watched({});
   const events = messages.flatMap((message) => message.events);
   const cases = events.map(({ kind }) => kind.case);
@@ -67,14 +66,13 @@ test("a spectator's page is sent no hidden card before the end of the game", asy
   expect(cases.at(-1)).toBe("gameEnded");
   expect(tellingOfHidden(events)).toEqual([]);
   expect(messages.filter(({ snapshot }) => snapshot?.observation)).toEqual([]);
-  // Nothing that this page's protocol does not know, and no other call but for the description of
-  // the room, which has no cards.
+  // No unknown fields, and no other call except the room's description, which has no cards.
   expect(messages.filter((message) => message.$unknown || message.events.some((event) => event.$unknown))).toEqual([]);
   expect([...called].filter((path) => path !== WATCH && path !== GET_ROOM)).toEqual([]);
   expect(openHand).toBe(false);
 });
 
-test("where a room shows hands, the same look finds them", async () => {
+test("if a room shows hands, the same check finds them", async () => {
   const { openHand, messages } = await watched({ spectatorsSeeHands: true, spectatorDelayDecisions: 1 });
   const hands = messages.flatMap(({ events }) => tellingOfHidden(events));
   expect(hands.map(({ kind }) => kind.case)).toContain("shiftStarted");
