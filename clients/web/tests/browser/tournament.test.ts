@@ -50,55 +50,59 @@ test("a tournament's page follows it from the first participant to the final sta
 });
 
 test.each([
-  ["one table", TournamentFormat.SWISS, 4, 0.05],
-  ["two tables", TournamentFormat.SWISS, 8, 0.035],
-  ["a bracket", TournamentFormat.KNOCKOUT, 8, 0.03],
-  ["many tables", TournamentFormat.SWISS, 40, 0.025],
-])("the wall view with %s fills the screen, and nothing is cut off", async (_, format, count, least) => {
-  const { tournaments } = clientsOf(server);
-  const make = async (startWhenJoined: number) => {
-    const settings = {
-      name: "On the wall",
-      format,
-      rounds: format === TournamentFormat.SWISS ? 1 : 0,
-      rules: { preset: "paper", faces: 8, stop: { case: "targetShifts" as const, value: 1 } },
-      builtInAgents: Array<string>(count).fill("greedy"),
-      startWhenJoined,
+  ["one table", TournamentFormat.SWISS, 4, 0.05, "no-preference"],
+  ["two tables", TournamentFormat.SWISS, 8, 0.035, "no-preference"],
+  ["two tables and reduced motion", TournamentFormat.SWISS, 8, 0.035, "reduce"],
+  ["a bracket", TournamentFormat.KNOCKOUT, 8, 0.03, "no-preference"],
+  ["many tables", TournamentFormat.SWISS, 40, 0.025, "no-preference"],
+] as const)(
+  "the wall view with %s fills the screen, and nothing is cut off",
+  async (_, format, count, least, reducedMotion) => {
+    const { tournaments } = clientsOf(server);
+    const make = async (startWhenJoined: number) => {
+      const settings = {
+        name: "On the wall",
+        format,
+        rounds: format === TournamentFormat.SWISS ? 1 : 0,
+        rules: { preset: "paper", faces: 8, stop: { case: "targetShifts" as const, value: 1 } },
+        builtInAgents: Array<string>(count).fill("greedy"),
+        startWhenJoined,
+      };
+      return (await tournaments.createTournament({ settings })).tournament?.tournamentId ?? "";
     };
-    return (await tournaments.createTournament({ settings })).tournament?.tournamentId ?? "";
-  };
-  const [open, over] = [await make(0), await make(count)];
-  const { page, faults } = await person(browser);
-  for (const [width, height] of [
-    [1280, 720],
-    [1920, 1080],
-    [3840, 2160],
-  ] as const) {
-    await page.setViewportSize({ width, height });
-    for (const [id, ready] of [
-      [open, '[data-part~="entrants"]'],
-      [over, '[data-part~="standings"]'],
-    ]) {
-      await page.goto(`${server.url}/tournaments/${id}?wall`);
-      await page
-        .locator('[data-part~="wall-fitted"]')
-        .locator(ready ?? "")
-        .waitFor();
-      if (id === over) await page.getByText("finished").first().waitFor();
-      const measured = () =>
-        page.locator('[data-part~="wall-fitted"]').evaluateAll((boxes) =>
-          boxes.map((box) => ({
-            size: Number.parseFloat(getComputedStyle(box).fontSize),
-            fits: box.scrollHeight <= box.clientHeight && box.scrollWidth <= box.clientWidth,
-            written: box.textContent !== "",
-          })),
-        );
-      // The size is computed again when a style sheet or font loads later.
-      await expect.poll(async () => (await measured())[0]?.size).toBeGreaterThan(least * height);
-      const full = Array<object>(id === over ? 2 : 1).fill({ fits: true, written: true });
-      await expect.poll(measured).toMatchObject(full);
-      expect(await page.evaluate(() => document.documentElement.scrollHeight <= window.innerHeight)).toBe(true);
+    const [open, over] = [await make(0), await make(count)];
+    const { page, faults } = await person(browser, { reducedMotion });
+    for (const [width, height] of [
+      [1280, 720],
+      [1920, 1080],
+      [3840, 2160],
+    ] as const) {
+      await page.setViewportSize({ width, height });
+      for (const [id, ready] of [
+        [open, '[data-part~="entrants"]'],
+        [over, '[data-part~="standings"]'],
+      ]) {
+        await page.goto(`${server.url}/tournaments/${id}?wall`);
+        await page
+          .locator('[data-part~="wall-fitted"]')
+          .locator(ready ?? "")
+          .waitFor();
+        if (id === over) await page.getByText("finished").first().waitFor();
+        const measured = () =>
+          page.locator('[data-part~="wall-fitted"]').evaluateAll((boxes) =>
+            boxes.map((box) => ({
+              size: Number.parseFloat(getComputedStyle(box).fontSize),
+              fits: box.scrollHeight <= box.clientHeight && box.scrollWidth <= box.clientWidth,
+              written: box.textContent !== "",
+            })),
+          );
+        // The size is computed again when a style sheet or font loads later.
+        await expect.poll(async () => (await measured())[0]?.size).toBeGreaterThan(least * height);
+        const full = Array<object>(id === over ? 2 : 1).fill({ fits: true, written: true });
+        await expect.poll(measured).toMatchObject(full);
+        expect(await page.evaluate(() => document.documentElement.scrollHeight <= window.innerHeight)).toBe(true);
+      }
     }
-  }
-  expect(faults).toEqual([]);
-});
+    expect(faults).toEqual([]);
+  },
+);
