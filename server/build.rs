@@ -1,5 +1,4 @@
-//! Generates the server side of the services a second time, with responses of its own for streams of seats: their updates are encoded when
-//! they happen, once for all who see the same, and not again when they are written (`wire.rs`).
+//! Generates the server side of the streaming services a second time, with responses that are encoded already (`wire`).
 
 use std::path::PathBuf;
 
@@ -10,14 +9,19 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     if std::env::var("PROFILE").is_ok_and(|profile| profile == "release") {
         println!("cargo::rerun-if-changed=../clients/web/dist");
     }
-    let file = PathBuf::from("../proto/chefshat/v1/play_service.proto");
-    let descriptors = protox::compile([file], ["../proto"])?;
+    let files = ["play_service", "spectator_service"]
+        .map(|service| PathBuf::from(format!("../proto/chefshat/v1/{service}.proto")));
+    let descriptors = protox::compile(files, ["../proto"])?;
     tonic_prost_build::configure()
         .build_client(false)
         .extern_path(".chefshat.v1", "::chefshat_proto::v1")
         .extern_path(".chefshat.v1.PlayResponse", "crate::wire::Updates")
         .extern_path(
             ".chefshat.v1.PlayServiceWatchResponse",
+            "crate::wire::Updates",
+        )
+        .extern_path(
+            ".chefshat.v1.SpectatorServiceWatchResponse",
             "crate::wire::Updates",
         )
         .compile_well_known_types(true)

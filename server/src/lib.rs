@@ -2,6 +2,7 @@
 //! line of the binary `chefshat`. The game itself lives in `chefshat-engine`, what is played offline in `chefshat-arena`, the form of
 //! records in `chefshat-records`.
 
+pub mod clock;
 pub mod config;
 pub mod connections;
 pub mod convert;

@@ -1,19 +1,18 @@
-//! What is ready to be written to one stream. A room puts updates in, the stream takes out everything that is there as one message, so
-//! that a client with many seats gets its batches by being busy. Bounded: a room is told when there is no more space, and goes on.
+//! The updates that wait for one stream. Rooms put updates in; the stream takes out everything that is ready as one message, so that a busy
+//! client with many seats receives batches. Bounded: a subscriber learns that there is no space, and again when there is.
 
 use std::pin::Pin;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::task::{Context, Poll};
 
-use chefshat_proto::v1::SpectatorServiceWatchResponse;
 use futures::Stream;
 use futures::task::AtomicWaker;
 use tokio::sync::Notify;
 use tokio::time::Instant;
-use tonic::Status;
 
-use crate::room::RoomClock;
+use crate::clock::RoomClock;
+use crate::wire::Updates;
 
 /// Most that may wait in an outbox, counted in updates and events.
 pub const OUTBOX_CAPACITY: usize = 8_192;
@@ -63,50 +62,28 @@ pub trait OnSpace: Send + Sync {
     fn space(&self);
 }
 
-/// What waits in an outbox: put together piece by piece, taken out as one message.
-pub trait Pile: Default {
-    /// Whether there is nothing.
-    fn is_empty(&self) -> bool;
-    /// What it counts for, in updates and events.
-    fn weight(&self) -> usize;
-    /// Moves everything from `other` to the end of this.
-    fn append(&mut self, other: &mut Self);
-    /// Takes from the beginning what counts for at most `most`, but at least one piece.
-    fn take(&mut self, most: usize) -> Self;
-}
-
-impl Pile for Vec<SpectatorServiceWatchResponse> {
-    fn is_empty(&self) -> bool {
-        Vec::is_empty(self)
-    }
-
-    fn weight(&self) -> usize {
-        self.iter().map(|piece| 1 + piece.events.len()).sum()
-    }
-
-    fn append(&mut self, other: &mut Self) {
-        Vec::append(self, other);
-    }
-
-    fn take(&mut self, most: usize) -> Self {
-        let mut weight = 0;
-        let count = self
-            .iter()
-            .take_while(|piece| {
-                weight += 1 + piece.events.len();
-                weight <= most
-            })
-            .count()
-            .max(1)
-            .min(self.len());
-        let rest = self.split_off(count);
-        std::mem::replace(self, rest)
-    }
+/// Why the server ends a stream. `grpc` turns it into a status.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StreamEnd {
+    /// Everything has been sent.
+    Complete,
+    /// The server shuts down.
+    ShuttingDown,
+    /// The store failed, and the server stops.
+    StoreFailed,
+    /// A room on the stream is gone.
+    RoomGone,
+    /// A spectator did not keep up.
+    SpectatorTooSlow,
+    /// Calls to games of tournaments were not taken.
+    CallsNotTaken,
+    /// The requests of the stream broke off or broke a rule. Their reader knows why.
+    RequestsFailed,
 }
 
 /// The updates that wait for one stream.
-pub struct Outbox<T> {
-    waiting: Mutex<Waiting<T>>,
+pub struct Outbox {
+    waiting: Mutex<Waiting>,
     waker: AtomicWaker,
     /// Notified when the client has gone away.
     gone: Notify,
@@ -114,25 +91,28 @@ pub struct Outbox<T> {
     reader: AtomicWaker,
 }
 
-struct Waiting<T> {
-    pile: T,
+struct Waiting {
+    updates: Updates,
     weight: usize,
     stamps: Vec<Arc<HandStamp>>,
     wanting_space: Vec<Arc<dyn OnSpace>>,
-    end: Option<Result<(), Status>>,
+    /// Taken by the stream, once.
+    end: Option<StreamEnd>,
+    ended: bool,
     abandoned: bool,
 }
 
-impl<T: Pile> Outbox<T> {
+impl Outbox {
     /// An empty outbox and the stream that empties it.
-    pub fn new() -> (Arc<Self>, OutboxStream<T>) {
+    pub fn new() -> (Arc<Self>, OutboxStream) {
         let outbox = Arc::new(Self {
             waiting: Mutex::new(Waiting {
-                pile: T::default(),
+                updates: Updates::default(),
                 weight: 0,
                 stamps: Vec::new(),
                 wanting_space: Vec::new(),
                 end: None,
+                ended: false,
                 abandoned: false,
             }),
             waker: AtomicWaker::new(),
@@ -143,57 +123,66 @@ impl<T: Pile> Outbox<T> {
         (Arc::clone(&outbox), OutboxStream { outbox })
     }
 
-    /// Puts a pile in; `stamp` is set when it is handed over. If the outbox is full, or would be, nothing is put in and `pile` is left as
-    /// it was; `on_space` is called when there is space again.
+    /// Puts updates in; `stamp` is set when they are handed over. If there is no space for them, nothing is put in, `updates` stays as it was,
+    /// and `on_space` is called when there is space again.
     pub fn push(
         &self,
-        pile: &mut T,
+        updates: &mut Updates,
         stamp: Option<&Arc<HandStamp>>,
         on_space: Option<&Arc<dyn OnSpace>>,
     ) -> bool {
-        let weight = pile.weight();
+        let weight = updates.weight();
         let mut waiting = self.lock();
         if waiting.abandoned {
-            *pile = T::default();
+            *updates = Updates::default();
             return true;
         }
         if waiting.weight > 0 && waiting.weight + weight > OUTBOX_CAPACITY {
-            if let Some(on_space) = on_space {
+            // A subscriber that tries again and again waits once.
+            if let Some(on_space) = on_space
+                && !(waiting.wanting_space.iter()).any(|other| Arc::ptr_eq(other, on_space))
+            {
                 waiting.wanting_space.push(Arc::clone(on_space));
             }
             return false;
         }
         waiting.weight += weight;
-        waiting.pile.append(pile);
+        waiting.updates.append(updates);
         waiting.stamps.extend(stamp.cloned());
         drop(waiting);
         self.waker.wake();
         true
     }
 
-    /// Puts in the last word of somebody, whether or not there is space.
-    pub fn push_last(&self, pile: &mut T) {
+    /// Puts in the last updates of a subscriber, whether or not there is space.
+    pub fn push_last(&self, updates: &mut Updates) {
         let mut waiting = self.lock();
         if !waiting.abandoned {
-            waiting.weight += pile.weight();
-            waiting.pile.append(pile);
+            waiting.weight += updates.weight();
+            waiting.updates.append(updates);
         }
         drop(waiting);
         self.waker.wake();
     }
 
-    /// Ends the stream once everything that waits has been taken.
-    pub fn end(&self, end: Result<(), Status>) {
-        self.lock().end.get_or_insert(end);
+    /// Ends the stream once everything that waits has been taken. Only the first end counts.
+    pub fn end(&self, end: StreamEnd) {
+        let mut waiting = self.lock();
+        if !waiting.ended {
+            waiting.ended = true;
+            waiting.end = Some(end);
+        }
+        drop(waiting);
         self.waker.wake();
     }
 
-    /// Ends the stream now, with nothing more than this.
-    pub fn cut(&self, status: Status) {
+    /// Ends the stream now and drops what waits.
+    pub fn cut(&self, end: StreamEnd) {
         let mut waiting = self.lock();
-        waiting.pile = T::default();
+        waiting.updates = Updates::default();
         waiting.weight = 0;
-        waiting.end = Some(Err(status));
+        waiting.ended = true;
+        waiting.end = Some(end);
         drop(waiting);
         self.waker.wake();
     }
@@ -229,14 +218,14 @@ impl<T: Pile> Outbox<T> {
         self.lock().abandoned
     }
 
-    fn lock(&self) -> MutexGuard<'_, Waiting<T>> {
+    fn lock(&self) -> MutexGuard<'_, Waiting> {
         self.waiting
             .lock()
             .expect("nothing that holds this lock can panic")
     }
 }
 
-impl<T> std::fmt::Debug for Outbox<T> {
+impl std::fmt::Debug for Outbox {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         formatter.debug_struct("Outbox").finish_non_exhaustive()
     }
@@ -244,36 +233,31 @@ impl<T> std::fmt::Debug for Outbox<T> {
 
 /// The stream that empties an outbox: all that is ready, at each poll.
 #[derive(Debug)]
-pub struct OutboxStream<T: Pile> {
-    outbox: Arc<Outbox<T>>,
+pub struct OutboxStream {
+    outbox: Arc<Outbox>,
 }
 
-impl<T: Pile> Stream for OutboxStream<T> {
-    type Item = Result<T, Status>;
+impl Stream for OutboxStream {
+    type Item = Result<Updates, StreamEnd>;
 
     fn poll_next(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Option<Self::Item>> {
         self.outbox.waker.register(context.waker());
         let mut waiting = self.outbox.lock();
-        if waiting.pile.is_empty() {
+        if waiting.updates.is_empty() {
             return match waiting.end.take() {
+                None if waiting.ended => Poll::Ready(None),
                 None => Poll::Pending,
-                Some(Ok(())) => {
-                    waiting.end = Some(Ok(()));
-                    Poll::Ready(None)
-                }
-                Some(Err(status)) => {
-                    waiting.end = Some(Ok(()));
-                    Poll::Ready(Some(Err(status)))
-                }
+                Some(StreamEnd::Complete) => Poll::Ready(None),
+                Some(end) => Poll::Ready(Some(Err(end))),
             };
         }
-        let pile = if waiting.weight <= MESSAGE_CAPACITY {
+        let updates = if waiting.weight <= MESSAGE_CAPACITY {
             waiting.weight = 0;
-            std::mem::take(&mut waiting.pile)
+            std::mem::take(&mut waiting.updates)
         } else {
-            let pile = waiting.pile.take(MESSAGE_CAPACITY);
-            waiting.weight -= pile.weight();
-            pile
+            let updates = waiting.updates.take(MESSAGE_CAPACITY);
+            waiting.weight -= updates.weight();
+            updates
         };
         // A decision that stays behind for the next message is stamped a little early; its agent has that much more time.
         if !waiting.stamps.is_empty() {
@@ -287,15 +271,15 @@ impl<T: Pile> Stream for OutboxStream<T> {
         for wanting in wanting_space {
             wanting.space();
         }
-        Poll::Ready(Some(Ok(pile)))
+        Poll::Ready(Some(Ok(updates)))
     }
 }
 
-impl<T: Pile> Drop for OutboxStream<T> {
+impl Drop for OutboxStream {
     fn drop(&mut self) {
         let mut waiting = self.outbox.lock();
         waiting.abandoned = true;
-        waiting.pile = T::default();
+        waiting.updates = Updates::default();
         waiting.weight = 0;
         waiting.stamps = Vec::new();
         waiting.wanting_space = Vec::new();
@@ -309,30 +293,23 @@ impl<T: Pile> Drop for OutboxStream<T> {
 mod tests {
     use std::sync::atomic::AtomicUsize;
 
-    use chefshat_proto::v1::GameEvent;
+    use chefshat_proto::v1::PlayResponse;
     use futures::{FutureExt as _, StreamExt as _};
+    use prost::Message as _;
 
-    use crate::outbox::*;
+    use super::*;
 
-    type Pieces = Vec<SpectatorServiceWatchResponse>;
-
-    /// One piece with so many events, all of this number.
-    fn piece(number: u64, events: usize) -> Pieces {
-        let event = GameEvent {
-            sequence: number,
-            ..GameEvent::default()
-        };
-        vec![SpectatorServiceWatchResponse {
-            events: vec![event; events],
-            ..SpectatorServiceWatchResponse::default()
-        }]
+    /// An update that counts as one and `events` events, all for this handle.
+    fn updates(handle: u32, events: usize) -> Updates {
+        let mut updates = Updates::default();
+        updates.add_events(handle, &[], events);
+        updates
     }
 
-    fn numbers(message: &Pieces) -> Vec<u64> {
-        message
-            .iter()
-            .map(|piece| piece.events[0].sequence)
-            .collect()
+    fn handles(updates: &Updates) -> Vec<u32> {
+        let response = PlayResponse::decode(updates.encode_to_vec().as_slice());
+        let updates = response.expect("it is a response").updates;
+        updates.iter().map(|update| update.handle).collect()
     }
 
     #[derive(Default)]
@@ -345,62 +322,64 @@ mod tests {
     }
 
     #[test]
-    fn what_is_ready_goes_out_as_one_message() {
-        let (outbox, mut stream) = Outbox::<Pieces>::new();
+    fn ready_updates_leave_as_one_message() {
+        let (outbox, mut stream) = Outbox::new();
         assert!(stream.next().now_or_never().is_none());
-        for number in 0..5 {
-            assert!(outbox.push(&mut piece(number, 2), None, None));
+        for handle in 0..5 {
+            assert!(outbox.push(&mut updates(handle, 2), None, None));
         }
         let message = stream.next().now_or_never().flatten();
         let message = message.expect("something is ready").expect("no error");
-        assert_eq!(numbers(&message), [0, 1, 2, 3, 4]);
-        outbox.end(Ok(()));
+        assert_eq!(handles(&message), [0, 1, 2, 3, 4]);
+        outbox.end(StreamEnd::Complete);
+        assert!(stream.next().now_or_never().expect("ended").is_none());
         assert!(stream.next().now_or_never().expect("ended").is_none());
     }
 
     #[test]
-    fn a_full_outbox_refuses_and_says_when_it_has_space() {
-        let (outbox, mut stream) = Outbox::<Pieces>::new();
+    fn a_full_outbox_refuses_and_reports_space_once_to_each_subscriber() {
+        let (outbox, mut stream) = Outbox::new();
         let count = Arc::new(Count::default());
         let on_space: Arc<dyn OnSpace> = Arc::clone(&count) as _;
         let mut pushed = 0;
         let mut refused = loop {
-            let mut pile = piece(pushed, 255);
-            if !outbox.push(&mut pile, None, Some(&on_space)) {
-                break pile;
+            let mut more = updates(pushed, 255);
+            if !outbox.push(&mut more, None, Some(&on_space)) {
+                break more;
             }
             pushed += 1;
         };
-        assert_eq!(numbers(&refused), [pushed], "nothing is lost");
+        assert_eq!(handles(&refused), [pushed], "nothing is lost");
+        for _ in 0..100 {
+            assert!(!outbox.push(&mut refused, None, Some(&on_space)));
+        }
+        assert_eq!(outbox.lock().wanting_space.len(), 1);
         assert_eq!(usize::try_from(pushed), Ok(OUTBOX_CAPACITY / 256));
-        let message = stream
-            .next()
-            .now_or_never()
-            .flatten()
-            .expect("ready")
-            .expect("no error");
-        assert_eq!(message.len(), MESSAGE_CAPACITY / 256);
+        let next = stream.next().now_or_never().flatten();
+        let message = next.expect("ready").expect("no error");
+        assert_eq!(handles(&message).len(), MESSAGE_CAPACITY / 256);
         assert_eq!(count.0.load(Ordering::Relaxed), 1);
         assert!(outbox.push(&mut refused, None, Some(&on_space)));
-        let rest: Vec<u64> = std::iter::from_fn(|| stream.next().now_or_never().flatten())
-            .flat_map(|message| numbers(&message.expect("no error")))
+        let rest: Vec<u32> = std::iter::from_fn(|| stream.next().now_or_never().flatten())
+            .flat_map(|message| handles(&message.expect("no error")))
             .collect();
-        let expected: Vec<u64> = (u64::try_from(message.len()).expect("small")..=pushed).collect();
+        let taken = u32::try_from(MESSAGE_CAPACITY / 256).expect("small");
+        let expected: Vec<u32> = (taken..=pushed).collect();
         assert_eq!(rest, expected, "in order, once");
     }
 
     #[test]
     fn a_cut_drops_what_waits_and_a_dropped_stream_takes_nothing_more() {
-        let (outbox, mut stream) = Outbox::<Pieces>::new();
-        outbox.push(&mut piece(0, 1), None, None);
-        outbox.cut(Status::resource_exhausted("too slow"));
+        let (outbox, mut stream) = Outbox::new();
+        outbox.push(&mut updates(0, 1), None, None);
+        outbox.cut(StreamEnd::SpectatorTooSlow);
         let end = stream.next().now_or_never().flatten().expect("an end");
-        assert_eq!(end.expect_err("cut").code(), tonic::Code::ResourceExhausted);
+        assert_eq!(end, Err(StreamEnd::SpectatorTooSlow));
         drop(stream);
         assert!(outbox.is_abandoned());
         assert!(outbox.abandoned().now_or_never().is_some());
-        let mut pile = piece(0, 1);
-        assert!(outbox.push(&mut pile, None, None));
-        assert!(pile.is_empty());
+        let mut more = updates(0, 1);
+        assert!(outbox.push(&mut more, None, None));
+        assert!(more.is_empty());
     }
 }

@@ -207,10 +207,10 @@ fn routes(
     closing: &CancellationToken,
 ) -> Result<Routes, ServeError> {
     use crate::wire::service::play_service_server::PlayServiceServer;
+    use crate::wire::service::spectator_service_server::SpectatorServiceServer;
     use v1::record_service_server::RecordServiceServer;
     use v1::room_service_server::RoomServiceServer;
     use v1::server_service_server::ServerServiceServer;
-    use v1::spectator_service_server::SpectatorServiceServer;
     use v1::tournament_service_server::TournamentServiceServer;
     use v1::vector_service_server::VectorServiceServer;
     let recorded = grpc::Recorded::new(Arc::clone(rooms));

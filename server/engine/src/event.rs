@@ -5,15 +5,15 @@ use crate::{ActionId, BySeat, Cards, Role, Seat, SeatOrder, SpecialAction, Stand
 
 /// One thing that happened in a game. What only some viewers may see stands in fields that can be
 /// left out ([`Event::seen_by`]); what must not even be known to have happened, such as a declined
-/// special action, is no event.
-#[derive(Copy, Clone, Eq, PartialEq, Debug)]
+/// special action, is no event. Large parts are boxed, so that the many small events stay small.
+#[derive(Clone, Eq, PartialEq, Debug)]
 pub enum Event {
     /// Cards were dealt.
     ShiftStarted {
         /// Number of the Shift, from 1.
         shift: u32,
         /// Private: each hand for its own seat.
-        hands: BySeat<Option<Cards>>,
+        hands: Box<BySeat<Option<Cards>>>,
     },
     /// Roles were given, from the second Shift on, or reversed by a Food Fight.
     RolesAssigned {
@@ -77,36 +77,40 @@ pub enum Event {
         next_leader: Seat,
     },
     /// The Shift ended.
-    ShiftEnded {
-        /// Number of the Shift, from 1.
-        shift: u32,
-        /// Seats by place.
-        order: SeatOrder,
-        /// How many seats got rid of their cards: those with the places 1..=finished. One less than
-        /// there are seats, unless adjudicated.
-        finished: u8,
-        /// Points of this Shift.
-        points: BySeat<u32>,
-        /// Points of the game so far.
-        scores: BySeat<u64>,
-        /// Seat that took the first turn.
-        starter: Seat,
-        /// Pizzas, the one in progress at the end included.
-        pizzas: u32,
-        /// Laps, the one in progress at the end included.
-        laps: u32,
-        /// Turns: plays and passes.
-        turns: u32,
-        /// The special action declared, if any.
-        special: Option<SpecialAction>,
-        /// Whether the Shift reached its limit of turns.
-        adjudicated: bool,
-    },
+    ShiftEnded(Box<ShiftEnd>),
     /// The game ended.
     GameEnded {
         /// The final table.
-        standings: Standings,
+        standings: Box<Standings>,
     },
+}
+
+/// How a Shift ended.
+#[derive(Copy, Clone, Eq, PartialEq, Debug)]
+pub struct ShiftEnd {
+    /// Number of the Shift, from 1.
+    pub shift: u32,
+    /// Seats by place.
+    pub order: SeatOrder,
+    /// How many seats got rid of their cards: those with the places 1..=finished. One less than
+    /// there are seats, unless adjudicated.
+    pub finished: u8,
+    /// Points of this Shift.
+    pub points: BySeat<u32>,
+    /// Points of the game so far.
+    pub scores: BySeat<u64>,
+    /// Seat that took the first turn.
+    pub starter: Seat,
+    /// Pizzas, the one in progress at the end included.
+    pub pizzas: u32,
+    /// Laps, the one in progress at the end included.
+    pub laps: u32,
+    /// Turns: plays and passes.
+    pub turns: u32,
+    /// The special action declared, if any.
+    pub special: Option<SpecialAction>,
+    /// Whether the Shift reached its limit of turns.
+    pub adjudicated: bool,
 }
 
 /// Who looks at a game.
@@ -131,12 +135,14 @@ impl Event {
     /// not the viewer's.
     pub fn seen_by(&self, viewer: Viewer) -> Event {
         if viewer == Viewer::Everything {
-            return *self;
+            return self.clone();
         }
-        match *self {
+        match self.clone() {
             Event::ShiftStarted { shift, hands } => Event::ShiftStarted {
                 shift,
-                hands: BySeat::from_fn(hands.len(), |seat| hands[seat].filter(|_| viewer.is(seat))),
+                hands: Box::new(BySeat::from_fn(hands.len(), |seat| {
+                    hands[seat].filter(|_| viewer.is(seat))
+                })),
             },
             Event::CardsExchanged {
                 giver,
@@ -157,7 +163,7 @@ impl Event {
             | Event::Passed { .. }
             | Event::SeatFinished { .. }
             | Event::PizzaDone { .. }
-            | Event::ShiftEnded { .. }
+            | Event::ShiftEnded(_)
             | Event::GameEnded { .. }) => public,
         }
     }

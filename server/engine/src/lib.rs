@@ -46,7 +46,7 @@ pub use actions::{Action, ActionSpace};
 pub use by_seat::BySeat;
 pub use cards::Cards;
 pub use deal::{Card, Deal, Seed};
-pub use event::{Event, Viewer};
+pub use event::{Event, ShiftEnd, Viewer};
 pub use exchange::ExchangePair;
 pub use game::{
     ActionError, Decision, DecisionKind, Game, GiftRequirement, PlayRequirement, Refusal,

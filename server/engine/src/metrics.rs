@@ -1,7 +1,9 @@
 //! Metrics of each Shift (`docs/rules.md` §8.7), collected from events. Averaging over games and
 //! printing are left to others.
 
-use crate::{BySeat, Event, Game, RewardScheme, RuleSet, Seat, SeatOrder, SpecialAction, Viewer};
+use crate::{
+    BySeat, Event, Game, RewardScheme, RuleSet, Seat, SeatOrder, ShiftEnd, SpecialAction, Viewer,
+};
 
 /// What one seat did in one Shift.
 #[derive(Copy, Clone, PartialEq, Debug, Default)]
@@ -119,19 +121,20 @@ impl MetricsRecorder {
                 self.valid(seat, cards_left, None);
                 None
             }
-            Event::ShiftEnded {
-                shift,
-                order,
-                points,
-                starter,
-                pizzas,
-                laps,
-                turns,
-                special,
-                adjudicated,
-                finished,
-                ..
-            } => {
+            Event::ShiftEnded(ref end) => {
+                let ShiftEnd {
+                    shift,
+                    order,
+                    points,
+                    starter,
+                    pizzas,
+                    laps,
+                    turns,
+                    special,
+                    adjudicated,
+                    finished,
+                    ..
+                } = **end;
                 self.end_shift(&order, &points, finished, pizzas);
                 let seats = self.seats;
                 self.seats = BySeat::filled(seats.len(), SeatMetrics::default());

@@ -1,7 +1,7 @@
 //! Rewards by named schemes (`docs/rules.md` §8.6), computed from events. Agents can compute their
 //! own from the same events.
 
-use crate::{Event, RuleSet, Seat};
+use crate::{Event, RuleSet, Seat, ShiftEnd};
 
 /// How turns, and invalid attempts at turns, are rewarded. Exchange and special action give nothing
 /// in any scheme.
@@ -113,12 +113,13 @@ impl RewardScheme {
                 Event::Passed { seat, cards_left } => {
                     give(seat, self.turn(rules, cards_left, None), index)
                 }
-                Event::ShiftEnded {
-                    order,
-                    points,
-                    finished,
-                    ..
-                } => {
+                Event::ShiftEnded(ref end) => {
+                    let ShiftEnd {
+                        order,
+                        points,
+                        finished,
+                        ..
+                    } = **end;
                     for (&seat, place) in order.as_slice().iter().zip(1u8..) {
                         if let Some(reward) = self.shift_end(place, points[seat], place <= finished)
                         {

@@ -231,10 +231,10 @@ pub(super) fn cards(cards: Cards, faces: u8) -> Vec<Card> {
 fn hands_seen(game: &Game, viewer: Viewer) -> BySeat<Option<Cards>> {
     let dealt = Event::ShiftStarted {
         shift: game.shift(),
-        hands: game.hands().map(Some),
+        hands: Box::new(game.hands().map(Some)),
     };
     match dealt.seen_by(viewer) {
-        Event::ShiftStarted { hands, .. } => hands,
+        Event::ShiftStarted { hands, .. } => *hands,
         _ => BySeat::filled(game.rules().players(), None),
     }
 }

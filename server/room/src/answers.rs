@@ -2,8 +2,6 @@
 
 use std::time::Duration;
 
-use chefshat_engine::Seat;
-
 use super::{MAX_EXPRESSIONS_PER_SEAT, MAX_SEATINGS};
 use crate::journal::{Fill, SeatedParticipant};
 
@@ -72,11 +70,9 @@ pub enum ExpressError {
     TooMany,
 }
 
-/// An answer as it arrived.
+/// An answer to a decision.
 #[derive(Debug)]
-pub struct AnswerInput {
-    /// The seat that answers.
-    pub seat: Seat,
+pub struct Answer {
     /// The decision it answers.
     pub decision_id: u64,
     /// The action, as it was sent.
@@ -85,10 +81,18 @@ pub struct AnswerInput {
     pub annotations: Option<Box<[u8]>>,
     /// Annotations were sent that cannot be recorded.
     pub annotations_refused: bool,
-    /// When the answer was read.
-    pub arrived: Duration,
-    /// When the decision was handed to the transport, if it was.
-    pub handed: Option<Duration>,
+}
+
+impl Answer {
+    /// An answer without annotations.
+    pub fn new(decision_id: u64, action: u32) -> Self {
+        Self {
+            decision_id,
+            action,
+            annotations: None,
+            annotations_refused: false,
+        }
+    }
 }
 
 /// What became of an answer.

@@ -152,9 +152,9 @@ impl Core {
     }
 
     /// The seat whose decision is open waits for our word since then.
-    pub(super) fn wait_for_word(&mut self, since: Duration) {
+    pub(super) fn pause_clock(&mut self, since: Duration) {
         if let Some(open) = &mut self.open {
-            open.waits.get_or_insert(since);
+            open.paused_since.get_or_insert(since);
         }
     }
 
@@ -199,7 +199,7 @@ impl Core {
         if let Some(open) = &self.open {
             let seat = open.decision.seat;
             // While the seat waits for our word its clock stands.
-            let by = open.waits.map_or(now, |since| since.min(now));
+            let by = open.paused_since.map_or(now, |since| since.min(now));
             let late = open
                 .start
                 .is_some_and(|start| start + self.time_allowed(seat) <= by);

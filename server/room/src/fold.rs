@@ -7,7 +7,7 @@ use chefshat_engine::{ActionId, DecisionKind, Event, Game, Seat, Seed};
 
 use super::{Answered, Core, LastAnswer, MAX_GAME_CHANGES, OpenDecision, State, Verdict};
 use crate::journal::{Change, Decided, Source};
-use crate::log::{ByWhom, GameHappening, Happening, MAX_GAME_EVENTS};
+use crate::log::{GameEvent, MAX_GAME_EVENTS, RoomEvent};
 
 impl Core {
     pub(super) fn fold(&mut self, at: Duration, change: &Change) {
@@ -20,7 +20,7 @@ impl Core {
                 state.joined_at = at;
                 state.ever_attached = false;
                 self.log
-                    .push(at, Happening::Seated(*seat, participant.clone()));
+                    .push(at, RoomEvent::Seated(*seat, participant.clone()));
             }
             Change::Vacated(seat) => {
                 let state = &mut self.seats[seat.index()];
@@ -28,19 +28,19 @@ impl Core {
                 state.connection = None;
                 state.away = false;
                 state.entropy = Vec::new();
-                self.log.push(at, Happening::Vacated(*seat));
+                self.log.push(at, RoomEvent::Vacated(*seat));
             }
             Change::Started { entropy } => self.begin(at, entropy),
             Change::Disconnected(seat) => {
                 self.seats[seat.index()].away = true;
-                self.log.push(at, Happening::Disconnected(*seat));
+                self.log.push(at, RoomEvent::Disconnected(*seat));
             }
             Change::Returned(seat) => {
                 let state = &mut self.seats[seat.index()];
                 state.away = false;
                 state.substituted = false;
                 state.timeouts = 0;
-                self.log.push(at, Happening::Returned(*seat));
+                self.log.push(at, RoomEvent::Returned(*seat));
                 if let Some(open) = &mut self.open
                     && open.decision.seat == *seat
                     && open.start.is_none()
@@ -52,7 +52,7 @@ impl Core {
                 let state = &mut self.seats[seat.index()];
                 state.substituted = true;
                 state.ever_substituted = true;
-                self.log.push(at, Happening::Substituted(*seat));
+                self.log.push(at, RoomEvent::Substituted(*seat));
             }
             Change::Attempted { .. } => {
                 if let Some(open) = &mut self.open {
@@ -68,14 +68,14 @@ impl Core {
                 self.seats[seat.index()].expressions += 1;
                 if !record_only {
                     self.log
-                        .push(at, Happening::Expressed(*seat, expression.clone()));
+                        .push(at, RoomEvent::Expressed(*seat, expression.clone()));
                 }
             }
             Change::ServerRestarted => self.restart(at),
             Change::Aborted(reason) => {
                 self.state = State::Aborted(*reason);
                 self.open = None;
-                self.log.push(at, Happening::GameAborted(*reason));
+                self.log.push(at, RoomEvent::GameAborted(*reason));
             }
         }
     }
@@ -101,13 +101,13 @@ impl Core {
         if let Some(open) = &mut self.open {
             open.release_anew(at);
         }
-        self.log.push(at, Happening::ServerRestarted);
+        self.log.push(at, RoomEvent::ServerRestarted);
     }
 
     fn begin(&mut self, at: Duration, entropy: &[Vec<u8>]) {
         self.entropy = entropy.to_vec();
         self.state = State::Playing;
-        self.log.push(at, Happening::GameStarted);
+        self.log.push(at, RoomEvent::GameStarted);
         self.log_before_deal = self.log.len();
         let recorded = self.header.start.branch.as_ref();
         let seed = recorded
@@ -123,14 +123,7 @@ impl Core {
         self.game = Some(Box::new(game));
         self.reseed();
         self.events = events;
-        self.log_events(
-            at,
-            ByWhom {
-                source: Source::Agent,
-                time_us: 0,
-                reward: None,
-            },
-        );
+        self.log_events(at, Source::Agent, 0);
         self.note_decision();
         self.open_next(at);
     }
@@ -162,14 +155,7 @@ impl Core {
             Source::Timeout | Source::Disconnected => seat.timeouts += 1,
             Source::Invalid | Source::Substitute | Source::Recorded => {}
         }
-        self.log_events(
-            at,
-            ByWhom {
-                source: decided.source,
-                time_us: decided.time_us,
-                reward: None,
-            },
-        );
+        self.log_events(at, decided.source, decided.time_us);
         self.decisions += 1;
         if decided.source == Source::Recorded {
             self.reseed();
@@ -213,65 +199,30 @@ impl Core {
     }
 
     /// Moves the events of one action to the log, with the rewards they brought.
-    fn log_events(&mut self, at: Duration, by: ByWhom) {
-        let events = std::mem::take(&mut self.events);
-        let scheme = self.header.policy.reward_scheme;
-        for (index, event) in events.iter().enumerate() {
-            let mut rewards = Vec::new();
-            if let Some(scheme) = scheme {
-                scheme.of_events(&self.header.rules, &events, |seat, value, bringer| {
-                    if bringer == index {
-                        rewards.push((seat, value));
-                    }
-                });
+    fn log_events(&mut self, at: Duration, source: Source, time_us: u64) {
+        let mut events = std::mem::take(&mut self.events);
+        let mut rewards = Vec::new();
+        if let Some(scheme) = self.header.policy.reward_scheme {
+            scheme.of_events(&self.header.rules, &events, |seat, value, index| {
+                rewards.push((index, (seat, value)));
+            });
+        }
+        for (index, event) in events.drain(..).enumerate() {
+            if matches!(event, Event::GameEnded { .. }) {
+                self.state = State::Finished;
             }
-            let reward = rewards.first().map(|(_, value)| *value);
-            let by = ByWhom { reward, ..by };
-            let happening = match *event {
-                Event::Played {
-                    seat,
-                    action,
-                    cards_left,
-                    ..
-                } => Happening::Played {
-                    seat,
-                    action,
-                    cards_left,
-                    by,
-                },
-                Event::Passed { seat, cards_left } => Happening::Passed {
-                    seat,
-                    cards_left,
-                    by,
-                },
-                Event::PizzaDone {
-                    pizza,
-                    last_to_play,
-                    next_leader,
-                } => Happening::PizzaDone {
-                    pizza,
-                    last_to_play,
-                    next_leader,
-                },
-                Event::SeatFinished { seat, place } => Happening::SeatFinished { seat, place },
-                Event::GameEnded { .. } => {
-                    self.state = State::Finished;
-                    Happening::GameEnded
-                }
-                Event::ShiftStarted { .. }
-                | Event::RolesAssigned { .. }
-                | Event::SpecialActionDeclared { .. }
-                | Event::CardsExchanged { .. }
-                | Event::ShiftEnded { .. } => Happening::Game(Box::new(GameHappening {
-                    event: *event,
-                    by,
-                    rewards,
-                })),
-            };
-            self.log.push(at, happening);
+            let brought = rewards.iter().filter(|(bringer, _)| *bringer == index);
+            self.log.push(
+                at,
+                RoomEvent::Game(GameEvent {
+                    rewards: brought.map(|(_, reward)| *reward).collect(),
+                    event,
+                    source,
+                    time_us,
+                }),
+            );
         }
         self.events = events;
-        self.events.clear();
     }
 
     /// Opens the next decision of the game, if there is one.
@@ -287,10 +238,10 @@ impl Core {
                     decision,
                     id: seat.decisions,
                     released: at,
-                    told: false,
+                    announced: false,
                     start: None,
                     look_again: Duration::ZERO,
-                    waits: None,
+                    paused_since: None,
                     attempts: 0,
                 }
             });

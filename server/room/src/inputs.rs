@@ -6,13 +6,13 @@ use std::time::Duration;
 
 use chefshat_engine::{ActionError, Seat};
 
-use super::answers::{AnswerInput, Answered, ExpressError, JoinError, LeaveError, Verdict};
+use super::answers::{Answer, Answered, ExpressError, JoinError, LeaveError, Verdict};
 use super::{
     ConnectionId, Core, MAX_ANNOTATION_BYTES, MAX_ANNOTATION_BYTES_PER_GAME, MAX_CONNECTION_EVENTS,
     MAX_EXPRESSIONS_PER_SEAT, MAX_SEATINGS, State,
 };
 use crate::journal::{Change, Fill, ParticipantKind, SeatedParticipant, Source};
-use crate::log::Happening;
+use crate::log::RoomEvent;
 
 impl Core {
     /// Takes a seat.
@@ -31,7 +31,7 @@ impl Core {
             State::Finished | State::Aborted(_) => return Err(JoinError::GameOver),
         }
         let log = self.log.since(0).iter();
-        let seatings = log.filter(|it| matches!(it.happening, Happening::Seated(..)));
+        let seatings = log.filter(|it| matches!(it.event, RoomEvent::Seated(..)));
         if seatings.count() >= MAX_SEATINGS {
             return Err(JoinError::TooManySeatings);
         }
@@ -117,7 +117,7 @@ impl Core {
         if self.awaited_from(seat).is_some() {
             self.settle_start(now, handed_before);
             self.restart_clock(now, seat);
-            self.wait_for_word(arrived);
+            self.pause_clock(arrived);
         }
         let state = &mut self.seats[seat.index()];
         state.recalled = false;
@@ -193,50 +193,55 @@ impl Core {
         Ok(())
     }
 
-    /// An answer has arrived.
-    pub fn answer(&mut self, now: Duration, input: AnswerInput) -> Answered {
-        let seat = input.seat;
+    /// Takes an answer that was read at `arrived`. `handed`: when the decision was handed to the seat's transport, if it was.
+    pub fn answer(
+        &mut self,
+        now: Duration,
+        seat: Seat,
+        answer: Answer,
+        arrived: Duration,
+        handed: Option<Duration>,
+    ) -> Answered {
         if let Some(last) = &self.seats[seat.index()].last_answer
-            && last.decision_id == input.decision_id
+            && last.decision_id == answer.decision_id
         {
-            return if last.action == input.action {
+            return if last.action == answer.action {
                 last.answered.clone()
             } else {
                 Answered::closed(Verdict::Closed)
             };
         }
-        if input.decision_id == 0 || input.decision_id > self.seats[seat.index()].decisions {
+        if answer.decision_id == 0 || answer.decision_id > self.seats[seat.index()].decisions {
             return Answered::closed(Verdict::Unknown);
         }
-        let open = match self.awaited_from(seat) {
-            Some(open) if open.id == input.decision_id => open.clone(),
-            _ => return Answered::closed(Verdict::Closed),
-        };
-        self.settle_start(now, input.handed);
-        let start = self
-            .open
-            .as_ref()
-            .and_then(|open| open.start)
-            .unwrap_or(open.released);
-        let time = input.arrived.saturating_sub(start);
+        if (self.awaited_from(seat)).is_none_or(|open| open.id != answer.decision_id) {
+            return Answered::closed(Verdict::Closed);
+        }
+        self.settle_start(now, handed);
+        let open = self.open.as_ref().expect("a decision is awaited");
+        // The clock stands while the seat waits for the server, as it does for the deadline.
+        let thought_until = open
+            .paused_since
+            .map_or(arrived, |since| since.min(arrived));
+        let time = thought_until.saturating_sub(open.start.unwrap_or(open.released));
+        let attempts = open.attempts + 1;
         if time >= self.time_allowed(seat) {
-            // It arrived after the deadline, before the room was told that the time was up.
-            self.tick(now, input.handed);
+            // It arrived after the deadline, but before the alarm rang.
+            self.tick(now, handed);
             return Answered {
                 time,
                 ..Answered::closed(Verdict::Closed)
             };
         }
-        let answered = match self.refusal(input.action) {
-            Some(error) => self.invalid(now, &input, time, open.attempts + 1, &error),
-            None => self.accept(now, input, time),
+        let answered = match self.refusal(answer.action) {
+            Some(error) => self.invalid(now, seat, answer.action, arrived, time, attempts, &error),
+            None => self.accept(now, seat, answer, time),
         };
         self.advance(now);
         answered
     }
 
-    fn accept(&mut self, now: Duration, input: AnswerInput, time: Duration) -> Answered {
-        let seat = input.seat;
+    fn accept(&mut self, now: Duration, seat: Seat, input: Answer, time: Duration) -> Answered {
         let taken_already = self.seats[seat.index()].annotation_bytes;
         let (annotations, annotations_dropped) = match input.annotations {
             Some(bytes)
@@ -265,10 +270,13 @@ impl Core {
         last.answered.clone()
     }
 
+    #[expect(clippy::too_many_arguments, reason = "one call, all of it known there")]
     fn invalid(
         &mut self,
         now: Duration,
-        input: &AnswerInput,
+        seat: Seat,
+        action: u32,
+        arrived: Duration,
         time: Duration,
         attempts: u32,
         error: &ActionError,
@@ -280,17 +288,11 @@ impl Core {
             .reward_scheme
             .filter(|_| self.open_is_turn())
             .map(|scheme| scheme.invalid());
-        self.commit(
-            now,
-            Change::Attempted {
-                seat: input.seat,
-                action: input.action,
-            },
-        );
+        self.commit(now, Change::Attempted { seat, action });
         if attempts >= self.attempts_limit() {
-            self.take_default(now, input.seat, Source::Invalid, time);
+            self.take_default(now, seat, Source::Invalid, time);
         } else {
-            self.wait_for_word(input.arrived);
+            self.pause_clock(arrived);
         }
         Answered {
             verdict: Verdict::Invalid {

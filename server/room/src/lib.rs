@@ -26,9 +26,7 @@ use chefshat_engine::{
     ActionId, Decision, Event, Game, Mask, Observation, Requirement, Seat, Viewer,
 };
 
-pub use answers::{
-    AnswerInput, Answered, ExpressError, JoinError, LeaveError, SeatStanding, Verdict,
-};
+pub use answers::{Answer, Answered, ExpressError, JoinError, LeaveError, SeatStanding, Verdict};
 
 pub use revive::BadJournal;
 
@@ -110,7 +108,7 @@ pub struct Core {
     /// When the server was last restarted.
     restarted: Option<Duration>,
     /// Changes that have been folded and not yet been handed to the store.
-    unkept: Vec<Entry>,
+    pending: Vec<Entry>,
     /// Room for the events of one action.
     events: Vec<Event>,
 }
@@ -156,13 +154,13 @@ pub struct OpenDecision {
     /// When it was opened or, for a seat that came back from a substitute, given back.
     released: Duration,
     /// Whether it has been kept, so that its seat may be told: from then on nothing moves its release.
-    told: bool,
+    announced: bool,
     /// When its clock began, once that is settled.
     start: Option<Duration>,
     /// When to ask again whether the transport has taken the request; zero before it was asked.
     look_again: Duration,
     /// Since when its seat waits for our word: on an answer that is refused, or on a new connection.
-    waits: Option<Duration>,
+    paused_since: Option<Duration>,
     /// Actions refused so far.
     attempts: u32,
 }
@@ -171,7 +169,7 @@ impl OpenDecision {
     /// Opens it once more, with all its time.
     fn release_anew(&mut self, at: Duration) {
         self.released = at;
-        self.told = false;
+        self.announced = false;
         self.start = None;
         self.look_again = Duration::ZERO;
     }
@@ -234,7 +232,7 @@ impl Core {
             changes: 0,
             decisions: 0,
             restarted: None,
-            unkept: Vec::new(),
+            pending: Vec::new(),
             events: Vec::new(),
         }
     }
@@ -393,19 +391,19 @@ impl Core {
 
     /// Changes that have been made and are not kept yet, for the store, which empties this. They have been folded already; nobody may be
     /// told before they are kept.
-    pub fn unkept(&mut self) -> &mut Vec<Entry> {
-        &mut self.unkept
+    pub fn pending(&mut self) -> &mut Vec<Entry> {
+        &mut self.pending
     }
 
     /// The changes so far have been kept, and what is open is told now: its time begins now, whatever the store took. If it was told
     /// before, the time is given back in which its seat could do nothing but wait for the store.
     pub fn released(&mut self, now: Duration) {
         let Some(open) = &mut self.open else { return };
-        if !open.told {
-            open.told = true;
+        if !open.announced {
+            open.announced = true;
             open.released = open.released.max(now);
         }
-        if let (Some(since), Some(start)) = (open.waits.take(), &mut open.start) {
+        if let (Some(since), Some(start)) = (open.paused_since.take(), &mut open.start) {
             let waited = now.saturating_sub(since.max(*start));
             if waited >= SLOW_STORE {
                 *start += waited;
@@ -415,7 +413,7 @@ impl Core {
 
     fn commit(&mut self, now: Duration, change: Change) {
         self.fold(now, &change);
-        self.unkept.push(Entry { at: now, change });
+        self.pending.push(Entry { at: now, change });
     }
 
     fn action_from(number: u32) -> ActionId {

@@ -1,27 +1,27 @@
-//! The log of a room: everything public that happened in it, compactly, in order. The number of an event is its position plus one. How
-//! an event looks to a viewer is written in `convert::log`.
+//! The log of a room: every public event, in order. The number of an event is its position plus one. `convert::event` in the server writes
+//! what a viewer may see of an event.
 
 use std::time::Duration;
 
-use chefshat_engine::{ActionId, Event, Seat};
+use chefshat_engine::{Event, Seat, Viewer};
 
 use crate::journal::{AbortReason, SeatedParticipant, Source};
 
-/// Most events of one game; beyond it the game is aborted.
+/// Most events of one game. The game is aborted when it reaches them.
 pub const MAX_GAME_EVENTS: usize = 1_000_000;
 
-/// One event.
+/// An event with its time.
 #[derive(Debug, Clone)]
 pub struct LogEntry {
     /// Milliseconds since the room was created.
     pub at_ms: u32,
-    /// What happened.
-    pub happening: Happening,
+    /// The event.
+    pub event: RoomEvent,
 }
 
-/// What happened.
+/// An event of a room: one of the engine, or one that only a room has.
 #[derive(Debug, Clone)]
-pub enum Happening {
+pub enum RoomEvent {
     /// A participant took a seat.
     Seated(Seat, Box<SeatedParticipant>),
     /// A seat became free again.
@@ -34,91 +34,47 @@ pub enum Happening {
     Substituted(Seat),
     /// The game began.
     GameStarted,
-    /// An event of the engine that comes rarely, with how it came about and the rewards it brought.
-    Game(Box<GameHappening>),
-    /// A seat played.
-    Played {
-        /// The seat.
-        seat: Seat,
-        /// The action.
-        action: ActionId,
-        /// Cards left in its hand.
-        cards_left: u8,
-        /// How it came about.
-        by: ByWhom,
-    },
-    /// A seat passed.
-    Passed {
-        /// The seat.
-        seat: Seat,
-        /// Cards left in its hand.
-        cards_left: u8,
-        /// How it came about.
-        by: ByWhom,
-    },
-    /// A pizza was done.
-    PizzaDone {
-        /// Its number in the Shift.
-        pizza: u32,
-        /// Who played last.
-        last_to_play: Option<Seat>,
-        /// Who leads the next.
-        next_leader: Seat,
-    },
-    /// A seat got rid of its last card.
-    SeatFinished {
-        /// The seat.
-        seat: Seat,
-        /// Its place, from 1.
-        place: u8,
-    },
-    /// The game ended with a result.
-    GameEnded,
+    /// An event of the engine.
+    Game(GameEvent),
     /// The game ended without a result.
     GameAborted(AbortReason),
     /// The server was restarted.
     ServerRestarted,
-    /// A seat expressed something publicly.
+    /// A seat expressed something publicly: the encoded `chefshat.v1.Expression`.
     Expressed(Seat, Box<[u8]>),
 }
 
-impl Happening {
-    /// Whether a seat is told more of this than everybody is. When in doubt, it is: what more there is, if anything, is then decided event
-    /// by event.
-    pub fn tells_more_to(&self, seat: Seat) -> bool {
-        match self {
-            Self::Played {
-                seat: actor, by, ..
-            }
-            | Self::Passed {
-                seat: actor, by, ..
-            } => *actor == seat && by.reward.is_some(),
-            Self::Game(_) => true,
-            _ => false,
-        }
-    }
-}
-
-/// A rare event of the engine.
+/// An event of the engine, with the decision that caused it and the rewards it brought.
 #[derive(Debug, Clone)]
-pub struct GameHappening {
-    /// The event, with nothing withheld.
+pub struct GameEvent {
+    /// The event, nothing withheld.
     pub event: Event,
-    /// How it came about.
-    pub by: ByWhom,
-    /// Rewards it brought.
-    pub rewards: Vec<(Seat, f32)>,
+    /// Who or what took the decision.
+    pub source: Source,
+    /// Measured time of the decision, microseconds.
+    pub time_us: u64,
+    /// Rewards by seat. Empty without a reward scheme.
+    pub rewards: Box<[(Seat, f32)]>,
 }
 
-/// How a decision came about, and what it brought its seat.
-#[derive(Debug, Clone, Copy)]
-pub struct ByWhom {
-    /// Who or what decided.
-    pub source: Source,
-    /// Measured decision time, microseconds.
-    pub time_us: u64,
-    /// The reward of the turn, where the room has a scheme.
-    pub reward: Option<f32>,
+impl RoomEvent {
+    /// Whether a viewer may see more of this event than the public does: private cards, or a reward.
+    pub fn shows_more_to(&self, viewer: Viewer) -> bool {
+        let Self::Game(game) = self else { return false };
+        let is = |seat: Seat| match viewer {
+            Viewer::Seat(own) => own == seat,
+            Viewer::Spectator => false,
+            Viewer::Everything => true,
+        };
+        let shows_cards = match &game.event {
+            Event::ShiftStarted { .. } => viewer != Viewer::Spectator,
+            Event::CardsExchanged {
+                giver, receiver, ..
+            } => is(*giver) || is(*receiver),
+            _ => false,
+        };
+        shows_cards || game.rewards.iter().any(|(seat, _)| is(*seat))
+    }
 }
 
 /// The events of a room.
@@ -128,25 +84,25 @@ pub struct Log {
 }
 
 impl Log {
-    /// Adds an event.
-    pub(super) fn push(&mut self, at: Duration, happening: Happening) {
+    /// Appends an event.
+    pub(super) fn push(&mut self, at: Duration, event: RoomEvent) {
         self.entries.push(LogEntry {
             at_ms: u32::try_from(at.as_millis()).unwrap_or(u32::MAX),
-            happening,
+            event,
         });
     }
 
-    /// Puts other hands in place of those dealt, as a test of what is hidden needs it.
+    /// Replaces the hands that were dealt, for tests of what is hidden.
     #[cfg(any(test, feature = "testing"))]
     pub(super) fn replace_hands(
         &mut self,
         hands: &chefshat_engine::BySeat<chefshat_engine::Cards>,
     ) {
         for entry in &mut self.entries {
-            if let Happening::Game(game) = &mut entry.happening
+            if let RoomEvent::Game(game) = &mut entry.event
                 && let Event::ShiftStarted { hands: dealt, .. } = &mut game.event
             {
-                *dealt = hands.map(Some);
+                **dealt = hands.map(Some);
             }
         }
     }
@@ -156,7 +112,7 @@ impl Log {
         self.entries.len()
     }
 
-    /// Whether nothing has happened yet.
+    /// Whether there is no event yet.
     pub fn is_empty(&self) -> bool {
         self.entries.is_empty()
     }
@@ -169,5 +125,15 @@ impl Log {
     /// The events from a position on.
     pub fn since(&self, position: usize) -> &[LogEntry] {
         self.entries.get(position..).unwrap_or_default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_entry_fits_one_cache_line() {
+        assert!(size_of::<LogEntry>() <= 64, "{}", size_of::<LogEntry>());
     }
 }

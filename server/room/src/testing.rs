@@ -13,9 +13,9 @@ use crate::ids::{Id, SecretHash};
 use crate::journal::{
     Change, Decided, Entry, Fill, GameHeader, GameStart, ParticipantKind, SeatedParticipant,
 };
-use crate::log::Happening;
+use crate::log::RoomEvent;
 use crate::policy::Policy;
-use crate::{AnswerInput, Answered, ConnectionId, Core, JoinError, Verdict};
+use crate::{Answer, Answered, ConnectionId, Core, JoinError, Verdict};
 
 pub const OPEN: Fill = Fill::Open { reserved_for: None };
 
@@ -93,7 +93,7 @@ impl Table {
                 ticket: SecretHash::of(b"ticket"),
             },
         );
-        self.keep();
+        self.commit();
         joined
     }
 
@@ -104,13 +104,13 @@ impl Table {
         let handed = (self.core.standing(seat).connected).then_some(self.now);
         self.core
             .attach(self.now, seat, connection, Vec::new(), self.now, handed);
-        self.keep();
+        self.commit();
         connection
     }
 
     pub fn lost(&mut self, seat: Seat, connection: ConnectionId) {
         self.core.lost(self.now, seat, connection, None);
-        self.keep();
+        self.commit();
     }
 
     /// Lets time pass, ringing at every deadline on the way.
@@ -124,7 +124,7 @@ impl Table {
                 .filter(|open| connected(open.decision.seat))
                 .map(|open| open.released);
             self.core.tick(self.now, handed);
-            self.keep();
+            self.commit();
         }
         self.now = until;
     }
@@ -151,19 +151,9 @@ impl Table {
 
     pub fn answer(&mut self, seat: Seat, decision_id: u64, action: u32) -> Answered {
         let handed = self.core.open().map(|open| open.released);
-        let answered = self.core.answer(
-            self.now,
-            AnswerInput {
-                seat,
-                decision_id,
-                action,
-                annotations: None,
-                annotations_refused: false,
-                arrived: self.now,
-                handed,
-            },
-        );
-        self.keep();
+        let answer = Answer::new(decision_id, action);
+        let answered = self.core.answer(self.now, seat, answer, self.now, handed);
+        self.commit();
         answered
     }
 
@@ -175,8 +165,8 @@ impl Table {
         seat
     }
 
-    pub fn keep(&mut self) {
-        self.journal.append(self.core.unkept());
+    pub fn commit(&mut self) {
+        self.journal.append(self.core.pending());
         self.now += std::mem::take(&mut self.store_takes);
         self.core.released(self.now);
     }
@@ -192,12 +182,12 @@ impl Table {
             .expect("a decision has been taken")
     }
 
-    pub fn happened(&self, wanted: impl Fn(&Happening) -> bool) -> usize {
+    pub fn happened(&self, wanted: impl Fn(&RoomEvent) -> bool) -> usize {
         self.core
             .log()
             .since(0)
             .iter()
-            .filter(|entry| wanted(&entry.happening))
+            .filter(|entry| wanted(&entry.event))
             .count()
     }
 

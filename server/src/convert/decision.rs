@@ -6,7 +6,7 @@ use chefshat_record::convert::{FieldProblem, check_expression};
 use prost::Message as _;
 
 use chefshat_room::journal::Source;
-use chefshat_room::{Answered, Verdict};
+use chefshat_room::{Answered, ExpressError, Verdict};
 
 /// A mask as the protocol writes it.
 pub(super) fn mask_bytes(mask: &Mask, rules: &RuleSet) -> Vec<u8> {
@@ -85,4 +85,21 @@ pub fn annotations_from_proto(
 pub fn expression_from_proto(expression: &v1::Expression) -> Result<Box<[u8]>, FieldProblem> {
     check_expression(expression)?;
     Ok(expression.encode_to_vec().into_boxed_slice())
+}
+
+/// Why an expression was refused, on the stream of its seat.
+pub fn express_refused(error: ExpressError) -> v1::Refused {
+    // Codes of google.rpc.Code.
+    const RESOURCE_EXHAUSTED: u32 = 8;
+    const FAILED_PRECONDITION: u32 = 9;
+    let (code, reason) = match error {
+        ExpressError::GameOver => (FAILED_PRECONDITION, "GAME_OVER"),
+        ExpressError::TooMany => (RESOURCE_EXHAUSTED, "TOO_MANY_EXPRESSIONS"),
+    };
+    v1::Refused {
+        reason: reason.into(),
+        message: error.to_string(),
+        code,
+        ..v1::Refused::default()
+    }
 }

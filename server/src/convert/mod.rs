@@ -2,7 +2,7 @@
 //! records share; here is what only a server has: policies, seats, decisions, the log.
 
 mod decision;
-mod log;
+mod event;
 mod name;
 mod players;
 mod policy;
@@ -14,8 +14,8 @@ mod start;
 mod tournament;
 mod vector;
 
-pub use decision::{annotations_from_proto, answer_result, expression_from_proto};
-pub use log::{game_started, view};
+pub use decision::{annotations_from_proto, answer_result, express_refused, expression_from_proto};
+pub use event::{event_to_proto, game_started};
 pub use name::name_to_show;
 pub use players::recorded_player;
 pub use policy::{millis, policy_from_proto, policy_to_proto, simulation_policy};

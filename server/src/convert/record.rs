@@ -10,7 +10,7 @@ use chefshat_record::jsonl::FORMAT_VERSION;
 use prost::Message as _;
 
 use super::decision::{mask_bytes, source_to_proto};
-use super::log::{standings, view};
+use super::event::{event_to_proto, standings};
 use super::policy::policy_of;
 use super::room::{aborted_because, participants, series_id, state_to_proto, tournament_id};
 use super::start::{origin, start_to_proto};
@@ -48,7 +48,7 @@ pub fn record_lines(header: &Arc<GameHeader>, journal: &[Entry]) -> Vec<v1::Reco
         core.refold(entry);
         body.extend(
             (before..core.log().len())
-                .filter_map(|position| view(&core, position, Viewer::Everything))
+                .filter_map(|position| event_to_proto(&core, position, Viewer::Everything))
                 .map(Line::Event),
         );
     }

@@ -7,7 +7,7 @@ use chefshat_engine::{MAX_SEATS, RuleSet, Seat};
 use chefshat_proto::v1::{self, seat_config::FilledBy};
 use chefshat_record::convert::{FieldProblem, rules_to_proto, seat_number};
 
-use super::log::abort_reason;
+use super::event::abort_reason;
 use super::name::name_to_show;
 use super::policy::{agent, policy_of};
 use super::start::{branch_point, origin};

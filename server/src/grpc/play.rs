@@ -5,7 +5,8 @@ mod participants;
 mod reader;
 
 use std::pin::Pin;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
+use std::task::{Context, Poll};
 
 use chefshat_proto::v1::{self, act_request};
 use chefshat_record::convert::FieldProblem;
@@ -14,15 +15,16 @@ use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 use tonic::{Request, Response, Status, Streaming};
 
-use super::status::{Refusal, field, ticket_unknown};
+use super::status::{Refusal, field, stream_ended, ticket_unknown};
 use crate::config::{HEARTBEAT, MAX_SEATS_PER_WATCH};
 use crate::convert;
-use crate::outbox::{Outbox, OutboxStream};
+use crate::outbox::{Outbox, OutboxStream, StreamEnd};
 use crate::room::SeatAction;
 use crate::rooms::Rooms;
 use crate::tournaments::Tournaments;
 use crate::wire::Updates;
 use crate::wire::service::play_service_server::PlayService;
+use chefshat_room::Answer;
 use chefshat_room::ids::Token;
 use reader::Reader;
 
@@ -50,14 +52,14 @@ impl Play {
     }
 
     /// The reader of a new stream.
-    fn reader(&self, outbox: &Arc<Outbox<Updates>>, with_decisions: bool) -> Reader {
+    fn reader(&self, outbox: &Arc<Outbox>, with_decisions: bool) -> Reader {
         Reader::new(&self.rooms, &self.tournaments, outbox, with_decisions)
     }
 }
 
 #[tonic::async_trait]
 impl PlayService for Play {
-    type PlayStream = OutboxStream<Updates>;
+    type PlayStream = Responses;
     type WatchStream = Pin<Box<dyn Stream<Item = Result<Updates, Status>> + Send>>;
 
     async fn play(
@@ -65,8 +67,9 @@ impl PlayService for Play {
         request: Request<Streaming<v1::PlayRequest>>,
     ) -> Result<Response<Self::PlayStream>, Status> {
         let (outbox, updates) = Outbox::new();
+        let failure = Arc::new(OnceLock::new());
         let reader = self.reader(&outbox, true);
-        tokio::spawn(reader.read(request.into_inner()));
+        tokio::spawn(reader.read(request.into_inner(), Arc::clone(&failure)));
         let closing = self.closing.clone();
         tokio::spawn(async move {
             tokio::select! {
@@ -74,7 +77,7 @@ impl PlayService for Play {
                 () = outbox.abandoned() => {}
             }
         });
-        Ok(Response::new(updates))
+        Ok(Response::new(Responses { updates, failure }))
     }
 
     async fn watch(
@@ -95,11 +98,19 @@ impl PlayService for Play {
             for attach in seats {
                 reader.attach(attach).await;
             }
-            // The seats stay attached until the client goes or the server closes.
-            tokio::select! {
-                () = outbox.abandoned() => {}
-                () = closing.cancelled() => outbox.end(Ok(())),
-                () = reader.follow_calls() => {}
+            // The seats stay attached until the client goes or the server closes. A call that has been taken is followed to its end: given up
+            // half-way, the seat would be attached to nobody.
+            loop {
+                tokio::select! {
+                    () = outbox.abandoned() => break,
+                    () = closing.cancelled() => {
+                        outbox.end(StreamEnd::Complete);
+                        break;
+                    }
+                    Some((handle, call)) = reader.called.recv() => {
+                        reader.follow_call(handle, call).await;
+                    }
+                }
             }
             reader.leave_all().await;
         });
@@ -136,20 +147,50 @@ impl PlayService for Play {
     }
 }
 
-/// Updates as Watch sends them, with heartbeats when nothing happens.
-fn with_heartbeats(updates: OutboxStream<Updates>) -> impl Stream<Item = Result<Updates, Status>> {
-    tokio_stream::StreamExt::timeout_repeating(updates, tokio::time::interval(HEARTBEAT))
-        .map(|message| message.unwrap_or_else(|_| Ok(Updates::default())))
+/// The responses of a Play stream.
+#[derive(Debug)]
+pub struct Responses {
+    updates: OutboxStream,
+    /// Why the requests failed, if they did.
+    failure: Arc<OnceLock<Status>>,
+}
+
+impl Stream for Responses {
+    type Item = Result<Updates, Status>;
+
+    fn poll_next(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Option<Self::Item>> {
+        let next = self.updates.poll_next_unpin(context);
+        next.map_err(|end| {
+            let failure = self
+                .failure
+                .get()
+                .filter(|_| end == StreamEnd::RequestsFailed);
+            failure.cloned().unwrap_or_else(|| stream_ended(end))
+        })
+    }
+}
+
+/// The responses of a stream without requests, with heartbeats while nothing happens.
+pub(super) fn with_heartbeats(
+    updates: OutboxStream,
+) -> impl Stream<Item = Result<Updates, Status>> {
+    tokio_stream::StreamExt::timeout_repeating(updates, tokio::time::interval(HEARTBEAT)).map(
+        |message| {
+            message
+                .unwrap_or_else(|_| Ok(Updates::default()))
+                .map_err(stream_ended)
+        },
+    )
 }
 
 fn answer_action(answer: v1::Answer) -> SeatAction {
     let annotations = convert::annotations_from_proto(answer.annotations);
-    SeatAction::Answer {
+    SeatAction::Answer(Answer {
         decision_id: answer.decision_id,
         action: answer.action,
         annotations_refused: annotations.is_err(),
         annotations: annotations.unwrap_or_default(),
-    }
+    })
 }
 
 fn express_action(expression: &v1::Expression) -> Result<SeatAction, FieldProblem> {

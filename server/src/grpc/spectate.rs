@@ -3,20 +3,19 @@
 use std::pin::Pin;
 use std::sync::Arc;
 
-use chefshat_proto::v1::{
-    SpectatorServiceWatchRequest, SpectatorServiceWatchResponse,
-    spectator_service_server::SpectatorService,
-};
-use futures::{Stream, StreamExt as _};
+use chefshat_proto::v1::SpectatorServiceWatchRequest;
+use futures::Stream;
 use tokio_util::sync::CancellationToken;
 use tonic::{Request, Response, Status};
 
+use super::play::with_heartbeats;
 use super::room_service::find;
 use super::status::Refusal;
-use crate::config::HEARTBEAT;
-use crate::outbox::Outbox;
+use crate::outbox::{Outbox, StreamEnd};
 use crate::room::SpectateRequest;
 use crate::rooms::Rooms;
+use crate::wire::Updates;
+use crate::wire::service::spectator_service_server::SpectatorService;
 
 /// The service.
 #[derive(Debug, Clone)]
@@ -34,8 +33,7 @@ impl Spectate {
 
 #[tonic::async_trait]
 impl SpectatorService for Spectate {
-    type WatchStream =
-        Pin<Box<dyn Stream<Item = Result<SpectatorServiceWatchResponse, Status>> + Send>>;
+    type WatchStream = Pin<Box<dyn Stream<Item = Result<Updates, Status>> + Send>>;
 
     async fn watch(
         &self,
@@ -57,23 +55,9 @@ impl SpectatorService for Spectate {
         tokio::spawn(async move {
             tokio::select! {
                 () = outbox.abandoned() => {}
-                () = closing.cancelled() => outbox.end(Ok(())),
+                () = closing.cancelled() => outbox.end(StreamEnd::Complete),
             }
         });
-        let messages =
-            tokio_stream::StreamExt::timeout_repeating(messages, tokio::time::interval(HEARTBEAT))
-                .map(|message| message.unwrap_or_else(|_| Ok(Vec::new())).map(merge));
-        Ok(Response::new(Box::pin(messages)))
+        Ok(Response::new(Box::pin(with_heartbeats(messages))))
     }
-}
-
-/// Everything that was ready, as one message.
-fn merge(parts: Vec<SpectatorServiceWatchResponse>) -> SpectatorServiceWatchResponse {
-    let mut whole = SpectatorServiceWatchResponse::default();
-    for part in parts {
-        whole.room = whole.room.or(part.room);
-        whole.snapshot = whole.snapshot.or(part.snapshot);
-        whole.events.extend(part.events);
-    }
-    whole
 }

@@ -8,6 +8,8 @@ use chefshat_record::convert::FieldProblem;
 use tonic::{Code, Status};
 use tonic_types::{ErrorDetails, StatusExt as _};
 
+use crate::convert;
+use crate::outbox::StreamEnd;
 use crate::room::{RoomGone, SpectateError};
 use crate::rooms::CreateError;
 use chefshat_room::{ExpressError, JoinError, LeaveError};
@@ -138,6 +140,19 @@ pub fn spectator_too_slow() -> Status {
     )
 }
 
+/// Why a stream ended, for its client.
+pub fn stream_ended(end: StreamEnd) -> Status {
+    match end {
+        StreamEnd::Complete => Status::ok(""),
+        StreamEnd::ShuttingDown => shutting_down(),
+        StreamEnd::StoreFailed => store_failed(),
+        StreamEnd::RoomGone => room_gone(),
+        StreamEnd::SpectatorTooSlow => spectator_too_slow(),
+        StreamEnd::CallsNotTaken => calls_not_taken(),
+        StreamEnd::RequestsFailed => internal(),
+    }
+}
+
 /// A room was there and is not to be reached: it has just gone, or it was put down because the server stops.
 pub fn room_gone() -> Status {
     status(
@@ -196,11 +211,9 @@ impl From<LeaveError> for Refusal {
 
 impl From<ExpressError> for Refusal {
     fn from(error: ExpressError) -> Self {
-        let (code, reason) = match error {
-            ExpressError::GameOver => (Code::FailedPrecondition, "GAME_OVER"),
-            ExpressError::TooMany => (Code::ResourceExhausted, "TOO_MANY_EXPRESSIONS"),
-        };
-        Self(status(code, reason, error.to_string(), []))
+        let refused = convert::express_refused(error);
+        let code = Code::from(i32::try_from(refused.code).unwrap_or_default());
+        Self(status(code, &refused.reason, refused.message, []))
     }
 }
 

@@ -5,16 +5,15 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use chefshat_engine::Seat;
-use chefshat_proto::v1::{self, SpectatorServiceWatchResponse};
+use chefshat_proto::v1;
 use tokio::sync::{mpsc, oneshot};
 use tokio::time::Instant;
 
-use super::delivery::Wishes;
+use super::subscriber::DeliveryOptions;
 use crate::outbox::{OnSpace, Outbox};
-use crate::wire::Updates;
 use chefshat_room::ids::{Id, Token};
 use chefshat_room::journal::{AbortReason, ParticipantKind};
-use chefshat_room::{ConnectionId, ExpressError, JoinError, LeaveError};
+use chefshat_room::{Answer, ConnectionId, ExpressError, JoinError, LeaveError};
 
 /// The room is gone: closed, ended long ago, or stopped because its store failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -51,26 +50,26 @@ pub struct AttachRequest {
     /// Chosen by the client.
     pub request_id: u32,
     /// The stream.
-    pub outbox: Arc<Outbox<Updates>>,
+    pub outbox: Arc<Outbox>,
     /// Number of the seat on the stream.
     pub handle: u32,
-    /// How it wants to be told.
-    pub wishes: Wishes,
+    /// How events and decisions reach it.
+    pub options: DeliveryOptions,
     /// The seat's part of the game seed.
     pub entropy: Vec<u8>,
     /// When it was asked.
     pub arrived: Instant,
     /// Set when the seat has left the stream.
-    pub ended: Arc<AtomicBool>,
-    /// The seat's ticket, to be told to a client that the server attaches by itself.
-    pub told_ticket: Option<Token>,
+    pub detached: Arc<AtomicBool>,
+    /// The seat's ticket, for a client that the server attaches by itself.
+    pub assigned_ticket: Option<Token>,
 }
 
 /// Asks to watch.
 #[derive(Debug)]
 pub struct SpectateRequest {
     /// The stream.
-    pub outbox: Arc<Outbox<Vec<SpectatorServiceWatchResponse>>>,
+    pub outbox: Arc<Outbox>,
     /// Position in the log from which events are wanted.
     pub from: usize,
     /// Start with a snapshot.
@@ -92,16 +91,7 @@ pub enum SpectateError {
 #[derive(Debug)]
 pub enum SeatAction {
     /// Answers a decision.
-    Answer {
-        /// The decision.
-        decision_id: u64,
-        /// The action.
-        action: u32,
-        /// Annotations, encoded.
-        annotations: Option<Box<[u8]>>,
-        /// Annotations were sent that cannot be recorded.
-        annotations_refused: bool,
-    },
+    Answer(Answer),
     /// Expresses something.
     Express {
         /// For the record only.
@@ -142,7 +132,7 @@ pub(super) enum Message {
         oneshot::Sender<Option<Result<v1::Room, LeaveError>>>,
     ),
     Abort(AbortReason),
-    PutDown,
+    Suspend,
     Space,
 }
 
@@ -270,10 +260,10 @@ impl Handle {
         self.ask(|reply| Message::Close(secret, reply)).await
     }
 
-    /// Ends the room because the server ends, if its game is not over: puts it down where it stands if it is durable, else aborts the game.
+    /// Ends the room because the server stops, if its game is not over: suspends a durable game, aborts any other.
     pub async fn end(&self, durable: bool) {
         let message = if durable {
-            Message::PutDown
+            Message::Suspend
         } else {
             Message::Abort(AbortReason::Shutdown)
         };

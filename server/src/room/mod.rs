@@ -1,18 +1,15 @@
-//! A room: a place with seats that owns one game. `core` is the synchronous heart that decides everything; `task` is the thin shell around
-//! it that receives, keeps, and only then tells; `delivery` is how what happened reaches streams.
+//! Rooms: a task each, which owns one game. `chefshat-room` decides; `task` commits and publishes; `subscriber` sends to the streams of seats
+//! and spectators; `handle` is how others reach a room.
 
-mod clock;
-pub mod delivery;
 mod handle;
-mod spectators;
+pub mod subscriber;
 mod task;
 #[cfg(test)]
 mod tests;
 
-pub use clock::{RoomClock, since_epoch_ms};
 pub use handle::{
     Acted, AttachRequest, Handle, JoinRequest, Joined, RoomGone, SeatAction, SpectateError,
     SpectateRequest,
 };
-pub use spectators::{MAX_SPECTATOR_LAG, MAX_SPECTATORS};
-pub use task::{RoomWatcher, TaskContext, go_on};
+pub use subscriber::{MAX_SPECTATOR_LAG, MAX_SPECTATORS};
+pub use task::{RoomWatcher, TaskContext, spawn_room};

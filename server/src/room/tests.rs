@@ -9,22 +9,25 @@ use chefshat_engine::SeedPlan;
 use chefshat_engine::{RULES_VERSION, RuleSetSpec, Seat, Stop};
 use chefshat_proto::v1::{self, seat_update::Update};
 use futures::StreamExt as _;
+use futures::future::BoxFuture;
 use prost::Message as _;
 use tokio::time::Instant;
 use tokio_util::task::TaskTracker;
 
-use super::delivery::Wishes;
+use super::subscriber::DeliveryOptions;
 use super::{
-    AttachRequest, Handle, JoinRequest, RoomClock, RoomWatcher, SeatAction, TaskContext, go_on,
+    AttachRequest, Handle, JoinRequest, RoomWatcher, SeatAction, SpectateRequest, TaskContext,
+    spawn_room,
 };
+use crate::clock::RoomClock;
 use crate::filing::Filing;
+use crate::outbox::StreamEnd;
 use crate::outbox::{Outbox, OutboxStream};
-use crate::store::{MemoryStore, Store as _};
-use crate::wire::Updates;
+use crate::store::{Journal, MemoryStore, Store as _, StoreError};
 use chefshat_room::ids::{Id, SecretHash, Token};
-use chefshat_room::journal::{Fill, GameHeader, GameStart, ParticipantKind};
+use chefshat_room::journal::{Entry, Fill, GameHeader, GameStart, ParticipantKind};
 use chefshat_room::policy::{AbortPolicy, Policy};
-use chefshat_room::{ConnectionId, Core};
+use chefshat_room::{Answer, ConnectionId, Core};
 
 struct Nobody;
 
@@ -34,6 +37,15 @@ impl RoomWatcher for Nobody {
 }
 
 async fn room(policy: Policy, shifts: u32) -> Handle {
+    room_with(policy, shifts, |journal| journal).await
+}
+
+/// A room whose journal is changed before it starts.
+async fn room_with(
+    policy: Policy,
+    shifts: u32,
+    change: impl FnOnce(Box<dyn Journal>) -> Box<dyn Journal>,
+) -> Handle {
     let header = Arc::new(GameHeader {
         room_id: Id([1; 16]),
         game_id: Id([2; 16]),
@@ -61,11 +73,11 @@ async fn room(policy: Policy, shifts: u32) -> Handle {
         .create(Arc::clone(&header), Vec::new())
         .await
         .expect("memory keeps it");
-    go_on(
+    spawn_room(
         Core::new(header),
         RoomClock::of_age(Duration::ZERO),
         None,
-        journal,
+        change(journal),
         TaskContext {
             filing: Filing::new(store.clone(), None, TaskTracker::new()),
             store,
@@ -81,7 +93,7 @@ struct AttachedSeat {
     seat: Seat,
     connection: ConnectionId,
     ticket: Token,
-    updates: OutboxStream<Updates>,
+    updates: OutboxStream,
 }
 
 async fn take_seat(room: &Handle) -> AttachedSeat {
@@ -105,7 +117,7 @@ async fn attach(room: &Handle, ticket: Token) -> AttachedSeat {
             request_id: 0,
             outbox,
             handle: 0,
-            wishes: Wishes {
+            options: DeliveryOptions {
                 at_once: true,
                 no_mask: false,
                 snapshot: false,
@@ -113,8 +125,8 @@ async fn attach(room: &Handle, ticket: Token) -> AttachedSeat {
             },
             entropy: Vec::new(),
             arrived: Instant::now(),
-            ended: Arc::default(),
-            told_ticket: None,
+            detached: Arc::default(),
+            assigned_ticket: None,
         })
         .await
         .expect("the room is there")
@@ -139,12 +151,10 @@ async fn read(room: &Handle, seat: &mut AttachedSeat, answering: bool) -> Vec<u6
                     numbers.extend(batch.events.iter().map(|event| event.sequence));
                 }
                 Update::Decision(decision) if answering => {
-                    let action = SeatAction::Answer {
-                        decision_id: decision.decision_id,
-                        action: first_legal(&decision),
-                        annotations: None,
-                        annotations_refused: false,
-                    };
+                    let action = SeatAction::Answer(Answer::new(
+                        decision.decision_id,
+                        first_legal(&decision),
+                    ));
                     room.perform(seat.seat, seat.connection, action, Instant::now())
                         .await
                         .expect("the room is there");
@@ -239,12 +249,7 @@ async fn a_flood_does_not_stop_the_clock() {
             let room = room.clone();
             tokio::spawn(async move {
                 loop {
-                    let nonsense = SeatAction::Answer {
-                        decision_id: u64::MAX,
-                        action: 0,
-                        annotations: None,
-                        annotations_refused: false,
-                    };
+                    let nonsense = SeatAction::Answer(Answer::new(u64::MAX, 0));
                     if room
                         .perform(seat, connection, nonsense, Instant::now())
                         .await
@@ -290,4 +295,75 @@ async fn the_last_word_finds_its_place_in_a_full_outbox() {
     };
     assert_eq!(detached.reason(), v1::DetachReason::Superseded);
     drop(newer);
+}
+
+/// A journal whose next appends succeed, and then one panics.
+struct PanicsAfter {
+    appends: usize,
+    journal: Box<dyn Journal>,
+}
+
+impl Journal for PanicsAfter {
+    fn append<'a>(
+        &'a mut self,
+        entries: &'a mut Vec<Entry>,
+    ) -> BoxFuture<'a, Result<(), StoreError>> {
+        self.appends = self
+            .appends
+            .checked_sub(1)
+            .expect("the journal is asked to panic");
+        self.journal.append(entries)
+    }
+
+    fn finish(
+        &mut self,
+        summary: Option<Box<v1::RecordSummary>>,
+    ) -> BoxFuture<'_, Result<(), StoreError>> {
+        self.journal.finish(summary)
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_streams_of_a_room_that_panics_end() {
+    // Four seats are taken and attached, then the first answer panics.
+    let room = room_with(Policy::default(), 1, |journal| {
+        Box::new(PanicsAfter {
+            appends: 5,
+            journal,
+        })
+    })
+    .await;
+    let mut seats = Vec::new();
+    for _ in 0..4 {
+        seats.push(take_seat(&room).await);
+    }
+    let (outbox, mut watched) = Outbox::new();
+    room.spectate(SpectateRequest {
+        outbox,
+        from: 0,
+        snapshot: false,
+    })
+    .await
+    .expect("the room is there")
+    .expect("spectators are admitted");
+    for seat in &seats {
+        let answers = (0..u32::from(u8::MAX)).map(|action| Answer::new(1, action));
+        for answer in answers {
+            let action = SeatAction::Answer(answer);
+            // Once the room is gone it takes nothing.
+            let _ = (room.perform(seat.seat, seat.connection, action, Instant::now())).await;
+        }
+    }
+    for stream in seats
+        .iter_mut()
+        .map(|seat| &mut seat.updates)
+        .chain([&mut watched])
+    {
+        let mut end = None;
+        while let Some(updates) = stream.next().await {
+            end = updates.err();
+        }
+        assert_eq!(end, Some(StreamEnd::RoomGone));
+    }
+    assert!(room.describe().await.is_err());
 }

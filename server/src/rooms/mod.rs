@@ -17,9 +17,10 @@ use tokio::sync::Notify;
 use tokio::sync::futures::Notified;
 use tokio_util::task::TaskTracker;
 
+use crate::clock::{RoomClock, since_epoch_ms};
 use crate::config::ServerConfig;
 use crate::filing::Filing;
-use crate::room::{Handle, RoomClock, RoomWatcher, TaskContext, go_on, since_epoch_ms};
+use crate::room::{Handle, RoomWatcher, TaskContext, spawn_room};
 use crate::store::{Store, StoreError};
 use chefshat_room::Core;
 use chefshat_room::ids::{Id, Token, join_code, normal_code, random_bytes};
@@ -364,14 +365,14 @@ impl Place {
             core.seat(Seat::new(seat), participant);
         }
         // Who sits there is kept with the room: there is never one whose seats are empty.
-        let seated = std::mem::take(core.unkept());
+        let seated = std::mem::take(core.pending());
         let store = &rooms.context.store;
         let mut journal = store.create(Arc::clone(&header), seated).await?;
         // Looked at and entered under one lock, so that a shutdown cannot slip in between and miss the room.
         if let Some(mut table) = Some(rooms.lock()).filter(|table| !table.shutting_down) {
             table.make_space(rooms.max_rooms);
             let clock = RoomClock::of_age(Duration::ZERO);
-            let handle = go_on(core, clock, None, journal, rooms.context.clone());
+            let handle = spawn_room(core, clock, None, journal, rooms.context.clone());
             table.enter(Entry {
                 handle: handle.clone(),
                 game_id: header.game_id,

@@ -11,8 +11,9 @@ use chefshat_record::convert::seat_number;
 use tracing::{error, info, warn};
 
 use super::{Entry, Rooms};
+use crate::clock::{RoomClock, since_epoch_ms};
 use crate::convert;
-use crate::room::{RoomClock, go_on, since_epoch_ms};
+use crate::room::spawn_room;
 use crate::store::{LeftGame, Store, StoreError};
 use chefshat_room::Core;
 use chefshat_room::ids::Id;
@@ -69,7 +70,7 @@ impl Rooms {
         let clock = RoomClock::of_age(age);
         let mut table = self.lock();
         let over_since = game.concluded.then_some(age);
-        let handle = go_on(core, clock, over_since, game.journal, self.context.clone());
+        let handle = spawn_room(core, clock, over_since, game.journal, self.context.clone());
         table.enter(Entry {
             handle,
             game_id: header.game_id,

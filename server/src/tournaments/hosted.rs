@@ -10,11 +10,9 @@ use tokio::sync::{mpsc, oneshot, watch};
 
 use super::shown::Shown;
 use crate::convert::{self, TournamentPlan};
-use crate::grpc::status::calls_not_taken;
-use crate::outbox::Outbox;
+use crate::outbox::{Outbox, StreamEnd};
 use crate::rooms::Rooms;
 use crate::store::tournaments::TournamentHeader;
-use crate::wire::Updates;
 use chefshat_room::ids::{Id, SecretHash, Token};
 use chefshat_room::journal::ParticipantKind;
 
@@ -37,7 +35,7 @@ pub struct Connection {
     /// Takes what the participant is told.
     pub calls: mpsc::Sender<(u32, Call)>,
     /// The stream.
-    pub outbox: Arc<Outbox<Updates>>,
+    pub outbox: Arc<Outbox>,
 }
 
 impl Connection {
@@ -45,7 +43,7 @@ impl Connection {
     pub(super) fn call(&self, call: Call) -> bool {
         let told = self.calls.try_send((self.handle, call)).is_ok();
         if !told {
-            self.outbox.cut(calls_not_taken());
+            self.outbox.cut(StreamEnd::CallsNotTaken);
         }
         told
     }

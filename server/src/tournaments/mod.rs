@@ -25,9 +25,9 @@ pub use hosted::{Call, Connection, Entry, Hosted, Stopped};
 pub use leaderboard::Leaderboard;
 pub use shared::NotWorkedOut;
 
+use crate::clock::since_epoch_ms;
 use crate::config::{MAX_TOURNAMENTS, TOURNAMENT_MAILBOX};
 use crate::convert::{self, TournamentPlan};
-use crate::room::since_epoch_ms;
 use crate::rooms::Rooms;
 use crate::store::StoreError;
 use crate::store::tournaments::{KeptTournament, TournamentEntry, TournamentHeader};

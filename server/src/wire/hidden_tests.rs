@@ -38,7 +38,7 @@ fn swapped(hands: &BySeat<Cards>, one: Seat, other: Seat, faces: u8) -> Option<B
 /// Everything the viewer is told of a table: all events, and the decision that is open if it is its own.
 fn told(table: &Table, viewer: Seat, see: Viewer) -> Vec<Vec<u8>> {
     let mut messages: Vec<Vec<u8>> = (0..table.core.log().len())
-        .filter_map(|position| convert::view(&table.core, position, see))
+        .filter_map(|position| convert::event_to_proto(&table.core, position, see))
         .map(|event| event.encode_to_vec())
         .collect();
     if let Some(open) = table

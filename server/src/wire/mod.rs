@@ -1,6 +1,6 @@
-//! Updates for a stream of seats, encoded when they happen. Events that look the same to everybody are encoded once for all who are told
-//! of them; what is ready for a stream is one run of bytes, which is the body of a `PlayResponse` (or of a `PlayServiceWatchResponse`:
-//! both have their updates in field 1). What stands in an update is said elsewhere: here is only how it lies on the wire.
+//! The bodies of streamed responses, encoded when events happen and not again when they are written. Public events are encoded once for all
+//! seats and spectators. The body of a response is a run of bytes: `PlayResponse` and `PlayServiceWatchResponse` have their updates in field 1,
+//! `SpectatorServiceWatchResponse` its events. What the messages mean is decided elsewhere.
 
 mod decision;
 #[cfg(test)]
@@ -15,7 +15,7 @@ use prost::encoding::{
 
 pub use decision::encode_decision;
 
-/// The service, with [`Updates`] as its streamed response.
+/// The streaming services, with [`Updates`] as their responses.
 pub mod service {
     #![allow(missing_docs, unreachable_pub, clippy::all, reason = "generated code")]
     tonic::include_proto!("chefshat.v1");
@@ -25,6 +25,9 @@ pub mod service {
 const RESPONSE_UPDATES: u32 = 1;
 /// Space made at once for what is usually told of at a time: a few events and a decision request.
 const USUAL_LENGTH: usize = 384;
+/// Fields of `SpectatorServiceWatchResponse`; its events are in the field that [`BATCH_EVENTS`] names.
+const SPECTATOR_ROOM: u32 = 2;
+const SPECTATOR_SNAPSHOT: u32 = 3;
 /// Fields of `SeatUpdate`.
 const UPDATE_HANDLE: u32 = 1;
 const UPDATE_EVENTS: u32 = 3;
@@ -32,7 +35,7 @@ const UPDATE_DECISION: u32 = 4;
 /// Field of the events in an `EventBatch`.
 const BATCH_EVENTS: u32 = 1;
 
-/// Encoded updates, in order: the body of a response.
+/// Encoded updates, in order: the body of a streamed response.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Updates {
     bytes: Vec<u8>,
@@ -73,6 +76,24 @@ impl Updates {
         self.end_part(1);
     }
 
+    /// Adds the room to a response for a spectator.
+    pub fn add_room(&mut self, room: &v1::Room) {
+        prost::encoding::message::encode(SPECTATOR_ROOM, room, &mut self.bytes);
+        self.end_part(1);
+    }
+
+    /// Adds a snapshot to a response for a spectator.
+    pub fn add_snapshot(&mut self, snapshot: &v1::Snapshot) {
+        prost::encoding::message::encode(SPECTATOR_SNAPSHOT, snapshot, &mut self.bytes);
+        self.end_part(1);
+    }
+
+    /// Adds `count` events to a response for a spectator, encoded as [`Events`] holds them.
+    pub fn add_spectator_events(&mut self, events: &[u8], count: usize) {
+        self.bytes.extend_from_slice(events);
+        self.end_part(1 + count);
+    }
+
     fn add_encoded(&mut self, handle: u32, field: u32, content: &[u8]) {
         let handle_length = if handle == 0 {
             0
@@ -100,16 +121,19 @@ impl Updates {
     }
 }
 
-impl crate::outbox::Pile for Updates {
-    fn is_empty(&self) -> bool {
+impl Updates {
+    /// Whether there is nothing.
+    pub fn is_empty(&self) -> bool {
         self.parts.is_empty()
     }
 
-    fn weight(&self) -> usize {
+    /// What they count for, in updates and events.
+    pub fn weight(&self) -> usize {
         self.parts.iter().map(|part| part.weight).sum()
     }
 
-    fn append(&mut self, other: &mut Self) {
+    /// Moves everything from `other` to the end of this.
+    pub fn append(&mut self, other: &mut Self) {
         if self.is_empty() {
             std::mem::swap(self, other);
             return;
@@ -122,7 +146,8 @@ impl crate::outbox::Pile for Updates {
         }));
     }
 
-    fn take(&mut self, most: usize) -> Self {
+    /// Takes updates from the front that count for at most `most`, but at least one.
+    pub fn take(&mut self, most: usize) -> Self {
         let mut weight = 0;
         let count = self
             .parts
@@ -226,7 +251,6 @@ fn start_delimited(bytes: &mut Vec<u8>, field: u32, length: usize) {
 
 #[cfg(test)]
 mod tests {
-    use crate::outbox::Pile as _;
     use crate::wire::*;
 
     fn event(sequence: u64) -> v1::GameEvent {

@@ -89,15 +89,13 @@ async fn every_column_says_what_the_engine_says() {
             );
             let action = u16::try_from(actions[row].0).expect("an action");
             game.apply(chefshat_engine::ActionId::new(action), |event| {
-                if let Event::ShiftEnded {
-                    pizzas,
-                    laps,
-                    turns,
-                    points,
-                    ..
-                } = event
-                {
-                    beside.push((pizzas, laps, turns, points.as_slice().to_vec()));
+                if let Event::ShiftEnded(end) = event {
+                    beside.push((
+                        end.pizzas,
+                        end.laps,
+                        end.turns,
+                        end.points.as_slice().to_vec(),
+                    ));
                 }
             })
             .expect("legal");

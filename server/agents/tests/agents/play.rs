@@ -16,7 +16,7 @@ struct Counts {
 impl Listener for Counts {
     fn on_event(&mut self, event: &Event) {
         match event {
-            Event::ShiftEnded { turns, .. } => self.turns += u64::from(*turns),
+            Event::ShiftEnded(end) => self.turns += u64::from(end.turns),
             Event::GameEnded { .. } => self.ended = true,
             _ => {}
         }

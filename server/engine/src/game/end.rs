@@ -2,7 +2,7 @@
 
 use super::shift_state::bit;
 use super::{Game, Stage};
-use crate::{BySeat, Deal, Event, Seat, SeatOrder, Standings, Stop};
+use crate::{BySeat, Deal, Event, Seat, SeatOrder, ShiftEnd, Standings, Stop};
 
 impl Game {
     /// Orders the seats that still hold cards when a Shift reaches its limit of turns (§5.4): fewest
@@ -50,7 +50,7 @@ impl Game {
             self.scores[seat] += u64::from(points[seat]);
         }
         self.last_order = order;
-        on_event(Event::ShiftEnded {
+        on_event(Event::ShiftEnded(Box::new(ShiftEnd {
             shift: self.shift,
             order,
             finished,
@@ -62,11 +62,11 @@ impl Game {
             turns: self.state.turns,
             special: self.special,
             adjudicated,
-        });
+        })));
         if self.is_decided() {
             self.stage = Stage::Over;
             on_event(Event::GameEnded {
-                standings: self.final_table(),
+                standings: Box::new(self.final_table()),
             });
         } else {
             let shift = self.shift + 1;

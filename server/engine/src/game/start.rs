@@ -30,7 +30,7 @@ impl Game {
         self.state = ShiftState::new(players);
         on_event(Event::ShiftStarted {
             shift,
-            hands: hands.map(Some),
+            hands: Box::new(hands.map(Some)),
         });
         if ranking.is_empty() {
             return self.open_first_turn();

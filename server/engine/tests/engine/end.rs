@@ -1,7 +1,7 @@
 //! How turns, pizzas, Shifts and games end, with hands one can check by eye.
 
 use chefshat_engine::{
-    BySeat, DecisionKind, Event, Game, PassScope, RuleSetSpec, Script, Seat, Seed, Stop,
+    BySeat, DecisionKind, Event, Game, PassScope, RuleSetSpec, Script, Seat, Seed, ShiftEnd, Stop,
 };
 
 use crate::rewards::TURNS;
@@ -152,7 +152,10 @@ fn adjudication_places_by_cards_left_and_then_by_distance() {
     act(&mut game, "C2;Q1;J0");
     act(&mut game, "pass");
     let events = act(&mut game, "pass");
-    let Event::ShiftEnded {
+    let Event::ShiftEnded(end) = &events[1] else {
+        panic!("{events:?}");
+    };
+    let ShiftEnd {
         order: placed,
         finished,
         turns,
@@ -160,10 +163,7 @@ fn adjudication_places_by_cards_left_and_then_by_distance() {
         adjudicated,
         points,
         ..
-    } = events[1]
-    else {
-        panic!("{events:?}");
-    };
+    } = **end;
     assert_eq!(
         (finished, turns, pizzas, adjudicated),
         (0, 4, 1, true),
@@ -188,15 +188,15 @@ fn the_last_turn_allowed_may_end_the_shift_by_itself() {
         act(&mut game, text);
     }
     let events = act(&mut game, TURNS[5]);
-    let Event::ShiftEnded {
+    let Event::ShiftEnded(end) = &events[2] else {
+        panic!("{events:?}")
+    };
+    let ShiftEnd {
         turns,
         adjudicated,
         finished,
         ..
-    } = events[2]
-    else {
-        panic!("{events:?}")
-    };
+    } = **end;
     assert_eq!((turns, adjudicated, finished), (6, false, 1));
 }
 
@@ -210,17 +210,17 @@ fn laps_count_reaching_and_passing_over_the_starter() {
         act(&mut game, text);
     }
     let events = act(&mut game, "C0;Q0;J1");
-    let Event::ShiftEnded {
+    let Event::ShiftEnded(end) = &events[2] else {
+        panic!("{events:?}")
+    };
+    let ShiftEnd {
         laps,
         turns,
         pizzas,
         starter,
         order: placed,
         ..
-    } = events[2]
-    else {
-        panic!("{events:?}")
-    };
+    } = **end;
     // Turns of seats 0 1 2 | 1 2 | 1 2 | 1 2 | 1: from 2 to 1 passes over seat 0 each time.
     assert_eq!((laps, turns, pizzas, starter), (5, 10, 5, seat(0)));
     assert_eq!(placed, order(&[0, 1, 2]));
@@ -253,7 +253,12 @@ fn equal_points_are_settled_by_the_last_shift() {
         assert_eq!(game.standings(), None);
         let events: Vec<Event> = TURNS.iter().flat_map(|text| act(&mut game, text)).collect();
         let standings = game.standings().unwrap();
-        assert_eq!(events.last(), Some(&Event::GameEnded { standings }));
+        assert_eq!(
+            events.last(),
+            Some(&Event::GameEnded {
+                standings: Box::new(standings)
+            })
+        );
         assert_eq!(standings.points.as_slice(), after);
         assert_eq!(standings.winner(), seat(winner));
         let lines = [

@@ -37,7 +37,7 @@ impl Model {
     pub(crate) fn follow(&mut self, event: &Event) {
         let faces = self.rules.faces();
         match *event {
-            Event::ShiftStarted { hands, .. } => {
+            Event::ShiftStarted { ref hands, .. } => {
                 self.hands = hands
                     .values()
                     .map(|hand| self.list(hand.unwrap()))

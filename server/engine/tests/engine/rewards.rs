@@ -36,7 +36,7 @@ fn rewards(scheme: RewardScheme, max_turns: u32) -> Vec<Vec<(usize, f32, usize)>
         scheme.of_events(&rules, &events, |seat, reward, index| {
             assert!(matches!(
                 events[index],
-                Event::Played { .. } | Event::Passed { .. } | Event::ShiftEnded { .. }
+                Event::Played { .. } | Event::Passed { .. } | Event::ShiftEnded(_)
             ));
             brought.push((seat.index(), reward, index));
         });

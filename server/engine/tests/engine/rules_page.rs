@@ -135,7 +135,7 @@ fn the_example_shift_is_played_by_the_rules() {
         let finished = |event: &Event| matches!(event, Event::SeatFinished { .. });
         assert_eq!(events.iter().any(finished), row[3].contains(" place**"));
         places.extend(events.iter().filter_map(|event| match event {
-            Event::ShiftEnded { order, points, .. } => Some((*order, *points)),
+            Event::ShiftEnded(end) => Some((end.order, end.points)),
             _ => None,
         }));
     }

@@ -319,14 +319,14 @@ fn leaky_decision(game: &Game, viewer: Viewer) -> Observation {
 
 fn leaky_deal(event: &Event, viewer: Viewer) -> Event {
     match event {
-        Event::ShiftStarted { .. } => *event,
+        Event::ShiftStarted { .. } => event.clone(),
         _ => event.seen_by(viewer),
     }
 }
 
 fn leaky_exchange(event: &Event, viewer: Viewer) -> Event {
     match event {
-        Event::CardsExchanged { .. } => *event,
+        Event::CardsExchanged { .. } => event.clone(),
         _ => event.seen_by(viewer),
     }
 }
@@ -348,7 +348,7 @@ fn private_fields_are_left_out_and_nothing_else() {
             let seen = event.seen_by(viewer);
             assert_eq!(std::mem::discriminant(&seen), std::mem::discriminant(event));
             assert_eq!(seen.seen_by(viewer), seen, "seeing twice shows no less");
-            match (*event, seen) {
+            match (event.clone(), seen.clone()) {
                 (Event::ShiftStarted { hands, .. }, Event::ShiftStarted { hands: shown, .. }) => {
                     deals += 1;
                     for (seat, hand) in shown.iter() {

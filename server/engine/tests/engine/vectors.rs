@@ -3,7 +3,7 @@
 
 use std::path::PathBuf;
 
-use chefshat_engine::{ActionId, Card, Deal, Event, Game, Seat, SpecialAction};
+use chefshat_engine::{ActionId, Card, Deal, Event, Game, Seat, ShiftEnd, SpecialAction};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
@@ -131,7 +131,10 @@ fn games() {
 
 /// The end of a Shift as the vectors write it.
 fn shift_json(event: &Event) -> Option<Value> {
-    let Event::ShiftEnded {
+    let Event::ShiftEnded(end) = event else {
+        return None;
+    };
+    let ShiftEnd {
         shift,
         order,
         starter,
@@ -141,10 +144,7 @@ fn shift_json(event: &Event) -> Option<Value> {
         special,
         adjudicated,
         ..
-    } = event
-    else {
-        return None;
-    };
+    } = **end;
     let special = special.map(|special| match special {
         SpecialAction::FoodFight => "food_fight",
         SpecialAction::DinnerIsServed => "dinner_is_served",

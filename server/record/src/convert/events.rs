@@ -82,27 +82,18 @@ pub fn event_kind(event: &Event, space: ActionSpace, by: By) -> Option<Kind> {
             last_to_play: last_to_play.map(seat_number),
             next_leader: seat_number(next_leader),
         }),
-        Event::ShiftEnded {
-            shift,
-            ref order,
-            ref points,
-            ref scores,
-            starter,
-            pizzas,
-            laps,
-            turns,
-            adjudicated,
-            ..
-        } => Kind::ShiftEnded(Box::new(v1::ShiftEnded {
-            shift,
-            order: order.as_slice().iter().copied().map(seat_number).collect(),
-            shift_points: points.values().copied().collect(),
-            points: scores.values().copied().collect(),
-            starter: seat_number(starter),
-            pizzas,
-            laps,
-            turns,
-            adjudicated,
+        Event::ShiftEnded(ref end) => Kind::ShiftEnded(Box::new(v1::ShiftEnded {
+            shift: end.shift,
+            order: (end.order.as_slice().iter().copied())
+                .map(seat_number)
+                .collect(),
+            shift_points: end.points.values().copied().collect(),
+            points: end.scores.values().copied().collect(),
+            starter: seat_number(end.starter),
+            pizzas: end.pizzas,
+            laps: end.laps,
+            turns: end.turns,
+            adjudicated: end.adjudicated,
         })),
         Event::GameEnded { .. } => return None,
     })

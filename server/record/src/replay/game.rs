@@ -178,8 +178,8 @@ impl<'a> Replay<'a> {
         let space = self.setup.rules.actions();
         for (event, rewards) in with_rewards(events, &self.setup.rules, self.setup.scheme) {
             let told = match &self.table {
-                Some(table) => table.as_told(*event),
-                None => *event,
+                Some(table) => table.as_told(event.clone()),
+                None => event.clone(),
             };
             if let Some(kind) = event_kind(&told, space, by) {
                 self.expected.push_back((kind, rewards));

@@ -36,8 +36,8 @@ impl Ruled {
         match *event {
             Event::RolesAssigned { roles } => last.roles = roles,
             Event::SeatFinished { seat, place } => last.places[seat] = place,
-            Event::ShiftEnded { ref order, .. } => {
-                for (place, seat) in (1..).zip(order.as_slice()) {
+            Event::ShiftEnded(ref end) => {
+                for (place, seat) in (1..).zip(end.order.as_slice()) {
                     last.places[*seat] = place;
                 }
             }

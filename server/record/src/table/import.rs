@@ -268,7 +268,7 @@ impl Importing {
         let scheme = reward_scheme_from_proto(self.told.scheme);
         for (event, rewards) in with_rewards(events, &rules, scheme) {
             self.ruled.note(event);
-            if let Some(kind) = event_kind(&self.table.as_told(*event), space, by) {
+            if let Some(kind) = event_kind(&self.table.as_told(event.clone()), space, by) {
                 self.event(kind, rewards);
             }
         }

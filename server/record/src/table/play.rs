@@ -136,13 +136,8 @@ impl Table {
         game: &mut Game,
         events: &mut Vec<Event>,
     ) -> Result<(), ScriptError> {
-        let ended = events.iter().find_map(|event| match *event {
-            Event::ShiftEnded {
-                shift,
-                order,
-                scores,
-                ..
-            } => Some((shift, order, scores)),
+        let ended = events.iter().find_map(|event| match event {
+            Event::ShiftEnded(end) => Some((end.shift, end.order, end.scores)),
             _ => None,
         });
         let Some((shift, order, scores)) = ended.filter(|_| !game.is_over()) else {
@@ -152,7 +147,7 @@ impl Table {
         // The engine has dealt a Shift of its own, which was never played.
         let end = events
             .iter()
-            .position(|event| matches!(event, Event::ShiftEnded { .. }));
+            .position(|event| matches!(event, Event::ShiftEnded(_)));
         events.truncate(end.map_or(0, |end| end + 1));
         // Points of a real game are far below the bound.
         let scores = scores.map(|score| u32::try_from(score).unwrap_or(u32::MAX));
@@ -207,10 +202,10 @@ impl Table {
         match event {
             Event::ShiftStarted { shift, hands } => Event::ShiftStarted {
                 shift,
-                hands: BySeat::from_fn(hands.len(), |seat| {
+                hands: Box::new(BySeat::from_fn(hands.len(), |seat| {
                     let told = |(_, fact): &(usize, Fact)| matches!(fact, Fact::Hand(told, _) if *told == seat);
                     hands[seat].filter(|_| facts.iter().any(told))
-                }),
+                })),
             },
             Event::CardsExchanged {
                 giver,

@@ -1,6 +1,7 @@
 //! Deadlines, banks, defaults, substitution, giving up.
 
 use chefshat_agents::AgentKind;
+use chefshat_engine::Event;
 
 use super::*;
 use crate::journal::AbortReason;
@@ -56,27 +57,19 @@ fn an_answer_that_arrived_in_time_counts_even_if_it_waited_in_a_queue() {
     let mut table = Table::playing(quick());
     let (seat, id) = table.open();
     let action = table.legal(0);
-    let answer = |arrived| AnswerInput {
-        seat,
-        decision_id: id,
-        action,
-        annotations: None,
-        annotations_refused: false,
-        arrived,
-        handed: Some(ms(0)),
+    let answer = |table: &mut Table, arrived| {
+        let answer = Answer::new(id, action);
+        (table.core).answer(ms(1600), seat, answer, arrived, Some(ms(0)))
     };
     let mut late = Table::playing(quick());
     assert_eq!(
-        late.core.answer(ms(1600), answer(ms(1500))).verdict,
+        answer(&mut late, ms(1500)).verdict,
         Verdict::Closed,
         "arrived at the deadline"
     );
-    late.keep();
+    late.commit();
     assert_eq!(late.last_decision().source, Source::Timeout);
-    assert_eq!(
-        table.core.answer(ms(1600), answer(ms(1499))).verdict,
-        Verdict::Accepted
-    );
+    assert_eq!(answer(&mut table, ms(1499)).verdict, Verdict::Accepted);
 }
 
 #[test]
@@ -202,7 +195,7 @@ fn a_silent_seat_is_substituted_and_comes_back() {
     }
     assert_eq!(lost, 2);
     assert_eq!(
-        table.happened(|event| matches!(event, Happening::Substituted(seat) if *seat == silent)),
+        table.happened(|event| matches!(event, RoomEvent::Substituted(seat) if *seat == silent)),
         1
     );
     // The substitute plays without being asked for.
@@ -210,15 +203,19 @@ fn a_silent_seat_is_substituted_and_comes_back() {
         assert_ne!(table.open().0, silent);
         table.play_one();
     }
-    let by_substitute = |happening: &Happening| match happening {
-        Happening::Played { seat, by, .. } | Happening::Passed { seat, by, .. } => {
-            *seat == silent && by.source == Source::Substitute
+    let by_substitute = |event: &RoomEvent| match event {
+        RoomEvent::Game(game) => {
+            let seat = match game.event {
+                Event::Played { seat, .. } | Event::Passed { seat, .. } => Some(seat),
+                _ => None,
+            };
+            seat == Some(silent) && game.source == Source::Substitute
         }
         _ => false,
     };
     assert!(table.happened(by_substitute) > 0);
     table.core.resume(table.now, silent);
-    table.keep();
+    table.commit();
     assert!(!table.core.standing(silent).substituted);
     while table.open().0 != silent {
         table.play_one();
@@ -261,13 +258,13 @@ fn disconnected_is_not_timeout_and_does_not_stop_the_clock() {
     table.pass_time(ms(400));
     table.lost(seat, connection);
     assert_eq!(
-        table.happened(|event| matches!(event, Happening::Disconnected(_))),
+        table.happened(|event| matches!(event, RoomEvent::Disconnected(_))),
         1
     );
     table.pass_time(ms(600));
     table.attach(seat);
     assert_eq!(
-        table.happened(|event| matches!(event, Happening::Returned(_))),
+        table.happened(|event| matches!(event, RoomEvent::Returned(_))),
         1
     );
     assert_eq!(table.open(), (seat, id), "still the same decision");
@@ -297,7 +294,7 @@ fn a_game_without_its_participants_is_given_up_as_the_policy_says() {
             ..quick()
         });
         table.pass_time(Duration::from_secs(3600));
-        let substituted = table.happened(|event| matches!(event, Happening::Substituted(_)));
+        let substituted = table.happened(|event| matches!(event, RoomEvent::Substituted(_)));
         match lost_seats {
             Some(lost) => {
                 assert_eq!(
@@ -329,7 +326,7 @@ fn built_in_agents_play_by_themselves_at_their_pace() {
         fills,
     );
     table.core.begin_if_all_built_in(table.now);
-    table.keep();
+    table.commit();
     assert_eq!(table.core.decisions(), 0);
     table.pass_time(ms(1000));
     assert_eq!(table.core.decisions(), 10);
@@ -418,4 +415,33 @@ fn built_in_agents_wait_a_second_where_a_person_plays() {
         }
         table.assert_replays();
     }
+}
+
+#[test]
+fn an_answer_is_called_closed_only_if_its_decision_is() {
+    let mut table = Table::playing(quick());
+    let (seat, id) = table.open();
+    let (wrong, right) = (table.illegal(), table.legal(0));
+    let core = &mut table.core;
+    // Both were read before the room had said anything: one in time, one after the deadline.
+    let first = core.answer(
+        ms(1600),
+        seat,
+        Answer::new(id, wrong),
+        ms(1400),
+        Some(ms(0)),
+    );
+    assert!(matches!(first.verdict, Verdict::Invalid { .. }));
+    let second = core.answer(
+        ms(1600),
+        seat,
+        Answer::new(id, right),
+        ms(1550),
+        Some(ms(0)),
+    );
+    assert_eq!(second.verdict, Verdict::Accepted, "the clock stood");
+    assert!(
+        core.open()
+            .is_none_or(|open| open.decision.seat != seat || open.id != id)
+    );
 }

@@ -9,9 +9,9 @@ use std::time::Duration;
 
 use chefshat_engine::Seat;
 
-use super::{AnswerInput, ConnectionId, Core, State, Verdict};
+use super::{Answer, ConnectionId, Core, State, Verdict};
 use crate::ids::SecretHash;
 use crate::journal::{Change, Fill, ParticipantKind, SeatedParticipant, Source};
-use crate::log::Happening;
+use crate::log::RoomEvent;
 use crate::policy::Policy;
 use crate::testing::{OPEN, Table, ms, one_shift};

@@ -7,9 +7,9 @@ use std::time::Duration;
 use chefshat_agents::AgentKind;
 use chefshat_engine::{ActionId, Seat};
 
-use super::{AnswerInput, Core, OPEN, Table, Verdict, ms, one_shift};
+use super::{Answer, Core, OPEN, Table, Verdict, ms, one_shift};
 use crate::journal::{Change, Fill, ParticipantKind, Source};
-use crate::log::Happening;
+use crate::log::RoomEvent;
 use crate::policy::Policy;
 use crate::{BadJournal, ConnectionId, JOIN_HOLD, RECALL_TIME, State};
 
@@ -20,7 +20,7 @@ impl Table {
         let header = Arc::clone(self.core.header());
         self.core =
             Core::revived(header, &self.journal, self.now).expect("the journal is as it was kept");
-        self.keep();
+        self.commit();
     }
 }
 
@@ -46,7 +46,7 @@ fn the_open_decision_stays_open_and_its_clock_waits_for_the_seat() {
     assert_eq!(table.open(), (seat, id));
     assert_eq!(table.core.legal_actions(), legal);
     assert_eq!(
-        table.happened(|it| matches!(it, Happening::ServerRestarted)),
+        table.happened(|it| matches!(it, RoomEvent::ServerRestarted)),
         1
     );
     table.assert_replays();
@@ -54,7 +54,7 @@ fn the_open_decision_stays_open_and_its_clock_waits_for_the_seat() {
     table.pass_time(RECALL_TIME - ms(10));
     assert_eq!(table.open(), (seat, id), "it was waited for");
     table.attach(seat);
-    assert_eq!(table.happened(|it| matches!(it, Happening::Returned(_))), 1);
+    assert_eq!(table.happened(|it| matches!(it, RoomEvent::Returned(_))), 1);
     let (left, bank) = table.core.time_left(table.now);
     assert_eq!((left, bank), (ms(1_000), ms(500)));
     table.pass_time(ms(1_499));
@@ -103,18 +103,13 @@ fn an_answer_that_was_acknowledged_is_acknowledged_again() {
     table.attach(seat);
     let again = table.core.answer(
         table.now,
-        AnswerInput {
-            seat,
-            decision_id,
-            action,
-            annotations: None,
-            annotations_refused: false,
-            arrived: table.now,
-            handed: None,
-        },
+        seat,
+        Answer::new(decision_id, action),
+        table.now,
+        None,
     );
     assert_eq!(again, answered);
-    assert!(table.core.unkept().is_empty(), "it counts once");
+    assert!(table.core.pending().is_empty(), "it counts once");
 }
 
 #[test]
@@ -132,7 +127,7 @@ fn built_in_agents_do_what_they_would_have_done() {
     let play = |restarts: &[u64]| {
         let mut table = Table::with_rules(paced.clone(), fills.to_vec(), one_shift());
         table.core.begin_if_all_built_in(table.now);
-        table.keep();
+        table.commit();
         for decisions in restarts {
             table.pass_time(ms(10 * decisions));
             table.restart(ms(5));
@@ -209,19 +204,12 @@ fn the_alarm_does_not_ring_for_a_seat_that_waits_for_the_store() {
     let (seat, id) = table.open();
     table.pass_time(ms(500));
     // The room was busy with the store, and finds the answer and the end of the time at once.
-    let answer = AnswerInput {
-        seat,
-        decision_id: id,
-        action: table.illegal(),
-        annotations: None,
-        annotations_refused: false,
-        arrived: table.now,
-        handed: Some(Duration::ZERO),
-    };
+    let (answer, arrived) = (Answer::new(id, table.illegal()), table.now);
     table.now += ms(3_000);
-    table.core.answer(table.now, answer);
+    let handed = Some(Duration::ZERO);
+    (table.core).answer(table.now, seat, answer, arrived, handed);
     table.core.tick(table.now, Some(Duration::ZERO));
-    table.keep();
+    table.commit();
     assert_eq!(table.open(), (seat, id));
     table.pass_time(ms(1_000));
     assert_eq!(table.last_decision().source, Source::Timeout);
@@ -247,7 +235,7 @@ fn wrong_answers_buy_no_time_from_a_store_that_is_as_usual() {
 #[test]
 fn a_substitute_plays_on_until_its_seat_comes_back() {
     let mut table = Table::playing(policy());
-    while table.happened(|it| matches!(it, Happening::Substituted(_))) == 0 {
+    while table.happened(|it| matches!(it, RoomEvent::Substituted(_))) == 0 {
         let (seat, _) = table.open();
         if seat == Seat::new(2) {
             // As long as it takes it to be late, and no longer.
@@ -293,7 +281,7 @@ fn a_room_that_waits_keeps_its_seats_for_those_who_come_back() {
     deserted.restart(ms(10));
     deserted.pass_time(JOIN_HOLD);
     assert_eq!(
-        deserted.happened(|it| matches!(it, Happening::Vacated(_))),
+        deserted.happened(|it| matches!(it, RoomEvent::Vacated(_))),
         1
     );
 }

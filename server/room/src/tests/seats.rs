@@ -45,7 +45,7 @@ fn a_seat_that_is_never_attached_is_freed() {
     table.attach(Seat::new(2));
     table.pass_time(JOIN_HOLD);
     assert_eq!(
-        table.happened(|event| matches!(event, Happening::Vacated(_))),
+        table.happened(|event| matches!(event, RoomEvent::Vacated(_))),
         3
     );
     assert!(table.core.standing(Seat::new(2)).participant.is_some());
@@ -134,7 +134,7 @@ fn rewards_go_to_turns_and_to_invalid_attempts() {
     assert_eq!(
         table.happened(|event| matches!(
             event,
-            Happening::Played { by, .. } if by.reward == Some(1.0)
+            RoomEvent::Game(game) if matches!(*game.rewards, [(rewarded, 1.0)] if rewarded == seat)
         )),
         1
     );
@@ -148,7 +148,7 @@ fn expressions_are_public_or_for_the_record_alone_and_bounded() {
         let said = table
             .core
             .express(table.now, seat, record_only, Box::default());
-        table.keep();
+        table.commit();
         said
     };
     let events = table.core.log().len();
@@ -172,17 +172,15 @@ fn annotations_are_capped() {
         let action = table.legal(0);
         let answered = table.core.answer(
             table.now,
-            AnswerInput {
-                seat,
-                decision_id,
-                action,
+            seat,
+            Answer {
                 annotations: Some(vec![0; bytes].into_boxed_slice()),
-                annotations_refused: false,
-                arrived: table.now,
-                handed: None,
+                ..Answer::new(decision_id, action)
             },
+            table.now,
+            None,
         );
-        table.keep();
+        table.commit();
         (answered, table.answer(seat, decision_id, action))
     };
     let limit = super::super::MAX_ANNOTATION_BYTES;
@@ -210,8 +208,8 @@ fn delayed_spectators_see_what_is_so_many_decisions_old() {
     assert!(matches!(
         table.core.log().since(told - 1),
         [first, second, ..]
-            if matches!(first.happening, Happening::GameStarted)
-                && matches!(second.happening, Happening::Game(_))
+            if matches!(first.event, RoomEvent::GameStarted)
+                && matches!(second.event, RoomEvent::Game(_))
     ));
     let mut lengths = vec![table.core.log().len()];
     while table.core.state() == State::Playing {
@@ -241,7 +239,7 @@ fn a_seat_that_was_given_back_knows_nothing_of_who_had_it() {
     table.attach(seats[2]);
     for seat in &seats[..3] {
         assert_eq!(table.core.leave(table.now, *seat), Ok(()));
-        table.keep();
+        table.commit();
     }
     assert!(table.core.standing(seats[1]).participant.is_none());
     assert!(!table.core.standing(seats[2]).connected);
@@ -251,7 +249,7 @@ fn a_seat_that_was_given_back_knows_nothing_of_who_had_it() {
         assert_eq!(table.join(ParticipantKind::Human), Ok(*seat));
         table.attach(*seat);
     }
-    let returned = table.happened(|it| matches!(it, Happening::Returned(_)));
+    let returned = table.happened(|it| matches!(it, RoomEvent::Returned(_)));
     assert_eq!(returned, 0, "they are others than those who went");
     assert_eq!(
         table.core.leave(table.now, seats[0]),

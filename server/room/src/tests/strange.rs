@@ -76,7 +76,7 @@ fn step(table: &mut Table, input: &Input) {
         Input::Resume(seat) => table.core.resume(table.now, Seat::new(seat)),
         Input::Wait(time) => table.pass_time(ms(time)),
     }
-    table.keep();
+    table.commit();
 }
 
 proptest! {

@@ -133,31 +133,25 @@ fn difference(expected: &[u16], got: &[u16]) -> String {
 
 /// The end of a Shift as the vectors write it.
 fn shift_end(event: &Event) -> Option<ShiftEnd> {
-    let Event::ShiftEnded {
-        shift,
-        order,
-        starter,
-        pizzas,
-        laps,
-        turns,
-        special,
-        adjudicated,
-        ..
-    } = event
-    else {
+    let Event::ShiftEnded(end) = event else {
         return None;
     };
     Some(ShiftEnd {
-        shift: *shift,
-        order: order.as_slice().iter().map(|seat| seat.index()).collect(),
-        starter: starter.index(),
-        pizzas: *pizzas,
-        laps: *laps,
-        turns: *turns,
-        special: special.map(|special| match special {
+        shift: end.shift,
+        order: end
+            .order
+            .as_slice()
+            .iter()
+            .map(|seat| seat.index())
+            .collect(),
+        starter: end.starter.index(),
+        pizzas: end.pizzas,
+        laps: end.laps,
+        turns: end.turns,
+        special: end.special.map(|special| match special {
             SpecialAction::FoodFight => Special::FoodFight,
             SpecialAction::DinnerIsServed => Special::DinnerIsServed,
         }),
-        adjudicated: *adjudicated,
+        adjudicated: end.adjudicated,
     })
 }

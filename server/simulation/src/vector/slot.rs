@@ -234,10 +234,8 @@ impl Slot {
                 batch.shifts.push(self.number, self.index, &shift, winner);
             }
         }
-        let end = table.events.iter().find_map(|event| match *event {
-            Event::ShiftEnded {
-                order, adjudicated, ..
-            } => Some((order, adjudicated)),
+        let end = table.events.iter().find_map(|event| match event {
+            Event::ShiftEnded(end) => Some((end.order, end.adjudicated)),
             _ => None,
         });
         let Some((order, adjudicated)) = end else {

@@ -159,10 +159,10 @@ struct Diary {
 
 impl Listener for Diary {
     fn on_event(&mut self, event: &Event) {
-        if let Event::ShiftEnded { order, turns, .. } = event {
+        if let Event::ShiftEnded(end) = event {
             self.shifts += 1;
-            self.turns += u64::from(*turns);
-            self.wins[order.as_slice()[0].index()] += 1;
+            self.turns += u64::from(end.turns);
+            self.wins[end.order.as_slice()[0].index()] += 1;
         }
     }
 

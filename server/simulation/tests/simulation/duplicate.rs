@@ -184,8 +184,8 @@ struct Deals {
 impl Listener for Deals {
     fn on_event(&mut self, event: &Event) {
         match event {
-            Event::ShiftStarted { hands, .. } => self.hands.push(*hands),
-            Event::ShiftEnded { order, .. } => self.order.extend(order.as_slice()),
+            Event::ShiftStarted { hands, .. } => self.hands.push(**hands),
+            Event::ShiftEnded(end) => self.order.extend(end.order.as_slice()),
             _ => {}
         }
     }

@@ -74,13 +74,6 @@ impl Reader {
         tournament.enter(participant, connection, way).await;
     }
 
-    /// Follows calls to games for as long as it is let.
-    pub(super) async fn follow_calls(&mut self) {
-        while let Some((handle, call)) = self.called.recv().await {
-            self.follow_call(handle, call).await;
-        }
-    }
-
     /// Does what a tournament has called a participant of this stream to.
     pub(super) async fn follow_call(&mut self, handle: u32, call: Call) {
         match call {
@@ -106,7 +99,7 @@ impl Reader {
         };
         // A seat that the client attached by itself with the same ticket stays where it is.
         let is_there = (self.seats.values()).any(|seat| {
-            seat.secret == ticket.secret && seat.room.id() == room && !seat.has_ended()
+            seat.secret == ticket.secret && seat.room.id() == room && !seat.is_detached()
         });
         let is_newest = (bound.tournament).is_newest(bound.participant, bound.connection);
         if is_there || !is_newest {

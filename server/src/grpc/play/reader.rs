@@ -3,8 +3,8 @@
 
 use std::collections::BTreeMap;
 use std::future::poll_fn;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
 use std::task::Poll;
 
 use chefshat_engine::MAX_ENTROPY;
@@ -19,8 +19,8 @@ use super::participants::{BoundParticipant, FIRST_CALLED};
 use super::{answer_action, express_action};
 use crate::config::{MAX_CALLS_WAITING, MAX_COMMANDS_PER_MESSAGE, MAX_SEATS_PER_STREAM};
 use crate::grpc::status::{field, refused, room_gone, status, ticket_unknown};
-use crate::outbox::Outbox;
-use crate::room::delivery::Wishes;
+use crate::outbox::{Outbox, StreamEnd};
+use crate::room::subscriber::DeliveryOptions;
 use crate::room::{AttachRequest, Handle, RoomGone, SeatAction};
 use crate::rooms::Rooms;
 use crate::tournaments::{Call, Tournaments};
@@ -34,13 +34,13 @@ pub(super) struct BoundSeat {
     seat: chefshat_engine::Seat,
     connection: ConnectionId,
     pub(super) secret: [u8; 32],
-    /// Set when the room has told the seat that it has left the stream.
-    ended: Arc<AtomicBool>,
+    /// Set when the seat has left the stream.
+    detached: Arc<AtomicBool>,
 }
 
 impl BoundSeat {
-    pub(super) fn has_ended(&self) -> bool {
-        self.ended.load(Ordering::Relaxed)
+    pub(super) fn is_detached(&self) -> bool {
+        self.detached.load(Ordering::Relaxed)
     }
 }
 
@@ -48,7 +48,7 @@ impl BoundSeat {
 pub(super) struct Reader {
     rooms: Arc<Rooms>,
     tournaments: Arc<Tournaments>,
-    pub(super) outbox: Arc<Outbox<Updates>>,
+    pub(super) outbox: Arc<Outbox>,
     /// Those attached, by handle.
     pub(super) seats: BTreeMap<u32, BoundSeat>,
     pub(super) participants: BTreeMap<u32, BoundParticipant>,
@@ -72,7 +72,7 @@ impl Reader {
     pub(super) fn new(
         rooms: &Arc<Rooms>,
         tournaments: &Arc<Tournaments>,
-        outbox: &Arc<Outbox<Updates>>,
+        outbox: &Arc<Outbox>,
         with_decisions: bool,
     ) -> Self {
         let (calls, called) = mpsc::channel(MAX_CALLS_WAITING);
@@ -90,7 +90,12 @@ impl Reader {
         }
     }
 
-    pub(super) async fn read(mut self, mut requests: Streaming<v1::PlayRequest>) {
+    /// Reads requests until the stream ends. `failure` is set if they break off or break a rule.
+    pub(super) async fn read(
+        mut self,
+        mut requests: Streaming<v1::PlayRequest>,
+        failure: Arc<OnceLock<Status>>,
+    ) {
         let outbox = Arc::clone(&self.outbox);
         let end = loop {
             let next = poll_fn(|context| {
@@ -130,7 +135,13 @@ impl Reader {
             }
         };
         self.leave_all().await;
-        self.outbox.end(end);
+        self.outbox.end(match end {
+            Ok(()) => StreamEnd::Complete,
+            Err(status) => {
+                failure.get_or_init(|| status);
+                StreamEnd::RequestsFailed
+            }
+        });
     }
 
     async fn obey(&mut self, command: v1::SeatCommand, arrived: Instant) {
@@ -190,7 +201,7 @@ impl Reader {
             }
             Ok(None) => self.refuse(handle, request_id, &ticket_unknown()),
             // A seat that is refused is given up by its agent; a stream that ends so is opened again until the room is back.
-            Err(RoomGone) => self.outbox.end(Err(room_gone())),
+            Err(RoomGone) => self.outbox.end(StreamEnd::RoomGone),
         }
     }
 
@@ -199,7 +210,7 @@ impl Reader {
         let full =
             |reader: &Self| reader.seats.len() + reader.participants.len() >= MAX_SEATS_PER_STREAM;
         if full(self) {
-            self.seats.retain(|_, bound| !bound.has_ended());
+            self.seats.retain(|_, bound| !bound.is_detached());
         }
         !full(self)
     }
@@ -209,7 +220,7 @@ impl Reader {
         &self,
         attach: v1::Attach,
         handle: u32,
-        told_ticket: Option<Token>,
+        assigned_ticket: Option<Token>,
     ) -> Result<Option<BoundSeat>, RoomGone> {
         let Some(token) = Token::parse(&attach.ticket) else {
             return Ok(None);
@@ -222,14 +233,14 @@ impl Reader {
             v1::EventDelivery::WithDecisions => false,
             v1::EventDelivery::AtOnce => true,
         };
-        let ended = Arc::new(AtomicBool::new(false));
+        let detached = Arc::new(AtomicBool::new(false));
         let from = attach.from_sequence.saturating_sub(1);
         let request = AttachRequest {
             secret: token.secret,
             request_id: attach.request_id,
             outbox: Arc::clone(&self.outbox),
             handle,
-            wishes: Wishes {
+            options: DeliveryOptions {
                 at_once,
                 no_mask: attach.no_mask,
                 snapshot: attach.snapshot,
@@ -237,8 +248,8 @@ impl Reader {
             },
             entropy: attach.entropy,
             arrived: Instant::now(),
-            ended: Arc::clone(&ended),
-            told_ticket,
+            detached: Arc::clone(&detached),
+            assigned_ticket,
         };
         let attached = room.attach(request).await?;
         Ok(attached.map(|(seat, connection)| BoundSeat {
@@ -246,7 +257,7 @@ impl Reader {
             seat,
             connection,
             secret: token.secret,
-            ended,
+            detached,
         }))
     }
 

@@ -12,7 +12,7 @@ use tracing::error;
 
 use super::errors::explain;
 use super::form::{self, FORM};
-use crate::room::since_epoch_ms;
+use crate::clock::since_epoch_ms;
 use crate::store::StoreError;
 use crate::store::tournaments::TournamentEntry;
 use chefshat_room::ids::Id;

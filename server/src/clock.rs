@@ -1,5 +1,4 @@
-//! The time of a room: the time since it was created, also when the server was restarted in between. What follows from it is decided in
-//! `core`.
+//! The time of a room: the time since it was created, restarts of the server included.
 
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 

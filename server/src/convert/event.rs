@@ -1,0 +1,166 @@
+//! The events of a room as messages, as a viewer may see them. `Event::seen_by` of the engine decides what of its events a viewer may see;
+//! rewards are withheld here, because only rooms have them.
+
+use chefshat_engine::SeedPlan;
+use chefshat_engine::{Game, Seat, Viewer};
+use chefshat_proto::v1::{self, game_event::Kind};
+use chefshat_record::convert::{
+    By, action_space, event_kind, final_table, rules_to_proto, seat_number,
+};
+use prost::Message as _;
+
+use super::decision::source_to_proto;
+use super::policy::policy_of;
+use super::room::{kind_to_proto, participants};
+use chefshat_room::Core;
+use chefshat_room::journal::AbortReason;
+use chefshat_room::log::RoomEvent;
+
+/// The event at a position of the log (from 0), as `viewer` may see it. `None` beyond the end.
+pub fn event_to_proto(core: &Core, position: usize, viewer: Viewer) -> Option<v1::GameEvent> {
+    let entry = core.log().get(position)?;
+    Some(v1::GameEvent {
+        sequence: u64::try_from(position).expect("a log fits memory") + 1,
+        elapsed_ms: entry.at_ms.into(),
+        rewards: rewards(&entry.event, viewer),
+        kind: Some(kind(core, &entry.event, viewer)),
+    })
+}
+
+fn kind(core: &Core, event: &RoomEvent, viewer: Viewer) -> Kind {
+    match event {
+        RoomEvent::Seated(seat, participant) => Kind::Seated(Box::new(v1::Seated {
+            seat: seat_number(*seat),
+            name: participant.name.clone(),
+            kind: kind_to_proto(Some(participant.kind)),
+        })),
+        RoomEvent::Vacated(seat) => Kind::Vacated(v1::Vacated {
+            seat: seat_number(*seat),
+        }),
+        RoomEvent::Disconnected(seat) => Kind::Disconnected(v1::Disconnected {
+            seat: seat_number(*seat),
+        }),
+        RoomEvent::Returned(seat) => Kind::Returned(v1::Returned {
+            seat: seat_number(*seat),
+        }),
+        RoomEvent::Substituted(seat) => Kind::Substituted(v1::Substituted {
+            seat: seat_number(*seat),
+            built_in_agent: core.header().policy.substitute.name().into(),
+        }),
+        RoomEvent::GameStarted => {
+            let mut started = game_started(core);
+            for seat in &mut started.seats {
+                // The same at any time and for all viewers: later changes have events of their own.
+                seat.connected = true;
+                seat.substituted = false;
+            }
+            Kind::GameStarted(Box::new(started))
+        }
+        RoomEvent::Game(game) => {
+            let by = By {
+                source: source_to_proto(game.source),
+                decision_time_us: game.time_us,
+            };
+            // The engine's end of a game has no seed to reveal: the room's end has.
+            event_kind(
+                &game.event.seen_by(viewer),
+                core.header().rules.actions(),
+                by,
+            )
+            .unwrap_or_else(|| {
+                Kind::GameEnded(Box::new(v1::GameEnded {
+                    standings: standings(core),
+                    reveal: reveal(core, viewer),
+                }))
+            })
+        }
+        RoomEvent::GameAborted(reason) => Kind::GameAborted(Box::new(v1::GameAborted {
+            reason: abort_reason(*reason).into(),
+            reveal: reveal(core, viewer),
+        })),
+        RoomEvent::ServerRestarted => Kind::ServerRestarted(v1::ServerRestarted {}),
+        RoomEvent::Expressed(seat, expression) => {
+            Kind::ExpressionShown(Box::new(v1::ExpressionShown {
+                seat: seat_number(*seat),
+                expression: v1::Expression::decode(expression.as_ref()).ok(),
+            }))
+        }
+    }
+}
+
+/// The protocol's name for why a game has no result.
+pub(super) fn abort_reason(reason: AbortReason) -> v1::AbortReason {
+    match reason {
+        AbortReason::Closed => v1::AbortReason::Closed,
+        AbortReason::Shutdown => v1::AbortReason::Shutdown,
+        AbortReason::ParticipantsLost => v1::AbortReason::ParticipantsLost,
+        AbortReason::NeverStarted => v1::AbortReason::NeverStarted,
+        AbortReason::TooLong => v1::AbortReason::TooLong,
+    }
+}
+
+/// The start of a game, with its seats as they stand now.
+pub fn game_started(core: &Core) -> v1::GameStarted {
+    let header = core.header();
+    v1::GameStarted {
+        game_id: header.game_id.to_string(),
+        rules: Some(rules_to_proto(&header.rules)),
+        rules_version: header.rules_version,
+        policy: Some(policy_of(core)),
+        seats: participants(core),
+        action_space: Some(action_space(&header.rules.actions())),
+        hand_size: header.rules.hand_size().into(),
+        seed_commitment: header
+            .seed
+            .commitment(&header.game_id.0)
+            .map_or_else(Vec::new, |hash| hash.to_vec()),
+    }
+}
+
+pub(super) fn standings(core: &Core) -> Vec<v1::Standing> {
+    core.game()
+        .and_then(Game::standings)
+        .map_or_else(Vec::new, |standings| final_table(&standings))
+}
+
+/// The seed, public once a game has ended. For a series of games with the same deals only the record has it, which stays closed while one
+/// of them is played.
+fn reveal(core: &Core, viewer: Viewer) -> Option<v1::SeedReveal> {
+    let game = core.game()?;
+    if core.header().series().is_some() && viewer != Viewer::Everything {
+        return None;
+    }
+    let (server_seed, nonce, seat_entropy) = match core.header().seed {
+        SeedPlan::Committed { server_seed, nonce } => (
+            server_seed.to_vec(),
+            nonce.to_vec(),
+            core.entropy().to_vec(),
+        ),
+        SeedPlan::Fixed { .. } => (Vec::new(), Vec::new(), Vec::new()),
+    };
+    Some(v1::SeedReveal {
+        server_seed,
+        nonce,
+        seat_entropy,
+        game_seed: game.seed().0.to_vec(),
+    })
+}
+
+/// The rewards of an event that a viewer may see: a seat its own, the record all, spectators none.
+fn rewards(event: &RoomEvent, viewer: Viewer) -> Vec<v1::SeatReward> {
+    let RoomEvent::Game(game) = event else {
+        return Vec::new();
+    };
+    let visible = |seat: Seat| match viewer {
+        Viewer::Seat(own) => own == seat,
+        Viewer::Spectator => false,
+        Viewer::Everything => true,
+    };
+    (game.rewards.iter())
+        .filter(|(seat, _)| visible(*seat))
+        .map(|(seat, value)| v1::SeatReward {
+            seat: seat_number(*seat),
+            value: *value,
+        })
+        .collect()
+}

@@ -1,0 +1,487 @@
+//! Subscribers of a room: the connections of its seats, and its spectators. Each has a viewer, a position in the log and an outbox. Events
+//! beyond the position are sent when they are due. A room never waits for a full outbox: the position stays, and delivery resumes when there
+//! is space; a spectator that falls too far behind is cut off.
+
+use std::borrow::Cow;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use chefshat_engine::{Event, Seat, Viewer};
+use chefshat_proto::v1::{self, seat_update::Update};
+use chefshat_record::convert::{observation_to_proto, seat_number};
+use chefshat_room::ids::Token;
+use chefshat_room::log::RoomEvent;
+use chefshat_room::{ConnectionId, Core};
+
+use crate::convert;
+use crate::outbox::{HandStamp, OnSpace, Outbox, StreamEnd};
+use crate::wire::{Events, Updates, encode_decision, put_event};
+
+/// Events that wait for a seat's next decision before they are sent without one.
+pub const MAX_PENDING_EVENTS: usize = 128;
+/// Most updates and events that wait for a full stream. Answers to commands beyond it are dropped.
+const MAX_PENDING_UPDATES: usize = 1_024;
+/// Most events that happen while a spectator's stream has no space, before it is cut off.
+pub const MAX_SPECTATOR_LAG: usize = 1_024;
+/// Most spectators of one room.
+pub const MAX_SPECTATORS: usize = 256;
+/// Usual size of a decision request, bytes.
+const DECISION_CAPACITY: usize = 256;
+/// Most events in one batch.
+const EVENTS_PER_BATCH: usize = 256;
+
+/// How events and decisions reach a seat.
+#[derive(Debug, Clone, Copy)]
+pub struct DeliveryOptions {
+    /// Send each event when it happens instead of with the next decision.
+    pub at_once: bool,
+    /// Leave masks out of decision requests.
+    pub no_mask: bool,
+    /// Start with a snapshot instead of the events so far.
+    pub snapshot: bool,
+    /// Position in the log from which events are wanted.
+    pub from: usize,
+}
+
+/// A subscriber of a room.
+pub struct Subscriber {
+    outbox: Arc<Outbox>,
+    on_space: Arc<dyn OnSpace>,
+    position: usize,
+    /// Updates that leave with the next flush.
+    pending: Updates,
+    stalled: bool,
+    ended: bool,
+    role: Role,
+}
+
+enum Role {
+    Seat(SeatConnection),
+    Spectator {
+        /// Length of what it may see when its stream last had space.
+        kept_up_at: usize,
+    },
+}
+
+/// A seat on a stream.
+pub struct SeatConnection {
+    /// The seat.
+    pub seat: Seat,
+    /// Number of the connection.
+    pub id: ConnectionId,
+    /// Number of the seat on the stream.
+    pub handle: u32,
+    /// How events and decisions reach it.
+    pub options: DeliveryOptions,
+    /// Notes when a decision leaves.
+    pub stamp: Arc<HandStamp>,
+    /// Set with the last update to the seat on this stream.
+    pub detached: Arc<AtomicBool>,
+    /// Decision that was sent last, or 0.
+    sent: u64,
+    /// Newest decision whose answer was acknowledged, or 0.
+    acknowledged: u64,
+    /// Whether a decision request is among the pending updates.
+    decision_pending: bool,
+}
+
+impl SeatConnection {
+    /// A connection that has received nothing yet.
+    pub fn new(
+        seat: Seat,
+        id: ConnectionId,
+        handle: u32,
+        options: DeliveryOptions,
+        stamp: Arc<HandStamp>,
+        detached: Arc<AtomicBool>,
+    ) -> Self {
+        Self {
+            seat,
+            id,
+            handle,
+            options,
+            stamp,
+            detached,
+            sent: 0,
+            acknowledged: 0,
+            decision_pending: false,
+        }
+    }
+}
+
+impl Subscriber {
+    /// A seat's connection. The seat learns of it by [`Subscriber::confirm_attached`].
+    pub fn seat(
+        connection: SeatConnection,
+        outbox: Arc<Outbox>,
+        on_space: Arc<dyn OnSpace>,
+    ) -> Self {
+        Self::new(
+            connection.options.from,
+            outbox,
+            on_space,
+            Role::Seat(connection),
+        )
+    }
+
+    /// A spectator from an event on (position from 0). The first message is in its outbox.
+    pub fn spectator(
+        core: &Core,
+        outbox: Arc<Outbox>,
+        on_space: Arc<dyn OnSpace>,
+        from: usize,
+        with_snapshot: bool,
+    ) -> Self {
+        let visible = core.visible_to_spectators();
+        let position = if with_snapshot {
+            visible
+        } else {
+            from.min(visible)
+        };
+        let role = Role::Spectator {
+            kept_up_at: visible,
+        };
+        let mut spectator = Self::new(position, outbox, on_space, role);
+        spectator.pending.add_room(&convert::describe(core));
+        if with_snapshot {
+            let snapshot = snapshot(core, Viewer::Spectator);
+            spectator.pending.add_snapshot(&snapshot);
+        }
+        spectator.flush();
+        spectator
+    }
+
+    fn new(position: usize, outbox: Arc<Outbox>, on_space: Arc<dyn OnSpace>, role: Role) -> Self {
+        Self {
+            outbox,
+            on_space,
+            position,
+            pending: Updates::default(),
+            stalled: false,
+            ended: false,
+            role,
+        }
+    }
+
+    /// The connection of a seat; `None` for a spectator.
+    pub fn connection(&self) -> Option<&SeatConnection> {
+        match &self.role {
+            Role::Seat(connection) => Some(connection),
+            Role::Spectator { .. } => None,
+        }
+    }
+
+    /// When a decision was handed to the transport; `None` while it was not.
+    pub fn handed(&self, decision_id: u64) -> Option<Duration> {
+        let connection = self.connection()?;
+        let left = connection.sent == decision_id && !connection.decision_pending;
+        connection.stamp.get().filter(|_| left)
+    }
+
+    /// Tells a seat that it is attached, with a snapshot if it asked for one. `ticket`: set if the server attached a participant of a
+    /// tournament by itself.
+    pub fn confirm_attached(&mut self, core: &Core, request_id: u32, ticket: Option<Token>) {
+        let Role::Seat(connection) = &self.role else {
+            return;
+        };
+        let (seat, handle, options) = (connection.seat, connection.handle, connection.options);
+        let header = core.header();
+        let attached = v1::Attached {
+            request_id,
+            room_id: header.room_id.to_string(),
+            game_id: header.game_id.to_string(),
+            seat: seat_number(seat),
+            next_sequence: next_sequence(core),
+            tournament_id: match &ticket {
+                Some(_) => convert::tournament_id(header),
+                None => String::new(),
+            },
+            ticket: ticket.map_or_else(String::new, |ticket| ticket.word()),
+        };
+        self.pending.add(handle, Update::Attached(attached));
+        if options.snapshot {
+            self.position = core.log().len();
+            let snapshot = snapshot(core, Viewer::Seat(seat));
+            self.pending
+                .add(handle, Update::Snapshot(Box::new(snapshot)));
+        }
+        self.position = self.position.min(core.log().len());
+    }
+
+    /// Sends the result of an answer: with the next flush if it was accepted and the seat receives events with its decisions, else at once.
+    pub fn send_result(&mut self, result: v1::AnswerResult) {
+        if self.ended || self.is_saturated() {
+            return;
+        }
+        let Role::Seat(connection) = &mut self.role else {
+            return;
+        };
+        // A client that repeats an answer has missed the first result.
+        let may_wait = !connection.options.at_once
+            && result.status() == v1::AnswerStatus::Accepted
+            && result.decision_id > connection.acknowledged;
+        connection.acknowledged = connection.acknowledged.max(result.decision_id);
+        let handle = connection.handle;
+        self.pending.add(handle, Update::Result(result));
+        if !may_wait {
+            self.flush();
+        }
+    }
+
+    /// Tells a seat that a command was refused.
+    pub fn refuse(&mut self, refused: v1::Refused) {
+        if self.ended || self.is_saturated() {
+            return;
+        }
+        if let Role::Seat(connection) = &self.role {
+            let handle = connection.handle;
+            self.pending.add(handle, Update::Refused(refused));
+            self.flush();
+        }
+    }
+
+    /// Takes a seat off its stream; what is pending is sent first.
+    pub fn detach(&mut self, reason: v1::DetachReason) {
+        let Role::Seat(connection) = &self.role else {
+            return;
+        };
+        if !self.ended {
+            self.ended = true;
+            let reason = reason.into();
+            let detached = Update::Detached(v1::Detached { reason });
+            self.pending.add(connection.handle, detached);
+            // There is one such update for each seat: a full outbox takes it too.
+            self.outbox.push_last(&mut self.pending);
+            connection.detached.store(true, Ordering::Relaxed);
+        }
+    }
+
+    /// Ends the whole stream. What is pending is dropped.
+    pub fn end(&mut self, end: StreamEnd) {
+        if !self.ended {
+            self.ended = true;
+            self.outbox.end(end);
+            if let Role::Seat(connection) = &self.role {
+                connection.detached.store(true, Ordering::Relaxed);
+            }
+        }
+    }
+
+    /// Sends what is due. `urgent`: send now even to a seat that receives events with its decisions. `false` when nothing more can follow.
+    pub fn deliver(
+        &mut self,
+        core: &Core,
+        public: &PublicEvents,
+        now: Duration,
+        urgent: bool,
+    ) -> bool {
+        if self.ended {
+            return false;
+        }
+        let visible = match &self.role {
+            Role::Seat(_) => core.log().len(),
+            Role::Spectator { .. } => core.visible_to_spectators(),
+        };
+        let over = core.state().is_over();
+        let decision = self.connection().and_then(|connection| {
+            core.awaited()
+                .filter(|open| open.decision.seat == connection.seat && open.id != connection.sent)
+        });
+        let backlog = visible - self.position;
+        let at_once = (self.connection()).is_none_or(|connection| connection.options.at_once);
+        let due = decision.is_some()
+            || urgent
+            || over
+            || self.stalled
+            || backlog >= MAX_PENDING_EVENTS
+            || (at_once && (backlog > 0 || !self.pending.is_empty()));
+        if !due {
+            return !self.outbox_is_abandoned_by_spectator();
+        }
+        if self.stalled && !self.flush() {
+            return self.keeps_up(visible);
+        }
+        while self.position < visible {
+            let end = (self.position + EVENTS_PER_BATCH).min(visible);
+            self.add_events(core, public, end);
+            if end < visible && !self.flush() {
+                return self.keeps_up(visible);
+            }
+        }
+        if let (Some(open), Role::Seat(connection)) = (decision, &mut self.role) {
+            let mut request = Vec::with_capacity(DECISION_CAPACITY);
+            encode_decision(core, open, now, !connection.options.no_mask, &mut request);
+            connection.sent = open.id;
+            connection.stamp.clear();
+            connection.decision_pending = true;
+            self.pending.add_decision(connection.handle, &request);
+        }
+        if !self.pending.is_empty() && !self.flush() {
+            return self.keeps_up(visible);
+        }
+        if let Role::Spectator { kept_up_at } = &mut self.role {
+            *kept_up_at = visible;
+        }
+        if over {
+            match self.role {
+                Role::Seat(_) => self.detach(v1::DetachReason::GameOver),
+                Role::Spectator { .. } => self.end(StreamEnd::Complete),
+            }
+        }
+        !self.ended && !self.outbox_is_abandoned_by_spectator()
+    }
+
+    /// Adds the events up to a position to the pending updates.
+    fn add_events(&mut self, core: &Core, public: &PublicEvents, end: usize) {
+        let (from, count) = (self.position, end - self.position);
+        match &self.role {
+            Role::Seat(connection) => {
+                let viewer = Viewer::Seat(connection.seat);
+                let events = public.range(core, from, end, viewer, true);
+                self.pending.add_events(connection.handle, &events, count);
+            }
+            Role::Spectator { .. } => {
+                let events = public.range(core, from, end, spectator_view(core), false);
+                self.pending.add_spectator_events(&events, count);
+            }
+        }
+        self.position = end;
+    }
+
+    /// Moves pending updates to the outbox. If that is full they stay pending, and the room hears when there is space.
+    fn flush(&mut self) -> bool {
+        let stamp = match &self.role {
+            Role::Seat(connection) => connection.decision_pending.then_some(&connection.stamp),
+            Role::Spectator { .. } => None,
+        };
+        let pushed = self
+            .outbox
+            .push(&mut self.pending, stamp, Some(&self.on_space));
+        self.stalled = !pushed;
+        if let Role::Seat(connection) = &mut self.role {
+            connection.decision_pending &= !pushed;
+        }
+        pushed
+    }
+
+    /// Cuts off a spectator that is too far behind. A seat is waited for.
+    fn keeps_up(&mut self, visible: usize) -> bool {
+        let Role::Spectator { kept_up_at } = self.role else {
+            return true;
+        };
+        if visible.saturating_sub(kept_up_at) <= MAX_SPECTATOR_LAG {
+            return true;
+        }
+        self.ended = true;
+        self.outbox.cut(StreamEnd::SpectatorTooSlow);
+        false
+    }
+
+    /// Whether the client does not read and as many updates are pending for it as may be.
+    fn is_saturated(&self) -> bool {
+        self.stalled && self.pending.weight() >= MAX_PENDING_UPDATES
+    }
+
+    fn outbox_is_abandoned_by_spectator(&self) -> bool {
+        matches!(self.role, Role::Spectator { .. }) && self.outbox.is_abandoned()
+    }
+}
+
+impl std::fmt::Debug for Subscriber {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter
+            .debug_struct("Subscriber")
+            .field("position", &self.position)
+            .finish_non_exhaustive()
+    }
+}
+
+/// The events of a room as the public sees them, encoded once for all subscribers.
+#[derive(Debug, Default)]
+pub struct PublicEvents {
+    events: Events,
+}
+
+impl PublicEvents {
+    /// Encodes what has been added to the log.
+    pub fn follow(&mut self, core: &Core) {
+        for position in self.events.len()..core.log().len() {
+            let event = convert::event_to_proto(core, position, Viewer::Spectator);
+            self.events
+                .add(&event.expect("the position is within the log"));
+        }
+    }
+
+    /// The events from one position to another, encoded as a viewer may see them. The bytes of public events are shared; only events that
+    /// show more to the viewer are encoded for it.
+    fn range(
+        &self,
+        core: &Core,
+        from: usize,
+        to: usize,
+        viewer: Viewer,
+        with_rewards: bool,
+    ) -> Cow<'_, [u8]> {
+        let mut own = Vec::new();
+        let mut shared = from;
+        for (position, entry) in (from..to).zip(core.log().since(from)) {
+            if entry.event.shows_more_to(viewer)
+                && let Some(mut event) = convert::event_to_proto(core, position, viewer)
+            {
+                if !with_rewards {
+                    event.rewards.clear();
+                }
+                own.extend_from_slice(self.events.range(shared, position));
+                put_event(&mut own, &event);
+                shared = position + 1;
+            }
+        }
+        if shared == from {
+            return Cow::Borrowed(self.events.range(from, to));
+        }
+        own.extend_from_slice(self.events.range(shared, to));
+        Cow::Owned(own)
+    }
+}
+
+/// The state of the game, for a viewer.
+pub fn snapshot(core: &Core, viewer: Viewer) -> v1::Snapshot {
+    v1::Snapshot {
+        game_started: core.game().map(|_| convert::game_started(core)),
+        observation: core
+            .observe(viewer)
+            .map(|observation| observation_to_proto(&observation)),
+        next_sequence: next_sequence(core),
+    }
+}
+
+fn next_sequence(core: &Core) -> u64 {
+    u64::try_from(core.log().len()).unwrap_or(u64::MAX) + 1
+}
+
+/// What spectators may see now: all hands after the game, or where the room allows it. The hands of a series of games with the same deals stay
+/// hidden, since others still play them.
+fn spectator_view(core: &Core) -> Viewer {
+    let header = core.header();
+    let shows_hands = header.policy.spectators_see_hands || core.state().is_over();
+    if shows_hands && header.series().is_none() {
+        Viewer::Everything
+    } else {
+        Viewer::Spectator
+    }
+}
+
+/// Whether an event is sent to a seat at once in any case: its own finishing, substitution and return, the end of a Shift and of the game.
+pub fn is_urgent(event: &RoomEvent, seat: Seat) -> bool {
+    match event {
+        RoomEvent::Substituted(own) | RoomEvent::Returned(own) => *own == seat,
+        RoomEvent::GameAborted(_) => true,
+        RoomEvent::Game(game) => match &game.event {
+            Event::SeatFinished { seat: own, .. } => *own == seat,
+            Event::ShiftEnded(_) | Event::GameEnded { .. } => true,
+            _ => false,
+        },
+        _ => false,
+    }
+}

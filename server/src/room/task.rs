@@ -1,0 +1,542 @@
+//! The task of a room: receives from a bounded mailbox, arms one deadline, and for every batch of inputs lets the core apply them, commits
+//! the changes to the store and only then publishes them. All decisions are the core's.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+use chefshat_engine::Seat;
+use chefshat_proto::v1;
+use chefshat_room::ids::{Id, Token};
+use chefshat_room::journal::{AbortReason, SeatedParticipant};
+use chefshat_room::{ConnectionId, Core, JoinError, LeaveError, State};
+use tokio::sync::{mpsc, oneshot};
+use tokio::time::{Instant, Sleep};
+use tokio_util::task::TaskTracker;
+use tracing::{debug, error, info};
+
+use super::handle::{
+    Acted, AttachRequest, Handle, JoinRequest, Joined, Message, SeatAction, SpectateError,
+    SpectateRequest, TellSpace,
+};
+use super::subscriber::{MAX_SPECTATORS, PublicEvents, SeatConnection, Subscriber, is_urgent};
+use crate::clock::RoomClock;
+use crate::config::ROOM_MAILBOX;
+use crate::convert;
+use crate::filing::Filing;
+use crate::outbox::{HandStamp, OnSpace, StreamEnd};
+use crate::store::{Journal, Store, StoreError};
+
+/// Inputs that are applied before the store is asked once for all of them.
+const INPUTS_PER_COMMIT: usize = 64;
+
+/// What a room needs from its server.
+#[derive(Clone)]
+pub struct TaskContext {
+    /// Where games are kept.
+    pub store: Arc<dyn Store>,
+    /// Writes records to files.
+    pub filing: Filing,
+    /// How long an ended room is still shown.
+    pub retention: Duration,
+    /// Numbers for connections.
+    pub connections: Arc<AtomicU64>,
+    /// Tasks that a shutdown waits for.
+    pub tracker: TaskTracker,
+    /// Told when the game of a room has ended, and when the room is gone.
+    pub watcher: Arc<dyn RoomWatcher>,
+}
+
+/// Who keeps the list of rooms.
+pub trait RoomWatcher: Send + Sync {
+    /// The game of a room has ended; the room is still shown.
+    fn game_over(&self, room: Id);
+    /// The room is gone.
+    fn gone(&self, room: Id);
+}
+
+/// Starts a room, whose game may have begun before. `over_since`: the game is over, and everything that follows from that has been done.
+pub fn spawn_room(
+    core: Core,
+    clock: RoomClock,
+    over_since: Option<Duration>,
+    journal: Box<dyn Journal>,
+    context: TaskContext,
+) -> Handle {
+    let (mailbox, inbox) = mpsc::channel(ROOM_MAILBOX);
+    let handle = Handle {
+        id: core.header().room_id,
+        mailbox: mailbox.clone(),
+    };
+    let seats = core.header().fills.len();
+    let task = Task {
+        core,
+        journal,
+        now: clock.now(),
+        clock,
+        connections: (0..seats).map(|_| None).collect(),
+        spectators: Vec::new(),
+        on_space: Arc::new(TellSpace(mailbox.downgrade())),
+        releases: Vec::new(),
+        public: PublicEvents::default(),
+        delivered: 0,
+        over_since,
+        suspended: false,
+        context: context.clone(),
+    };
+    context.tracker.spawn(task.run(inbox));
+    handle
+}
+
+/// What is sent once the changes are committed.
+enum Release {
+    Join(
+        oneshot::Sender<Result<Joined, JoinError>>,
+        Result<Joined, JoinError>,
+    ),
+    Attach(
+        Box<AttachRequest>,
+        Seat,
+        ConnectionId,
+        oneshot::Sender<Option<(Seat, ConnectionId)>>,
+    ),
+    Result(Seat, ConnectionId, v1::AnswerResult),
+    Refuse(Seat, ConnectionId, v1::Refused),
+    Acted(oneshot::Sender<Option<Acted>>, Acted),
+    Closed(oneshot::Sender<Option<v1::Room>>),
+    Left(
+        oneshot::Sender<Option<Result<v1::Room, LeaveError>>>,
+        Result<(), LeaveError>,
+    ),
+    Describe(oneshot::Sender<v1::Room>),
+    Spectate(
+        Box<SpectateRequest>,
+        oneshot::Sender<Result<(), SpectateError>>,
+    ),
+}
+
+struct Task {
+    core: Core,
+    journal: Box<dyn Journal>,
+    clock: RoomClock,
+    /// The time of the inputs in hand.
+    now: Duration,
+    connections: Vec<Option<Subscriber>>,
+    spectators: Vec<Subscriber>,
+    on_space: Arc<dyn OnSpace>,
+    releases: Vec<Release>,
+    public: PublicEvents,
+    /// Length of the log when everybody had last been looked after.
+    delivered: usize,
+    over_since: Option<Duration>,
+    /// The room ends without its game being over, which goes on when the server is back.
+    suspended: bool,
+    context: TaskContext,
+}
+
+impl Task {
+    async fn run(mut self, mut inbox: mpsc::Receiver<Message>) {
+        self.core.begin_if_all_built_in(self.now);
+        let mut messages = Vec::with_capacity(INPUTS_PER_COMMIT);
+        let alarm = tokio::time::sleep_until(self.clock.instant(self.now));
+        tokio::pin!(alarm);
+        let mut armed = true;
+        loop {
+            if !self.commit_and_publish().await {
+                break;
+            }
+            if self.suspended && self.over_since.is_none() {
+                self.end_streams(StreamEnd::ShuttingDown);
+                break;
+            }
+            armed = self.arm(alarm.as_mut(), armed);
+            tokio::select! {
+                biased;
+                received = inbox.recv_many(&mut messages, INPUTS_PER_COMMIT) => {
+                    if received == 0 {
+                        break;
+                    }
+                    self.now = self.clock.now();
+                    for message in messages.drain(..) {
+                        self.receive(message);
+                    }
+                    // A mailbox that is never empty does not stop the clock.
+                    let due = armed && self.clock.at(alarm.deadline()) <= self.now;
+                    if due && !self.ring(&mut armed) {
+                        break;
+                    }
+                }
+                () = alarm.as_mut(), if armed => {
+                    self.now = self.clock.now();
+                    if !self.ring(&mut armed) {
+                        break;
+                    }
+                }
+            }
+        }
+        debug!(room = %self.core.header().room_id, "the room is gone");
+    }
+
+    /// The alarm has rung. `false` when the room has been shown long enough.
+    fn ring(&mut self, armed: &mut bool) -> bool {
+        *armed = false;
+        if self.is_expired() {
+            return false;
+        }
+        let handed = self.handed();
+        self.core.tick(self.now, handed);
+        true
+    }
+
+    /// Arms the alarm for the next deadline. An alarm that rings too early finds nothing to do and is armed again, so that a later
+    /// deadline costs nothing.
+    fn arm(&self, alarm: std::pin::Pin<&mut Sleep>, armed: bool) -> bool {
+        let deadline = match self.over_since {
+            Some(since) => Some(since + self.context.retention),
+            None => self.core.deadline(),
+        };
+        let Some(deadline) = deadline else {
+            return false;
+        };
+        let deadline = self.clock.instant(deadline);
+        if !armed || alarm.deadline() > deadline {
+            alarm.reset(deadline);
+        }
+        true
+    }
+
+    fn is_expired(&self) -> bool {
+        self.over_since
+            .is_some_and(|since| since + self.context.retention <= self.now)
+    }
+
+    /// When the open decision was handed to its seat's transport.
+    fn handed(&self) -> Option<Duration> {
+        let open = self.core.awaited()?;
+        self.connections[open.decision.seat.index()]
+            .as_ref()?
+            .handed(open.id)
+    }
+
+    fn receive(&mut self, message: Message) {
+        match message {
+            Message::Join(request, reply) => {
+                let joined = self.join(*request);
+                self.releases.push(Release::Join(reply, joined));
+            }
+            Message::Attach(request, reply) => self.attach(request, reply),
+            Message::Lost(seat, connection, reason) => self.lost(seat, connection, reason),
+            Message::Do(seat, connection, action, arrived) => {
+                if self.is_current(seat, connection) {
+                    match self.perform(seat, action, arrived) {
+                        Ok(Some(result)) => {
+                            self.releases
+                                .push(Release::Result(seat, connection, result));
+                        }
+                        Ok(None) => {}
+                        Err(error) => {
+                            let refused = convert::express_refused(error);
+                            self.releases
+                                .push(Release::Refuse(seat, connection, refused));
+                        }
+                    }
+                }
+            }
+            Message::Act(secret, action, arrived, reply) => {
+                match self.core.seat_of_ticket(&secret) {
+                    Some(seat) => {
+                        let acted = self.perform(seat, action, arrived);
+                        self.releases.push(Release::Acted(reply, acted));
+                    }
+                    None => answer(reply, None),
+                }
+            }
+            Message::Spectate(request, reply) => {
+                self.releases.push(Release::Spectate(request, reply));
+            }
+            Message::Describe(reply) => self.releases.push(Release::Describe(reply)),
+            Message::Close(secret, reply) => {
+                if self.core.header().owner.matches(&secret) {
+                    self.core.abort(self.now, AbortReason::Closed);
+                    self.releases.push(Release::Closed(reply));
+                } else {
+                    answer(reply, None);
+                }
+            }
+            Message::Leave(secret, reply) => match self.core.seat_of_ticket(&secret) {
+                Some(seat) => {
+                    let left = self.core.leave(self.now, seat);
+                    if left.is_ok()
+                        && let Some(mut subscriber) = self.connections[seat.index()].take()
+                    {
+                        subscriber.detach(v1::DetachReason::Requested);
+                    }
+                    self.releases.push(Release::Left(reply, left));
+                }
+                None => answer(reply, None),
+            },
+            Message::Abort(reason) => self.core.abort(self.now, reason),
+            Message::Suspend => self.suspended = true,
+            Message::Space => {}
+        }
+    }
+
+    fn join(&mut self, request: JoinRequest) -> Result<Joined, JoinError> {
+        let ticket = Token::random(self.core.header().room_id);
+        let seat = self.core.join(
+            self.now,
+            request.seat,
+            SeatedParticipant {
+                name: request.name,
+                kind: request.kind,
+                ticket: ticket.hash(),
+            },
+        )?;
+        Ok(Joined {
+            seat,
+            ticket,
+            room: Box::new(convert::describe(&self.core)),
+        })
+    }
+
+    fn attach(
+        &mut self,
+        request: Box<AttachRequest>,
+        reply: oneshot::Sender<Option<(Seat, ConnectionId)>>,
+    ) {
+        let Some(seat) = self.core.seat_of_ticket(&request.secret) else {
+            answer(reply, None);
+            return;
+        };
+        let connection = ConnectionId(self.context.connections.fetch_add(1, Ordering::Relaxed));
+        let handed = self.handed();
+        let (entropy, arrived) = (request.entropy.clone(), self.clock.at(request.arrived));
+        self.core
+            .attach(self.now, seat, connection, entropy, arrived, handed);
+        self.releases
+            .push(Release::Attach(request, seat, connection, reply));
+    }
+
+    fn lost(&mut self, seat: Seat, connection: ConnectionId, reason: Option<v1::DetachReason>) {
+        if !self.is_current(seat, connection) {
+            return;
+        }
+        let handed = self.handed();
+        self.core.lost(self.now, seat, connection, handed);
+        if let Some(mut subscriber) = self.connections[seat.index()].take()
+            && let Some(reason) = reason
+        {
+            subscriber.detach(reason);
+        }
+    }
+
+    fn is_current(&self, seat: Seat, connection: ConnectionId) -> bool {
+        self.connections[seat.index()]
+            .as_ref()
+            .is_some_and(|subscriber| is_connection(subscriber, connection))
+    }
+
+    fn perform(&mut self, seat: Seat, action: SeatAction, arrived: Instant) -> Acted {
+        match action {
+            SeatAction::Answer(answer) => {
+                let (decision_id, action) = (answer.decision_id, answer.action);
+                let handed = self.connections[seat.index()]
+                    .as_ref()
+                    .and_then(|subscriber| subscriber.handed(decision_id));
+                let arrived = self.clock.at(arrived);
+                let answered = self.core.answer(self.now, seat, answer, arrived, handed);
+                Ok(Some(convert::answer_result(decision_id, action, answered)))
+            }
+            SeatAction::Express {
+                record_only,
+                expression,
+            } => self
+                .core
+                .express(self.now, seat, record_only, expression)
+                .map(|()| None),
+            SeatAction::Resume => {
+                self.core.resume(self.now, seat);
+                Ok(None)
+            }
+        }
+    }
+
+    fn spectate(&mut self, request: SpectateRequest) -> Result<(), SpectateError> {
+        let policy = &self.core.header().policy;
+        if !policy.spectators {
+            return Err(SpectateError::NotAdmitted);
+        }
+        if request.snapshot && policy.spectator_delay_decisions > 0 {
+            return Err(SpectateError::SnapshotDelayed);
+        }
+        if self.spectators.len() >= MAX_SPECTATORS {
+            return Err(SpectateError::Full);
+        }
+        let spectator = Subscriber::spectator(
+            &self.core,
+            request.outbox,
+            Arc::clone(&self.on_space),
+            request.from,
+            request.snapshot,
+        );
+        self.spectators.push(spectator);
+        Ok(())
+    }
+
+    /// Hands new changes to the store, awaits it, then tells everybody what they may know. `false` when the room must stop.
+    async fn commit_and_publish(&mut self) -> bool {
+        if !self.core.pending().is_empty() {
+            if let Err(error) = self.journal.append(self.core.pending()).await {
+                self.fail(&error);
+                return false;
+            }
+            // What the store took is nobody's thinking time.
+            self.now = self.clock.now();
+        }
+        self.core.released(self.now);
+        let ends = self.core.state().is_over() && self.over_since.is_none();
+        if ends && !self.conclude().await {
+            return false;
+        }
+        self.public.follow(&self.core);
+        let mut releases = std::mem::take(&mut self.releases);
+        for release in releases.drain(..) {
+            self.release(release);
+        }
+        self.releases = releases;
+        self.deliver();
+        if ends {
+            // Whoever waits for games to end may close streams at once: everything has been put into them.
+            self.context.watcher.game_over(self.core.header().room_id);
+        }
+        true
+    }
+
+    fn release(&mut self, release: Release) {
+        match release {
+            Release::Join(reply, joined) => answer(reply, joined),
+            Release::Attach(request, seat, connection, reply) => {
+                self.release_attach(*request, seat, connection, reply);
+            }
+            Release::Result(seat, connection, result) => {
+                if let Some(subscriber) = self.current(seat, connection) {
+                    subscriber.send_result(result);
+                }
+            }
+            Release::Refuse(seat, connection, refused) => {
+                if let Some(subscriber) = self.current(seat, connection) {
+                    subscriber.refuse(refused);
+                }
+            }
+            Release::Acted(reply, acted) => answer(reply, Some(acted)),
+            Release::Closed(reply) => answer(reply, Some(convert::describe(&self.core))),
+            Release::Left(reply, left) => {
+                answer(reply, Some(left.map(|()| convert::describe(&self.core))));
+            }
+            Release::Describe(reply) => answer(reply, convert::describe(&self.core)),
+            Release::Spectate(request, reply) => answer(reply, self.spectate(*request)),
+        }
+    }
+
+    fn release_attach(
+        &mut self,
+        request: AttachRequest,
+        seat: Seat,
+        connection: ConnectionId,
+        reply: oneshot::Sender<Option<(Seat, ConnectionId)>>,
+    ) {
+        let connected = SeatConnection::new(
+            seat,
+            connection,
+            request.handle,
+            request.options,
+            HandStamp::new(self.clock),
+            request.detached,
+        );
+        let mut subscriber =
+            Subscriber::seat(connected, request.outbox, Arc::clone(&self.on_space));
+        subscriber.confirm_attached(&self.core, request.request_id, request.assigned_ticket);
+        subscriber.deliver(&self.core, &self.public, self.now, true);
+        if let Some(mut older) = self.connections[seat.index()].replace(subscriber) {
+            older.detach(v1::DetachReason::Superseded);
+        }
+        answer(reply, Some((seat, connection)));
+    }
+
+    fn current(&mut self, seat: Seat, connection: ConnectionId) -> Option<&mut Subscriber> {
+        self.connections[seat.index()]
+            .as_mut()
+            .filter(|subscriber| is_connection(subscriber, connection))
+    }
+
+    fn deliver(&mut self) {
+        let news = self.core.log().since(self.delivered);
+        for seat in self.core.all_seats() {
+            if let Some(subscriber) = &mut self.connections[seat.index()] {
+                let urgent = news.iter().any(|entry| is_urgent(&entry.event, seat));
+                subscriber.deliver(&self.core, &self.public, self.now, urgent);
+            }
+        }
+        self.delivered = self.core.log().len();
+        let (core, public, now) = (&self.core, &self.public, self.now);
+        self.spectators
+            .retain_mut(|spectator| spectator.deliver(core, public, now, false));
+    }
+
+    /// The game has ended: the store is told, the record is written.
+    async fn conclude(&mut self) -> bool {
+        self.over_since = Some(self.now);
+        let header = Arc::clone(self.core.header());
+        // Of a room in which nothing was ever dealt there is no record.
+        let summary = self.core.game().map(|_| convert::summary(&self.core));
+        let has_record = summary.is_some();
+        if let Err(error) = self.journal.finish(summary.map(Box::new)).await {
+            self.fail(&error);
+            return false;
+        }
+        info!(
+            room = %header.room_id,
+            game = %header.game_id,
+            finished = self.core.state() == State::Finished,
+            decisions = self.core.decisions(),
+            "the game has ended"
+        );
+        if has_record {
+            self.context.filing.file(header.game_id);
+        }
+        true
+    }
+
+    /// The store has failed: nobody is told of what may not be kept. The streams end, so that agents connect again and find the game where
+    /// the server, once it is back, finds it.
+    fn fail(&mut self, error: &StoreError) {
+        error!(room = %self.core.header().room_id, %error, "the room stops");
+        self.releases.clear();
+        self.end_streams(StreamEnd::StoreFailed);
+    }
+
+    /// Ends the streams of all subscribers, who may connect again.
+    fn end_streams(&mut self, end: StreamEnd) {
+        let seats = self.connections.iter_mut().flatten();
+        for subscriber in seats.chain(&mut self.spectators) {
+            subscriber.end(end);
+        }
+    }
+}
+
+/// Whatever ends the task, a panic too: nobody waits for a room that is gone.
+impl Drop for Task {
+    fn drop(&mut self) {
+        self.end_streams(StreamEnd::RoomGone);
+        self.context.watcher.gone(self.core.header().room_id);
+    }
+}
+
+fn is_connection(subscriber: &Subscriber, connection: ConnectionId) -> bool {
+    (subscriber.connection()).is_some_and(|attached| attached.id == connection)
+}
+
+/// Answers a caller. One that is no longer there does not want to know.
+fn answer<T>(reply: oneshot::Sender<T>, answer: T) {
+    let _ = reply.send(answer);
+}
