@@ -57,27 +57,27 @@ class SpectatorServiceWatchResponse(_message.Message):
 
     DESCRIPTOR: _descriptor.Descriptor
 
+    EVENTS_FIELD_NUMBER: _builtins.int
     ROOM_FIELD_NUMBER: _builtins.int
     SNAPSHOT_FIELD_NUMBER: _builtins.int
-    EVENTS_FIELD_NUMBER: _builtins.int
+    @_builtins.property
+    def events(self) -> _containers.RepeatedCompositeFieldContainer[_event_pb2.GameEvent]:
+        """Events in order."""
+
     @_builtins.property
     def room(self) -> _room_pb2.Room:
         """The room, in the first message."""
 
     @_builtins.property
     def snapshot(self) -> _play_service_pb2.Snapshot:
-        """Where the game stands, in the first message, if asked for."""
-
-    @_builtins.property
-    def events(self) -> _containers.RepeatedCompositeFieldContainer[_event_pb2.GameEvent]:
-        """Events in order."""
+        """The state of the game, in the first message, if asked for."""
 
     def __init__(
         self,
         *,
+        events: _abc.Iterable[_event_pb2.GameEvent] | None = ...,
         room: _room_pb2.Room | None = ...,
         snapshot: _play_service_pb2.Snapshot | None = ...,
-        events: _abc.Iterable[_event_pb2.GameEvent] | None = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["room", b"room", "snapshot", b"snapshot"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
