@@ -10,10 +10,10 @@ use chefshat_record::convert::{
 use prost::Message as _;
 
 use super::decision::source_to_proto;
+use super::kind::kind_to_proto;
 use super::policy::policy_of;
-use super::room::{kind_to_proto, participants};
+use super::room::{abort_reason, participants};
 use chefshat_room::Core;
-use chefshat_room::journal::AbortReason;
 use chefshat_room::log::RoomEvent;
 
 /// The event at a position of the log (from 0), as `viewer` may see it. `None` beyond the end.
@@ -85,17 +85,6 @@ fn kind(core: &Core, event: &RoomEvent, viewer: Viewer) -> Kind {
                 expression: v1::Expression::decode(expression.as_ref()).ok(),
             }))
         }
-    }
-}
-
-/// The protocol's name for why a game has no result.
-pub(super) fn abort_reason(reason: AbortReason) -> v1::AbortReason {
-    match reason {
-        AbortReason::Closed => v1::AbortReason::Closed,
-        AbortReason::Shutdown => v1::AbortReason::Shutdown,
-        AbortReason::ParticipantsLost => v1::AbortReason::ParticipantsLost,
-        AbortReason::NeverStarted => v1::AbortReason::NeverStarted,
-        AbortReason::TooLong => v1::AbortReason::TooLong,
     }
 }
 

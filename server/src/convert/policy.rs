@@ -8,7 +8,7 @@ use chefshat_engine::RewardScheme;
 use chefshat_proto::v1;
 use chefshat_record::convert::{FieldProblem, reward_scheme_from_proto, reward_scheme_to_proto};
 
-use super::room::{kind_from_proto, kind_to_proto};
+use super::kind::{kind_from_proto, kind_to_proto, unknown};
 use chefshat_room::journal::ParticipantKind;
 use chefshat_room::policy::{AbortPolicy, Durability, KindClock, Policy};
 use chefshat_room::{Core, State};
@@ -199,10 +199,6 @@ fn in_range(
         )),
         value => Ok(value),
     }
-}
-
-pub(super) fn unknown(field: &'static str, value: i32) -> FieldProblem {
-    FieldProblem::new(field, format!("{value} is not a value of this enum"))
 }
 
 #[cfg(test)]

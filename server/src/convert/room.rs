@@ -7,12 +7,12 @@ use chefshat_engine::{MAX_SEATS, RuleSet, Seat};
 use chefshat_proto::v1::{self, seat_config::FilledBy};
 use chefshat_record::convert::{FieldProblem, rules_to_proto, seat_number};
 
-use super::event::abort_reason;
+use super::kind::{kind_from_proto, kind_to_proto};
 use super::name::name_to_show;
 use super::policy::{agent, policy_of};
 use super::start::{branch_point, origin};
 use chefshat_room::ids::Id;
-use chefshat_room::journal::{Fill, GameHeader, ParticipantKind, RecordedSeat};
+use chefshat_room::journal::{AbortReason, Fill, GameHeader, ParticipantKind, RecordedSeat};
 use chefshat_room::{Core, State};
 
 /// What fills the seats of a new room; none given means that all are open.
@@ -115,37 +115,6 @@ fn player_to_proto(player: RecordedSeat) -> v1::RecordedPlayer {
     }
 }
 
-/// The kind of a participant; `None` when unspecified.
-///
-/// # Errors
-/// A number that names no kind.
-pub fn kind_from_proto(
-    field: &'static str,
-    kind: i32,
-) -> Result<Option<ParticipantKind>, FieldProblem> {
-    match v1::ParticipantKind::try_from(kind) {
-        Ok(v1::ParticipantKind::Unspecified) => Ok(None),
-        Ok(v1::ParticipantKind::Agent) => Ok(Some(ParticipantKind::Agent)),
-        Ok(v1::ParticipantKind::Human) => Ok(Some(ParticipantKind::Human)),
-        Ok(v1::ParticipantKind::Robot) => Ok(Some(ParticipantKind::Robot)),
-        Err(_) => Err(FieldProblem::new(
-            field,
-            format!("{kind} is not a kind of participant"),
-        )),
-    }
-}
-
-/// The message's name for a kind.
-pub fn kind_to_proto(kind: Option<ParticipantKind>) -> i32 {
-    match kind {
-        None => v1::ParticipantKind::Unspecified,
-        Some(ParticipantKind::Agent) => v1::ParticipantKind::Agent,
-        Some(ParticipantKind::Human) => v1::ParticipantKind::Human,
-        Some(ParticipantKind::Robot) => v1::ParticipantKind::Robot,
-    }
-    .into()
-}
-
 /// A room as everybody sees it.
 pub fn describe(core: &Core) -> v1::Room {
     let header = core.header();
@@ -177,6 +146,17 @@ pub fn tournament_id(header: &GameHeader) -> String {
 /// The series a game belongs to, or nothing.
 pub(super) fn series_id(header: &GameHeader) -> String {
     (header.series()).map_or_else(String::new, |series| series.to_string())
+}
+
+/// The protocol's name for why a game has no result.
+pub(super) fn abort_reason(reason: AbortReason) -> v1::AbortReason {
+    match reason {
+        AbortReason::Closed => v1::AbortReason::Closed,
+        AbortReason::Shutdown => v1::AbortReason::Shutdown,
+        AbortReason::ParticipantsLost => v1::AbortReason::ParticipantsLost,
+        AbortReason::NeverStarted => v1::AbortReason::NeverStarted,
+        AbortReason::TooLong => v1::AbortReason::TooLong,
+    }
 }
 
 /// Why the game has no result, if it has none.

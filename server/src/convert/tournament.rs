@@ -8,9 +8,9 @@ use chefshat_tournament::{
     Deals, EntrantKind, Format, Game, GameState, MAX_PARTICIPANTS, Settings, State, Tournament,
 };
 
+use super::kind::{kind_from_proto, kind_to_proto, unknown};
 use super::number;
-use super::policy::{agent, policy_from_proto, policy_to_proto, unknown};
-use super::room::{kind_from_proto, kind_to_proto};
+use super::policy::{agent, policy_from_proto, policy_to_proto};
 use chefshat_room::ids::Id;
 use chefshat_room::journal::ParticipantKind;
 use chefshat_room::policy::{AbortPolicy, Policy};

@@ -15,7 +15,8 @@ use chefshat_simulation::vector::{
     VectorSetup,
 };
 
-use super::policy::{agent, unknown};
+use super::kind::unknown;
+use super::policy::agent;
 use crate::config::{MAX_HOSTED_SHIFTS, MAX_VECTOR_RECORDED_GAMES, MAX_VECTOR_SEEDS};
 use chefshat_record::convert::MAX_RECORDED_ATTEMPTS;
 

@@ -1,7 +1,6 @@
 //! `PlayService`: streams of seats, and single commands without a stream. What a stream asks is read and done in `reader`; its responses come
 //! from its outbox, which rooms fill.
 
-mod participants;
 mod reader;
 
 use std::pin::Pin;
@@ -17,16 +16,14 @@ use tonic::{Request, Response, Status, Streaming};
 
 use super::status::{Refusal, field, stream_ended, ticket_unknown};
 use crate::config::{HEARTBEAT, MAX_SEATS_PER_WATCH};
-use crate::convert;
 use crate::outbox::{Outbox, OutboxStream, StreamEnd};
 use crate::room::SeatAction;
 use crate::rooms::Rooms;
 use crate::tournaments::Tournaments;
 use crate::wire::Updates;
 use crate::wire::service::play_service_server::PlayService;
-use chefshat_room::Answer;
 use chefshat_room::ids::Token;
-use reader::Reader;
+use reader::{Reader, answer_action, express_action};
 
 /// The service.
 #[derive(Debug, Clone)]
@@ -181,21 +178,4 @@ pub(super) fn with_heartbeats(
                 .map_err(stream_ended)
         },
     )
-}
-
-fn answer_action(answer: v1::Answer) -> SeatAction {
-    let annotations = convert::annotations_from_proto(answer.annotations);
-    SeatAction::Answer(Answer {
-        decision_id: answer.decision_id,
-        action: answer.action,
-        annotations_refused: annotations.is_err(),
-        annotations: annotations.unwrap_or_default(),
-    })
-}
-
-fn express_action(expression: &v1::Expression) -> Result<SeatAction, FieldProblem> {
-    Ok(SeatAction::Express {
-        record_only: expression.record_only,
-        expression: convert::expression_from_proto(expression)?,
-    })
 }

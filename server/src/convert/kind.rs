@@ -1,0 +1,41 @@
+//! Kinds of participants, and values that an enum of the protocol does not have.
+
+use chefshat_proto::v1;
+use chefshat_record::convert::FieldProblem;
+use chefshat_room::journal::ParticipantKind;
+
+/// The kind of a participant; `None` when unspecified.
+///
+/// # Errors
+/// A number that names no kind.
+pub fn kind_from_proto(
+    field: &'static str,
+    kind: i32,
+) -> Result<Option<ParticipantKind>, FieldProblem> {
+    match v1::ParticipantKind::try_from(kind) {
+        Ok(v1::ParticipantKind::Unspecified) => Ok(None),
+        Ok(v1::ParticipantKind::Agent) => Ok(Some(ParticipantKind::Agent)),
+        Ok(v1::ParticipantKind::Human) => Ok(Some(ParticipantKind::Human)),
+        Ok(v1::ParticipantKind::Robot) => Ok(Some(ParticipantKind::Robot)),
+        Err(_) => Err(FieldProblem::new(
+            field,
+            format!("{kind} is not a kind of participant"),
+        )),
+    }
+}
+
+/// The message's name for a kind.
+pub fn kind_to_proto(kind: Option<ParticipantKind>) -> i32 {
+    match kind {
+        None => v1::ParticipantKind::Unspecified,
+        Some(ParticipantKind::Agent) => v1::ParticipantKind::Agent,
+        Some(ParticipantKind::Human) => v1::ParticipantKind::Human,
+        Some(ParticipantKind::Robot) => v1::ParticipantKind::Robot,
+    }
+    .into()
+}
+
+/// A number that names no value of an enum.
+pub(super) fn unknown(field: &'static str, value: i32) -> FieldProblem {
+    FieldProblem::new(field, format!("{value} is not a value of this enum"))
+}
