@@ -1,6 +1,5 @@
-//! The Chef's Hat game server: rooms that run the rule engine, seats filled by remote agents, clocks, storage, gRPC, and the command
-//! line of the binary `chefshat`. The game itself lives in `chefshat-engine`, what is played offline in `chefshat-arena`, the form of
-//! records in `chefshat-records`.
+//! The Chef's Hat game server as a library: tasks of rooms and tournaments, stores, gRPC services and the page. The core of a room is
+//! `chefshat-room`, the rules are `chefshat-engine`; the command line is `chefshat`, in `server/cli`.
 
 pub mod clock;
 pub mod config;

@@ -1,16 +1,16 @@
-//! What goes into a room's core and what it says to it: an answer as it arrived, what became of it, why somebody is refused.
+//! Inputs and outputs of the core of a room: answers, their results, and why a request is refused.
 
 use std::time::Duration;
 
 use super::{MAX_EXPRESSIONS_PER_SEAT, MAX_SEATINGS};
 use crate::journal::{Fill, SeatedParticipant};
 
-/// How a seat stands, as everybody may know it.
+/// The public state of a seat.
 #[derive(Debug, Clone, Copy)]
 pub struct SeatStanding<'a> {
     /// What fills it.
     pub fill: Fill,
-    /// Who has taken it.
+    /// The participant who has taken it.
     pub participant: Option<&'a SeatedParticipant>,
     /// Whether an agent is attached.
     pub connected: bool,
@@ -24,10 +24,10 @@ pub enum JoinError {
     /// All seats are taken.
     #[error("every seat of this room is taken")]
     RoomFull,
-    /// Seats were taken and given back again and again.
+    /// Seats were taken and given back too often.
     #[error("seats of this room were taken {MAX_SEATINGS} times; make a new room")]
     TooManySeatings,
-    /// The seat asked for is taken.
+    /// The requested seat is taken.
     #[error("this seat is taken; leave `seat` unset to take any free one")]
     SeatTaken,
     /// There is no such seat.
@@ -59,13 +59,13 @@ pub enum LeaveError {
     GameOver,
 }
 
-/// Why an expression is not taken.
+/// Why an expression is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum ExpressError {
     /// The game is over.
     #[error("the game is over")]
     GameOver,
-    /// The seat has expressed too much.
+    /// The seat has sent too many expressions.
     #[error("a seat may express itself at most {MAX_EXPRESSIONS_PER_SEAT} times in a game")]
     TooMany,
 }
@@ -95,18 +95,18 @@ impl Answer {
     }
 }
 
-/// What became of an answer.
+/// The result of an answer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Answered {
     /// The verdict.
     pub verdict: Verdict,
     /// Measured decision time; zero where there is none.
     pub time: Duration,
-    /// Annotations were over their limit.
+    /// Annotations exceeded their limit and were dropped.
     pub annotations_dropped: bool,
 }
 
-/// Whether an answer counts.
+/// Whether an answer was accepted.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Verdict {
     /// The action was taken.
@@ -122,7 +122,7 @@ pub enum Verdict {
     },
     /// The decision is closed.
     Closed,
-    /// There has been no such decision.
+    /// There is no such decision yet.
     Unknown,
 }
 

@@ -1,5 +1,5 @@
-//! Everything a room does because time has passed: deadlines and banks, default decisions, substitution, the decisions of built-in
-//! agents, seats that are not attached in time.
+//! What a room does as time passes: deadlines and banks, default decisions, substitution, the decisions of built-in agents, seats that are
+//! not attached in time.
 
 use std::time::Duration;
 
@@ -13,7 +13,7 @@ use crate::journal::{AbortReason, Change, Fill, ParticipantKind, Source};
 use crate::policy::AbortPolicy;
 
 impl Core {
-    /// When the room must next be told that time has passed; `None` when nothing depends on it.
+    /// When [`Core::tick`] must be called next; `None` when nothing depends on time.
     pub fn deadline(&self) -> Option<Duration> {
         match self.state {
             State::Waiting => {
@@ -35,7 +35,7 @@ impl Core {
         }
     }
 
-    /// Time has passed. `handed` is when the open decision was handed to its seat's transport, if it was.
+    /// Does what is due at `now`. `handed`: when the open decision was handed to its seat's transport, if it was.
     pub fn tick(&mut self, now: Duration, handed: Option<Duration>) {
         match self.state {
             State::Waiting => self.tick_waiting(now),
@@ -44,14 +44,14 @@ impl Core {
         }
     }
 
-    /// Ends the game without a result, unless it has ended.
+    /// Ends the game without a result. Does nothing if it has ended.
     pub fn abort(&mut self, now: Duration, reason: AbortReason) {
         if !self.state.is_over() {
             self.commit(now, Change::Aborted(reason));
         }
     }
 
-    /// Lets built-in agents and substitutes decide as far as they may now.
+    /// Lets built-in agents and substitutes take the decisions that are due.
     pub(super) fn advance(&mut self, now: Duration) {
         let mut budget = BUILT_IN_BUDGET;
         while budget > 0 {
@@ -70,7 +70,7 @@ impl Core {
         }
     }
 
-    /// What a built-in agent or substitute waits before it decides.
+    /// How long a built-in agent or substitute waits before it decides.
     pub fn pace(&self) -> Duration {
         let mut participants = self
             .seats
@@ -80,7 +80,7 @@ impl Core {
         self.header.policy.pace_of(with_people)
     }
 
-    /// What the open decision of a built-in agent counts for.
+    /// Cost of the open decision of a built-in agent, in decisions.
     fn cost_of_open(&self) -> usize {
         let replayed = self.open.as_ref().is_some_and(|open| {
             matches!(self.seats[open.decision.seat.index()].fill, Fill::Replay(_))
@@ -95,7 +95,7 @@ impl Core {
         policy.decision_time_of(participant.map(|participant| participant.kind))
     }
 
-    /// Time a seat has for a decision, its bank included.
+    /// Time a seat has for a decision, including its bank.
     pub(super) fn time_allowed(&self, seat: Seat) -> Duration {
         self.decision_time(seat) + self.seats[seat.index()].bank_left
     }
@@ -118,7 +118,7 @@ impl Core {
         )
     }
 
-    /// Settles when the clock of the open decision began, if it is not settled yet. It never begins again.
+    /// Settles when the clock of the open decision started, unless that is settled: it never restarts.
     pub(super) fn settle_start(&mut self, now: Duration, handed: Option<Duration>) {
         let Some(seat) = self.open.as_ref().map(|open| open.decision.seat) else {
             return;
@@ -140,7 +140,7 @@ impl Core {
         };
     }
 
-    /// A seat that comes back after a restart of the server has all the time for the decision that waits for it.
+    /// Gives a seat that returns after a restart of the server all its time for the open decision.
     pub(super) fn restart_clock(&mut self, now: Duration, seat: Seat) {
         let recalled = self.seats[seat.index()].recalled;
         if let Some(open) = &mut self.open
@@ -151,14 +151,14 @@ impl Core {
         }
     }
 
-    /// The seat whose decision is open waits for our word since then.
+    /// Pauses the clock of the open decision: its seat waits for the server since then.
     pub(super) fn pause_clock(&mut self, since: Duration) {
         if let Some(open) = &mut self.open {
             open.paused_since.get_or_insert(since);
         }
     }
 
-    /// Until when a seat is waited for that has not come back since the server was restarted.
+    /// Until when the clock waits for a seat that has not returned since the server restarted.
     fn recalled_until(&self, seat: Seat) -> Option<Duration> {
         self.restarted
             .filter(|_| self.seats[seat.index()].recalled)
@@ -174,7 +174,7 @@ impl Core {
         })
     }
 
-    /// When a room is given up whose seats have not come. A restart leaves them time to come back.
+    /// When a room whose seats are not all attached is closed. A restart leaves them time to return.
     fn waits_until(&self) -> Duration {
         let after_restart = self.restarted.map_or(Duration::ZERO, |at| at + JOIN_HOLD);
         self.header.policy.waiting_time.max(after_restart)
@@ -198,7 +198,7 @@ impl Core {
         self.settle_start(now, handed);
         if let Some(open) = &self.open {
             let seat = open.decision.seat;
-            // While the seat waits for our word its clock stands.
+            // The clock is paused while the seat waits for the server.
             let by = open.paused_since.map_or(now, |since| since.min(now));
             let late = open
                 .start
@@ -210,7 +210,7 @@ impl Core {
         self.advance(now);
     }
 
-    /// Takes the default decision for a seat whose time is up, and what follows from its being late too often.
+    /// Takes the default decision for a seat whose time is up. A seat that is late too often gets a substitute.
     fn time_out(&mut self, now: Duration) {
         let Some(open) = &self.open else { return };
         let seat = open.decision.seat;
@@ -246,7 +246,7 @@ impl Core {
         self.commit(now, Change::Decided(decided));
     }
 
-    /// A seat has been late too often: a substitute plays for it, or the game is given up.
+    /// Substitutes a seat that has been late too often, or aborts the game.
     fn lose(&mut self, now: Duration, seat: Seat) {
         let others_lost = self
             .seats
@@ -269,7 +269,7 @@ impl Core {
         self.commit(now, Change::Substituted(seat));
     }
 
-    /// Makes the agent that plays for a seat while it is substituted.
+    /// Creates the agent that plays for a substituted seat.
     pub(super) fn give_substitute(&mut self, seat: Seat) {
         let substitute = self.header.policy.substitute;
         let seed = self.header.seed.agent_seed(seat.index());

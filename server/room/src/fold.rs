@@ -1,5 +1,5 @@
-//! What a change does to the state and to the log. The same for a change that has just been made and for one read from a journal: nothing
-//! here looks at a clock, a connection or a generator.
+//! The effect of a change on the state and the log, the same for a new change and for one read from a journal: nothing here reads a clock, a
+//! connection or a generator.
 
 use std::time::Duration;
 
@@ -80,7 +80,7 @@ impl Core {
         }
     }
 
-    /// Nobody is connected any more, and the open decision has all its time again.
+    /// Disconnects everybody and gives the open decision all its time again.
     fn restart(&mut self, at: Duration) {
         self.restarted = Some(at);
         for state in &mut self.seats {
@@ -164,7 +164,7 @@ impl Core {
         self.open_next(at);
     }
 
-    /// Has later Shifts dealt from the seed they are to be dealt from.
+    /// Sets the seed that later Shifts are dealt from.
     fn reseed(&mut self) {
         let seed = self.seed_for(self.decisions);
         if let Some(game) = &mut self.game {
@@ -172,7 +172,7 @@ impl Core {
         }
     }
 
-    /// The seed from which a Shift is dealt that begins after so many decisions: one that was taken over, or the game's own.
+    /// The seed of a Shift that begins after this number of decisions: one taken over from a record, or the game's own.
     fn seed_for(&self, decisions: u64) -> Seed {
         let mut end = 0;
         self.header
@@ -190,7 +190,7 @@ impl Core {
             )
     }
 
-    /// Remembers how far spectators with a delay may see after this decision.
+    /// Notes how far delayed spectators may see after this decision.
     fn note_decision(&mut self) {
         if self.header.policy.spectator_delay_decisions > 0 {
             self.log_after_decision

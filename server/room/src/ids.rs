@@ -1,5 +1,5 @@
-//! Names and secrets: room and game ids, join codes, tickets, owner tokens. Secrets are random from the operating system, kept as hashes
-//! and compared in constant time.
+//! Names and secrets: room and game ids, join codes, tickets, owner tokens. Secrets come from the operating system's generator, are
+//! stored as hashes and compared in constant time.
 
 use std::fmt;
 
@@ -14,7 +14,7 @@ const CODE_LENGTH: usize = 8;
 /// Random bytes from the operating system.
 ///
 /// # Panics
-/// When the operating system has no randomness to give, without which no room can be fair.
+/// When the operating system provides no randomness: without it no deal is fair.
 pub fn random_bytes<const N: usize>() -> [u8; N] {
     let mut bytes = [0; N];
     rand::rngs::SysRng
@@ -53,7 +53,7 @@ impl fmt::Debug for Id {
     }
 }
 
-/// The hash under which a secret is kept.
+/// The hash of a secret, which is what stores hold.
 #[derive(Clone, Copy, Debug)]
 pub struct SecretHash([u8; 32]);
 
@@ -63,12 +63,12 @@ impl SecretHash {
         Self(Sha256::digest(secret).into())
     }
 
-    /// The hash that was kept.
+    /// A stored hash.
     pub fn from_bytes(bytes: [u8; 32]) -> Self {
         Self(bytes)
     }
 
-    /// What to keep.
+    /// The bytes to store.
     pub fn bytes(&self) -> &[u8; 32] {
         &self.0
     }
@@ -78,7 +78,7 @@ impl SecretHash {
         self.is(&Self::of(secret))
     }
 
-    /// Whether two secrets are the same, in constant time.
+    /// Whether two hashes are the same, in constant time.
     pub fn is(&self, other: &Self) -> bool {
         self.0.ct_eq(&other.0).into()
     }
@@ -103,7 +103,7 @@ impl Token {
         }
     }
 
-    /// Reads a token; `None` if the word is none.
+    /// Parses a token; `None` if the text is not one.
     pub fn parse(word: &str) -> Option<Self> {
         let mut bytes = [0; 48];
         hex::decode_to_slice(word, &mut bytes).ok()?;
@@ -114,12 +114,12 @@ impl Token {
         })
     }
 
-    /// The word that is given to the client.
+    /// The token as text, for the client.
     pub fn word(&self) -> String {
         hex::encode([self.room.0.as_slice(), &self.secret].concat())
     }
 
-    /// The hash to keep.
+    /// The hash to store.
     pub fn hash(&self) -> SecretHash {
         SecretHash::of(&self.secret)
     }

@@ -1,5 +1,5 @@
-//! What participants do: join, attach, leave, answer, express, come back. Each input is checked against the state; what is not right is
-//! answered and changes nothing.
+//! What participants do: join, attach, leave, answer, express, return. Each input is checked against the state; an invalid one is refused
+//! and changes nothing.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -18,7 +18,7 @@ impl Core {
     /// Takes a seat.
     ///
     /// # Errors
-    /// Why none can be taken; the room is then as it was.
+    /// Why no seat can be taken. The room is left as it was.
     pub fn join(
         &mut self,
         now: Duration,
@@ -94,13 +94,13 @@ impl Core {
         Ok(())
     }
 
-    /// Seats a participant before anybody is told of the room.
+    /// Seats a participant before the room is published.
     pub fn seat(&mut self, seat: Seat, participant: SeatedParticipant) {
         let participant = Box::new(participant);
         self.commit(Duration::ZERO, Change::Seated { seat, participant });
     }
 
-    /// Attaches a connection to a seat, which asked for it at `arrived`. Whoever was attached before has lost the seat.
+    /// Attaches a connection to a seat. `arrived`: when the request was read. An older connection loses the seat.
     pub fn attach(
         &mut self,
         now: Duration,
@@ -110,7 +110,7 @@ impl Core {
         arrived: Duration,
         handed_before: Option<Duration>,
     ) {
-        // Whoever comes to hear how a game ended was not there at its end.
+        // A connection made after the end does not count as present at the end.
         if self.state.is_over() {
             return;
         }
@@ -123,7 +123,7 @@ impl Core {
         state.recalled = false;
         state.connection = Some(connection);
         state.ever_attached = true;
-        // What one table adds to the seed would make its deals other than those of the series.
+        // A contribution to the seed would give this game other deals than the rest of its series.
         let dealt_alike = self.header.series().is_some();
         if self.state == State::Waiting && !dealt_alike {
             state.entropy = entropy;
@@ -135,7 +135,7 @@ impl Core {
         self.advance(now);
     }
 
-    /// A connection has gone. Does nothing if the seat has a newer one.
+    /// Notes the loss of a connection. Does nothing if the seat has a newer one.
     pub fn lost(
         &mut self,
         now: Duration,
@@ -143,7 +143,7 @@ impl Core {
         connection: ConnectionId,
         handed: Option<Duration>,
     ) {
-        // Of a game that is over it stays known who was there at its end.
+        // After the end of a game, who was present at its end stays as it was.
         if self.seats[seat.index()].connection != Some(connection) || self.state.is_over() {
             return;
         }
@@ -158,17 +158,17 @@ impl Core {
         }
     }
 
-    /// The seat's agent says that it plays itself again.
+    /// Gives a substituted seat back to its agent.
     pub fn resume(&mut self, now: Duration, seat: Seat) {
         if self.seats[seat.index()].substituted {
             self.returned(now, seat);
         }
     }
 
-    /// Somebody expresses something; `expression` is the encoded message.
+    /// Takes an expression of a seat, as an encoded message.
     ///
     /// # Errors
-    /// Why it is not taken.
+    /// Why it is refused.
     pub fn express(
         &mut self,
         now: Duration,
@@ -305,7 +305,7 @@ impl Core {
         }
     }
 
-    /// Why an action cannot be taken now; `None` if it can.
+    /// Why an action is illegal now; `None` if it is legal.
     fn refusal(&self, action: u32) -> Option<ActionError> {
         let action = Self::action_from(action);
         if self.legal_actions().contains(action) {
@@ -360,7 +360,7 @@ impl Core {
         }
     }
 
-    /// A room without open seats begins by itself.
+    /// Begins the game of a room without open seats.
     pub fn begin_if_all_built_in(&mut self, now: Duration) {
         self.start_if_complete(now);
         self.advance(now);

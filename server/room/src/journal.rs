@@ -1,5 +1,5 @@
-//! What a game is kept as: its header and every change that moved it. Everything else (events, records) follows by folding the changes
-//! again. The form on disk belongs to the store that writes one; here are the values.
+//! A game as a store holds it: its header and its changes. Events and records follow from folding the changes again. These are the values; each
+//! store has its own form on disk.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -23,7 +23,7 @@ pub enum Fill {
     },
     /// A built-in agent.
     BuiltIn(AgentKind),
-    /// A built-in agent that plays what a recorded player played.
+    /// A built-in agent that imitates a recorded player.
     Replay(RecordedSeat),
 }
 
@@ -43,7 +43,7 @@ pub struct RecordedSeat {
     pub seat: Seat,
 }
 
-/// How a game begins. The standard is a deal.
+/// How a game begins; by default with a deal.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct GameStart {
     /// The first Shift, where its hands are given.
@@ -59,11 +59,11 @@ pub struct Branch {
     pub game: Id,
     /// Whether later Shifts are dealt as in the recorded game.
     pub same_deals: bool,
-    /// What is taken over, in order; not empty, so that the seed of its first Shift is known.
+    /// The decisions taken over, in order. Not empty, so that the seed of the first Shift is known.
     pub taken_over: Vec<TakenOver>,
 }
 
-/// What a participant is.
+/// The kind of a participant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ParticipantKind {
     /// A program.
@@ -79,11 +79,11 @@ pub enum ParticipantKind {
 pub struct TournamentGame {
     /// The tournament.
     pub tournament: Id,
-    /// The games that are dealt like it; until all of them have ended, what could tell the deals is withheld.
+    /// The series of games with the same deals. Until all of them have ended, nothing that could reveal the deals is published.
     pub series: Option<Id>,
 }
 
-/// Everything about a game that stands before it begins.
+/// Everything about a game that is fixed before it begins.
 #[derive(Debug, Clone)]
 pub struct GameHeader {
     /// The room.
@@ -100,9 +100,9 @@ pub struct GameHeader {
     pub policy: Policy,
     /// What fills each seat.
     pub fills: Vec<Fill>,
-    /// Names of built-in agents that go by others than their own, by seat.
+    /// Display names of built-in agents that have one of their own, by seat.
     pub called: BTreeMap<usize, String>,
-    /// The recorded players of the seats that are filled by one, by seat.
+    /// Recorded players, by seat.
     pub recorded: BTreeMap<usize, Arc<RecordedPlayer>>,
     /// How the game begins.
     pub start: GameStart,
@@ -119,7 +119,7 @@ pub struct GameHeader {
 }
 
 impl GameHeader {
-    /// The games that are dealt like this one.
+    /// The series of games with the same deals.
     pub fn series(&self) -> Option<Id> {
         self.tournament.and_then(|game| game.series)
     }
@@ -128,9 +128,9 @@ impl GameHeader {
 /// One change of a game.
 #[derive(Debug, Clone)]
 pub struct Entry {
-    /// When, since the room was created.
+    /// Time since the room was created.
     pub at: Duration,
-    /// What.
+    /// The change.
     pub change: Change,
 }
 
@@ -166,7 +166,7 @@ pub enum AbortReason {
     TooLong,
 }
 
-/// What happened.
+/// A change of a game.
 #[derive(Debug, Clone)]
 pub enum Change {
     /// A participant took a seat.
@@ -178,9 +178,9 @@ pub enum Change {
     },
     /// A seat that was never attached became free again.
     Vacated(Seat),
-    /// The game began, with what the seats added to its seed.
+    /// The game began.
     Started {
-        /// Each seat's bytes, in seat order.
+        /// The seats' contributions to the game seed, in seat order.
         entropy: Vec<Vec<u8>>,
     },
     /// A seat's agent lost its connection.
@@ -189,7 +189,7 @@ pub enum Change {
     Returned(Seat),
     /// A built-in agent plays for a seat from now on.
     Substituted(Seat),
-    /// An action that is not legal was answered.
+    /// A seat answered with an illegal action.
     Attempted {
         /// The seat.
         seat: Seat,
@@ -198,9 +198,9 @@ pub enum Change {
     },
     /// A decision was taken.
     Decided(Decided),
-    /// Somebody expressed something.
+    /// A seat expressed something.
     Expressed {
-        /// By whom.
+        /// The seat.
         seat: Seat,
         /// For the record only.
         record_only: bool,
@@ -218,7 +218,7 @@ pub enum Change {
 pub struct SeatedParticipant {
     /// Name to show.
     pub name: String,
-    /// What it is.
+    /// Its kind.
     pub kind: ParticipantKind,
     /// Its ticket, hashed.
     pub ticket: SecretHash,
@@ -235,7 +235,7 @@ pub struct Decided {
     pub source: Source,
     /// Measured decision time, microseconds; 0 for built-in agents.
     pub time_us: u64,
-    /// What is left in the seat's bank, milliseconds.
+    /// Time left in the seat's bank, milliseconds.
     pub bank_left_ms: u32,
     /// The message `chefshat.v1.Annotations`, encoded.
     pub annotations: Option<Box<[u8]>>,

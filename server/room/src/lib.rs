@@ -1,8 +1,8 @@
-//! The heart of a room: `(state, input, now) → changes and answers`, without async or IO. Timeouts, invalid attempts, substitution and
-//! reconnection are decided here and nowhere else. Time is told by the caller as the time since the room was created.
+//! The core of a room: `(state, input, now) → changes and answers`, without async or IO. It alone decides timeouts, invalid attempts,
+//! substitution and reconnection. The caller passes the time, as the time since the room was created.
 //!
-//! An input (`inputs`, `clock`) checks what it is given against the state and states what follows as changes; a change (`fold`) alters the
-//! state and the log, and can be folded again later to the same effect. That is how a game is replayed from its journal.
+//! An input (`inputs`, `clock`) is checked against the state and turned into changes. A change (`fold`) alters the state and the log, and
+//! always to the same effect: a game is replayed from its journal by folding its changes again.
 
 mod answers;
 mod clock;
@@ -34,16 +34,16 @@ use crate::ids::SecretHash;
 use crate::journal::{AbortReason, Change, Entry, Fill, GameHeader, SeatedParticipant};
 use crate::log::Log;
 
-/// A joined seat whose ticket is not attached within this time is freed, before the game begins.
+/// Before the game begins, a seat whose ticket is not attached within this time becomes free again.
 pub const JOIN_HOLD: Duration = Duration::from_secs(120);
-/// The clock of a decision starts at the latest this long after the decision was released, even if the transport has not taken it.
+/// The clock of a decision starts at most this long after its release, even if the transport has not taken it.
 pub const MAX_HANDOVER: Duration = Duration::from_secs(5);
 /// After a restart of the server the clock of a decision waits this long for its seat to be attached again.
 pub const RECALL_TIME: Duration = Duration::from_secs(60);
-/// A seat that has had to wait this long for the store is given the time back. Shorter waits are part of every answer; were they given
-/// back as well, wrong answers would buy time.
+/// A seat that has waited this long for the store gets the time back. Shorter waits are part of every answer; if they were given back too,
+/// invalid answers would buy time.
 const SLOW_STORE: Duration = Duration::from_millis(100);
-/// How often to ask whether the transport has taken a request whose deadline would have passed.
+/// How often the room checks whether the transport has taken a request whose deadline would have passed.
 const LOOK_AGAIN: Duration = Duration::from_millis(20);
 /// Most annotations recorded per seat and game, bytes.
 pub const MAX_ANNOTATION_BYTES_PER_GAME: usize = 256 * 1024;
@@ -51,45 +51,45 @@ pub const MAX_ANNOTATION_BYTES_PER_GAME: usize = 256 * 1024;
 pub const MAX_ANNOTATION_BYTES: usize = 4 * 1024;
 /// Most expressions of one seat in one game.
 pub const MAX_EXPRESSIONS_PER_SEAT: u32 = 10_000;
-/// Most events of lost and new connections of one seat in one game; later ones are not told.
+/// Most events of lost and new connections of one seat in one game. Later ones are not published.
 pub const MAX_CONNECTION_EVENTS: u32 = 1_000;
 
-/// Seats taken in a room, those counted that were given back: each stays in its log.
+/// Most times that seats are taken in a room, including seats given back: each stays in its log.
 pub const MAX_SEATINGS: usize = 1_000;
-/// Invalid attempts at one decision after which the default is taken even where they are unlimited: a record must hold them.
+/// Invalid attempts at one decision after which the default is taken even where attempts are unlimited, so that a record can hold them.
 pub const MAX_ATTEMPTS: u32 = 10_000;
-/// Most changes of one game; beyond it the game is aborted.
+/// Most changes of one game. The game is aborted when it reaches them.
 pub const MAX_GAME_CHANGES: u64 = 2_000_000;
-/// Decisions a room's built-in agents take before it looks at its mailbox again.
+/// Most decisions that built-in agents take before the room reads its mailbox again.
 pub const BUILT_IN_BUDGET: usize = 256;
-/// A recorded player compares what it sees with all it has seen: one decision of it counts as so many.
+/// Cost of one decision of a recorded player, in decisions of other agents: it compares its observation with all recorded ones.
 const REPLAY_COST: usize = 32;
 
-/// Where a room stands.
+/// The state of a room.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum State {
-    /// Seats are free or not attached.
+    /// Waiting for seats to be taken and attached.
     Waiting,
     /// The game is being played.
     Playing,
     /// The game has ended with a result.
     Finished,
-    /// The game has ended without one.
+    /// The game has ended without a result.
     Aborted(AbortReason),
 }
 
 impl State {
-    /// Whether the game has ended, one way or the other.
+    /// Whether the game has ended, with or without a result.
     pub fn is_over(self) -> bool {
         matches!(self, Self::Finished | Self::Aborted(_))
     }
 }
 
-/// A connection of a seat: each attachment has its own number.
+/// The number of a connection. Each attachment of a seat has its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ConnectionId(pub u64);
 
-/// The state of a room.
+/// A room: its header, seats, game and log.
 #[derive(Debug)]
 pub struct Core {
     header: Arc<GameHeader>,
@@ -99,17 +99,17 @@ pub struct Core {
     entropy: Vec<Vec<u8>>,
     open: Option<OpenDecision>,
     log: Log,
-    /// Length of the log when the game had begun and nothing was dealt yet.
+    /// Length of the log before the first deal.
     log_before_deal: usize,
-    /// Length of the log after the deal and after each decision; kept where spectators are delayed.
+    /// Length of the log after the deal and after each decision. Empty unless spectators are delayed.
     log_after_decision: Vec<u32>,
     changes: u64,
     decisions: u64,
     /// When the server was last restarted.
     restarted: Option<Duration>,
-    /// Changes that have been folded and not yet been handed to the store.
+    /// Changes that have been folded but not yet handed to the store.
     pending: Vec<Entry>,
-    /// Room for the events of one action.
+    /// Buffer for the events of one action.
     events: Vec<Event>,
 }
 
@@ -121,9 +121,9 @@ struct SeatState {
     ever_attached: bool,
     connection: Option<ConnectionId>,
     entropy: Vec<u8>,
-    /// Whether everybody was told that the agent is away.
+    /// Whether the loss of the agent's connection has been published.
     away: bool,
-    /// Whether it has not been attached since the server was restarted.
+    /// Whether it has not been attached since the server restarted.
     recalled: bool,
     connection_events: u32,
     expressions: u32,
@@ -144,29 +144,29 @@ struct LastAnswer {
     answered: Answered,
 }
 
-/// The decision that is open.
+/// An open decision.
 #[derive(Debug, Clone)]
 pub struct OpenDecision {
-    /// Whose and what.
+    /// The seat and the kind.
     pub decision: Decision,
     /// Number of the decision, per seat, from 1.
     pub id: u64,
-    /// When it was opened or, for a seat that came back from a substitute, given back.
+    /// When it was opened, or given back to a seat that returned from a substitute.
     released: Duration,
-    /// Whether it has been kept, so that its seat may be told: from then on nothing moves its release.
+    /// Whether it has been committed, so that its seat may learn of it. From then on its release does not move.
     announced: bool,
-    /// When its clock began, once that is settled.
+    /// When its clock started, once that is settled.
     start: Option<Duration>,
-    /// When to ask again whether the transport has taken the request; zero before it was asked.
+    /// When to check again whether the transport has taken the request; zero before the first check.
     look_again: Duration,
-    /// Since when its seat waits for our word: on an answer that is refused, or on a new connection.
+    /// Since when the clock is paused: the seat waits for the server after an invalid answer, or on a new connection.
     paused_since: Option<Duration>,
-    /// Actions refused so far.
+    /// Invalid attempts so far.
     attempts: u32,
 }
 
 impl OpenDecision {
-    /// Opens it once more, with all its time.
+    /// Opens the decision again, with all its time.
     fn release_anew(&mut self, at: Duration) {
         self.released = at;
         self.announced = false;
@@ -176,7 +176,7 @@ impl OpenDecision {
 }
 
 impl Core {
-    /// A room whose seats are free.
+    /// A room with free seats.
     pub fn new(header: Arc<GameHeader>) -> Self {
         let seats = header
             .fills
@@ -237,7 +237,7 @@ impl Core {
         }
     }
 
-    /// A room as it stood after the entries of a journal.
+    /// The room that the entries of a journal lead to.
     pub fn replay(header: Arc<GameHeader>, journal: &[Entry]) -> Self {
         let mut core = Self::new(header);
         for entry in journal {
@@ -246,22 +246,22 @@ impl Core {
         core
     }
 
-    /// Folds an entry of a journal that follows on what has been folded before.
+    /// Folds the next entry of a journal.
     pub fn refold(&mut self, entry: &Entry) {
         self.fold(entry.at, &entry.change);
     }
 
-    /// What stands about the game from before it began.
+    /// The header: everything that was fixed before the game began.
     pub fn header(&self) -> &Arc<GameHeader> {
         &self.header
     }
 
-    /// Where the room stands.
+    /// The state of the room.
     pub fn state(&self) -> State {
         self.state
     }
 
-    /// What has happened.
+    /// The events so far.
     pub fn log(&self) -> &Log {
         &self.log
     }
@@ -271,12 +271,12 @@ impl Core {
         self.game.as_deref()
     }
 
-    /// The decision that is open.
+    /// The open decision.
     pub fn open(&self) -> Option<&OpenDecision> {
         self.open.as_ref()
     }
 
-    /// The open decision if it is put to a seat's own agent, not to a built-in one or a substitute.
+    /// The open decision, if the seat's own agent takes it and not a built-in agent or substitute.
     pub fn awaited(&self) -> Option<&OpenDecision> {
         self.open
             .as_ref()
@@ -314,7 +314,7 @@ impl Core {
         self.decisions
     }
 
-    /// What the seats added to the game seed, once the game has begun.
+    /// The seats' contributions to the game seed, once the game has begun.
     pub fn entropy(&self) -> &[Vec<u8>] {
         &self.entropy
     }
@@ -324,7 +324,7 @@ impl Core {
         (0..self.seats.len()).map(Seat::new)
     }
 
-    /// How a seat stands, as everybody may know it.
+    /// The public state of a seat.
     pub fn standing(&self, seat: Seat) -> SeatStanding<'_> {
         let state = &self.seats[seat.index()];
         SeatStanding {
@@ -355,7 +355,7 @@ impl Core {
         self.game().and_then(Game::default_action)
     }
 
-    /// The seat a ticket's secret belongs to, in constant time for each seat.
+    /// The seat that a ticket's secret belongs to. Compares in constant time for each seat.
     pub fn seat_of_ticket(&self, secret: &[u8]) -> Option<Seat> {
         let hash = SecretHash::of(secret);
         self.all_seats().find(|seat| {
@@ -383,20 +383,19 @@ impl Core {
             })
     }
 
-    /// Whether a built-in agent decides for the seat, its own or a substitute.
+    /// Whether a built-in agent or a substitute decides for the seat.
     fn is_automatic(&self, seat: Seat) -> bool {
         let state = &self.seats[seat.index()];
         state.substituted || state.fill.is_built_in()
     }
 
-    /// Changes that have been made and are not kept yet, for the store, which empties this. They have been folded already; nobody may be
-    /// told before they are kept.
+    /// Changes that are folded but not committed. The store takes them out; nobody may learn of them before they are committed.
     pub fn pending(&mut self) -> &mut Vec<Entry> {
         &mut self.pending
     }
 
-    /// The changes so far have been kept, and what is open is told now: its time begins now, whatever the store took. If it was told
-    /// before, the time is given back in which its seat could do nothing but wait for the store.
+    /// Notes that all changes have been committed and the open decision is published now: its time starts now, however long the commit
+    /// took. If it was published before, its seat gets back the time in which it could only wait for the store.
     pub fn released(&mut self, now: Duration) {
         let Some(open) = &mut self.open else { return };
         if !open.announced {

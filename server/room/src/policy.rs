@@ -1,4 +1,4 @@
-//! The policy of a room, validated: times, limits and manners.
+//! The validated policy of a room: times, limits, and what happens when participants are lost.
 
 use std::time::Duration;
 
@@ -7,7 +7,7 @@ use chefshat_engine::RewardScheme;
 
 use crate::journal::ParticipantKind;
 
-/// When a game is given up because its participants are gone.
+/// When a game is aborted because participants are lost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AbortPolicy {
     /// When every seat that is not a built-in agent's has been substituted.
@@ -18,12 +18,12 @@ pub enum AbortPolicy {
     Never,
 }
 
-/// What a game outlives.
+/// What a game survives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Durability {
-    /// The death of the server.
+    /// A crash or restart of the server.
     Durable,
-    /// Nothing: it is kept when it ends.
+    /// Nothing: only a finished game is stored.
     Ephemeral,
 }
 
@@ -32,14 +32,14 @@ pub enum Durability {
 pub struct KindClock {
     /// The kind.
     pub kind: ParticipantKind,
-    /// Time for a decision, if it is another.
+    /// Time for a decision; `None`: the room's.
     pub decision_time: Option<Duration>,
-    /// The bank, if it is another.
+    /// The bank; `None`: the room's.
     pub bank: Option<Duration>,
 }
 
 impl KindClock {
-    /// The standard times of people.
+    /// The default times for people.
     pub const PEOPLE: Self = Self {
         kind: ParticipantKind::Human,
         decision_time: Some(Duration::from_secs(60)),
@@ -47,54 +47,54 @@ impl KindClock {
     };
 }
 
-/// What a built-in agent or substitute waits before it decides where a person plays and nobody says otherwise.
+/// Default pace of built-in agents and substitutes in a game with people.
 const PACE_WITH_PEOPLE: Duration = Duration::from_secs(1);
 
-/// A room's policy. Made by `convert::policy`, which checks the ranges stated in `room.proto`.
+/// The policy of a room. The server's `convert::policy` checks the ranges stated in `room.proto`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Policy {
     /// Time for a decision.
     pub decision_time: Duration,
-    /// What each seat may use beyond that over the whole game.
+    /// Extra time of each seat, for the whole game.
     pub bank: Duration,
     /// Invalid attempts after which the default decision is taken; `None`: unlimited.
     pub max_invalid_attempts: Option<u32>,
-    /// Decisions in a row lost to the clock before a seat is substituted.
+    /// Timeouts in a row after which a seat is substituted.
     pub max_timeouts: u32,
-    /// Who plays for a substituted seat.
+    /// The agent that plays for a substituted seat.
     pub substitute: AgentKind,
-    /// When the game is aborted instead.
+    /// When the game is aborted instead of substituting a seat.
     pub abort: AbortPolicy,
-    /// Rewards told to seats.
+    /// The scheme of the rewards that seats receive.
     pub reward_scheme: Option<RewardScheme>,
-    /// How long a built-in agent or substitute waits before it decides; `None`: as suits who plays.
+    /// How long a built-in agent or substitute waits before it decides; `None`: depends on whether people play.
     pub pace: Option<Duration>,
-    /// How long the room waits for its seats.
+    /// How long the room waits for its seats to be attached.
     pub waiting_time: Duration,
     /// Whether spectators may watch.
     pub spectators: bool,
-    /// By how many decisions spectators are behind.
+    /// By how many decisions spectators are delayed.
     pub spectator_delay_decisions: usize,
     /// Whether spectators see all hands.
     pub spectators_see_hands: bool,
-    /// What the game outlives.
+    /// What the game survives.
     pub durability: Durability,
-    /// Other times for participants of some kinds, each at most once.
+    /// Times for kinds of participants, each kind at most once.
     pub clocks: Vec<KindClock>,
 }
 
 impl Policy {
-    /// Time for a decision of a participant; of a built-in agent (`None`) it is the room's.
+    /// Time for a decision of a kind of participant. Built-in agents (`None`) have the room's.
     pub fn decision_time_of(&self, kind: Option<ParticipantKind>) -> Duration {
         (self.clock_of(kind).and_then(|clock| clock.decision_time)).unwrap_or(self.decision_time)
     }
 
-    /// What a participant may use beyond that over the whole game.
+    /// The bank of a kind of participant.
     pub fn bank_of(&self, kind: Option<ParticipantKind>) -> Duration {
         (self.clock_of(kind).and_then(|clock| clock.bank)).unwrap_or(self.bank)
     }
 
-    /// How long a built-in agent or substitute waits before it decides, in a game that a person plays in or not.
+    /// How long a built-in agent or substitute waits before it decides. `with_people`: whether people play.
     pub fn pace_of(&self, with_people: bool) -> Duration {
         let standard = match with_people {
             true => PACE_WITH_PEOPLE,

@@ -1,5 +1,5 @@
-//! Going on with a game after the server was restarted: its journal is read back, entry by entry, each checked before it is folded, because
-//! a file can be damaged. Built-in agents are asked again what they were asked then, so that their generators stand where they stood.
+//! Resumes a game after a restart of the server: reads its journal entry by entry and checks each before folding it, because a file can be
+//! damaged. Built-in agents decide again, so that their generators reach the state they had.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -10,7 +10,7 @@ use chefshat_engine::{Seat, Viewer};
 use super::Core;
 use crate::journal::{Change, Entry, Fill, GameHeader, Source};
 
-/// Why a game cannot be gone on with.
+/// Why a game cannot be resumed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("entry {entry} of its journal does not fit: {problem}")]
 pub struct BadJournal {
@@ -21,10 +21,10 @@ pub struct BadJournal {
 }
 
 impl Core {
-    /// A room as it stood after the entries of a journal, with everybody's connection lost, unless its game is over.
+    /// The room that the entries of a journal lead to, with all connections lost unless its game is over.
     ///
     /// # Errors
-    /// The first entry that does not fit what was before it.
+    /// The first entry that does not fit the entries before it.
     pub fn revived(
         header: Arc<GameHeader>,
         journal: &[Entry],
@@ -93,7 +93,7 @@ impl Core {
         check(open == Some(seat), "no decision of this seat is open")
     }
 
-    /// Moves the generators of built-in agents to where they stood after a change.
+    /// Advances the generators of built-in agents to their state after a change.
     fn remind_agents(&mut self, change: &Change) {
         let asked = match change {
             Change::Attempted { seat, .. } => *seat,

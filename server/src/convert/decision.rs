@@ -1,4 +1,4 @@
-//! Decisions: what is put to a seat, what it answers, what becomes of the answer.
+//! Decisions: masks, answers and their results, annotations, expressions.
 
 use chefshat_engine::{Mask, RuleSet};
 use chefshat_proto::v1;
@@ -25,7 +25,7 @@ pub(super) fn source_to_proto(source: Source) -> v1::DecisionSource {
     }
 }
 
-/// What became of an answer, as a message.
+/// The result of an answer, as a message.
 pub fn answer_result(decision_id: u64, action: u32, answered: Answered) -> v1::AnswerResult {
     let mut result = v1::AnswerResult {
         decision_id,
@@ -57,7 +57,7 @@ pub fn answer_result(decision_id: u64, action: u32, answered: Answered) -> v1::A
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct NotFinite;
 
-/// Annotations as they are kept: encoded.
+/// Annotations as they are stored: encoded.
 ///
 /// # Errors
 /// A number in them is not finite.
@@ -78,7 +78,7 @@ pub fn annotations_from_proto(
     Ok(Some(bytes).filter(|bytes| !bytes.is_empty()))
 }
 
-/// An expression as it is kept: checked and encoded.
+/// An expression as it is stored: checked and encoded.
 ///
 /// # Errors
 /// The field out of its range.

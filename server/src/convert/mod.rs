@@ -1,5 +1,5 @@
-//! Between what rooms hold and what the protocol says. Rule sets and the engine's events are translated in `chefshat-records`, which
-//! records share; here is what only a server has: policies, seats, decisions, the log.
+//! Translation between rooms and the protocol: policies, seats, decisions, the log. `chefshat-record` translates rule sets and the engine's
+//! events, which records share.
 
 mod decision;
 mod event;
@@ -36,7 +36,7 @@ pub use vector::{
     Reset, batch_to_proto, reset_from_proto, setup_from_proto, setup_seeds, started_to_proto,
 };
 
-/// A number or a count as messages have it. All of them are bounded far below what does not fit.
+/// A count as messages have it. All counts are bounded far below the limit.
 pub fn number(value: usize) -> u32 {
     u32::try_from(value).unwrap_or(u32::MAX)
 }

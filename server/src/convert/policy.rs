@@ -16,7 +16,7 @@ use chefshat_room::{Core, State};
 /// A day, the longest time a policy may name, milliseconds.
 const DAY_MS: u32 = 86_400_000;
 
-/// The policy a message asks for: the standard one with every field that is set in place of the standard's.
+/// The policy a message asks for. Fields that are not set have their defaults.
 ///
 /// # Errors
 /// The first field out of its range.
@@ -77,7 +77,7 @@ pub fn policy_from_proto(message: &v1::RoomPolicy) -> Result<Policy, FieldProble
     Ok(policy)
 }
 
-/// The policy of a room: a pace that depends on who plays is set when that stands.
+/// The policy of a room. A pace that depends on who plays is set once the game has begun.
 pub(super) fn policy_of(core: &Core) -> v1::RoomPolicy {
     let mut policy = policy_to_proto(&core.header().policy);
     if core.state() != State::Waiting {
@@ -86,7 +86,7 @@ pub(super) fn policy_of(core: &Core) -> v1::RoomPolicy {
     policy
 }
 
-/// A policy with every field set, but for a pace that depends on who plays.
+/// A policy with every field set, except a pace that depends on who plays.
 pub fn policy_to_proto(policy: &Policy) -> v1::RoomPolicy {
     v1::RoomPolicy {
         decision_time_ms: Some(millis(policy.decision_time)),
@@ -123,7 +123,7 @@ pub fn policy_to_proto(policy: &Policy) -> v1::RoomPolicy {
     }
 }
 
-/// The policy of a game that is played without a room, where nobody waits for anybody: only its limits and rewards mean something.
+/// The policy of a game that is played without a room. Only its limits and rewards have a meaning.
 pub fn simulation_policy(
     max_invalid_attempts: Option<u32>,
     reward_scheme: Option<RewardScheme>,

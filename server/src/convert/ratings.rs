@@ -1,4 +1,4 @@
-//! Ratings as everybody sees them. How they come about is in `chefshat-arena`, which games count in `chefshat-records`.
+//! Ratings as messages. `chefshat-tournament` computes them; `chefshat-record` says which games count.
 
 use chefshat_proto::v1;
 use chefshat_record::outcome::Identity;
@@ -13,7 +13,7 @@ pub fn rating_to_proto(rated: &Rated) -> v1::Rating {
     }
 }
 
-/// The leaderboard of those of a kind (UNSPECIFIED: all) who have played at least so many games, at most so many lines of it.
+/// The leaderboard of participants of a kind (UNSPECIFIED: all) with at least `min_games` games, at most `limit` rows.
 pub fn leaderboard(
     ratings: &Ratings<Identity>,
     kind: v1::ParticipantKind,

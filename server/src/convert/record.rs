@@ -113,7 +113,7 @@ pub fn summary(core: &Core) -> v1::RecordSummary {
     }
 }
 
-/// Every line of the record of a game, however it is kept.
+/// Every line of the record of a stored game.
 pub fn lines_of(kept: &KeptGame) -> Cow<'_, [v1::RecordLine]> {
     match kept {
         KeptGame::Hosted(header, journal) => Cow::Owned(record_lines(header, journal)),

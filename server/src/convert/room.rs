@@ -115,7 +115,7 @@ fn player_to_proto(player: RecordedSeat) -> v1::RecordedPlayer {
     }
 }
 
-/// A room as everybody sees it.
+/// The public view of a room.
 pub fn describe(core: &Core) -> v1::Room {
     let header = core.header();
     let commitment = header.seed.commitment(&header.game_id.0);
@@ -167,7 +167,7 @@ pub(super) fn aborted_because(state: State) -> v1::AbortReason {
     }
 }
 
-/// The message's name for where a room stands.
+/// The state of a room, as a message.
 pub(super) fn state_to_proto(state: State) -> v1::RoomState {
     match state {
         State::Waiting => v1::RoomState::Waiting,

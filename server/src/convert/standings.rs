@@ -1,4 +1,4 @@
-//! Standings of a tournament as everybody sees them, with ratings and how sure their order is. How they come about is in `chefshat-arena`.
+//! Standings of a tournament as messages, with ratings and the confidence in their order. `chefshat-tournament` computes them.
 
 use chefshat_proto::v1;
 use chefshat_tournament::Tournament;

@@ -1,4 +1,4 @@
-//! `PlayService`: streams of seats, and single commands without a stream. What a stream asks is read and done in `reader`; its responses come
+//! `PlayService`: streams of seats, and single commands without a stream. `reader` carries out the requests of a stream; the responses come
 //! from its outbox, which rooms fill.
 
 mod reader;

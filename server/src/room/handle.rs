@@ -1,5 +1,4 @@
-//! How others reach a room: the messages its mailbox takes, and a handle that puts them there and brings back the answers. What is made of
-//! them is the task's.
+//! How others reach a room: the messages of its mailbox, and a handle that sends them and returns the answers.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -15,19 +14,19 @@ use chefshat_room::ids::{Id, Token};
 use chefshat_room::journal::{AbortReason, ParticipantKind};
 use chefshat_room::{Answer, ConnectionId, ExpressError, JoinError, LeaveError};
 
-/// The room is gone: closed, ended long ago, or stopped because its store failed.
+/// The room is gone: closed, ended long ago, or stopped after a failure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("the room is gone")]
 pub struct RoomGone;
 
-/// Asks for a seat.
+/// A request for a seat.
 #[derive(Debug)]
 pub struct JoinRequest {
     /// Name to show.
     pub name: String,
-    /// What joins.
+    /// The kind of the participant.
     pub kind: ParticipantKind,
-    /// A certain seat.
+    /// The seat wanted; `None` for any.
     pub seat: Option<u32>,
 }
 
@@ -42,12 +41,12 @@ pub struct Joined {
     pub room: Box<v1::Room>,
 }
 
-/// Asks to attach a stream to a seat.
+/// A request to attach a stream to a seat.
 #[derive(Debug)]
 pub struct AttachRequest {
     /// The ticket's secret.
     pub secret: [u8; 32],
-    /// Chosen by the client.
+    /// The client's number for the request.
     pub request_id: u32,
     /// The stream.
     pub outbox: Arc<Outbox>,
@@ -57,7 +56,7 @@ pub struct AttachRequest {
     pub options: DeliveryOptions,
     /// The seat's part of the game seed.
     pub entropy: Vec<u8>,
-    /// When it was asked.
+    /// When the request was read.
     pub arrived: Instant,
     /// Set when the seat has left the stream.
     pub detached: Arc<AtomicBool>,
@@ -65,7 +64,7 @@ pub struct AttachRequest {
     pub assigned_ticket: Option<Token>,
 }
 
-/// Asks to watch.
+/// A request to watch.
 #[derive(Debug)]
 pub struct SpectateRequest {
     /// The stream.
@@ -81,13 +80,13 @@ pub struct SpectateRequest {
 pub enum SpectateError {
     /// The policy does not admit spectators.
     NotAdmitted,
-    /// There are too many.
+    /// There are too many spectators.
     Full,
-    /// A snapshot of a delayed room would tell what is not to be known yet.
+    /// A snapshot of a delayed room would reveal the present.
     SnapshotDelayed,
 }
 
-/// What a seat does.
+/// A command of a seat.
 #[derive(Debug)]
 pub enum SeatAction {
     /// Answers a decision.
@@ -99,14 +98,14 @@ pub enum SeatAction {
         /// The expression, encoded.
         expression: Box<[u8]>,
     },
-    /// Plays itself again.
+    /// Takes the seat back from its substitute.
     Resume,
 }
 
-/// What became of an action that was sent without a stream.
+/// The result of a command that was sent without a stream.
 pub type Acted = Result<Option<v1::AnswerResult>, ExpressError>;
 
-/// What is put into a room's mailbox.
+/// A message to a room.
 pub(super) enum Message {
     Join(Box<JoinRequest>, oneshot::Sender<Result<Joined, JoinError>>),
     Attach(
@@ -136,7 +135,7 @@ pub(super) enum Message {
     Space,
 }
 
-/// How others reach a room.
+/// A handle to a room.
 #[derive(Clone)]
 pub struct Handle {
     pub(super) id: Id,
@@ -150,7 +149,7 @@ impl std::fmt::Debug for Handle {
 }
 
 impl Handle {
-    /// Which room.
+    /// The id of the room.
     pub fn id(&self) -> Id {
         self.id
     }
@@ -176,7 +175,7 @@ impl Handle {
             .await
     }
 
-    /// The connection of a seat has gone, or leaves (`reason` is told to it).
+    /// Notes that a seat's connection is lost or leaves. `reason` is sent to one that leaves.
     pub async fn lost(
         &self,
         seat: Seat,
@@ -190,7 +189,7 @@ impl Handle {
             .await;
     }
 
-    /// A seat does something over its stream, where it hears what became of it.
+    /// Performs a command of a seat; the result is sent on its stream.
     ///
     /// # Errors
     /// The room is gone.
@@ -207,7 +206,7 @@ impl Handle {
             .map_err(|_| RoomGone)
     }
 
-    /// A seat does something without a stream; `None` if the ticket is not of this room.
+    /// Performs a command of a seat without a stream; `None` if the ticket is not of this room.
     ///
     /// # Errors
     /// The room is gone.
@@ -221,7 +220,7 @@ impl Handle {
             .await
     }
 
-    /// Watches.
+    /// Adds a spectator.
     ///
     /// # Errors
     /// The room is gone, or (inside) why it cannot be watched.
@@ -233,7 +232,7 @@ impl Handle {
             .await
     }
 
-    /// The room as everybody sees it.
+    /// The public view of the room.
     ///
     /// # Errors
     /// The room is gone.
@@ -290,7 +289,7 @@ impl Handle {
     }
 }
 
-/// Tells a room that a stream has space again.
+/// Notifies a room that a stream has space again.
 pub(super) struct TellSpace(pub(super) mpsc::WeakSender<Message>);
 
 impl OnSpace for TellSpace {

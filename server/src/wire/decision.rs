@@ -1,5 +1,5 @@
-//! A decision request written straight from the engine's values: it is the message that is sent most, and a message tree of it would be
-//! built, walked and thrown away for every decision. A test holds what is written here equal to that message.
+//! Writes decision requests straight from the engine's values. They are the most frequent message, and a message tree would be built and
+//! dropped for each. A test holds the bytes equal to those of the message.
 
 use std::time::Duration;
 

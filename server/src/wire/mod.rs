@@ -23,7 +23,7 @@ pub mod service {
 
 /// Field of the updates in a response.
 const RESPONSE_UPDATES: u32 = 1;
-/// Space made at once for what is usually told of at a time: a few events and a decision request.
+/// Usual size of what is sent at a time: a few events and a decision request, bytes.
 const USUAL_LENGTH: usize = 384;
 /// Fields of `SpectatorServiceWatchResponse`; its events are in the field that [`BATCH_EVENTS`] names.
 const SPECTATOR_ROOM: u32 = 2;
@@ -39,7 +39,7 @@ const BATCH_EVENTS: u32 = 1;
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Updates {
     bytes: Vec<u8>,
-    /// Where each update ends, and what it counts for.
+    /// The end and weight of each update.
     parts: Vec<Part>,
 }
 

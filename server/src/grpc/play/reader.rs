@@ -1,5 +1,5 @@
-//! Reads what is asked on one stream of `PlayService` and does it: seats are attached, act, and leave. Participants of tournaments, who are
-//! called to their seats, are in `participants`.
+//! Reads the requests of one stream of `PlayService` and carries them out: seats attach, act and leave. Participants of tournaments attach once and
+//! are then seated in each of their games.
 
 use std::collections::BTreeMap;
 use std::future::poll_fn;
@@ -48,15 +48,15 @@ pub(super) struct Reader {
     rooms: Arc<Rooms>,
     tournaments: Arc<Tournaments>,
     pub(super) outbox: Arc<Outbox>,
-    /// Those attached, by handle.
+    /// The attached seats, by handle.
     pub(super) seats: BTreeMap<u32, BoundSeat>,
     pub(super) participants: BTreeMap<u32, BoundParticipant>,
     next_handle: u32,
     pub(super) next_called: u32,
-    /// Where tournaments call participants of this stream, and what they have called.
+    /// Calls of tournaments to participants of this stream.
     pub(super) calls: mpsc::Sender<(u32, Call)>,
     pub(super) called: mpsc::Receiver<(u32, Call)>,
-    /// What unspecified delivery means: on Play with decisions, on Watch at once.
+    /// Whether unspecified delivery means with decisions (Play) or at once (Watch).
     with_decisions: bool,
 }
 
@@ -214,7 +214,7 @@ impl Reader {
         !full(self)
     }
 
-    /// Attaches a seat; `None` if nobody has such a ticket.
+    /// Attaches a seat; `None` if the ticket is unknown.
     pub(super) async fn bind(
         &self,
         attach: v1::Attach,
@@ -295,7 +295,7 @@ impl Reader {
         self.tell(handle, Update::Refused(refused(request_id, refusal)));
     }
 
-    /// Tells the client; `false` if it does not read what it was told before.
+    /// Sends an update; `false` if the client does not read its stream.
     pub(super) fn tell(&self, handle: u32, update: Update) -> bool {
         let mut updates = Updates::default();
         updates.add(handle, update);
@@ -325,7 +325,7 @@ pub(super) struct BoundParticipant {
     tournament: Arc<Hosted>,
     participant: usize,
     connection: u64,
-    /// How it asked to be attached, which holds for its seats too.
+    /// The request that attached it. Its options hold for its seats too.
     attach: v1::Attach,
 }
 
@@ -375,7 +375,7 @@ impl Reader {
         tournament.enter(participant, connection, way).await;
     }
 
-    /// Does what a tournament has called a participant of this stream to.
+    /// Carries out a call of a tournament.
     pub(super) async fn follow_call(&mut self, handle: u32, call: Call) {
         match call {
             Call::Seat(room) => self.take_seat(handle, room).await,
@@ -421,7 +421,7 @@ impl Reader {
         }
     }
 
-    /// Tells a participant that it will not be seated again on this stream. Its seats stay.
+    /// Detaches a participant from this stream. Its seats stay.
     fn dismiss(&mut self, handle: u32, reason: v1::DetachReason) {
         if self.participants.remove(&handle).is_some() {
             let reason = reason.into();
