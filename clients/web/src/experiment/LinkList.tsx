@@ -22,7 +22,7 @@ export function LinkList({ links }: { links: readonly StudyLink[] }) {
   return (
     <>
       {links.length > 1 && (
-        <p class={css.ways}>
+        <p class="row">
           {copy && <Button onClick={copy}>{copied ? `✓ ${t().common.copied}` : words.copyAll}</Button>}
           <Button onClick={() => download(tableOf(links), "links.csv")}>{words.download}</Button>
         </p>

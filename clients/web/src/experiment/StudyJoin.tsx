@@ -57,7 +57,7 @@ export function StudyJoin(props: StudyJoinProps) {
           <h2>{words.consent}</h2>
           <blockquote class={css.consent}>{study.consent}</blockquote>
           <p class="soft small">{words.fromHost}</p>
-          <p class={css.ways}>
+          <p class="row">
             <Button look="main" onClick={() => setStep(afterConsent)}>
               {words.agree}
             </Button>
@@ -69,7 +69,7 @@ export function StudyJoin(props: StudyJoinProps) {
         <>
           <h2>{words.before}</h2>
           <p>{words.beforeText(hostOf(study.before))}</p>
-          <p class={css.ways}>
+          <p class="row">
             <QuestionnaireLink address={study.before} blanks={{ name: study.name }} />
             <Button onClick={() => setStep("seat")}>{words.done}</Button>
           </p>

@@ -50,7 +50,7 @@ export function Doorway({ roomId }: { roomId: string }) {
   const waiting = room.state === RoomState.WAITING && room.tournamentId === "";
   return (
     <div class={css.doorway}>
-      <section class={`sheet ${css.room}`}>
+      <section class="sheet stack">
         <header class={css.head}>
           <h1>{room.name || t().lobby.rooms.unnamed}</h1>
           <RoomStateChip room={room} />
@@ -79,7 +79,7 @@ function WayIn({ room }: { room: Room }) {
   return (
     <>
       {seatForPeople && (
-        <section class={`sheet ${css.part}`}>
+        <section class="sheet stack">
           <h2>{words.sitDown}</h2>
           {hosted ? <NameForm code={hosted.joinCode} room={room} /> : <JoinForm />}
         </section>

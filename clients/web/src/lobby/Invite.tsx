@@ -27,7 +27,7 @@ export function Invite({ title, code, address, agent }: InviteProps) {
   const words = t().lobby.invite;
   return (
     <section class={css.invite}>
-      <div class={css.words}>
+      <div class="stack">
         <h2>{title}</h2>
         <p>{words.text}</p>
         <CopyLine label={words.code} text={code} large />

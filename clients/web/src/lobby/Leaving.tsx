@@ -71,7 +71,7 @@ export function LeaveDialog({ roomId, playing, others, policy, onClose }: LeaveD
   const timeouts = policy?.maxTimeouts ?? 1;
   return (
     <Dialog title={words.title} onClose={onClose}>
-      <div class={css.question}>
+      <div class="stack">
         {playing ? (
           <>
             <p>{givenUp ? words.givenUp(timeouts) : words.substituted(timeouts, policy?.substitute ?? "")}</p>
@@ -82,7 +82,7 @@ export function LeaveDialog({ roomId, playing, others, policy, onClose }: LeaveD
         )}
         {hostedRoom(roomId) && <p>{playing ? words.closePlaying : words.closeWaiting}</p>}
         {fault && <Notice kind="fault">{fault}</Notice>}
-        <p class={css.ways}>
+        <p class="row">
           <Button look="main" onClick={onClose}>
             {words.stay}
           </Button>

@@ -42,7 +42,7 @@ export function TournamentStrip() {
           </li>
         ))}
       </ul>
-      <div class={css.ways}>
+      <div class="row">
         <ButtonLink href={pathOf({ page: "newTournament" })}>{t().organise.link}</ButtonLink>
         <ButtonLink href={pathOf({ page: "tournaments" })} look="quiet">
           {words.all}

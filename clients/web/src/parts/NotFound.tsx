@@ -2,13 +2,12 @@
 
 import { t } from "../i18n";
 import { ButtonLink } from "./Button";
-import css from "./Layout.module.css";
 
 /** Says so, and links to the lobby. */
 export function NotFound() {
   const words = t().common.notFound;
   return (
-    <section class={`sheet ${css.notFound}`}>
+    <section class="sheet stack">
       <h1>{words.title}</h1>
       <p>{words.text}</p>
       <p>

@@ -45,7 +45,7 @@ export function PersonPage({ route }: PageProps<"person">) {
       {list && list.items.length > 0 && (
         <>
           <Facts rated={rated.value} games={list} />
-          <section class={`sheet ${css.personPlayed}`}>
+          <section class="sheet stack">
             <h2>{words.played}</h2>
             <WhichAreRated />
             <Games games={list.items} />

@@ -26,7 +26,7 @@ export function Rounds({ tournament, games, mine }: RoundsProps) {
   const newest = rounds.find(({ round }) => round === tournament.round) ?? rounds[0];
   if (!newest) return <p class="soft">{words.games.none}</p>;
   return (
-    <div class={css.rounds}>
+    <div class="stack">
       {rounds.map(({ round, tables }) => (
         <details key={round} class={`sheet ${css.one}`} open={round === newest.round}>
           <summary>{words.round(round)}</summary>

@@ -22,7 +22,7 @@ export function LookupTable({ lookup, taken }: LookupTableProps) {
   const cells = [...lookup.plays.flat(2), ...lookup.others];
   const legal = cells.filter((cell) => cell.state === "legal").length;
   return (
-    <div class={css.lookup} data-part="lookup">
+    <div class={`${css.lookup} stack`} data-part="lookup">
       <p>
         <strong>{words.count(legal)}</strong> <span class="soft small">{words.groups}</span>
       </p>
