@@ -1,4 +1,4 @@
-"""Columns of observations made up by chance, for tests and fixtures that need no server. No game need ever have stood like this."""
+"""Random columns of observations, for tests and fixtures that need no server. They need not be reachable in a game."""
 
 from dataclasses import dataclass
 
@@ -7,11 +7,12 @@ import numpy as np
 from chefshat import pb
 from chefshat.learn import features
 from chefshat.learn.features import Bytes, Counts
+from chefshat.learn.network import Network
 
 
 @dataclass(frozen=True)
 class HandMade:
-    """Columns of observations, and with them what a row says of its decision."""
+    """Columns of observations, and of their decisions."""
 
     players: int
     faces: int
@@ -34,9 +35,31 @@ class HandMade:
     def __len__(self) -> int:
         return len(self.seats)
 
+    def default_actions(self) -> list[int]:
+        """The default action of each row, which a server sends with the request."""
+        turns = features.turn_actions(self.faces)
+        found = []
+        for row, kind in enumerate(self.kinds):
+            legal = np.flatnonzero(np.unpackbits(self.mask_bits[row], bitorder="little"))
+            plain = self.hands[row].copy()
+            plain[self.faces - 1] -= self.golden[row]
+            held = np.flatnonzero(plain[: self.faces])
+            gift = held[-1] if len(held) else self.faces - 1 if self.golden[row] else self.faces
+            wanted = {pb.DECISION_KIND_TURN: turns - 1, pb.DECISION_KIND_EXCHANGE: turns + gift}.get(kind, turns + self.faces + 1)
+            found.append(int(wanted if wanted in legal else legal[0]))
+        return found
+
+    def actions(self, network: Network) -> list[int]:
+        """The action that an agent takes by a network in each row."""
+        chosen = network.actions(self, self.seats, self.kinds, self.mask_bits)
+        if network.info.output == "actions":
+            return [int(action) for action in chosen]
+        turns = self.kinds == pb.DECISION_KIND_TURN
+        return [int(action) for action in np.where(turns, chosen, self.default_actions())]
+
 
 def hand_made(rows: int, *, seed: int, players: int = 4, faces: int = 11, jokers: int = 2) -> HandMade:
-    """Rows that keep to the deck, to the own seat's count of cards and to the decision kind, and are otherwise drawn freely."""
+    """Draws rows that respect the deck, the own seat's count of cards and the decision kind, and are otherwise arbitrary."""
     chance = np.random.default_rng(seed)
     deck = np.repeat(np.arange(faces + 1), [*range(1, faces + 1), jokers])
     size = features.dealt(players, faces, jokers)

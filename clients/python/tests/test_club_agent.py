@@ -60,6 +60,10 @@ def asked(
     request = decision(legal=legal)
     request.request.decision_id = number
     request.request.kind = kind
+    # The server's part.
+    defaults = {pb.DECISION_KIND_TURN: 199, pb.DECISION_KIND_SPECIAL_ACTION: 212}
+    default = max((action for action in legal if action < T + 11), default=legal[0]) if kind not in defaults else defaults[kind]
+    request.request.default_action = default if default in legal else legal[0]
     request.seat_info.seat = seat
     return Decision(request.request, request.seat_info, left)
 
@@ -138,7 +142,7 @@ def test_where_there_is_no_answer_the_default_decision_is_taken(answer: object, 
     assert agent.decide(asked(0, 8, 199)) == 199
     assert agent.decide(asked(6, 8, number=10)) == 6
     assert (agent.counts.failures, agent.counts.replaced) == (2, 2)
-    expected = str(answer) if isinstance(answer, AgentError) else "200 numbers were expected"
+    expected = str(answer) if isinstance(answer, AgentError) else "not 200 numbers"
     assert caplog.messages[0].startswith("Puppet: ")
     assert expected in caplog.messages[0]
 

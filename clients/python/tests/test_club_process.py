@@ -77,7 +77,7 @@ def test_what_a_player_raises_is_told_and_it_lives_on(make: Make) -> None:
 
 
 def test_answers_nobody_can_write_down_are_told(make: Make) -> None:
-    with pytest.raises(AgentRaised, match="answered with object, which is neither numbers nor a list of them"):
+    with pytest.raises(AgentRaised, match="returned object, not a number or a list of numbers"):
         make("Unspeakable").call("get_action", VECTOR)
 
 
@@ -87,7 +87,7 @@ def test_a_player_that_dies_is_started_anew_and_given_up_in_the_end(make: Make) 
         for _ in range(4):
             process.call("get_action", VECTOR)
         assert process.restarts == life
-        with pytest.raises(AgentLost, match=r"died in get_action \(exit code 7; it last printed:\nfarewell\)"):
+        with pytest.raises(AgentLost, match=r"died in get_action \(exit code 7; its last output:\nfarewell\)"):
             process.call("get_action", VECTOR)
     assert process.given_up
     with pytest.raises(AgentLost, match="has been given up"):
@@ -96,7 +96,7 @@ def test_a_player_that_dies_is_started_anew_and_given_up_in_the_end(make: Make) 
 
 def test_a_player_that_hangs_is_ended(make: Make) -> None:
     process = make("Hanging", call_limit_s=HANGS_S, restarts=0)
-    with pytest.raises(AgentLost, match="get_action did not return within 3 s"):
+    with pytest.raises(AgentLost, match="get_action did not finish within 3 s"):
         process.call("get_action", VECTOR)
     assert process.given_up
 
@@ -104,7 +104,7 @@ def test_a_player_that_hangs_is_ended(make: Make) -> None:
 @pytest.mark.parametrize(
     ("player", "options", "said"),
     [
-        ("Unmade", {}, "making it raised FileNotFoundError: no model there"),
+        ("Unmade", {}, "creating it raised FileNotFoundError: no model there"),
         ("Nothing", {}, "lacks get_exhanged_cards and do_special_action"),
         ("Missing", {}, "has no attribute 'Missing'"),
         ("TESTS", {}, "has no attribute 'TESTS'"),
@@ -120,10 +120,10 @@ def test_a_player_that_cannot_be_made_is_told(make: Make, player: str, options: 
 @pytest.mark.parametrize(
     ("script", "said"),
     [
-        ("read call; exit 3", r"died in making it \(exit code 3; it printed nothing\)"),
-        ("read call; echo hello; read nothing", "answered making it with nonsense: b'hello"),
-        ("read call; echo 7; read nothing", "answered making it with nonsense: b'7"),
-        ('read call; echo \'{"id": 5, "value": 1}\'; read nothing', "the number of another call"),
+        ("read call; exit 3", r"died in creating it \(exit code 3; it printed nothing\)"),
+        ("read call; echo hello; read nothing", "sent an invalid answer to creating it: b'hello"),
+        ("read call; echo 7; read nothing", "sent an invalid answer to creating it: b'7"),
+        ('read call; echo \'{"id": 5, "value": 1}\'; read nothing', "the id of another call"),
     ],
 )
 def test_what_is_no_python_is_told(make: Make, tmp_path: Path, script: str, said: str) -> None:
@@ -151,7 +151,7 @@ def test_a_player_that_is_being_made_can_be_closed(make: Make, tmp_path: Path) -
         starting = pool.submit(process.start)
         wait_until(lambda: file.exists() and file.read_text(), "the player is being made")
         process.close()
-        with pytest.raises(AgentLost, match="died in making it"):
+        with pytest.raises(AgentLost, match="died in creating it"):
             starting.result(LIMIT_S)
     with pytest.raises(ProcessLookupError):
         os.kill(int(file.read_text()), 0)

@@ -68,7 +68,7 @@ def test_a_server_may_take_its_time_to_answer_a_connection(fake: FakeServer) -> 
 def test_addresses() -> None:
     for address in ("127.0.0.1:1", "http://127.0.0.1:1/", "https://127.0.0.1:1"):
         chefshat.Client(address).close()
-    with pytest.raises(ValueError, match="neither http"):
+    with pytest.raises(ValueError, match="must begin with http"):
         chefshat.Client("ftp://127.0.0.1:1")
 
 

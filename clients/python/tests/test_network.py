@@ -98,7 +98,7 @@ def test_actions_are_legal_and_the_best_ones(output: str) -> None:
     info = replace(INFO, output="turns" if output == "turns" else "actions")
     net = Network(chance_layers(info), info)
     case = hand_made(200, seed=6)
-    actions = net.actions(case, case.seats, case.kinds, case.mask_bits)
+    actions = case.actions(net)
     outputs = net.outputs(net.inputs(case, case.seats, case.kinds, case.mask_bits))
     legal = np.unpackbits(case.mask_bits, axis=1, bitorder="little")[:, : features.num_actions(11)].astype(bool)
     seen = set()
@@ -144,30 +144,6 @@ def test_a_hidden_unit_that_is_no_number_says_nothing() -> None:
     np.testing.assert_allclose(outputs, Network(layers, INFO).outputs(inputs), rtol=1e-5)
 
 
-def test_the_default_decisions() -> None:
-    case = hand_made(300, seed=7)
-    turns, all_legal = features.turn_actions(11), np.full_like(case.mask_bits, 255)
-    chosen = network.default_decisions(case, case.kinds, all_legal, faces=11)
-    seen = set()
-    for row, action in enumerate(chosen):
-        if case.kinds[row] == pb.DECISION_KIND_TURN:
-            assert action == 199
-        elif case.kinds[row] == pb.DECISION_KIND_SPECIAL_ACTION:
-            assert action == turns + 12
-        else:
-            plain = case.hands[row].copy()
-            plain[10] -= case.golden[row]
-            faces = np.flatnonzero(plain[:11])
-            expected = turns + faces[-1] if len(faces) else turns + 10 if case.golden[row] else turns + 11
-            seen.add("plain" if len(faces) else "golden" if case.golden[row] else "joker")
-            assert action == expected
-    assert "plain" in seen
-    # Of what the mask forbids nothing is taken.
-    np.testing.assert_array_equal(
-        network.default_decisions(case, case.kinds, np.eye(1, 27, 2, dtype=np.uint8).repeat(300, 0), faces=11), np.full(300, 16)
-    )
-
-
 def test_a_network_fits_rules_with_as_many_players_faces_and_cards_dealt() -> None:
     """The Rust tests read the same file."""
     rows = json.loads((FIXTURES / "fits.json").read_text())
@@ -195,4 +171,4 @@ def test_the_fixtures_say_what_they_said(name: str) -> None:
     inputs = net.inputs(case, case.seats, case.kinds, case.mask_bits)
     np.testing.assert_array_equal(inputs, np.array([row["features"] for row in rows], np.float32))
     np.testing.assert_allclose(net.outputs(inputs), [row["outputs"] for row in rows], rtol=1e-5, atol=1e-5)
-    assert net.actions(case, case.seats, case.kinds, case.mask_bits).tolist() == [row["action"] for row in rows]
+    assert case.actions(net) == [row["action"] for row in rows]

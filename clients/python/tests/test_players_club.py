@@ -241,7 +241,7 @@ def test_a_command_that_is_interrupted_while_players_are_made_leaves_nobody_behi
 def test_a_player_that_cannot_be_made_takes_no_seat(real_address: str, capsys: pytest.CaptureFixture[str]) -> None:
     code = room(real_address, [None, "random", "random", "random"])
     assert main(command(real_address, code, "Unmade", "--json")) == 1
-    assert "making it raised FileNotFoundError: no model there" in one_line(capsys)["message"]
+    assert "creating it raised FileNotFoundError: no model there" in one_line(capsys)["message"]
     assert main(command(real_address, code, "Largest", "--json")) == 0
 
 
@@ -260,8 +260,8 @@ def test_the_actions_are_those_of_the_server(real_address: str) -> None:
     ("options", "said"),
     [
         (["--agent", "no colon"], "not of the form module.path:Class"),
-        (["--arguments", "[1]"], "an object was expected"),
-        (["--arguments", "{"], "no JSON"),
+        (["--arguments", "[1]"], "must be an object"),
+        (["--arguments", "{"], "not JSON"),
         (["--limit", "0"], "must be above 0"),
         (["--attempts", "-1"], "must be 0 or more"),
     ],

@@ -92,7 +92,7 @@ def test_decisions_are_paired_by_seat_and_shift(tmp_path: Path) -> None:
     turns = replay.from_dataset(tmp_path, decisions="turns", episode="game")
     assert turns.actions.tolist() == [10, 12, 14, 11]
     assert len(replay.from_dataset(tmp_path, agents=["Ada"])) == len(made)
-    with pytest.raises(ValueError, match="called 'Bob': choose of Ada"):
+    with pytest.raises(ValueError, match="called 'Bob'; they are Ada"):
         replay.from_dataset(tmp_path, agents=["Ada", "Bob"])
 
 

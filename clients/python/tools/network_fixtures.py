@@ -1,8 +1,8 @@
-"""Makes tests/fixtures/network: small networks of chance weights; rows of observations with their features, outputs, actions.
+"""Generates tests/fixtures/network: small networks of random weights; observations with their features, outputs and actions.
 
-Run it with the package's `learn` extra installed: `python tools/network_fixtures.py`. The Rust tests and the Python ones read the
-same files, and so agree on what features and networks are. The observations are made up (tests/hand_made.py). JSON holds
-single-precision numbers in full.
+Run it with the package's `learn` extra installed: `python tools/network_fixtures.py`. The Rust and the Python tests read the same
+files, so that both compute the same. The observations are random (tests/hand_made.py). The JSON has single-precision numbers in
+full.
 """
 
 import itertools
@@ -23,7 +23,7 @@ ROWS = 12
 HIDDEN = 6
 
 sys.path.insert(0, str(HERE.parent / "tests"))
-from hand_made import HandMade, hand_made  # noqa: E402 (the path above is where it lies)
+from hand_made import HandMade, hand_made  # noqa: E402 (imported from the path above)
 
 CASES = {
     "table-actions": NetworkInfo("table", "actions", "none", True, 4, 11, 2, '{"preset":"paper"}', "table-actions", "chance"),
@@ -36,7 +36,7 @@ COLUMNS = ("hands", "boards", "cards_left", "passed", "places", "roles", "points
 
 
 def layers(info: NetworkInfo, chance: np.random.Generator) -> list[Layer]:
-    """Two layers of numbers that float16 holds exactly."""
+    """Draws two layers of numbers that float16 represents exactly."""
     widths = [info.input_width, HIDDEN, info.output_width]
     return [
         Layer(*(chance.integers(-64, 65, shape).astype(np.float32) / 64 for shape in ((outputs, inputs), (outputs,))))
@@ -45,9 +45,8 @@ def layers(info: NetworkInfo, chance: np.random.Generator) -> list[Layer]:
 
 
 def row(case: HandMade, net: Network, index: int) -> dict[str, object]:
-    """One row as JSON: what a seat sees, then what is computed of it."""
+    """Returns one row as JSON: the observation, then what follows from it."""
     inputs = net.inputs(case, case.seats, case.kinds, case.mask_bits)
-    actions = net.actions(case, case.seats, case.kinds, case.mask_bits)
     return {
         "seat": int(case.seats[index]),
         "kind": pb.DecisionKind.Name(pb.DecisionKind.ValueType(int(case.kinds[index]))),
@@ -57,7 +56,7 @@ def row(case: HandMade, net: Network, index: int) -> dict[str, object]:
         "legal": np.flatnonzero(np.unpackbits(case.mask_bits[index], bitorder="little")).tolist(),
         "features": inputs[index].tolist(),
         "outputs": net.outputs(inputs)[index].tolist(),
-        "action": int(actions[index]),
+        "action": case.actions(net)[index],
     }
 
 

@@ -31,7 +31,7 @@ class Client(AsyncCalls):
     """
 
     async def _play_session(self, session: PlaySession) -> None:
-        """Plays until the session is done, over as many connections as it takes."""
+        """Plays until the session is done, reconnecting as needed."""
         failures = 0
         run = _Run(session)
         try:
@@ -51,18 +51,18 @@ class Client(AsyncCalls):
 
 
 class _Run:
-    """A session being played: the connection of the moment, and the agents that are thinking."""
+    """A session in play: the current connection, and the agents that are deciding."""
 
     def __init__(self, session: PlaySession) -> None:
         self._session = session
         self._call: PlayCall | None = None
-        # gRPC takes one message at a time.
+        # gRPC permits one write at a time.
         self._writing = asyncio.Lock()
         self._thinking: set[asyncio.Task[None]] = set()
         self._failure: BaseException | None = None
 
     async def connection(self, call: PlayCall) -> ChefsHatError:
-        """Plays over one connection until it is lost or the session is done. Returns why it was lost."""
+        """Plays over one connection until it is lost or the session is done. Returns the error that ended it."""
         session = self._session
         session.connected()
         self._call = call
@@ -79,9 +79,9 @@ class _Run:
         except grpc.RpcError as error:
             return from_rpc_error(error)
         except asyncio.InvalidStateError:
-            return connection_lost()  # The call ended before this side could write to it.
+            return connection_lost()  # The call ended before a write.
         except asyncio.CancelledError:
-            # Cancelling the call (below, for an agent's failure) and cancelling the caller's task look the same from here.
+            # Either an agent's failure cancelled the call (below), or the caller's task was cancelled.
             if self._failure is not None:
                 raise self._failure from None
             raise
@@ -91,14 +91,14 @@ class _Run:
         return connection_lost()
 
     async def end(self) -> None:
-        """Ends whatever agents are still thinking."""
+        """Cancels agents that are still deciding."""
         thinking = list(self._thinking)
         for task in thinking:
             task.cancel()
         await asyncio.gather(*thinking, return_exceptions=True)
 
     def _decide(self, ask: Ask) -> None:
-        """Has the agent decide: at once, or in a task if it takes its time."""
+        """Lets the agent decide: at once, or in a task if `decide` is a coroutine."""
         action = ask.seat.agent.decide(ask.decision)
         if type(action) is int or not isinstance(action, Awaitable):
             self._session.answer(ask, action)
@@ -108,7 +108,7 @@ class _Run:
         task.add_done_callback(self._thinking.discard)
 
     async def _think(self, ask: Ask, action: Awaitable[int]) -> None:
-        """Waits for an agent's answer and sends it over the connection there is by then."""
+        """Waits for an agent's answer and sends it over the then current connection."""
         try:
             self._session.answer(ask, await action)
         except Exception as failure:
@@ -122,21 +122,21 @@ class _Run:
         try:
             await self._flush(call)
         except (grpc.RpcError, asyncio.InvalidStateError, asyncio.CancelledError):
-            # Whoever reads the call sees its end too; the answer is repeated on the next connection.
+            # The reader of the call sees its end, too; the next connection repeats the answer.
             if self._call is call:
                 call.cancel()
 
     async def _flush(self, call: PlayCall) -> None:
-        """Sends what the session has to say."""
+        """Sends the session's requests."""
         async with self._writing:
             if call is not self._call:
-                return  # The answers of a lost connection are the session's to repeat.
+                return  # The session repeats the answers of a lost connection.
             for request in self._session.take_requests():
                 await call.write(request)
 
 
 async def _part(call: PlayCall) -> None:
-    """Half-closes the stream and gives the server the time to end it. What it still says is of no interest."""
+    """Half-closes the stream and waits for the server to end it. Ignores its messages."""
     try:
         async with asyncio.timeout(FAREWELL_S):
             await call.done_writing()

@@ -33,7 +33,7 @@ class Client(Calls):
     """
 
     def _play_session(self, session: PlaySession) -> None:
-        """Plays until the session is done, over as many connections as it takes."""
+        """Plays until the session is done, reconnecting as needed."""
         failures = 0
         while not session.done:
             before = session.progress
@@ -47,11 +47,11 @@ class Client(Calls):
                 session.give_up(final)
 
     def _play_connection(self, session: PlaySession) -> ChefsHatError | None:
-        """Plays over one connection. Returns why it was lost, or None if the session is done."""
+        """Plays over one connection. Returns the error that ended it, or None if the session is done."""
         session.connected()
         pump = _Pump(session)
         with pump.busy:
-            # The stream's thread may ask the pump for its second request before `Play` has returned.
+            # The stream's thread may request the second message before `Play` returns.
             pump.call = call = self._play.Play(pump)
         try:
             if not call.add_callback(pump.stopped.set):
@@ -60,7 +60,7 @@ class Client(Calls):
         except BaseException:
             call.cancel()
             raise
-        # An agent that is still thinking finishes first: nobody else may touch the session until then.
+        # Waits for an agent that is still deciding, which uses the session.
         with pump.busy:
             pump.closed = True
             session.lost(pump.asks)
@@ -71,7 +71,7 @@ class Client(Calls):
         if session.done:
             _part(call)
             return None
-        # The call ends without this side having noticed where an agent was thinking meanwhile; its status tells why all the same.
+        # If the call ended while an agent was deciding, its status has the error.
         call.cancel()
         if failure is None and isinstance(call, grpc.RpcError) and call.code() is not grpc.StatusCode.OK:
             failure = call
@@ -79,21 +79,21 @@ class Client(Calls):
 
 
 class _Pump(Iterator[pb.PlayRequest]):
-    """The stream's requests, made while the stream asks for them.
+    """The stream's requests, created on demand.
 
-    gRPC takes a stream's requests from an iterator, in a thread of its own. This iterator reads the responses in that same thread
-    and lets the agents decide there. Compared with a queue between two threads that saves a change of threads for every decision.
+    gRPC takes a stream's requests from an iterator, in a thread of its own. This iterator reads the responses in the same thread
+    and lets the agents decide there, which saves a thread switch for every decision.
     """
 
     def __init__(self, session: PlaySession) -> None:
         self.call: PlayCall
-        #: Held while the session is in use.
+        #: Locked while the session is in use.
         self.busy = threading.Lock()
-        #: Set when nothing more will come: the session is done, something failed, or the call has ended.
+        #: Set when the session is done, something failed, or the call has ended.
         self.stopped = threading.Event()
-        #: Makes the iterator end; set under `busy`.
+        #: Ends the iterator; set under `busy`.
         self.closed = False
-        #: What the call or an agent raised.
+        #: The exception of the call or of an agent.
         self.failure: BaseException | None = None
         self._session = session
         self._ready = deque(session.take_requests())
@@ -105,7 +105,7 @@ class _Pump(Iterator[pb.PlayRequest]):
             if not self.closed:
                 try:
                     request = self._next_request()
-                except BaseException as failure:  # Raised again by whoever runs the session.
+                except BaseException as failure:  # `_play_connection` raises it again.
                     self.failure = failure
                 else:
                     if request is not None:
@@ -115,7 +115,7 @@ class _Pump(Iterator[pb.PlayRequest]):
             raise StopIteration
 
     def _next_request(self) -> pb.PlayRequest | None:
-        """The next request; None when there is none because the session is done or the call has ended without an error."""
+        """Returns the next request; None if the session is done or the call has ended without an error."""
         session = self._session
         while not self._ready:
             if self.asks:
@@ -133,7 +133,7 @@ class _Pump(Iterator[pb.PlayRequest]):
         return self._ready.popleft()
 
     def _decide(self) -> None:
-        """Has decisions made until there are none, or until the first answer has waited for long enough."""
+        """Lets agents decide until no decision is open, or until the first answer must be sent."""
         asks = self.asks
         until = time.monotonic() + FLUSH_AFTER_S
         while asks:
@@ -141,22 +141,22 @@ class _Pump(Iterator[pb.PlayRequest]):
             action = ask.seat.agent.decide(ask.decision)
             if type(action) is not int and isinstance(action, Awaitable):
                 if isinstance(action, Coroutine):
-                    action.close()  # Or Python warns that nobody awaited it.
-                raise TypeError("an agent with an async `decide` plays under chefshat.aio")
+                    action.close()  # Avoids Python's warning about an unawaited coroutine.
+                raise TypeError("an agent with an async `decide` needs chefshat.aio")
             self._session.answer(ask, action)
             if time.monotonic() > until:
                 return
 
 
 def _part(call: "PlayCall") -> None:
-    """Gives the server the time to end a stream that this side has half-closed. What it still says is of no interest."""
+    """Waits for the server to end a half-closed stream. Ignores its messages."""
     limit = threading.Timer(FAREWELL_S, call.cancel)
     limit.start()
     try:
-        # Without reading, the end of the stream would never be seen behind an unread message.
+        # Unread messages would hide the end of the stream.
         for _ in call:
             pass
     except grpc.RpcError:
-        return  # However the stream ended, the games are over.
+        return  # The games are over in any case.
     finally:
         limit.cancel()

@@ -78,6 +78,7 @@ def evaluate(
         client_seats=[0],
         opponents=opponents,
         episode="shift",
+        decisions="turns" if network.info.output == "turns" else "all",
         skip_forced=True,
         total_games=games,
         seed=seed,

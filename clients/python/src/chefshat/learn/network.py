@@ -16,7 +16,6 @@ import numpy.typing as npt
 import safetensors
 import safetensors.numpy
 
-from chefshat import pb
 from chefshat.files import check_readable, write_atomically
 from chefshat.learn import features
 
@@ -176,16 +175,12 @@ class Network:
     def actions(
         self, observations: features.Columns, seats: features.Bytes, kinds: features.Bytes, mask_bits: features.Bytes
     ) -> Actions:
-        """The action of each row, (R,) u16: the legal one with the highest output, the lowest index of equal ones.
+        """Returns the action of each row, (R,) u16: the legal one with the highest output, the lowest index of equal ones.
 
-        Decisions that a network of output "turns" does not know are the default ones.
+        A network of output "turns" has no outputs for other decisions, at which agents take the server's default action.
         """
-        # Not after tanh: that changes no order, but makes equal what is far from 0.
-        chosen = best_legal(self._sums(self.inputs(observations, seats, kinds, mask_bits)), mask_bits)
-        if self.info.output == "actions":
-            return chosen
-        defaults = default_decisions(observations, kinds, mask_bits, faces=self.info.faces)
-        return np.where(kinds == pb.DECISION_KIND_TURN, chosen, defaults)
+        # Before the tanh, which preserves order but rounds values far from 0 to the same number.
+        return best_legal(self._sums(self.inputs(observations, seats, kinds, mask_bits)), mask_bits)
 
 
 def best_legal(outputs: Floats, mask_bits: features.Bytes) -> Actions:
@@ -199,30 +194,6 @@ def best_legal(outputs: Floats, mask_bits: features.Bytes) -> Actions:
     allowed = np.take_along_axis(legal, best[:, np.newaxis], axis=1)[:, 0]
     chosen: Actions = np.where(allowed, best, np.argmax(legal, axis=1)).astype(np.uint16)
     return chosen
-
-
-def default_decisions(observations: features.Columns, kinds: features.Bytes, mask_bits: features.Bytes, *, faces: int) -> Actions:
-    """The default decision of each row, (R,) u16.
-
-    At a turn a pass; in the exchange the highest plain face, else the Golden card, else a joker; of special actions none. Where
-    that is not legal, the legal action with the lowest index.
-    """
-    turns = features.turn_actions(faces)
-    plain = observations.hands.copy()
-    plain[:, faces - 1] -= observations.golden
-    # Ascending in preference: joker, Golden card, faces 1..F.
-    holds = np.column_stack([observations.hands[:, faces], observations.golden, plain[:, :faces]]) > 0
-    gift = np.append([turns + faces, turns + faces - 1], turns + np.arange(faces))
-    preferred = gift[holds.shape[1] - 1 - np.argmax(holds[:, ::-1], axis=1)]
-    wanted = np.select(
-        [kinds == pb.DECISION_KIND_TURN, kinds == pb.DECISION_KIND_EXCHANGE],
-        [np.full(len(kinds), turns - 1), preferred],
-        turns + faces + 1,
-    )
-    legal = np.unpackbits(mask_bits, axis=1, count=features.num_actions(faces), bitorder="little").view(np.bool_)
-    allowed = np.take_along_axis(legal, wanted[:, np.newaxis], axis=1)[:, 0]
-    decisions: Actions = np.where(allowed, wanted, np.argmax(legal, axis=1)).astype(np.uint16)
-    return decisions
 
 
 def save(

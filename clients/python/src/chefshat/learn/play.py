@@ -30,8 +30,10 @@ class NetworkAgent(Agent):
         self._check(seat)
 
     def decide(self, request: Decision) -> int:
-        """Returns the legal action with the highest output."""
+        """Returns the legal action with the highest output, or the default action for a decision without outputs."""
         self._check(request.seat_info)
+        if self._network.info.output == "turns" and request.kind != pb.DECISION_KIND_TURN:
+            return request.default_action
         kinds = np.array([request.kind], np.uint8)
         seats = np.array([request.seat], np.uint8)
         mask_bits = np.frombuffer(request.mask_bytes, np.uint8)[np.newaxis]

@@ -1,7 +1,7 @@
-"""Players Club adapter: players written for the reference implementation's second version, unchanged, as remote agents.
+"""Players Club adapter: runs players written for the reference implementation's second version, unchanged, as remote agents.
 
-`python -m chefshat.players_club` joins a room with one. Each runs in a process, and if need be a Python, of its own: nothing of
-what it imports is needed here. `PlayersClubAgent` is the agent, `AgentProcess` the process it asks.
+`python -m chefshat.players_club` joins a room with one. Each runs in its own process, optionally with another Python, so that its
+dependencies are not needed here. `PlayersClubAgent` is the agent, `AgentProcess` its process.
 """
 
 from chefshat.players_club.agent import PlayersClubAgent, RulesDoNotFit

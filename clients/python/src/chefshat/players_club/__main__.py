@@ -1,6 +1,6 @@
 """The command `python -m chefshat.players_club`: plays in rooms or a tournament with a player of the reference implementation.
 
-Here are the arguments and the output. Running and understanding the player is in `process` and `agent`, joining in `join_options`.
+The player's process is in `process`, its translation in `agent`, joining in `join_options`.
 """
 
 import argparse
@@ -26,18 +26,18 @@ EXAMPLE = """examples:
   python -m chefshat.players_club --server 127.0.0.1:50051 --tournament BCDF2345 --games 2 --name Dora \\
     --agent my_players:Cautious --path ~/players --ticket-file dora.ticket
 
-The player runs with all your rights, like any program that you start. What it chooses illegally is sent, counted by the server as a
-wrong action, and the player is asked again. Where it raises, hangs or dies, the default decision of the rules is taken; a process
-that is gone is started anew at the next call. With --games N it plays in N processes, which know nothing of each other but have
-the same --arguments and --log: where these say {process}, each has its own number, from 0.
+The player runs with all your rights, like any program that you start. An illegal choice is sent, counted by the server as an
+invalid attempt, and the player is asked again. If it raises, hangs or dies, the default action is taken; a lost process restarts at
+the next call. With --games N it plays in N separate processes with the same --arguments and --log; {process} in these is replaced
+by the number of the process, from 0.
 
-If this command itself dies, another goes on in its place with the ticket that it printed, or with the same --ticket-file. The
-player is told the game from the beginning, but knows nothing else of before.
+If this command dies, run it again with the ticket that it printed, or with the same --ticket-file, to resume. The player receives
+all events of the game again; any other state is lost.
 
-exit code: 0 every game or the tournament was finished, 1 one was refused, lost or aborted, or the player was given up, 2 the
-arguments are wrong, 130 interrupted
+exit code: 0 every game or the tournament finished, 1 one was refused, lost or aborted, or the player was given up, 2 wrong
+arguments, 130 interrupted
 """
-# Characters of the longest name a server shows.
+# Maximum characters of a display name.
 MAX_NAME = 64
 
 
@@ -57,7 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
 
     def play_all() -> int:
-        # First the player, then the place: nobody waits for a player that cannot be made.
+        # Starts the player before joining, so that nobody waits for a player that fails to start.
         with Players(spec, options.games or 1, attempts=options.attempts) as players, Client(options.address) as client:
             codes = [play(client, players, way, as_json=options.json) for way in options.ways]
             return max(*codes, int(players.given_up))
@@ -66,24 +66,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def play(client: Client, players: Players, way: JoinOptions, *, as_json: bool) -> int:
-    """Plays the game of one room, or a tournament, and prints what came of it. Returns 0 if it was finished, else 1."""
+    """Plays the game of one room, or a tournament, and prints the result. Returns 0 if it was finished, else 1."""
     way = replace(way, name=way.name or players.name[:MAX_NAME])
     before = own_counts(players)
     played = join_options.take_part(client, way, players.seat, check_rules=check_rules, prepare=players.prepare)
     own = {what: count - before[what] for what, count in own_counts(players).items()}
     words = "{failures} failures of the player, {replaced} decisions taken for it, {restarts} restarts".format(**own)
     if own["crowded"]:
-        words += ", {crowded} games begun with a process that had one already".format(**own)
+        words += ", {crowded} games started with a busy process".format(**own)
     return outcome.report(played, as_json=as_json, own=own, own_words=words)
 
 
 def own_counts(players: Players) -> dict[str, int]:
-    """What was not the player's own in all games so far."""
+    """Counts the failures and replaced decisions of all games so far."""
     return {**asdict(players.counts), "restarts": players.restarts, "crowded": players.crowded}
 
 
 def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
-    """The arguments, checked; the places they name are in `ways`."""
+    """Parses the arguments; the places they name are in `ways`."""
     parser = argparse.ArgumentParser(
         prog="python -m chefshat.players_club",
         description="Joins a room or a tournament of a Chef's Hat server with a player written for the reference implementation's "
@@ -94,11 +94,11 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--server", "--address", dest="address", required=True, help="the server, HOST:PORT")
     join_options.add_options(parser, several_codes=True)
     parser.add_argument("--agent", required=True, type=class_name, help="the player, module.path:Class")
-    parser.add_argument("--python", default=sys.executable, help="the Python that has what the player needs (default: this one)")
+    parser.add_argument("--python", default=sys.executable, help="the Python with the player's dependencies (default: this one)")
     parser.add_argument(
-        "--path", action="append", default=[], metavar="DIR", help="a folder to look for its modules in; may be repeated"
+        "--path", action="append", default=[], metavar="DIR", help="a folder to search for its modules; may be repeated"
     )
-    parser.add_argument("--name", help="name to show, and to give to the player (default: what the player calls itself)")
+    parser.add_argument("--name", help="display name, also passed to the player (default: the player's own name)")
     parser.add_argument(
         "--arguments", type=json_object, default={}, metavar="JSON", help="arguments of its constructor, as an object"
     )
@@ -109,19 +109,21 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         help="illegal choices sent for one decision before the best legal one is taken (default: %(default)s, as in the reference)",
     )
     parser.add_argument(
-        "--limit", type=seconds, default=60.0, metavar="S", help="seconds a call may take before the player counts as hanging"
+        "--limit", type=seconds, default=60.0, metavar="S", help="time limit of a call, in seconds (default: %(default)s)"
     )
-    parser.add_argument("--start-limit", type=seconds, default=120.0, metavar="S", help="seconds it may take to be made")
-    parser.add_argument("--restarts", type=count, default=3, help="how often a process is started anew (default: %(default)s)")
-    parser.add_argument("--log", type=Path, metavar="FILE", help="a file to append what the player prints to (default: not kept)")
-    parser.add_argument("--json", action="store_true", help="print one line of JSON a game or tournament instead of a table")
+    parser.add_argument(
+        "--start-limit", type=seconds, default=120.0, metavar="S", help="time limit of starting, in seconds (default: %(default)s)"
+    )
+    parser.add_argument("--restarts", type=count, default=3, help="maximum restarts of a process (default: %(default)s)")
+    parser.add_argument("--log", type=Path, metavar="FILE", help="a file to append the player's output to")
+    parser.add_argument("--json", action="store_true", help="print one line of JSON for each game or tournament instead of a table")
     options = parser.parse_args(arguments)
     options.ways = join_options.ways(parser, options, needs_name=False)
     return options
 
 
 def class_name(text: str) -> str:
-    """Checks that it has the form module.path:Class."""
+    """Checks the form module.path:Class."""
     module, _, name = text.partition(":")
     if not (module and name.isidentifier()):
         raise argparse.ArgumentTypeError(f"{text!r} is not of the form module.path:Class")
@@ -129,18 +131,18 @@ def class_name(text: str) -> str:
 
 
 def json_object(text: str) -> dict[str, Any]:
-    """Reads an object with the arguments of a constructor."""
+    """Parses a JSON object."""
     try:
         read = json.loads(text)
     except ValueError as error:
-        raise argparse.ArgumentTypeError(f"no JSON: {error}") from error
+        raise argparse.ArgumentTypeError(f"not JSON: {error}") from error
     if not isinstance(read, dict):
-        raise argparse.ArgumentTypeError('an object was expected, for instance {"verbose_console": false}')
+        raise argparse.ArgumentTypeError('must be an object, for example {"verbose_console": false}')
     return read
 
 
 def seconds(text: str) -> float:
-    """Reads a number of seconds above 0."""
+    """Parses a number of seconds above 0."""
     value = float(text)
     if not 0 < value < float("inf"):
         raise argparse.ArgumentTypeError("must be above 0")
@@ -148,7 +150,7 @@ def seconds(text: str) -> float:
 
 
 def count(text: str) -> int:
-    """Reads a number from 0."""
+    """Parses a number from 0."""
     value = int(text)
     if value < 0:
         raise argparse.ArgumentTypeError("must be 0 or more")

@@ -1,8 +1,8 @@
-"""A player of the reference implementation's second version as an agent of this package: its answers become actions.
+"""A player of the reference implementation's second version as an agent of this package.
 
-The player itself is in a process of its own (`process`), and sees the game as it is used to (`table`). Here is what its answers
-mean, and what is done where it has none: the default decision of the rules. An illegal choice is sent to the server, which counts
-it and asks again, as often as the reference would; then the legal choice that the player likes best is taken.
+The player runs in its own process (`process`), and sees the game in its own terms (`table`). Here its answers become actions. If it
+fails to answer, the default action is taken. An illegal choice is sent to the server, which counts it and asks again, as often as
+the reference would; then the legal choice with the highest score is taken.
 """
 
 import logging
@@ -19,44 +19,44 @@ from chefshat.agents import Agent
 from chefshat.decision import Decision, SeatInfo
 from chefshat.errors import ChefsHatError
 from chefshat.players_club.process import AgentError, AgentProcess
-from chefshat.players_club.table import ACTIONS, DINNER_SERVED, FACES, FOOD_FIGHT, JOKER, PASS, PLAYERS, Call, Table
+from chefshat.players_club.table import ACTIONS, DINNER_SERVED, FACES, FOOD_FIGHT, JOKER, PLAYERS, Call, Table
 from chefshat.result import SeatResult
 
 LOG = logging.getLogger("chefshat")
 
 JOKERS = 2
-#: How often an illegal choice is sent before a legal one is: what the reference allows.
+#: Illegal choices to send before a legal one: the limit of the reference.
 ATTEMPTS = 5
-# Numbers of the actions that are no turn, for eleven faces. Giving card c, jokers included, is GIVE + c.
+# Indices of the actions other than turns, for eleven faces. Giving card c, jokers included, is GIVE + c.
 GIVE = len(ACTIONS) - 1
 DECLINE = len(ACTIONS) + FACES + 1
 DECLARE = DECLINE + 1
 # Cards that the Chef and the Sous-Chef choose to give.
 GIVEN_BY: dict[int, int] = {pb.ROLE_CHEF: 2, pb.ROLE_SOUS_CHEF: 1}
-# Failures that are told in full. An agent that fails once often does so at every decision.
+# Failures to log. An agent that fails usually does so at every decision.
 TOLD = 3
 
 
 class RulesDoNotFit(ValueError):
-    """Its players know no other games than those of four players, eleven faces and two jokers."""
+    """The game does not have four players, eleven faces and two jokers, as players of the reference require."""
 
 
 def check_rules(rules: pb.RuleSet) -> None:
-    """Raises RulesDoNotFit for a game whose numbers are not those that players of the reference implementation know."""
+    """Raises RulesDoNotFit if players of the reference implementation cannot play under these rules."""
     if (rules.players, rules.faces, rules.jokers) != (PLAYERS, FACES, JOKERS):
         raise RulesDoNotFit(
-            f"players of the reference implementation know games of {PLAYERS} players, {FACES} faces and {JOKERS} jokers alone; "
+            f"players of the reference implementation only play games of {PLAYERS} players, {FACES} faces and {JOKERS} jokers; "
             f"this one has {rules.players}, {rules.faces} and {rules.jokers}"
         )
 
 
 @dataclass
 class Counts:
-    """What was not the player's own, in one game or many.
+    """Failures of the player, in one game or many.
 
     Attributes:
-        failures: how often the player raised, was lost, or answered with what is no answer.
-        replaced: decisions that were taken for it, because it failed or chose nothing legal to the last.
+        failures: calls that raised, that were lost, or that returned no valid answer.
+        replaced: decisions taken for the player, because it failed or made no legal choice.
     """
 
     failures: int = 0
@@ -64,54 +64,54 @@ class Counts:
 
 
 class PlayersClubAgent(Agent):
-    """Plays one game with a player of the reference implementation. Another game with the same process takes another of these.
+    """Plays one game with a player of the reference implementation. Create a new one for another game of the same process.
 
     Attributes:
         counts: of this game.
-        over: whether its game is over, and the player has been told, or its seat is lost.
+        over: whether the game is over, and the player has been notified, or the seat is lost.
     """
 
     def __init__(self, process: AgentProcess, *, attempts: int = ATTEMPTS, total: Counts | None = None) -> None:
-        """Seats a player.
+        """Creates the agent of one game.
 
         Args:
-            process: the player, started.
-            attempts: how often an illegal choice is sent before a legal one is taken instead; the room's own limit holds too.
-            total: counted on with the game's own counts.
+            process: the started player.
+            attempts: illegal choices to send before a legal one is taken instead; the room's limit applies, too.
+            total: also counts the failures of this game.
         """
         self._process = process
         self._attempts = attempts
         self._table: Table | None = None
-        # The decision that is open, and how often it was answered illegally.
+        # The open decision, and its illegal answers so far.
         self._decision_id = 0
         self._refused = 0
-        # Cards the player has chosen that are still to be given.
+        # Cards that the player has chosen to give next.
         self._to_give: list[int] = []
         self.counts = Counts()
         self._total = total or Counts()
         self.over = False
 
     def on_attached(self, seat: SeatInfo) -> None:
-        """Learns the number of the seat."""
+        """Creates the game as the player sees it."""
         if self._table is None:
             self._table = Table(seat.seat, self._process.name)
 
     def on_event(self, event: pb.GameEvent) -> None:
-        """Tells the player what it would have been told by the reference implementation."""
+        """Makes the calls that the reference implementation would make."""
         if event.HasField("game_started"):
             check_rules(event.game_started.rules)
         if event.HasField("shift_started"):
             self._to_give = []
-        self._tell(self._seen.event(event))
+        self._notify(self._seen.event(event))
 
     def on_game_over(self, result: SeatResult) -> None:
-        """Says how much of the game was the player's own."""
+        """Logs the failures."""
         self.over = True
         if self.counts.failures:
             LOG.warning("%s failed %d times in this game", self._process.name, self.counts.failures)
 
     def on_seat_lost(self, error: ChefsHatError) -> None:
-        """The player is free for another game. It is told nothing: the reference has no word for this."""
+        """Frees the player for another game. The reference has no call for this."""
         self.over = True
 
     def decide(self, request: Decision) -> int:
@@ -121,7 +121,7 @@ class PlayersClubAgent(Agent):
         else:
             self._decision_id, self._refused = request.decision_id, 0
         left = request.invalid_attempts_left
-        # The last attempt that the room grants is not wasted: after it the server would decide.
+        # Does not use up the room's last attempt, after which the server would decide.
         insists = self._refused < self._attempts and (left is None or left > 1)
         if request.kind == pb.DECISION_KIND_EXCHANGE:
             return self._give(request, insists)
@@ -131,17 +131,17 @@ class PlayersClubAgent(Agent):
 
     @property
     def _seen(self) -> Table:
-        assert self._table is not None, "seats are attached before they are told or asked anything"
+        assert self._table is not None, "seats are attached before any event or decision"
         return self._table
 
     def _turn(self, request: Decision, insists: bool) -> int:
-        """The largest of the 200 numbers, of those that are legal if the player may not insist on an illegal one any more."""
-        self._tell(self._seen.turn_of(request.seat))
+        """Chooses the action with the highest of the 200 scores; a legal one if the player may no longer insist."""
+        self._notify(self._seen.turn_of(request.seat))
         vector = [float(number) for number in request.classic_vector()]
         scores = self._numbers(vector)
         if scores is None:
             self._seen.asked(vector, replaced=True)
-            return self._replaced(_default_turn(request))
+            return self._replaced(request.default_action)
         choice = int(np.argmax(scores))
         legal = request.legal_actions
         if choice in legal:
@@ -151,40 +151,40 @@ class PlayersClubAgent(Agent):
         return choice if insists else self._replaced(int(legal[np.argmax(scores[legal])]))
 
     def _numbers(self, vector: list[float]) -> NDArray[np.float64] | None:
-        """What the player answers to the 228 numbers; None if that is no answer."""
+        """Returns the player's scores for the 228 numbers; None if the answer is invalid."""
         try:
             answer = self._process.call("get_action", vector)
         except AgentError as error:
             self._failed(error)
             return None
         if not (_is_numbers(answer) and len(answer) == len(ACTIONS)):
-            self._failed(f"get_action returned {_shape(answer)}: {len(ACTIONS)} numbers were expected")
+            self._failed(f"get_action returned {_shape(answer)}, not {len(ACTIONS)} numbers")
             return None
         return np.array(answer, np.float64)
 
     def _give(self, request: Decision, insists: bool) -> int:
-        """The Chef is asked twice by the server, the player once for both cards."""
+        """Gives a card. The server asks the Chef twice, the player is asked once for both cards."""
         legal = request.legal_actions
         if self._refused:
             self._to_give = []
         if not self._to_give:
-            # Some may have been given already, by a process before this one too.
+            # Cards may have been given already, also by a process before this one.
             amount = max(GIVEN_BY.get(int(request.roles[request.seat]), 1) - int(request.gave.sum()), 1)
             cards = [int(card) for card in np.repeat(np.arange(1, JOKER + 1), request.hand)]
             try:
                 answer = self._process.call("get_exhanged_cards", cards, amount)
             except AgentError as error:
                 self._failed(error)
-                return self._replaced(_default_gift(request))
+                return self._replaced(request.default_action)
             if not (_is_numbers(answer) and len(answer) == amount and all(card in range(1, JOKER + 1) for card in answer)):
-                self._failed(f"get_exhanged_cards returned {_shape(answer)}: a list of {amount} of the cards it holds was expected")
-                return self._replaced(_default_gift(request))
+                self._failed(f"get_exhanged_cards returned {_shape(answer)}, not a list of {amount} of its cards")
+                return self._replaced(request.default_action)
             self._to_give = [int(card) for card in answer]
         action = GIVE + self._to_give.pop(0)
         if action in legal or insists:
             return action
-        self._failed("get_exhanged_cards chose cards that it does not hold")
-        return self._replaced(_default_gift(request))
+        self._failed("get_exhanged_cards chose cards that are not in its hand")
+        return self._replaced(request.default_action)
 
     def _special_action(self, request: Decision) -> int:
         dishwasher = int(request.roles[request.seat]) == pb.ROLE_DISHWASHER
@@ -192,13 +192,13 @@ class PlayersClubAgent(Agent):
             answer = self._process.call("do_special_action", self._seen.info, FOOD_FIGHT if dishwasher else DINNER_SERVED)
         except AgentError as error:
             self._failed(error)
-            return self._replaced(DECLINE)
+            return self._replaced(request.default_action)
         return DECLARE if answer else DECLINE
 
-    def _tell(self, calls: Sequence[Call]) -> None:
+    def _notify(self, calls: Sequence[Call]) -> None:
         for call in calls:
             if self._process.given_up:
-                return  # It has been said.
+                return  # Logged before.
             try:
                 self._process.call(call.method, *call.arguments)
             except AgentError as error:
@@ -215,33 +215,21 @@ class PlayersClubAgent(Agent):
         if self.counts.failures <= TOLD:
             LOG.warning("%s: %s", self._process.name, why)
         if self.counts.failures == TOLD:
-            LOG.warning("%s: further failures are counted, not told", self._process.name)
-
-
-def _default_turn(request: Decision) -> int:
-    """Pass, or where that is not legal the legal action with the lowest index: the default decision of the rules."""
-    legal = request.legal_actions
-    return PASS if PASS in legal else int(legal[0])
-
-
-def _default_gift(request: Decision) -> int:
-    """The highest face, or a joker if there is nothing else: the default decision of the rules."""
-    gifts = [int(action) for action in request.legal_actions if action != GIVE + JOKER]
-    return max(gifts, default=GIVE + JOKER)
+            LOG.warning("%s: further failures are counted, but not logged", self._process.name)
 
 
 def _is_numbers(answer: object) -> TypeGuard[list[float]]:
-    """Whether that is a list of numbers, infinite ones allowed."""
+    """Whether the answer is a list of numbers, which may be infinite, but not NaN."""
     if not (isinstance(answer, list) and all(isinstance(number, int | float) for number in answer)):
         return False
     try:
         return not any(math.isnan(number) for number in answer)
     except OverflowError:
-        return False  # A whole number of hundreds of digits.
+        return False  # An integer of hundreds of digits.
 
 
 def _shape(answer: object) -> str:
-    """An answer in few words."""
+    """Describes an answer briefly."""
     if isinstance(answer, list):
         return f"{len(answer)} values" if len(answer) > PLAYERS else repr(answer)[:80]
     return f"{type(answer).__name__} {answer!r}"[:80]

@@ -1,7 +1,7 @@
-"""The processes of one player that plays in rooms one after the other, or in games of a tournament at the same time.
+"""The processes of one player that plays in rooms one after another, or in several games of a tournament at a time.
 
-A player knows one game at a time. So there are as many processes as games at a time, and each goes from game to game, with what it
-has learnt. One process is in `process`, one game in `agent`.
+A player plays one game at a time. So there are as many processes as parallel games, and each plays game after game with its learned
+state. One process is in `process`, one game in `agent`.
 """
 
 import json
@@ -19,26 +19,26 @@ from chefshat.players_club.process import AgentLost, AgentProcess, AgentSpec
 
 LOG = logging.getLogger("chefshat")
 
-#: What stands for the number of a process in the arguments of its player and in the name of its log.
+#: Placeholder for the number of a process in the arguments of its player and in the name of its log.
 PROCESS = "{process}"
 
 
 class Players:
-    """The processes, started; a context manager. `seat` gives the agent of each game.
+    """The started processes; a context manager. `seat` creates the agent of each game.
 
     Attributes:
-        processes: all of them.
+        processes: all processes.
         counts: of all games so far.
-        crowded: games that were begun when no process was free, with one that had a game already.
+        crowded: games that were started with a busy process, because none was free.
     """
 
     def __init__(self, spec: AgentSpec, games: int, *, attempts: int) -> None:
-        """Names the player.
+        """Configures the player.
 
         Args:
-            spec: the player. Where its arguments or its log say PROCESS, each process has its number there, from 0.
-            games: games it is to play at a time, at least 1.
-            attempts: how often an illegal choice is sent, see `PlayersClubAgent`.
+            spec: the player. PROCESS in its arguments or its log is replaced by the number of each process, from 0.
+            games: games to play at a time, at least 1.
+            attempts: illegal choices to send, see `PlayersClubAgent`.
         """
         self.processes = [AgentProcess(_numbered(spec, number)) for number in range(games)]
         self.counts = Counts()
@@ -47,11 +47,11 @@ class Players:
         self._attempts = attempts
         self._stack = ExitStack()
         self._closed = False
-        # Who plays the latest game of each process.
+        # The agent of the latest game of each process.
         self._playing: dict[AgentProcess, PlayersClubAgent] = {}
 
     def __enter__(self) -> Self:
-        """Starts all processes, side by side: some take long to load what they need. Raises AgentError if one cannot be started."""
+        """Starts all processes in parallel, since some load for long. Raises AgentError if one cannot be started."""
         self._start(self.processes)
         return self
 
@@ -60,10 +60,10 @@ class Players:
         self._stack.close()
 
     def prepare(self, games: int) -> None:
-        """Sees to it that there are processes for so many games at a time. Raises AgentError if one cannot be started."""
+        """Starts further processes for `games` games at a time. Raises AgentError if one cannot be started."""
         more = [AgentProcess(_numbered(self._spec, number)) for number in range(len(self.processes), games)]
         if more:
-            LOG.warning("processes are started for %d games at a time, not %d", games, len(self.processes))
+            LOG.warning("starting processes for %d games at a time instead of %d", games, len(self.processes))
             self._start(more)
             self.processes += more
 
@@ -73,47 +73,47 @@ class Players:
         with ThreadPoolExecutor(len(processes)) as pool:
             try:
                 if self._closed:
-                    raise AgentLost("all is over already")
+                    raise AgentLost("the players are closed")
                 list(pool.map(AgentProcess.start, processes))
             except BaseException:
-                # Before the pool is waited for, which would wait until all others have been made.
+                # Before leaving the pool, which waits until all others have started.
                 self._stack.close()
                 raise
 
     @property
     def name(self) -> str:
-        """What the player calls itself."""
+        """The player's own name."""
         return self.processes[0].name
 
     @property
     def given_up(self) -> bool:
-        """Whether a process is gone and will not be started again."""
+        """Whether a process has ended and will not be restarted."""
         return any(process.given_up for process in self.processes)
 
     @property
     def restarts(self) -> int:
-        """How often a process was started anew."""
+        """Number of restarts of all processes."""
         return sum(process.restarts for process in self.processes)
 
     def seat(self, seat: SeatInfo) -> PlayersClubAgent:
-        """Seats a process that plays no game now, if need be one that has been given up."""
+        """Assigns a free process to the seat, preferably one that has not been given up."""
         playing = self._playing
         free = [process for process in self.processes if process not in playing or playing[process].over]
         if free:
             process = min(free, key=lambda process: process.given_up)
         else:
-            # The server may have called the next game before it has said that one is over.
+            # The next game may begin before the end of the last one arrives.
             process = next(iter(playing))
             self.crowded += 1
-            LOG.warning("no process is free for the game in room %s: one that has a game already plays in it too", seat.room_id)
-        # Those that have been playing for longest come first.
+            LOG.warning("no process is free for the game in room %s: assigning a busy one", seat.room_id)
+        # Ordered by the start of the latest game.
         playing.pop(process, None)
         playing[process] = agent = PlayersClubAgent(process, attempts=self._attempts, total=self.counts)
         return agent
 
 
 def _numbered(spec: AgentSpec, number: int) -> AgentSpec:
-    """The player of one process, which need not share files with those of the others."""
+    """Returns the spec of one process, with its number."""
     arguments = json.loads(json.dumps(dict(spec.arguments)).replace(PROCESS, str(number)))
     log = spec.log and Path(str(spec.log).replace(PROCESS, str(number)))
     return replace(spec, arguments=arguments, log=log)

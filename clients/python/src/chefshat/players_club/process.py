@@ -1,7 +1,7 @@
-"""One agent in a process and Python of its own: started, called, ended. Nothing here knows what the calls are about.
+"""One agent in its own process: starting, calling and ending it, independent of the meaning of the calls.
 
-A process that does not answer in time, dies or answers nonsense is ended; the next call starts it anew, a bounded number of times.
-What is decided in its place is for `agent` to say. The other end of the pipes is `host`.
+A process that exceeds the time limit, dies or sends an invalid answer is killed; the next call restarts it, a bounded number of
+times. `agent` takes the decisions that are lost. The other end of the pipes is `host`.
 """
 
 import contextlib
@@ -23,42 +23,42 @@ from chefshat.join_options import TICKET
 LOG = logging.getLogger("chefshat")
 
 HOST = Path(__file__).with_name("host.py")
-# The call that makes the agent; all others are methods of it.
+# The call that creates the agent; all others are methods of it.
 START = "start"
-#: Bytes of the longest answer that is read.
+#: Maximum bytes of an answer.
 MAX_ANSWER = 1 << 20
-# Bytes of the agent's own output that are kept for the message that it has died.
+# Bytes of the agent's output to include in the error when it dies.
 MAX_TAIL = 2000
-# Seconds a process has to end when it is told that there is nothing more to do.
+# Seconds that a process has to end when its input is closed.
 FAREWELL_S = 5.0
 
 
 class AgentError(Exception):
-    """An agent did not do what it was asked for. The message says what happened instead."""
+    """A call of an agent failed. The message says how."""
 
 
 class AgentRaised(AgentError):
-    """Its code raised an exception. The process lives on."""
+    """The agent raised an exception. Its process continues."""
 
 
 class AgentLost(AgentError):
-    """Its process died, or was ended because it did not answer in time or answered nonsense."""
+    """The agent's process died, or was killed after a timeout or an invalid answer."""
 
 
 @dataclass(frozen=True)
 class AgentSpec:
-    """Which agent, and how it is made.
+    """The configuration of an agent.
 
     Attributes:
         agent: "module.path:Class".
-        name: given to the constructor as `name`, if it takes that.
-        arguments: further arguments of the constructor, by name; whatever JSON can hold.
-        python: the Python that has what the agent needs.
-        paths: folders in which its modules are looked for first; then in the current one.
-        start_limit_s: seconds it may take to be made: importing, loading models, downloading them.
-        call_limit_s: seconds it may take over one call, before it counts as hanging.
-        restarts: how often its process is started anew in all.
-        log: a file to which what it prints is appended; nowhere if None.
+        name: passed to the constructor as `name`, if it takes that.
+        arguments: further arguments of the constructor, by name; JSON values.
+        python: the Python with the agent's dependencies.
+        paths: folders to search for its modules, before the working directory.
+        start_limit_s: time limit for creating it (importing, loading or downloading models), in seconds.
+        call_limit_s: time limit of one call, in seconds.
+        restarts: maximum total number of restarts of its process.
+        log: a file to append its output to; None: no file.
     """
 
     agent: str
@@ -73,11 +73,11 @@ class AgentSpec:
 
 
 class AgentProcess:
-    """Keeps one agent's process. One thread at a time calls it, but for `close`, which any thread may call. A context manager."""
+    """The process of one agent; a context manager. Not thread-safe, except for `close`."""
 
     def __init__(self, spec: AgentSpec) -> None:
         self.spec = spec
-        #: What the agent calls itself; known once it has been started.
+        #: The agent's own name, once it has been started.
         self.name = spec.name
         self.restarts = 0
         self._started = False
@@ -93,14 +93,14 @@ class AgentProcess:
 
     @property
     def given_up(self) -> bool:
-        """Whether the process is gone and will not be started again."""
+        """Whether the process has ended and will not be restarted."""
         return self._closed or (self._started and self._running is None and self.restarts >= self.spec.restarts)
 
     def start(self) -> None:
-        """Starts the process and waits until the agent is made. Does nothing if it is there already.
+        """Starts the process and waits until the agent is created. Does nothing if it is running.
 
         Raises:
-            AgentError: it cannot be made, or may not be made again.
+            AgentError: the agent could not be created, or was given up.
         """
         if self._running is not None:
             return
@@ -108,18 +108,16 @@ class AgentProcess:
             raise AgentLost(f"{self.spec.agent} has been given up")
         if self._started:
             self.restarts += 1
-            LOG.warning(
-                "%s is started anew (%d of %d); it knows nothing of before", self.spec.agent, self.restarts, self.spec.restarts
-            )
+            LOG.warning("restarting %s (%d of %d); its state is lost", self.spec.agent, self.restarts, self.spec.restarts)
         self._started = True
         spec = self.spec
-        # Known before the agent is made, which may take long: `close` ends it in that too.
+        # Set before the agent is created, which may take long, so that `close` can end it.
         self._running = running = _Running(spec.python, spec.log)
         arguments = {"agent": spec.agent, "name": spec.name, "arguments": dict(spec.arguments), "paths": list(spec.paths)}
         try:
             if self._closed:
                 raise AgentLost("it has been closed")
-            said = running.call(START, arguments, spec.start_limit_s)
+            started = running.call(START, arguments, spec.start_limit_s)
         except BaseException as error:
             self._running = None
             running.end()
@@ -127,14 +125,14 @@ class AgentProcess:
                 raise type(error)(f"{spec.agent}: {error}") from error
             raise
         running.made = True
-        self.name = str(said["name"]) if isinstance(said, dict) else spec.name
+        self.name = str(started["name"]) if isinstance(started, dict) else spec.name
 
     def call(self, method: str, *arguments: object) -> object:
-        """Calls a method of the agent and returns its answer, starting the process anew first if it is gone.
+        """Calls a method of the agent and returns its answer. Restarts the process first if it has ended.
 
         Raises:
             AgentRaised: the method raised.
-            AgentLost: there is no process any more.
+            AgentLost: the process has ended.
         """
         self.start()
         running = self._running
@@ -148,7 +146,7 @@ class AgentProcess:
             raise
 
     def close(self) -> None:
-        """Lets the process end by itself, or ends it: at once where the agent is still being made. More than once does no harm."""
+        """Ends the process: gracefully, or at once if the agent is still being created. Does nothing if it has ended."""
         self._closed = True
         running, self._running = self._running, None
         if running is None:
@@ -160,23 +158,23 @@ class AgentProcess:
 
 
 class _Running:
-    """A process and the two threads that read what it writes."""
+    """A process and the two threads that read its output."""
 
     def __init__(self, python: str, log: Path | None) -> None:
-        #: Whether it has made its agent.
+        #: Whether the agent has been created.
         self.made = False
         self._calls = 0
         self._answers: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
         self._tail = b""
         try:
-            # A session of its own: Ctrl-C is for the program that plays, and what the agent itself has started ends with it.
+            # In a session of its own it does not receive Ctrl-C, and its children can be killed with it.
             self._process = subprocess.Popen(
                 [python, "-u", str(HOST)],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.PIPE,
                 start_new_session=True,
-                # The place is the command's: what the agent brings along need not know how to take it.
+                # The agent must not see the ticket.
                 env={name: value for name, value in os.environ.items() if name != TICKET},
             )
         except OSError as error:
@@ -191,16 +189,16 @@ class _Running:
     def call(self, method: str, arguments: object, limit_s: float) -> object:
         """Sends one call and waits for its answer."""
         self._calls += 1
-        what = "making it" if method == START else method
+        what = "creating it" if method == START else method
         request = json.dumps({"id": self._calls, "call": method, "arguments": arguments})
-        assert self._process.stdin is not None, "it was asked for"
+        assert self._process.stdin is not None, "it is a pipe"
         try:
-            # At most one call is under way, and each fits into the pipe: nobody waits here.
+            # Does not block: there is one call at a time, and it fits into the pipe.
             self._process.stdin.write(request.encode() + b"\n")
             self._process.stdin.flush()
             line = self._answers.get(timeout=limit_s)
         except queue.Empty:
-            raise AgentLost(f"{what} did not return within {limit_s:g} s") from None
+            raise AgentLost(f"{what} did not finish within {limit_s:g} s") from None
         except OSError:
             line = None
         if line is None:
@@ -208,18 +206,18 @@ class _Running:
         try:
             answer = json.loads(line)
             if answer["id"] != self._calls:
-                raise ValueError("the number of another call")
+                raise ValueError("the id of another call")
             if "error" not in answer:
                 value: object = answer["value"]
                 return value
             raised = AgentRaised(f"{what} raised {answer['error']}\n{answer['trace']}")
         except (ValueError, KeyError, TypeError, RecursionError) as error:
-            raise AgentLost(f"its process answered {what} with nonsense: {line[:80]!r} ({error})") from error
+            raise AgentLost(f"its process sent an invalid answer to {what}: {line[:80]!r} ({error})") from error
         raise raised
 
     def leave(self) -> None:
-        """Tells the process that there is nothing more to do, and ends it if it takes long over that."""
-        assert self._process.stdin is not None, "it was asked for"
+        """Closes the process's input, and kills the process if it does not end in time."""
+        assert self._process.stdin is not None, "it is a pipe"
         with contextlib.suppress(OSError):
             self._process.stdin.close()
         with contextlib.suppress(subprocess.TimeoutExpired):
@@ -227,8 +225,8 @@ class _Running:
         self.end()
 
     def end(self) -> None:
-        """Ends the process and everything it has started."""
-        # Once it has gone and been waited for, its number may be somebody else's.
+        """Kills the process and its children."""
+        # The id of a process that has ended may have been reused.
         if self._process.poll() is None:
             with contextlib.suppress(OSError):
                 if hasattr(os, "killpg"):
@@ -249,26 +247,26 @@ class _Running:
         self._answers.put(None)
 
     def _read_output(self, pipe: IO[bytes], log: Path | None) -> None:
-        """Keeps the last of what the agent prints. It must be read to its end, or the agent would wait."""
+        """Stores the last output of the agent. Reads it to its end, so that the agent does not block."""
         with contextlib.ExitStack() as stack:
             stack.enter_context(pipe)
-            kept = None
+            file = None
             if log is not None:
                 try:
-                    kept = stack.enter_context(log.open("ab", buffering=0))
+                    file = stack.enter_context(log.open("ab", buffering=0))
                 except OSError as error:
-                    LOG.warning("what the agent prints is not kept: %s", error)
+                    LOG.warning("cannot log the agent's output: %s", error)
             while some := os.read(pipe.fileno(), 1 << 16):
                 self._tail = (self._tail + some)[-MAX_TAIL:]
-                if kept is not None:
-                    kept.write(some)
+                if file is not None:
+                    file.write(some)
 
     def _how_it_died(self) -> str:
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(FAREWELL_S)
-            # Its output ends with it, unless it has left somebody behind who still may print.
+            # Its output ends with it, unless children are still running.
             self._readers[1].join(FAREWELL_S)
         code = self._process.returncode
         how = "it closed its output" if code is None else f"exit code {code}" if code >= 0 else f"signal {-code}"
-        said = self._tail.decode(errors="replace").strip()
-        return f"{how}; it last printed:\n{said}" if said else f"{how}; it printed nothing"
+        output = self._tail.decode(errors="replace").strip()
+        return f"{how}; its last output:\n{output}" if output else f"{how}; it printed nothing"

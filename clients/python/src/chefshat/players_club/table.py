@@ -1,7 +1,7 @@
-"""The game as the reference implementation tells it: our events go in, the calls that its players get come out.
+"""Translates our events to the calls that players of the reference implementation get.
 
-It says "match" for a Shift and "round" for a pizza; here, and here alone, our words become its. There is no process, no server and
-no rule in here: who acts next, for instance, is known when they have. What is decided is in `agent`.
+The reference says "match" for a Shift and "round" for a pizza; only this module uses its words. There is no process, no server and
+no rule here: for example, the next seat to act is known only when it acts. Decisions are in `agent`.
 """
 
 from collections.abc import Sequence
@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from chefshat import pb
 
-# The sizes it is made for. Its 228 numbers are this many of the board, of the hand, and of the mask.
+# The sizes of the reference's games. Its 228 numbers are FACES of the board, HAND of the hand, and the mask.
 PLAYERS = 4
 FACES = 11
 HAND = 17
@@ -22,9 +22,9 @@ ACTIONS = tuple(
 )
 PASS = len(ACTIONS) - 1
 EMPTY_BOARD = [EMPTY] + [0] * (FACES - 1)
-#: Points of a match by place, whatever those of the room: its players read their place off them.
+#: Points of a match by place, independent of the room's rules: its players infer their place from them.
 MATCH_POINTS = (3, 2, 1, 0)
-#: Points of a match that is not over.
+#: Points of an unfinished match.
 UNKNOWN = -1
 
 ROLES = {pb.ROLE_CHEF: "Chef", pb.ROLE_SOUS_CHEF: "Souschef", pb.ROLE_WAITER: "Waiter", pb.ROLE_DISHWASHER: "Dishwasher"}
@@ -34,21 +34,21 @@ DINNER_SERVED = "Dinner served!"
 
 
 class Call(NamedTuple):
-    """A method of the player to be called, and with what."""
+    """A method of the player to call, with its arguments."""
 
     method: str
     arguments: list[Any]
 
 
 class Asked(NamedTuple):
-    """What the player was asked at its own turn: the 228 numbers, and whether its choice had to be replaced."""
+    """A turn of the player: the 228 numbers, and whether its choice was replaced."""
 
     vector: list[float]
     replaced: bool
 
 
 class Table:
-    """What one seat has seen of one game."""
+    """One game as one seat has seen it."""
 
     def __init__(self, seat: int, own_name: str) -> None:
         self._seat = seat
@@ -67,16 +67,16 @@ class Table:
         self._match_score = [UNKNOWN] * PLAYERS
         self._game_score = [0] * PLAYERS
         self._performance = [0.0] * PLAYERS
-        # Whether the player has been told that the match has begun, which it is when the first to act is known.
+        # Whether the player knows that the match has begun; it is notified when the first seat to act is known.
         self._begun = False
         self._asked: Asked | None = None
-        # The last action, until what follows from it is known.
+        # The last action, until its consequences are known.
         self._pending: dict[str, Any] | None = None
-        #: What the player was told last of an action.
+        #: The last action as the player was notified of it.
         self.info: dict[str, Any] = {}
 
     def event(self, event: pb.GameEvent) -> list[Call]:
-        """Takes in an event. Returns what the player is to be told now."""
+        """Processes an event. Returns the calls to make."""
         calls: list[Call] = []
         match event.WhichOneof("kind"):
             case "game_started":
@@ -95,7 +95,7 @@ class Table:
                 calls += self.turn_of(event.play.seat)
                 self._play(event.play)
             case "pass":
-                # `pass` is a word of Python's.
+                # `pass` is a keyword of Python.
                 passed: pb.Pass = getattr(event, "pass")
                 calls += self.turn_of(passed.seat)
                 self._act(passed.seat, PASS, passed.source, self._board, self._cards[passed.seat])
@@ -110,7 +110,7 @@ class Table:
         return calls
 
     def turn_of(self, seat: int) -> list[Call]:
-        """It is known that this seat acts next. Returns what the player is to be told before."""
+        """Sets the seat that acts next. Returns the calls to make before."""
         calls = self._settle(seat)
         if not self._begun:
             self._begun = True
@@ -120,7 +120,7 @@ class Table:
         return calls
 
     def asked(self, vector: list[float], *, replaced: bool) -> None:
-        """Notes what the player was asked at its turn, and whether something else was done than it chose."""
+        """Stores a turn of the player, and whether its choice was replaced."""
         self._asked = Asked(vector, replaced)
 
     def _deal(self, started: pb.ShiftStarted) -> None:
@@ -152,7 +152,7 @@ class Table:
             self._take_away(cards)
 
     def _act(self, seat: int, action: int, source: int, board: list[int], cards_left: int) -> None:
-        """Notes an action. `_settle` tells the player of it."""
+        """Stores an action, for `_settle`."""
         before = self._vector(action)
         asked = self._asked if seat == self._seat else None
         if asked is not None:
@@ -192,11 +192,11 @@ class Table:
             self._performance[seat] = (before + 10 * points / max(ended.pizzas, 1)) / self._matches
             self._roles[seat] = ROLES_BY_PLACE[place]
         self._finished = [True] * PLAYERS
-        # Whoever is left with cards would be next.
+        # The last seat still has cards and would be next.
         return [*self._settle(ended.order[-1]), Call("update_end_match", [self._for(others=True)])]
 
     def _settle(self, next_player: int) -> list[Call]:
-        """All that follows from the last action is known: the player is told of it."""
+        """Returns the calls about the last action, whose consequences are known now."""
         action, self._pending = self._pending, None
         if action is None:
             return []
@@ -219,14 +219,14 @@ class Table:
         return [Call("update_my_action" if own else "update_action_others", [self._for(others=not own)])]
 
     def _for(self, *, others: bool) -> dict[str, Any]:
-        """The last action as it is told: of those of others, the reference leaves empty what only its author may know."""
+        """Returns the last action; of other seats', the reference hides what only they may know."""
         if not others:
             return dict(self.info)
-        kept = ("Observation_Before", "Observation_After", "Action_Random", "Author_Possible_Actions")
-        return {**self.info, **dict.fromkeys(kept, "")}
+        hidden = ("Observation_Before", "Observation_After", "Action_Random", "Author_Possible_Actions")
+        return {**self.info, **dict.fromkeys(hidden, "")}
 
     def _vector(self, action: int) -> list[float]:
-        """The 228 numbers at a moment when the player is asked nothing: in place of a mask there is one action alone."""
+        """Returns the 228 numbers outside of the player's turns, with a single action instead of a mask."""
         hand = sorted(self._hand)
         cards = [*self._board, *([0] * (HAND - len(hand))), *hand]
         mask = [0.0] * len(ACTIONS)
@@ -239,14 +239,14 @@ class Table:
                 self._hand.remove(card)
 
     def _unique(self, names: list[str]) -> list[str]:
-        """The names of the players, its own as it calls itself. Players look for themselves by name, so no two are alike."""
+        """Makes the players' names unique, with its own name for its seat: players identify themselves by name."""
         taken = {self._own_name}
         unique = []
         for seat, name in enumerate(names):
             if seat == self._seat:
                 unique.append(self._own_name)
                 continue
-            # Numbered by its seat, until nobody has that name.
+            # Appends the seat until the name is unique.
             while name in taken:
                 name = f"{name} ({seat})"
             taken.add(name)

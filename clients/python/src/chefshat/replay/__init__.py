@@ -1,7 +1,7 @@
-"""Learning from games that were played before: transitions of records and datasets, and a buffer to draw them from.
+"""Learning from recorded games: transitions from records and datasets, and a replay buffer.
 
-`buffer` keeps transitions, however they came about; `recorded` makes them of records and datasets; `tables` reads the files of
-datasets. What a dataset's columns hold is told in docs/datasets.md.
+`buffer` stores transitions; `recorded` creates them from records and datasets; `tables` reads the files of datasets. The columns of
+datasets are described in docs/datasets.md.
 """
 
 from chefshat.replay.buffer import ReplayBuffer

@@ -1,4 +1,4 @@
-"""A memory of transitions with a fixed capacity, drawn from uniformly. Weighted drawing is not here."""
+"""A replay buffer of fixed capacity with uniform sampling."""
 
 from typing import Any
 
@@ -10,36 +10,34 @@ from chefshat.transitions import Transitions
 
 
 class ReplayBuffer:
-    """The latest transitions, up to a capacity, in columns.
-
-    What is added and drawn depends on the seed alone. A transition takes some 350 bytes.
+    """The latest transitions, up to a capacity, in columns. The seed determines the samples. A transition takes some 350 bytes.
 
     Attributes:
-        capacity: transitions it holds at most; the oldest give way.
+        capacity: maximum number of transitions; new ones replace the oldest.
     """
 
     def __init__(self, capacity: int, *, seed: int | None = None) -> None:
-        """Makes an empty buffer.
+        """Creates an empty buffer.
 
         Args:
             capacity: at least 1.
-            seed: of what is drawn; None: chance.
+            seed: seed of sampling; None: random.
         """
         if capacity < 1:
-            raise ValueError(f"a buffer holds at least 1 transition, not {capacity}")
+            raise ValueError(f"the capacity must be at least 1, not {capacity}")
         self.capacity = capacity
-        self._chance = np.random.default_rng(seed)
+        self._rng = np.random.default_rng(seed)
         self._columns: dict[str, NDArray[Any]] = {}
         self._sizes: Sizes | None = None
-        self._held = 0
-        # The slot to be written next.
+        self._stored = 0
+        # The slot to write next.
         self._next = 0
 
     def __len__(self) -> int:
-        return self._held
+        return self._stored
 
     def add(self, transitions: Transitions) -> None:
-        """Adds transitions, in order; all must be of decks and tables of one size."""
+        """Adds transitions, in order. All must have the same sizes of decks and tables."""
         columns = transitions.flatten()
         if self._sizes is None:
             self._sizes = transitions.sizes
@@ -49,17 +47,17 @@ class ReplayBuffer:
                 f"the buffer has transitions of {self._sizes}, these are of {transitions.sizes}: use a buffer for each"
             )
         count = len(transitions)
-        kept = min(count, self.capacity)
-        # Of more than the capacity only the last remain.
-        slots = (self._next + np.arange(count - kept, count)) % self.capacity
+        # The last ones, if there are more than the capacity.
+        first = max(count - self.capacity, 0)
+        slots = (self._next + np.arange(first, count)) % self.capacity
         for name, array in columns.items():
-            self._columns[name][slots] = array[count - kept :]
+            self._columns[name][slots] = array[first:]
         self._next = (self._next + count) % self.capacity
-        self._held = min(self._held + count, self.capacity)
+        self._stored = min(self._stored + count, self.capacity)
 
     def sample(self, count: int) -> Transitions:
-        """Draws so many transitions, each time any of those held, all alike likely."""
-        if self._sizes is None or self._held == 0:
-            raise ValueError("the buffer is empty: add transitions before drawing some")
-        rows = self._chance.integers(self._held, size=count)
+        """Draws transitions uniformly, with replacement."""
+        if self._sizes is None or self._stored == 0:
+            raise ValueError("the buffer is empty: add transitions before sampling")
+        rows = self._rng.integers(self._stored, size=count)
         return Transitions.unflatten(self._sizes, {name: array[rows] for name, array in self._columns.items()})

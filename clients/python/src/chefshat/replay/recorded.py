@@ -1,7 +1,6 @@
-"""Transitions of games that were recorded: from datasets of `chefshat export`, from records as files, from those a server holds.
+"""Transitions of recorded games: from datasets of `chefshat export`, from files of records, and from a server's records.
 
-Records are not replayed here: the program does that, which knows the rules, when it makes a dataset of them. Reading a dataset's
-files is in `tables`.
+Records are converted to datasets by the program, which knows the rules. Reading a dataset's files is in `tables`.
 """
 
 import json
@@ -24,7 +23,7 @@ from chefshat.local_server import clean_environment, find_binary
 from chefshat.replay.tables import Decisions, has_pyarrow, read
 from chefshat.transitions import RewardFunction, Transitions
 
-# Players that an error names.
+# Maximum number of players listed in an error.
 MOST_NAMES = 20
 SCHEMES = ("validity", "paper", "paper_intended", "winning", "points")
 _KINDS = {
@@ -43,30 +42,28 @@ def from_dataset(
     invalid_attempts: bool = True,
     agents: Sequence[str] | None = None,
 ) -> Transitions:
-    """The transitions of a dataset's games, as a `VectorEnv` would have given them, by game and seat.
+    """Returns the transitions of a dataset's games as from a `VectorEnv`, ordered by game and seat.
 
-    What a seat saw at the end of an episode is not in a dataset: `after` is all zeros there. `truncated` is not known, and false.
-    The number of a game counts the games of the dataset. Decisions whose hand nobody knows (imported games) are left out, and the
-    last of each seat in an episode that was not played to its end.
+    Datasets lack final observations: `after` is all zeros at the end of an episode, and `truncated` is false. Games are numbered in
+    the order of the dataset. Decisions with an unknown hand (imported games) are omitted, and so are the last decisions of
+    unfinished episodes.
 
     Args:
         path: a folder made by `chefshat export`, or its file decisions.parquet, .jsonl or .csv.
-        rewards: the scheme, "validity", "paper", "paper_intended", "winning" or "points"; or a function of them; None: 0.
+        rewards: the scheme, "validity", "paper", "paper_intended", "winning" or "points"; or a function; None: 0.
         episode: "shift" or "game".
         decisions: "all" or "turns".
-        invalid_attempts: whether each invalid attempt is a transition to the same decision, as it was when it was made.
-        agents: names of the players whose decisions are wanted; None: all.
+        invalid_attempts: whether each invalid attempt is a transition to the same decision.
+        agents: names of the players whose decisions to include; None: all.
 
     Raises:
         FileNotFoundError: there is no dataset.
         ImportError: it is a Parquet file, and pyarrow is not installed.
-        ValueError: it is no dataset, its games differ in players or decks, an argument is none of its names, or one of `agents` did
-            not play.
+        ValueError: it is not a dataset, its games differ in players or decks, an argument is invalid, or one of `agents` did not
+            play.
     """
     if isinstance(rewards, str) and rewards not in SCHEMES:
-        raise ValueError(
-            f"rewards={rewards!r}: choose one of {', '.join(map(repr, SCHEMES))}, or give a function of the transitions"
-        )
+        raise ValueError(f"rewards={rewards!r}: choose one of {', '.join(map(repr, SCHEMES))}, or give a function")
     for argument, value, known in (("episode", episode, ("shift", "game")), ("decisions", decisions, ("all", "turns"))):
         if value not in known:
             raise ValueError(f"{argument}={value!r}: choose one of {', '.join(map(repr, known))}")
@@ -85,17 +82,17 @@ def from_dataset(
 
 
 def from_records(paths: Path | str | Sequence[Path | str], **options: Any) -> Transitions:  # noqa: ANN401 - See from_dataset.
-    """The transitions of recorded games: files GAME-ID.jsonl, or folders of them. `options` are those of `from_dataset`.
+    """Returns the transitions of recorded games: files GAME-ID.jsonl, or folders of them. `options` are those of `from_dataset`.
 
     Raises:
-        ChefsHatError: there is no chefshat program to replay them (see `find_binary`), or it refuses them: the message says which.
+        ChefsHatError: the program chefshat was not found (see `find_binary`), or it refuses a record, which the message names.
     """
     files = [paths] if isinstance(paths, (str, Path)) else list(paths)
     with tempfile.TemporaryDirectory() as folder:
         made = Path(folder) / "dataset"
         form = "parquet" if has_pyarrow() else "jsonl"
-        # Not instead of it the address of a server, as elsewhere.
-        program = find_binary("replay the records, which is done on this machine, wherever they come from", instead="")
+        # A server's address is no alternative here.
+        program = find_binary("replay the records on this machine", instead="")
         command = [str(program), "export", *map(str, files), "--out", str(made), "--format", form]
         done = subprocess.run(command, capture_output=True, text=True, env=clean_environment())
         if done.returncode != 0:
@@ -104,12 +101,12 @@ def from_records(paths: Path | str | Sequence[Path | str], **options: Any) -> Tr
 
 
 def from_server(address: str, wanted: pb.RecordFilter | None = None, **options: Any) -> Transitions:  # noqa: ANN401 - See from_dataset.
-    """The transitions of the games a server has records of; those a filter lets through if one is given.
+    """Returns the transitions of a server's recorded games, optionally those that match a filter.
 
-    The records are fetched, and replayed by a chefshat program of this machine. `options` are those of `from_dataset`.
+    Downloads the records and replays them by the program chefshat on this machine. `options` are those of `from_dataset`.
 
     Raises:
-        ChefsHatError: there are none, the server refuses, or see `from_records`.
+        ChefsHatError: there are no such records, the server refuses, or see `from_records`.
     """
     with tempfile.TemporaryDirectory() as folder, Client(address) as client:
         count = 0
@@ -122,37 +119,37 @@ def from_server(address: str, wanted: pb.RecordFilter | None = None, **options: 
 
 
 def save_record(lines: Iterable[pb.RecordLine], path: Path | str) -> None:
-    """Writes a record as a file, whole or not at all, as the server keeps them: for instance what `Client.record` gives."""
+    """Writes a record, for example from `Client.record`, to a file atomically, in the server's format."""
     write_record(path, lines)
 
 
 class _Steps(NamedTuple):
-    """Which rows of the table become transitions. T of them."""
+    """The rows of the table that become T transitions."""
 
     # (T,): the row of the decision, and of the seat's next; -1 where the episode ended.
     before: NDArray[np.intp]
     after: NDArray[np.intp]
-    # (R,): number of the game each row of the table belongs to.
+    # (R,): number of the game of each row of the table.
     games: NDArray[np.intp]
 
 
 def _check_agents(table: Decisions, agents: Sequence[str] | None) -> None:
-    """Refuses names that nobody has who played: a slip would go unnoticed, and there would be nothing to learn from."""
+    """Refuses names of no player: a typo would silently give no transitions."""
     playing = np.unique(table.texts("agent")).tolist()
     for name in agents or ():
         if name not in playing:
-            raise ValueError(f"agents: no player of these games is called {name!r}: choose of {', '.join(playing[:MOST_NAMES])}")
+            raise ValueError(f"agents: no player of these games is called {name!r}; they are {', '.join(playing[:MOST_NAMES])}")
 
 
 def _sizes(table: Decisions) -> Sizes:
-    """The sizes that all games of the table have in common."""
+    """Returns the sizes of all games of the table."""
     found = set()
     for text in np.unique(table.texts("rules")).tolist():
         rules = json.loads(text)
         found.add((int(rules["players"]), int(rules["faces"]), int(rules.get("jokers", 0))))
     if len(found) != 1:
         kinds = "; ".join(f"{players} players, {faces} faces, {jokers} jokers" for players, faces, jokers in sorted(found))
-        raise ValueError(f"the dataset's games differ ({kinds}): make a dataset of each kind")
+        raise ValueError(f"the dataset's games differ ({kinds}): make a dataset for each")
     ((players, faces, jokers),) = found
     hand_size = features.dealt(players, faces, jokers)
     return Sizes(players, faces, jokers, hand_size, features.num_actions(faces), features.turn_actions(faces))
@@ -172,7 +169,7 @@ def _steps(table: Decisions, *, by_game: bool, turns_only: bool, agents: Sequenc
         same &= shifts[rows[1:]] == shifts[rows[:-1]]
     after = np.full(len(rows), -1, np.intp)
     after[:-1][same] = rows[1:][same]
-    # Places are known where an episode was played to its end.
+    # Finished episodes have places.
     ends = table.numbers("game_place" if by_game else "shift_place", np.uint8)[rows] > 0
     wanted = known[rows] & np.where(after >= 0, known[after], ends)
     if agents is not None:
@@ -181,7 +178,7 @@ def _steps(table: Decisions, *, by_game: bool, turns_only: bool, agents: Sequenc
 
 
 def _columns(table: Decisions, sizes: Sizes, steps: _Steps, scheme: str, *, by_game: bool) -> dict[str, NDArray[Any]]:
-    """The columns of transitions, by their flat names."""
+    """Returns the columns of transitions, by their flat names."""
     before, after, games = steps
     ended = after < 0
     situations: dict[str, NDArray[Any]] = {
@@ -223,9 +220,9 @@ def _columns(table: Decisions, sizes: Sizes, steps: _Steps, scheme: str, *, by_g
 
 
 def _with_attempts(table: Decisions, steps: _Steps, scheme: str, columns: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    """The same with a transition for every invalid attempt, before that of the decision it was made at.
+    """Adds a transition for every invalid attempt, before that of its decision.
 
-    Where the attempts were exhausted, the seat decided nothing more: its last attempt leads on, by way of the default decision.
+    If the attempts were exhausted, the last one leads to the next decision, since the server took the default action.
     """
     tried, lengths = table.ragged("invalid_attempts")
     attempts = lengths[steps.before]
@@ -233,7 +230,7 @@ def _with_attempts(table: Decisions, steps: _Steps, scheme: str, columns: dict[s
         return columns
     decided = (table.texts("source")[steps.before] != "invalid") | (attempts == 0)
     counts = attempts + decided
-    # Each transition is repeated for its attempts. The last of them leads on, the others back to the same decision.
+    # Repeats each transition for its attempts. The last one leads to the next decision, the others to the same one.
     source = np.repeat(np.arange(len(counts)), counts)
     last = np.cumsum(counts) - 1
     number = np.arange(len(source)) - np.repeat(last + 1 - counts, counts)
@@ -244,7 +241,7 @@ def _with_attempts(table: Decisions, steps: _Steps, scheme: str, columns: dict[s
     more = {name: array[source] for name, array in columns.items()}
     begins = np.cumsum(lengths) - lengths
     chosen = tried[begins[steps.before[source[wrong]]] + number[wrong]]
-    # What is no action of any kind is told apart from all that are by being the largest number there is.
+    # Clips numbers that are not actions at the largest one.
     more["actions"][wrong] = np.minimum(chosen, np.iinfo(np.uint16).max)
     more["attempts"] = number.astype(np.uint32)
     more["invalid"] = wrong

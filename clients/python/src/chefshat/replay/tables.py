@@ -1,6 +1,6 @@
-"""The table of decisions of a dataset, read from Parquet, JSON Lines or CSV, and its columns as numpy arrays.
+"""Reads the table of decisions of a dataset from Parquet, JSON Lines or CSV, as numpy arrays.
 
-What the columns mean is in docs/datasets.md. Nothing is made of them here (see `recorded`).
+The columns are described in docs/datasets.md; `recorded` converts them to transitions.
 """
 
 import csv
@@ -14,53 +14,52 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 TABLE = "decisions"
-# By preference.
+# In order of preference.
 SUFFIXES = (".parquet", ".jsonl", ".csv")
 
 
 class Decisions(ABC):
-    """The table; R is the number of its rows."""
+    """A table of R rows."""
 
     rows: int
 
     @abstractmethod
     def numbers(self, name: str, dtype: DTypeLike) -> NDArray[Any]:
-        """A column of numbers or booleans, (R,); null is 0."""
+        """Returns a column of numbers or booleans, (R,); null is 0."""
 
     @abstractmethod
     def lists(self, name: str, width: int, dtype: DTypeLike) -> tuple[NDArray[Any], NDArray[np.bool_]]:
-        """A column of lists of one length, (R, width), and where it is known, (R,); null is zeros."""
+        """Returns a column of lists of one length, (R, width), and whether each is known, (R,); null is zeros."""
 
     @abstractmethod
     def ragged(self, name: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """A column of lists of any length: their items one after the other, and their lengths, (R,)."""
+        """Returns a column of lists of any length: all items in order, and the lengths, (R,)."""
 
     @abstractmethod
     def packed(self, name: str, width: int) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
-        """A column of bytes of one length, (R, width), and where it is known, (R,)."""
+        """Returns a column of bytes of one length, (R, width), and whether each is known, (R,)."""
 
     @abstractmethod
     def texts(self, name: str) -> NDArray[np.str_]:
-        """A column of texts, (R,); null is empty."""
+        """Returns a column of texts, (R,); null is empty."""
 
 
 def read(path: Path) -> Decisions:
-    """Reads a table: the file, or the best there is in a dataset's folder.
+    """Reads a file, or the preferred file in a dataset's folder.
 
     Raises:
         FileNotFoundError: there is no table of decisions.
         ImportError: it is a Parquet file, and pyarrow is not installed.
-        ValueError: it is no table of decisions.
+        ValueError: it is not a table of decisions.
     """
     file = _file_of(path)
-    columns = _Arrow(file) if file.suffix == ".parquet" else _Rows(file)
-    return columns
+    return _Arrow(file) if file.suffix == ".parquet" else _Rows(file)
 
 
 def _file_of(path: Path) -> Path:
     if path.is_file():
         if path.suffix not in SUFFIXES:
-            raise ValueError(f"{path} is none of {', '.join(SUFFIXES)}: give a dataset made by `chefshat export`")
+            raise ValueError(f"{path} is not one of {', '.join(SUFFIXES)}: give a dataset made by `chefshat export`")
         return path
     found = [path / f"{TABLE}{suffix}" for suffix in SUFFIXES if (path / f"{TABLE}{suffix}").is_file()]
     if not found:
@@ -71,7 +70,7 @@ def _file_of(path: Path) -> Path:
 
 
 def has_pyarrow() -> bool:
-    """Whether Parquet can be read."""
+    """Whether Parquet files can be read."""
     try:
         import pyarrow.parquet  # noqa: F401
     except ImportError:
@@ -87,7 +86,7 @@ class _Arrow(Decisions):
             import pyarrow.parquet
         except ImportError as error:
             hint = "pip install pyarrow, or export with --format jsonl"
-            raise ImportError(f"{file} is a Parquet file, which pyarrow reads: {hint}") from error
+            raise ImportError(f"{file} is a Parquet file, which needs pyarrow: {hint}") from error
         self._file = file
         self._table = pyarrow.parquet.read_table(file)
         self.rows = self._table.num_rows
@@ -124,14 +123,14 @@ class _Arrow(Decisions):
 
 
 class _Rows(Decisions):
-    """A file of JSON Lines or CSV. Slower than Parquet, and needs nothing."""
+    """A file of JSON Lines or CSV. Slower than Parquet, but without dependencies."""
 
     def __init__(self, file: Path) -> None:
         self._file = file
         with file.open(encoding="utf-8", newline="") as lines:
             if file.suffix == ".csv":
                 rows = list(csv.reader(lines))
-                # A cell holds JSON, or a text as it is; an empty one is null.
+                # A cell has JSON or a plain text; an empty one is null.
                 self._parse: Callable[[str], Any] | None = json.loads
                 names = rows[0] if rows else []
                 self._cells = {name: [row[number] or None for row in rows[1:]] for number, name in enumerate(names)}
@@ -174,7 +173,7 @@ class _Rows(Decisions):
 
 
 def _filled(known: NDArray[np.bool_], items: NDArray[Any], width: int, dtype: DTypeLike) -> NDArray[Any]:
-    """Rows of one width put where they are known, zeros elsewhere."""
+    """Returns rows of one width; zeros where they are unknown."""
     array = np.zeros((len(known), width), dtype)
     array[known] = items.reshape(-1, width)
     return array
