@@ -1,6 +1,5 @@
-// One agent, without an SDK: it reads the .proto files, takes a seat with a join code and plays a random legal action at every
-// decision, in one game or in all of its games of a tournament. It knows no rules of the game. A lost connection is made again and
-// resumes where it broke off; with its ticket another process goes on in its place.
+// An agent without an SDK: it reads the .proto files, joins a room or a tournament and takes a random legal action at every decision.
+// It contains no rules of the game. It reconnects after a lost connection; with its ticket another process can resume its seat.
 import { randomInt } from "node:crypto";
 import { existsSync, readFileSync, renameSync, rmSync, writeFileSync } from "node:fs";
 import path from "node:path";
@@ -15,11 +14,11 @@ const FILES = ["room", "play", "tournament"].map((name) => `chefshat/v1/${name}_
 const FORM = { includeDirs: [PROTO], keepCase: true, longs: Number, enums: String, oneofs: true, defaults: true };
 export const protocol = grpc.loadPackageDefinition(loader.loadSync(FILES, FORM)).chefshat.v1;
 
-const MAX_GAMES = 64; // A participant may play so many games at a time.
-const MAX_FAILURES = 9; // Connections in a row that may bring nothing before the agent gives up.
+const MAX_GAMES = 64; // Maximum number of games that a participant plays at a time.
+const MAX_FAILURES = 9; // Maximum number of consecutive connections without progress.
 const connect = (Service, address) => new Service(address, grpc.credentials.createInsecure());
 
-/** The legal actions of a mask: bit i%8 of byte i/8 is action i. */
+/** Returns the legal actions of a mask: bit i%8 of byte i/8 is action i. */
 export function legalActions(mask) {
   return Array.from({ length: mask.length * 8 }, (_, i) => i).filter((i) => mask[i >> 3] & (1 << (i & 7)));
 }
@@ -30,27 +29,27 @@ function join(Service, method, address, request) {
   return promisify(service[method]).call(service, asked, { deadline: Date.now() + 30_000 }).finally(() => service.close());
 }
 
-/** One seat: what it makes of each update it is told. `say` sends a command for it. What is returned is the outcome of its game. */
-function takeSeat(ticket, about = {}) {
+/** A seat with a handler for each kind of update. `send` sends a command for it. A handler returns the outcome when the game is over. */
+function seatOf(ticket, about = {}) {
   let [seat, end, open] = [undefined, {}, {}];
   const failed = (error) => ({ ...about, seat, error });
   const self = {
     ticket,
-    next: 0, // The first event it has not seen.
+    next: 0, // The number of the next event.
     attached: (attached) => { seat = attached.seat; },
-    events: ({ events }, say) => events.filter(({ sequence }) => sequence >= self.next).forEach((event) => {
+    events: ({ events }, send) => events.filter(({ sequence }) => sequence >= self.next).forEach((event) => {
       self.next = event.sequence + 1;
       if (event.game_ended || event.game_aborted) end = event;
-      if (event.substituted?.seat === seat) say({ resume: {} }); // Back from being late too often.
+      if (event.substituted?.seat === seat) send({ resume: {} }); // Takes the seat back from its substitute.
     }),
-    decision: (request, say) => {
+    decision: (request, send) => {
       open = request;
       const legal = legalActions(request.action_mask);
-      say({ answer: { decision_id: request.decision_id, action: legal[randomInt(legal.length)] } });
+      send({ answer: { decision_id: request.decision_id, action: legal[randomInt(legal.length)] } });
     },
-    result: ({ decision_id, status }, say) => {
-      const again = status === "ANSWER_STATUS_INVALID" && decision_id === open.decision_id; // It is not put again.
-      if (again) self.decision(open, say);
+    result: ({ decision_id, status }, send) => {
+      const again = status === "ANSWER_STATUS_INVALID" && decision_id === open.decision_id; // The server does not repeat the request.
+      if (again) self.decision(open, send);
     },
     refused: ({ message, reason }) => failed(`refused: ${message} (${reason})`),
     detached: ({ reason }) => {
@@ -62,19 +61,19 @@ function takeSeat(ticket, about = {}) {
   return self;
 }
 
-/** Plays the seat that the ticket is of or, if it is of a participant in a tournament, all that the server gives it, until all is over. */
-async function playPlace(address, ticket) {
+/** Plays with the ticket of a seat, or of a tournament participant with all its seats, until the game or tournament is over. */
+async function playTicket(address, ticket) {
   const client = connect(protocol.PlayService, address);
-  let [seats, tournament, participant] = [[takeSeat(ticket)]];
+  let [seats, tournament, participant] = [[seatOf(ticket)]];
   let [outcomes, lost] = [[], new Error("the server ended the stream")];
   try {
     for (let failures = 0; failures < MAX_FAILURES; failures += 1) {
       await sleep(failures && 50 * 2 ** failures);
       const stream = client.Play().on("error", (error) => { lost = error; });
       const commands = seats.map(({ ticket, next }) => ({ attach: { ticket, from_sequence: next } }));
-      if (tournament) commands.push({ attach: { ticket: tournament } }); // Last, so that it is not given the seats it has already.
+      if (tournament) commands.push({ attach: { ticket: tournament } }); // Last, so that the server does not attach its seats again.
       stream.write({ commands });
-      const byHandle = new Map(seats.entries()); // A handle is the number of an attachment, until the server makes its own.
+      const byHandle = new Map(seats.entries()); // Handles number the attachments of the client; the server adds further ones.
       let entered = tournament ? seats.length : -1;
       try {
         for await (const { updates } of stream) {
@@ -82,10 +81,10 @@ async function playPlace(address, ticket) {
           for (const { handle, update, [update]: content } of updates) {
             if (update === "attached" && content.ticket) {
               const known = seats.find(({ ticket }) => ticket === content.ticket);
-              byHandle.set(handle, known ?? takeSeat(content.ticket, { game_id: content.game_id }));
+              byHandle.set(handle, known ?? seatOf(content.ticket, { game_id: content.game_id }));
               byHandle.get(handle).attached(content);
               if (!known) seats.push(byHandle.get(handle));
-            } else if (update === "entered") { // The ticket is no seat's.
+            } else if (update === "entered") { // The ticket is a participant's.
               [tournament, participant, entered] = [ticket, content.participant, handle];
               seats = seats.filter((seat) => seat.ticket !== ticket);
             } else if (handle === entered && (update === "refused" || update === "detached")) {
@@ -108,39 +107,39 @@ async function playPlace(address, ticket) {
   } finally { client.close(); }
 }
 
-/** Takes a place in a room or a tournament; gives its ticket. */
-async function takePlace({ address, code, tournament, name, games }) {
+/** Joins a room or a tournament. Returns the ticket. */
+async function joinTable({ address, code, tournament, name, games }) {
   if (!tournament) return (await join(protocol.RoomService, "JoinRoom", address, { join_code: code, name })).ticket;
   const request = { join_code: tournament, name, max_games: Number(games) };
   return (await join(protocol.TournamentService, "JoinTournament", address, request)).ticket;
 }
 
 /**
- * Takes a place, or goes on in the one whose `ticket` is given, and plays to the end. Gives the seat and the standings; of a tournament
- * the participant's number and what came of each of its games. Throws an error that says why there is no such thing.
+ * Joins, or resumes with a `ticket`, and plays to the end. Returns the seat and the standings; for a tournament the participant's number
+ * and the outcome of each game. Throws an error if there is no result.
  */
 export async function play({ ticket, ...way }) {
-  const { participant, outcomes } = await playPlace(way.address, ticket ?? (await takePlace(way)));
+  const { participant, outcomes } = await playTicket(way.address, ticket ?? (await joinTable(way)));
   if (participant !== undefined) return { participant, games: outcomes.map(({ over, ...outcome }) => outcome) };
   const [{ error, over, ...outcome }] = outcomes;
   if (error) throw Object.assign(new Error(error), { over });
   return outcome;
 }
 
-/** Whether another process with this number runs. */
+/** Whether another process with this id is running. */
 function runs(pid) {
   try {
-    return pid !== process.pid && process.kill(pid, 0); // One's own number was another's before, where a container counts anew.
+    return pid !== process.pid && process.kill(pid, 0); // A restarted container may reuse its own id.
   } catch ({ code }) {
     return code === "EPERM";
   }
 }
 
 /**
- * Does something with a ticket file alone: a lock beside it names the process. That of a process which is gone counts for nothing.
- * A folder that nobody may write in needs none to go on with the ticket that is there.
+ * Locks a ticket file during `use`, by a file next to it with the process id. The lock of a process that has ended is ignored. In a
+ * read-only folder an existing ticket is used without a lock.
  */
-async function alone(file, use) {
+async function withLock(file, use) {
   const lock = file && beside(file, "lock");
   const take = () => writeFileSync(lock, `${process.pid}`, { flag: "wx" });
   if (!file) return use();
@@ -150,57 +149,57 @@ async function alone(file, use) {
     if (error.code !== "EEXIST" && existsSync(file)) return use();
     if (error.code !== "EEXIST") throw error;
     const pid = Number(readFileSync(lock, "utf8"));
-    if (runs(pid)) throw new Error(`another agent plays in the place of ${file}; if process ${pid} is none, remove ${lock}`);
+    if (runs(pid)) throw new Error(`another agent uses ${file}; if process ${pid} is not an agent, remove ${lock}`);
     rmSync(lock, { force: true });
     take();
   }
   try {
     return await use();
   } finally {
-    try { rmSync(lock, { force: true }); } catch { /* It is nobody's any more, and counts for nothing. */ }
+    try { rmSync(lock, { force: true }); } catch { /* The next process ignores it. */ }
   }
 }
 
 const beside = (file, what) => path.join(path.dirname(file), `.${path.basename(file)}.${what}`);
-const kept = (file) => (file && existsSync(file) ? readFileSync(file, "utf8").trim() : "");
+const stored = (file) => (file && existsSync(file) ? readFileSync(file, "utf8").trim() : "");
 
-/** The ticket of the place to play in: that in the file, or of one that is taken now and then kept there, or at least told. */
+/** Returns the ticket in the file, or joins and stores or prints the new ticket. */
 async function ticketOf(file, way) {
-  if (kept(file)) {
-    console.error(`goes on in the place whose ticket is in ${file}`);
-    return kept(file);
+  if (stored(file)) {
+    console.error(`resuming with the ticket in ${file}`);
+    return stored(file);
   }
-  if (!way.code && !way.tournament) throw new Error("give --code, --tournament or the --ticket of a place that was taken before");
+  if (!way.code && !way.tournament) throw new Error("give --code, --tournament or --ticket");
   const part = file && beside(file, "new");
   if (file) {
     rmSync(part, { force: true });
-    writeFileSync(part, "", { flag: "wx", mode: 0o600 }); // Before the place is taken, and for its owner alone.
+    writeFileSync(part, "", { flag: "wx", mode: 0o600 }); // Before joining, and readable only by the owner.
   }
   try {
-    const ticket = await takePlace(way);
-    let how = `another goes on with --ticket ${ticket}`;
+    const ticket = await joinTable(way);
+    let how = `with --ticket ${ticket}`;
     if (file) {
       try {
         writeFileSync(part, `${ticket}\n`);
         renameSync(part, file);
-        how = `it goes on in its place when it is started again: ${file} has its ticket`;
-      } catch (error) { // The place is taken, and nobody else knows the ticket.
-        console.error(`warning: ${file} cannot keep the ticket: ${error.message}`);
+        how = `by the same command: the ticket is in ${file}`;
+      } catch (error) { // The ticket exists nowhere else, so it is printed.
+        console.error(`warning: cannot store the ticket in ${file}: ${error.message}`);
       }
     }
-    console.error(`should this agent end before its ${way.tournament ? "tournament" : "game"}, ${how}`);
+    console.error(`if this process ends before the ${way.tournament ? "tournament" : "game"}, resume ${how}`);
     return ticket;
   } finally {
     if (file) rmSync(part, { force: true });
   }
 }
 
-/** All is over: the file goes, unless another ticket is in it by now. */
+/** Deletes the file of a used ticket, unless it has another ticket by now. */
 function forget(file, ticket) {
   try {
-    if (kept(file) === ticket) rmSync(file, { force: true });
+    if (stored(file) === ticket) rmSync(file, { force: true });
   } catch (error) {
-    console.error(`warning: all is over, but its ticket is still kept: ${error.message}; remove ${file}`);
+    console.error(`warning: cannot delete the used ticket: ${error.message}; remove ${file}`);
   }
 }
 
@@ -212,11 +211,11 @@ if (import.meta.url === pathToFileURL(process.argv[1] ?? "").href) {
     const { values } = parseArgs({ options: { ...where, ...own, name: option("Node"), games: option("1") } });
     const { ticket: given, "ticket-file": file, ...way } = values;
     if ([way.code, way.tournament, given].filter(Boolean).length > 1 || (given && file)) {
-      throw new Error("give one of --code, --tournament and --ticket (or CHEFSHAT_TICKET); --ticket-file is for the first two");
+      throw new Error("give one of --code, --tournament and --ticket (or CHEFSHAT_TICKET); --ticket-file excludes --ticket");
     }
-    if (!/^\d{1,2}$/.test(way.games) || !(way.games >= 1 && way.games <= MAX_GAMES)) throw new Error(`--games is a number from 1 to ${MAX_GAMES}`);
+    if (!/^\d{1,2}$/.test(way.games) || !(way.games >= 1 && way.games <= MAX_GAMES)) throw new Error(`--games must be a number from 1 to ${MAX_GAMES}`);
     way.code ??= way.tournament ? undefined : process.env.CHEFSHAT_CODE;
-    const outcome = await alone(file, async () => {
+    const outcome = await withLock(file, async () => {
       const ticket = given || (await ticketOf(file, way));
       const end = () => { if (file) forget(file, ticket); };
       return play({ ...way, ticket }).then((played) => { end(); return played; }, (error) => { if (error.over) end(); throw error; });

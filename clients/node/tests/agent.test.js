@@ -235,7 +235,7 @@ test("the process prints the standings as one line of JSON and exits with 0", as
     stream.write({ updates: [attached, events(ended(1)), detached("GAME_OVER")] });
   });
   const { status, out, err } = await run(["--address", server.address], { CHEFSHAT_CODE: "TABLE" });
-  assert.equal(err, "should this agent end before its game, another goes on with --ticket a ticket\n");
+  assert.equal(err, "if this process ends before the game, resume with --ticket a ticket\n");
   assert.equal(status, 0);
   assert.match(out, /^[^\n]+\n$/);
   assert.deepEqual(JSON.parse(out), { seat: 2, standings: STANDINGS });
@@ -248,7 +248,7 @@ test("the process takes part in a tournament and prints its games as one line of
     stream.write({ updates: [called(0, events(ended(1))), called(0, detached("GAME_OVER")), over(0)] });
   });
   const { status, out, err } = await run(["--address", server.address, "--tournament", "CUP", "--games", "3"]);
-  assert.deepEqual([status, err], [0, "should this agent end before its tournament, another goes on with --ticket cup\n"]);
+  assert.deepEqual([status, err], [0, "if this process ends before the tournament, resume with --ticket cup\n"]);
   assert.match(out, /^[^\n]+\n$/);
   assert.deepEqual(JSON.parse(out), { participant: 5, games: [{ game_id: "a", seat: 2, standings: STANDINGS }] });
   assert.equal(server.joins[0].max_games, 3);
@@ -261,7 +261,7 @@ const ending = (tickets) => async (stream, read) => {
 };
 
 for (const [how, args, env] of [["an argument", ["--ticket", "kept"], {}], ["the environment", [], { CHEFSHAT_TICKET: "kept" }]]) {
-  test(`the process goes on with a ticket from ${how}, and joins nothing`, async () => {
+  test(`the process resumes with a ticket from ${how}, and does not join`, async () => {
     const tickets = [];
     const server = await serve(ending(tickets));
     const { status, out, err } = await run(["--address", server.address, ...args], { CHEFSHAT_CODE: "TABLE", ...env });
@@ -271,7 +271,7 @@ for (const [how, args, env] of [["an argument", ["--ticket", "kept"], {}], ["the
   });
 }
 
-test("a ticket is kept in a file while the place lasts: a process that was killed goes on when it is started again", async (context) => {
+test("a ticket is stored in a file until the game is over: a killed process resumes when it is started again", async (context) => {
   const folder = await folderOf(context);
   const file = join(folder, "ticket");
   const tickets = [];
@@ -284,12 +284,12 @@ test("a ticket is kept in a file while the place lasts: a process that was kille
   const args = ["--address", server.address, "--code", "TABLE", "--ticket-file", file];
   const killed = await run(args, {}, (started) => { agent = started; });
   assert.equal(killed.out, "");
-  assert.match(killed.err, /^should this agent end before its game, it goes on .*ticket has its ticket\n$/);
+  assert.match(killed.err, /^if this process ends before the game, resume by the same command: the ticket is in .*ticket\n$/);
   assert.equal(await readFile(file, "utf8"), "a ticket\n");
   assert.equal((await stat(file)).mode & 0o777, 0o600);
 
   const { status, out, err } = await run(args);
-  assert.deepEqual([status, err], [0, `goes on in the place whose ticket is in ${file}\n`]);
+  assert.deepEqual([status, err], [0, `resuming with the ticket in ${file}\n`]);
   assert.deepEqual(JSON.parse(out), { seat: 2, standings: STANDINGS });
   assert.deepEqual([tickets, server.joins.length], [["a ticket", "a ticket"], 1]);
   assert.deepEqual(await readdir(folder), []);
@@ -316,7 +316,7 @@ test("a second agent with the same ticket file is refused, and one that is gone 
   });
   assert.equal((await run(args(server))).status, 0);
   assert.equal(second.status, 1);
-  assert.match(second.err, /^agent: another agent plays in the place of .*ticket; if process \d+ is none, remove .*\.ticket\.lock\n$/);
+  assert.match(second.err, /^agent: another agent uses .*ticket; if process \d+ is not an agent, remove .*\.ticket\.lock\n$/);
   assert.equal(server.joins.length, 1);
   assert.deepEqual(await readdir(folder), []);
 
@@ -341,9 +341,9 @@ test("a ticket that cannot be kept is told, and the game is played", async (cont
   assert.equal(status, 0);
   assert.deepEqual(JSON.parse(out), { seat: 2, standings: STANDINGS });
   const [warning, told, left] = err.split("\n");
-  assert.match(warning, /^warning: .*ticket cannot keep the ticket: EISDIR/);
-  assert.equal(told, "should this agent end before its game, another goes on with --ticket a ticket");
-  assert.match(left, /^warning: all is over, but its ticket is still kept/);
+  assert.match(warning, /^warning: cannot store the ticket in .*ticket: EISDIR/);
+  assert.equal(told, "if this process ends before the game, resume with --ticket a ticket");
+  assert.match(left, /^warning: cannot delete the used ticket/);
 });
 
 test("a finished game is no error where the ticket cannot be removed; another's ticket is not removed", async (context) => {
@@ -352,8 +352,8 @@ test("a finished game is no error where the ticket cannot be removed; another's 
   const server = await serve();
   const args = ["--address", server.address, "--ticket-file", file];
   for (const [meanwhile, left] of [
-    [async () => { await rm(file); await mkdir(file); }, /^goes on .*\nwarning: all is over, but its ticket is still kept: EISDIR.*\n$/],
-    [() => writeFile(file, "another's"), /^goes on .*\n$/],
+    [async () => { await rm(file); await mkdir(file); }, /^resuming .*\nwarning: cannot delete the used ticket: EISDIR.*\n$/],
+    [() => writeFile(file, "another's"), /^resuming .*\n$/],
   ]) {
     await rm(file, { recursive: true, force: true });
     await writeFile(file, "kept");
@@ -386,11 +386,11 @@ test("the process says what is wrong and exits with 1", async () => {
   }
   for (const games of ["0", "65", "two", "1e1", ""]) {
     const { status, err } = await run(["--address", address, "--tournament", "CUP", "--games", games]);
-    assert.deepEqual([status, err], [1, "agent: --games is a number from 1 to 64\n"]);
+    assert.deepEqual([status, err], [1, "agent: --games must be a number from 1 to 64\n"]);
   }
   const nothing = await run(["--address", address]);
   assert.deepEqual([nothing.status, nothing.out], [1, ""]);
-  assert.match(nothing.err, /^agent: give --code, --tournament or the --ticket/);
+  assert.match(nothing.err, /^agent: give --code, --tournament or --ticket/);
 
   const misspelt = await run(["--adress", address]);
   assert.equal(misspelt.status, 1);

@@ -145,7 +145,7 @@ test("a tournament on the real server", { skip }, () => withServer(async (addres
 // Far longer than a test: who is killed comes back in time, however slow the machine is.
 const patient = { decision_time_ms: 600_000 };
 
-test("an agent that was killed in mid-game goes on in its seat", { skip }, () => withServer(async (address) => {
+test("an agent that was killed in mid-game resumes its seat", { skip }, () => withServer(async (address) => {
   const request = { name: "kill", policy: patient, seats: [{}, {}, { built_in_agent: "random" }, { built_in_agent: "random" }] };
   const { room, join_code: code } = await call(protocol.RoomService, "CreateRoom", address, request);
   const other = await call(protocol.RoomService, "JoinRoom", address, { join_code: code, name: "other", kind: "PARTICIPANT_KIND_AGENT" });
@@ -159,7 +159,7 @@ test("an agent that was killed in mid-game goes on in its seat", { skip }, () =>
   assert.deepEqual(standings.map(({ place }) => place), [1, 2, 3, 4]);
 }));
 
-test("an agent that was killed in mid-game goes on in its tournament", { skip }, () => withServer(async (address) => {
+test("an agent that was killed in mid-game resumes its tournament", { skip }, () => withServer(async (address) => {
   const settings = {
     name: "killed",
     format: "TOURNAMENT_FORMAT_ROUND_ROBIN",

@@ -1,6 +1,6 @@
-"""Several games at once in one event loop, each with an agent that takes its time.
+"""Several games at once in one event loop, each with a slow agent.
 
-Run it beside a server: `python samples/asyncio_agents.py 127.0.0.1:50051`.
+Start a server, then run `python samples/asyncio_agents.py 127.0.0.1:50051`.
 """
 
 import asyncio
@@ -13,10 +13,10 @@ GAMES = 3
 
 
 class Slow(chefshat.Agent):
-    """Waits a moment, as if it asked a model far away, and then plays its rarest legal action."""
+    """Waits, like a client of a remote model, and then takes the first legal action."""
 
     async def decide(self, request: chefshat.Decision) -> int:
-        """Decides after a while; the other games go on meanwhile."""
+        """Decides after a delay; the other games continue meanwhile."""
         await asyncio.sleep(0.001)
         return int(request.legal_actions[0])
 

@@ -1,7 +1,7 @@
-"""An agent with a plan: it sheds its most common cards first and keeps its jokers, and explains every answer.
+"""An agent with a strategy: it plays its most common cards first and saves its jokers, and annotates every answer.
 
-It reads the meaning of the actions from the server's table and needs no rules of its own. Run it beside a server:
-`python samples/careful_agent.py 127.0.0.1:50051`, or join any room with it:
+It reads the meaning of the actions from the server's table, without any rules. Start a server, then run
+`python samples/careful_agent.py 127.0.0.1:50051`, or join a room:
 `python -m chefshat.agent --address HOST:PORT --code JOINCODE --name Careful --agent samples.careful_agent:Careful`.
 """
 
@@ -15,7 +15,7 @@ PLAY = re.compile(r"C(\d+);Q(\d+);J(\d+)")
 
 
 def price(text: str) -> tuple[int, int, int]:
-    """How dear an action is; the cheapest is chosen: no jokers, the highest face, as many cards as possible, and passing last."""
+    """Returns the cost of an action: lowest without jokers, with a high face and many cards; highest for passing."""
     if (play := PLAY.fullmatch(text)) is not None:
         face, quantity, jokers = map(int, play.groups())
         return jokers, -face, -quantity
@@ -32,7 +32,7 @@ class Careful(chefshat.Agent):
         self.shifts = 0
 
     def decide(self, request: chefshat.Decision) -> int:
-        """Compares the prices of the legal actions."""
+        """Compares the costs of the legal actions."""
         actions = [int(action) for action in request.legal_actions]
         if not self.texts:
             return actions[0]

@@ -1,6 +1,6 @@
-"""Four random agents of one process play one game against each other over one stream.
+"""Four random agents in one process play a game against each other over one stream.
 
-Run it beside a server: `python samples/several_seats.py 127.0.0.1:50051`.
+Start a server, then run `python samples/several_seats.py 127.0.0.1:50051`.
 """
 
 import sys

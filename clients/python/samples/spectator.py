@@ -1,7 +1,7 @@
-"""Watches a room and tells what happens, in a line for each pizza, finish and Shift.
+"""Watches a room and prints a line for each pizza, finish and Shift.
 
-Run it beside a server: `python samples/spectator.py 127.0.0.1:50051 ROOM-ID`. Without a room it makes one, with a random agent of
-its own and three built-in ones.
+Start a server, then run `python samples/spectator.py 127.0.0.1:50051 ROOM-ID`. Without a room it creates one, with a random agent
+and three built-in ones.
 """
 
 import sys
@@ -11,8 +11,8 @@ import chefshat
 from chefshat import pb
 
 
-def tell(event: pb.GameEvent) -> str | None:
-    """The line for an event; None for those not worth one."""
+def describe(event: pb.GameEvent) -> str | None:
+    """Returns the line for an event; None for other events."""
     if event.HasField("pizza_done"):
         return f"pizza {event.pizza_done.pizza} is done, seat {event.pizza_done.next_leader} leads the next"
     if event.HasField("seat_finished"):
@@ -37,7 +37,7 @@ def main(address: str = "127.0.0.1:50051", room_id: str = "") -> None:
             player = threading.Thread(target=client.play, args=(chefshat.RandomAgent(seed=1), ticket))
             player.start()
         for event in client.watch(room_id):
-            if (line := tell(event)) is not None:
+            if (line := describe(event)) is not None:
                 print(line)
         if player is not None:
             player.join()

@@ -1,6 +1,6 @@
-"""Holds a tournament and takes part in it: one participant, up to two games at a time, against built-in agents.
+"""Creates a tournament and takes part in it with one participant, up to two games at a time, against built-in agents.
 
-Run it beside a server: `python samples/tournament.py 127.0.0.1:50051`.
+Start a server, then run `python samples/tournament.py 127.0.0.1:50051`.
 """
 
 import sys
@@ -10,18 +10,18 @@ from chefshat import pb
 
 
 class Hoarder(chefshat.Agent):
-    """Plays the last of its legal actions, and passes where it can."""
+    """Takes the last legal action, which is passing where possible."""
 
     def __init__(self, seat: chefshat.SeatInfo) -> None:
         self.seat = seat
 
     def decide(self, request: chefshat.Decision) -> int:
-        """Takes the action with the largest number."""
+        """Takes the action with the highest index."""
         return int(request.legal_actions[-1])
 
 
 def main(address: str = "127.0.0.1:50051") -> None:
-    """Holds the tournament, takes part, and prints the standings."""
+    """Creates the tournament, takes part, and prints the standings."""
     settings = pb.TournamentSettings(
         name="Coppa del Cuoco",
         format=pb.TOURNAMENT_FORMAT_ROUND_ROBIN,

@@ -1,13 +1,12 @@
-"""Self-play training on a Ray cluster, with RLlib: its runners play batches of games, its algorithm learns by masked PPO in JAX.
+"""Self-play training on a Ray cluster with RLlib: its runners play batches of games, its algorithm learns by masked PPO in JAX.
 
     pip install 'chefshat[ray]'
     python samples/cluster/rllib_ppo.py --iterations 3
     python samples/cluster/rllib_ppo.py --ray auto --runners 32 --iterations 1000 --out strong.safetensors
 
-The last line is for a cluster. Every runner is an actor of Ray, on whichever machine Ray puts it, and starts a server there by
-itself (the program `chefshat` must be on the PATH, or named by CHEFSHAT_BIN); with --address all of them play on one server. The
-networks and the loss are those of `python -m chefshat.learn ppo`: RLlib's own learners need torch, whose wheels for Linux bring
-gigabytes of CUDA along.
+The last line is for a cluster. Every runner is an actor of Ray and starts a server on its machine (the program `chefshat` must be
+on the PATH, or named by CHEFSHAT_BIN); with --address all of them play on one server. The networks and the loss are those of
+`python -m chefshat.learn ppo`: RLlib's own learners need torch, whose wheels for Linux include gigabytes of CUDA.
 """
 
 import argparse
@@ -36,14 +35,14 @@ from chefshat.vector import VectorEnv
 
 
 class SelfPlayRunner(EnvRunner):  # type: ignore[misc]  # Ray has no types.
-    """Plays on where it stopped, with whatever weights it is given. One decision in each of its games is one step."""
+    """Continues its games with the given weights. One decision in each of its games is one step."""
 
     def __init__(self, *, config: AlgorithmConfig, **kwargs: Any) -> None:  # noqa: ANN401 - RLlib's.
         super().__init__(config=config, **kwargs)
         setting = config.env_config
         self._plan: Plan = setting["plan"]
-        # Every runner has deals and chance of its own, and none the deals that the policy is evaluated with.
-        self._chance = jax.random.fold_in(jax.random.key(config.seed), self.worker_index)
+        # Every runner has its own seeds, which differ from those of evaluations.
+        self._key = jax.random.fold_in(jax.random.key(config.seed), self.worker_index)
         self._calls = 0
         self.env = VectorEnv(
             setting["address"],
@@ -58,14 +57,14 @@ class SelfPlayRunner(EnvRunner):  # type: ignore[misc]  # Ray has no types.
     def sample(self, params: Params, **_: Any) -> Samples:  # noqa: ANN401 - RLlib's.
         """Plays `plan.steps` steps."""
         self._calls += 1
-        return play(self._collector, params, jax.random.fold_in(self._chance, self._calls), self._plan)
+        return play(self._collector, params, jax.random.fold_in(self._key, self._calls), self._plan)
 
     def assert_healthy(self) -> None:
-        """Asks whether the games are there."""
+        """Checks that the games exist."""
         assert self.env is not None
 
     def get_spaces(self) -> None:
-        """None: there is no module of RLlib's that would have to know them."""
+        """Returns None: there is no RLlib module."""
 
     def stop(self) -> None:
         """Ends the games."""
@@ -73,7 +72,7 @@ class SelfPlayRunner(EnvRunner):  # type: ignore[misc]  # Ray has no types.
 
 
 class JaxPPOConfig(AlgorithmConfig):  # type: ignore[misc]
-    """Runners are as above; most of what RLlib configures is not needed. `env_config` holds the plan, the address and the rules."""
+    """Configures the runners above. `env_config` has the plan, the address and the rules."""
 
     def __init__(self, algo_class: type[Algorithm] | None = None) -> None:
         super().__init__(algo_class=algo_class or JaxPPO)
@@ -82,14 +81,14 @@ class JaxPPOConfig(AlgorithmConfig):  # type: ignore[misc]
         self._dont_auto_sync_env_runner_states = True
 
     def validate(self) -> None:
-        """RLlib refuses its new runners without its new learners; these runners bring what they need."""
+        """Skips the check that refuses RLlib's new runners without its new learners."""
 
 
 class JaxPPO(Algorithm):  # type: ignore[misc]
-    """Every iteration all runners play with the newest weights, and what they played is learned from, all at once."""
+    """In every iteration all runners play with the latest weights, and the algorithm learns from all samples."""
 
     def setup(self, config: AlgorithmConfig) -> None:
-        """Makes the networks, and the runners."""
+        """Creates the networks and the runners."""
         super().setup(config)
         options = self.config.env_config
         self.training = ppo_checkpoint.begin(
@@ -100,7 +99,7 @@ class JaxPPO(Algorithm):  # type: ignore[misc]
     def training_step(self) -> None:
         """Plays and learns once."""
         plan = self.training.plan
-        # Put once, fetched by every machine once.
+        # Each machine fetches this object once.
         params = ray.put(jax.tree.map(np.asarray, self._learner.params))
         parts = self.env_runner_group.foreach_env_runner(partial(_sample, params), local_env_runner=False)
         samples = joined(parts)
@@ -113,7 +112,7 @@ class JaxPPO(Algorithm):  # type: ignore[misc]
             self.metrics.log_value(("losses", name), float(value), window=1)
 
     def network(self, name: str) -> network.Network:
-        """The policy as it stands."""
+        """Returns the current policy."""
         return dataclasses.replace(self.training, learner=self._learner).network(name)
 
 
@@ -122,19 +121,19 @@ def _sample(params: ray.ObjectRef, runner: SelfPlayRunner) -> Samples:
 
 
 def main() -> None:
-    """Trains a few iterations and says what came of it."""
+    """Trains for some iterations and evaluates the policy."""
     parser = argparse.ArgumentParser(description="Trains by self-play on a Ray cluster.")
     parser.add_argument(
-        "--ray", metavar="ADDRESS", help="a Ray cluster ('auto': the one this machine is part of); default: a local one"
+        "--ray", metavar="ADDRESS", help="a Ray cluster ('auto': the cluster of this machine); default: a local one"
     )
     parser.add_argument(
-        "--address", metavar="HOST:PORT", help="a Chef's Hat server for all runners; default: one for each, started by it"
+        "--address", metavar="HOST:PORT", help="one Chef's Hat server for all runners; default: one for each runner"
     )
     parser.add_argument("--runners", type=int, default=2, help="runners (default: 2)")
-    parser.add_argument("--games", type=int, default=128, help="games of each (default: 128)")
+    parser.add_argument("--games", type=int, default=128, help="games of each runner (default: 128)")
     parser.add_argument("--iterations", type=int, default=3, help="iterations (default: 3)")
     parser.add_argument("--rules", default="paper", metavar="PRESET", help="the rule set (default: paper)")
-    parser.add_argument("--seed", type=int, default=1, help="where chance comes from, 0 to 2147483647 (default: 1)")
+    parser.add_argument("--seed", type=int, default=1, help="the seed, 0 to 2147483647 (default: 1)")
     parser.add_argument("--out", type=Path, metavar="FILE", help="write the network to this file")
     options = parser.parse_args()
 
@@ -147,10 +146,9 @@ def main() -> None:
     algorithm = config.build_algo()
     try:
         for iteration in range(1, options.iterations + 1):
-            told = algorithm.train()
-            print(
-                json.dumps({"iteration": iteration, "decisions": told["decisions"], "seconds": round(told["time_this_iter_s"], 1)})
-            )
+            result = algorithm.train()
+            seconds = round(result["time_this_iter_s"], 1)
+            print(json.dumps({"iteration": iteration, "decisions": result["decisions"], "seconds": seconds}))
         trained = algorithm.network("rllib")
         for opponents in ("random", "greedy"):
             print(evaluate(trained, opponents, games=200, seed=EVALUATION_SEED, rules=setting["rules"], address=options.address))
