@@ -137,7 +137,7 @@ def test_without_attempts_illegal_choices_are_never_sent() -> None:
     ],
     ids=lambda answer: repr(answer)[:20],
 )
-def test_where_there_is_no_answer_the_default_decision_is_taken(answer: object, caplog: pytest.LogCaptureFixture) -> None:
+def test_missing_or_invalid_answers_are_replaced_by_the_default_action(answer: object, caplog: pytest.LogCaptureFixture) -> None:
     agent = seated(answer, answer)
     assert agent.decide(asked(0, 8, 199)) == 199
     assert agent.decide(asked(6, 8, number=10)) == 6
@@ -147,7 +147,7 @@ def test_where_there_is_no_answer_the_default_decision_is_taken(answer: object, 
     assert expected in caplog.messages[0]
 
 
-def test_a_player_that_fails_always_is_told_of_a_few_times(caplog: pytest.LogCaptureFixture) -> None:
+def test_only_the_first_failures_are_logged(caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.WARNING)
     agent = seated(*[None] * 20)
     decide_all(agent, [asked(0, number=number) for number in range(1, 21)])
@@ -173,7 +173,7 @@ def test_the_chef_is_asked_for_both_cards_at_once() -> None:
     assert [card for card, count in enumerate(HAND, 1) for _ in range(count)] == CARDS
 
 
-def test_a_chef_that_has_given_one_card_before_its_process_was_there_is_asked_for_the_other() -> None:
+def test_a_restarted_chef_is_asked_only_for_the_remaining_card() -> None:
     agent = seated([11], seat=CHEF)
     assert agent.decide(gift(*HELD, number=10, given=1)) == T - 1 + 11
     assert puppet(agent).asked == [("get_exhanged_cards", CARDS, 1)]
@@ -185,7 +185,7 @@ def test_the_sous_chef_is_asked_for_one_card() -> None:
     assert puppet(agent).asked == [("get_exhanged_cards", CARDS, 1)]
 
 
-def test_each_exchange_is_asked_for_anew() -> None:
+def test_each_exchange_is_a_new_request() -> None:
     agent = seated([2, 4], [12, 11], seat=CHEF)
     assert agent.decide(gift(*HELD)) == T - 1 + 2
     # The second card was never asked for: its partner was short of cards.
@@ -193,7 +193,7 @@ def test_each_exchange_is_asked_for_anew() -> None:
     assert decide_all(agent, [gift(*HELD, number=20), gift(*HELD, number=21, given=1)]) == [T - 1 + 12, T - 1 + 11]
 
 
-def test_a_card_that_is_not_held_is_sent_and_asked_for_again() -> None:
+def test_a_card_not_in_the_hand_is_sent_and_asked_again() -> None:
     agent = seated([2, 3], [5], [6], [11], seat=CHEF, attempts=2)
     first, second = gift(*HELD), gift(*HELD, number=10, given=1)
     assert decide_all(agent, [first, second, second]) == [T - 1 + 2, T - 1 + 3, T - 1 + 5]
@@ -203,7 +203,7 @@ def test_a_card_that_is_not_held_is_sent_and_asked_for_again() -> None:
 
 
 @pytest.mark.parametrize("answer", [None, [11, 12, 12], [11, 0], [11, 13], ["11", "12"], [11.5, 2], AgentLost("gone")], ids=repr)
-def test_where_no_cards_are_answered_the_default_is_given(answer: Any) -> None:
+def test_missing_or_invalid_cards_are_replaced_by_the_default_action(answer: Any) -> None:
     agent = seated(answer, answer, seat=CHEF)
     assert agent.decide(gift(*HELD)) == T - 1 + 11
     assert agent.decide(gift(12, number=10)) == T - 1 + 12
@@ -272,7 +272,7 @@ def test_a_process_that_has_been_given_up_is_seated_last() -> None:
     assert players.crowded == 0
 
 
-def test_what_was_not_the_player_s_own_is_counted_by_game_and_in_all() -> None:
+def test_failures_are_counted_by_game_and_in_total() -> None:
     players = club()
     for process in players.processes:
         process.close()
@@ -284,7 +284,7 @@ def test_what_was_not_the_player_s_own_is_counted_by_game_and_in_all() -> None:
     assert players.counts == Counts(failures=2, replaced=2)
 
 
-def test_each_process_has_its_number_where_one_is_asked_for() -> None:
+def test_placeholders_are_replaced_by_the_number_of_the_process() -> None:
     given = {"log_directory": "trained/{process}", "names": ["{process}"], "rate": 0.5}
     players = Players(AgentSpec("a:B", "Ada", given, log=Path("log.{process}")), 2, attempts=5)
     specs = [process.spec for process in players.processes]

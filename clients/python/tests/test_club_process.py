@@ -34,7 +34,7 @@ def make() -> Iterator[Make]:
         process.close()
 
 
-def test_a_player_answers_and_says_its_name(make: Make) -> None:
+def test_a_player_answers_and_reports_its_name(make: Make) -> None:
     process = make("Largest")
     process.start()
     assert process.name == "PLAYER_Ada"
@@ -56,7 +56,7 @@ def test_callbacks_may_be_missing_and_return_anything(make: Make, tmp_path: Path
     assert (tmp_path / "log").read_text() == '["update_my_action", {"Matches": 1}]\n'
 
 
-def test_what_a_player_prints_is_no_answer(make: Make, tmp_path: Path) -> None:
+def test_output_of_a_player_is_not_an_answer(make: Make, tmp_path: Path) -> None:
     process = make("Babbling", log=tmp_path / "log")
     for _ in range(3):
         answer = process.call("get_action", VECTOR)
@@ -66,7 +66,7 @@ def test_what_a_player_prints_is_no_answer(make: Make, tmp_path: Path) -> None:
     assert (tmp_path / "log").read_text().count('{"id": 2, "value": [0]}\n') == 3
 
 
-def test_what_a_player_raises_is_told_and_it_lives_on(make: Make) -> None:
+def test_an_exception_is_reported_and_the_process_continues(make: Make) -> None:
     process = make("Raising")
     with pytest.raises(AgentRaised, match="get_action raised RuntimeError: no idea\nTraceback"):
         process.call("get_action", VECTOR)
@@ -76,12 +76,12 @@ def test_what_a_player_raises_is_told_and_it_lives_on(make: Make) -> None:
     assert process.restarts == 0
 
 
-def test_answers_nobody_can_write_down_are_told(make: Make) -> None:
+def test_answers_that_are_not_json_are_reported(make: Make) -> None:
     with pytest.raises(AgentRaised, match="returned object, not a number or a list of numbers"):
         make("Unspeakable").call("get_action", VECTOR)
 
 
-def test_a_player_that_dies_is_started_anew_and_given_up_in_the_end(make: Make) -> None:
+def test_a_dead_player_is_restarted_and_finally_given_up(make: Make) -> None:
     process = make("Mortal", restarts=2)
     for life in range(3):
         for _ in range(4):
@@ -112,7 +112,7 @@ def test_a_player_that_hangs_is_ended(make: Make) -> None:
         ("Largest", {"python": "/no/such/python"}, "/no/such/python cannot be started: No such file"),
     ],
 )
-def test_a_player_that_cannot_be_made_is_told(make: Make, player: str, options: dict[str, Any], said: str) -> None:
+def test_a_failed_start_is_reported(make: Make, player: str, options: dict[str, Any], said: str) -> None:
     with pytest.raises(AgentError, match=said):
         make(player, **options).start()
 
@@ -126,7 +126,7 @@ def test_a_player_that_cannot_be_made_is_told(make: Make, player: str, options: 
         ('read call; echo \'{"id": 5, "value": 1}\'; read nothing', "the id of another call"),
     ],
 )
-def test_what_is_no_python_is_told(make: Make, tmp_path: Path, script: str, said: str) -> None:
+def test_a_program_that_is_not_python_is_reported(make: Make, tmp_path: Path, script: str, said: str) -> None:
     python = tmp_path / "python"
     python.write_text(f"#!/bin/sh\n{script}\n")
     python.chmod(0o755)
@@ -144,7 +144,7 @@ def test_a_closed_player_is_not_started_again(make: Make) -> None:
     assert process.restarts == 0
 
 
-def test_a_player_that_is_being_made_can_be_closed(make: Make, tmp_path: Path) -> None:
+def test_a_starting_player_can_be_closed(make: Make, tmp_path: Path) -> None:
     file = tmp_path / "pid"
     process = make("Slow", arguments={"file": str(file)})
     with ThreadPoolExecutor(1) as pool:
@@ -159,7 +159,7 @@ def test_a_player_that_is_being_made_can_be_closed(make: Make, tmp_path: Path) -
         process.start()
 
 
-def test_a_player_is_not_told_the_ticket(make: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_player_does_not_see_the_ticket(make: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(TICKET, "secret")
     file = tmp_path / "known"
     make("Knowing", arguments={"file": str(file)}).start()

@@ -56,12 +56,12 @@ def test_a_match_begins_when_the_first_to_act_is_known() -> None:
     assert dealt().turn_of(OWN)[0].arguments[2] == "RANDOM_me"
 
 
-def test_names_are_told_apart() -> None:
+def test_names_are_made_unique() -> None:
     (begins,) = dealt(names=("me", "greedy", "RANDOM_me", "greedy")).turn_of(HIS)
     assert begins.arguments[1:] == [["RANDOM_me", "greedy", "RANDOM_me (2)", "greedy (3)"], "greedy"]
 
 
-def test_an_action_of_another_is_told_when_its_consequences_are_known() -> None:
+def test_other_seats_actions_are_reported_with_their_consequences() -> None:
     table = dealt()
     happens(table, **play(HERS, 11, 2, 1, left=14))
     told = happens(table, **passes(ITS))
@@ -100,7 +100,7 @@ def vector(board: list[int], hand: list[int], *legal: int) -> object:
     return pytest.approx([card / 13 for card in cards] + [float(action in legal) for action in range(200)])
 
 
-def test_an_action_of_ones_own_is_told_with_what_was_seen_before_and_after() -> None:
+def test_own_actions_are_reported_with_both_observations() -> None:
     table = dealt()
     asked = [0.25] * 28 + [1.0, 0.0] * 100
     table.turn_of(OWN)
@@ -119,14 +119,14 @@ def test_an_action_of_ones_own_is_told_with_what_was_seen_before_and_after() -> 
 
 
 @pytest.mark.parametrize(("source", "replaced"), [(pb.DECISION_SOURCE_TIMEOUT, False), (AGENT, True)])
-def test_what_the_player_did_not_choose_counts_as_random(source: Source, replaced: bool) -> None:
+def test_replaced_choices_count_as_random(source: Source, replaced: bool) -> None:
     table = dealt()
     table.asked([0.0] * 228, replaced=replaced)
     happens(table, **passes(OWN, source))
     assert table.turn_of(HIS)[0].arguments[0]["Action_Random"] is True
 
 
-def test_what_a_substitute_did_is_told_although_nobody_was_asked() -> None:
+def test_actions_of_a_substitute_are_reported() -> None:
     table = dealt()
     happens(table, **play(OWN, 11, 3, left=14, source=pb.DECISION_SOURCE_SUBSTITUTE))
     info = table.turn_of(HIS)[0].arguments[0]
@@ -192,7 +192,7 @@ def test_a_match_ends_with_the_points_of_the_reference() -> None:
     assert info["Game_Performance_Score"] == pytest.approx([3.0, 2.25, 5.25, 0.0])
 
 
-def test_an_exchange_is_told_before_the_match_begins() -> None:
+def test_an_exchange_is_reported_before_the_match_begins() -> None:
     table = dealt(shift=2)
     roles = [pb.ROLE_CHEF, pb.ROLE_SOUS_CHEF, pb.ROLE_WAITER, pb.ROLE_DISHWASHER]
     assert happens(table, roles_assigned=pb.RolesAssigned(roles=roles)) == []
@@ -211,12 +211,12 @@ def test_an_exchange_is_told_before_the_match_begins() -> None:
     ("action", "text"),
     [(pb.SPECIAL_ACTION_FOOD_FIGHT, "It is food fight!"), (pb.SPECIAL_ACTION_DINNER_IS_SERVED, "Dinner served!")],
 )
-def test_a_special_action_is_told_with_the_seat_that_declared_it(action: pb.SpecialAction.ValueType, text: str) -> None:
+def test_a_special_action_is_reported_with_its_seat(action: pb.SpecialAction.ValueType, text: str) -> None:
     declared = pb.SpecialActionDeclared(seat=ITS, action=action, source=pb.DECISION_SOURCE_AGENT)
     assert happens(dealt(shift=2), special_action_declared=declared) == [Call("observe_special_action", [text, ITS])]
 
 
-def test_the_end_of_the_game_is_told_even_of_one_without_a_result() -> None:
+def test_the_end_of_an_aborted_game_is_reported_too() -> None:
     assert happens(dealt(), game_ended=pb.GameEnded()) == [Call("update_game_over", [])]
     table = dealt()
     happens(table, **passes(HIS))

@@ -45,7 +45,7 @@ def decision(hand: bytes = HAND, legal: tuple[int, ...] = (0, 8, 199, 213), deal
     return Decision(request, info)
 
 
-def test_views_show_what_was_sent() -> None:
+def test_views_show_the_message() -> None:
     view = decision(board_face=4, board_size=3, board_jokers=1)
     assert view.hand.tolist() == list(HAND)
     assert view.hand.dtype == np.uint8

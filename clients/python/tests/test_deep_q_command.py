@@ -42,7 +42,7 @@ def place(tmp_path: Path, real_address: str) -> Place:
 
 
 @pytest.mark.server
-def test_what_ctrl_c_ends_goes_on(
+def test_a_training_resumes_after_ctrl_c(
     place: Place, processes: list["subprocess.Popen[str]"], capsys: pytest.CaptureFixture[str]
 ) -> None:
     # More Shifts than anybody would wait for: it ends because it is told to.
@@ -118,7 +118,7 @@ def test_parameters_are_not_contradicted(place: Place, full_rules: pb.RuleSet, c
     assert "batch size 4, not 8" in capsys.readouterr().err
 
 
-def test_without_a_training_there_is_nothing_to_go_on_from(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_resuming_needs_a_checkpoint(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(Place(tmp_path, "127.0.0.1:1").arguments(5, "--resume")) == 1
     assert "leave out --resume" in capsys.readouterr().err
 

@@ -29,7 +29,7 @@ def training() -> Training:
     return Training(SMALL, agents, RULES, "a command", "greedy", "validity", 3, 17)
 
 
-def test_a_training_goes_on_where_it_was(training: Training, tmp_path: Path) -> None:
+def test_a_training_resumes_exactly(training: Training, tmp_path: Path) -> None:
     checkpoint.save(tmp_path / "t.training", training)
     read = checkpoint.load(tmp_path / "t.training")
     for name in ("config", "rules", "trained_by", "opponents", "rewards", "seed", "shifts"):
@@ -82,14 +82,14 @@ def test_a_training_of_an_older_version_continues(tmp_path: Path) -> None:
         np.testing.assert_allclose(now.bias, then.bias, rtol=1e-5, atol=1e-6)
 
 
-def test_what_an_agent_does_not_see_has_no_weight() -> None:
+def test_hidden_inputs_have_zero_weights() -> None:
     config = dataclasses.replace(SMALL, see_mask=False)
     (net,) = Training(config, deep_q.start(config, [1]), RULES, "").networks("blind")
     assert not net.layers[0].weight[:, 28:].any()
     assert net.layers[0].weight[:, :28].all()
 
 
-def test_what_is_no_training_is_refused(training: Training, tmp_path: Path) -> None:
+def test_files_of_other_formats_are_refused(training: Training, tmp_path: Path) -> None:
     path = tmp_path / "t.training"
     path.write_bytes(b"nothing of the kind")
     with pytest.raises(TrainingFileError, match=r"t\.training is not a training"):

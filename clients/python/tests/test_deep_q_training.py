@@ -34,7 +34,7 @@ def legal(rows: int) -> Any:
     return np.ones((rows, 3), np.bool_)
 
 
-def test_agents_remember_what_came_of_each_decision() -> None:
+def test_agents_store_the_outcome_of_each_decision() -> None:
     """Agent 0 decides three times in two episodes, agent 2 once and then again in the next, agent 1 never."""
     stack = LockStep(TINY, deep_q.start(TINY, [1, 2, 3]), 2)
     first = stack.decide(ids(0, 2), told(9, 9), seen(10, 12), legal(2), ids(0, 0))
@@ -53,7 +53,7 @@ def test_agents_remember_what_came_of_each_decision() -> None:
     assert (float(memory.states[2, 0, 0]), float(memory.rewards[2, 0]), bool(memory.done[2, 0])) == (12, 4, True)
 
 
-def test_agents_that_do_not_learn_remember_nothing() -> None:
+def test_agents_that_do_not_learn_store_nothing() -> None:
     stack = LockStep(TINY, deep_q.start(TINY, [1]), 1, explore=False, learn=False)
     actions = {int(stack.decide(ids(0), told(1), seen(10), legal(1), ids(0))[0]) for _ in range(20)}
     stack.end(ids(0), told(1))
@@ -99,7 +99,7 @@ def test_a_game_is_the_same_whatever_is_played_beside_it(real_address: str) -> N
 
 
 @pytest.mark.server
-def test_agents_with_a_mask_do_nothing_wrong(real_address: str) -> None:
+def test_agents_with_a_mask_take_no_illegal_action(real_address: str) -> None:
     config = DeepQConfig(hidden=(16,), batch_size=8, memory_size=64, mask=True)
     with games(real_address, seats=[1], seeds=[bytes(32)], invalid="error") as env:
         agents, played = deep_q_training.play(env, config, deep_q.start(config, [1]))
@@ -113,7 +113,7 @@ def test_agents_with_a_mask_do_nothing_wrong(real_address: str) -> None:
 
 
 @pytest.mark.server
-def test_an_agent_is_trained_goes_on_and_plays_in_a_room(
+def test_an_agent_is_trained_resumed_and_plays_in_a_room(
     real_address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "agent.safetensors"
@@ -179,7 +179,7 @@ def test_a_network_for_other_decks_does_not_play(real_address: str, tmp_path: Pa
     assert "plays with 4 players, 11 faces and hands of 17 cards; this game has 4, 7 and 7" in capsys.readouterr().err
 
 
-def test_a_file_that_is_no_network_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_file_that_is_not_a_network_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "n").write_text("no")
     assert main(["play", str(tmp_path / "n"), "--address", "127.0.0.1:1", "--code", "C", "--name", "N"]) == 1
     assert "is not a network" in capsys.readouterr().err
@@ -226,9 +226,7 @@ def test_parameters_of_no_such_file_are_refused(tmp_path: Path, capsys: pytest.C
 
 
 @pytest.mark.server
-def test_what_came_of_a_few_shifts_is_not_told_in_percent(
-    real_address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_results_of_a_few_shifts_are_counts(real_address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["deep-q", "--out", str(tmp_path / "a.safetensors"), "--shifts", "2", "--address", real_address]) == 0
     said = capsys.readouterr().out
     assert re.search(r"won [01] of the last 1, ", said)

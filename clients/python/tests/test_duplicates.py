@@ -51,7 +51,7 @@ def test_the_command_draws(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"rows": []}', '{"rows": [{"game": "1 Shift"}]}'])
-def test_what_is_no_report_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str) -> None:
+def test_other_files_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str) -> None:
     report, out = tmp_path / "report.json", tmp_path / "duplicates.png"
     report.write_text(text)
     assert main([str(report), "--out", str(out)]) == 1

@@ -130,7 +130,7 @@ def test_the_vector_environment_is_many_of_the_single_one(real_address: str) -> 
 
 
 @pytest.mark.server
-def test_forms_are_what_their_names_say(real_address: str) -> None:
+def test_forms_have_their_observations(real_address: str) -> None:
     with chefshat.VectorEnv(real_address, seed=3) as env:
         seen = env.batch
         sizes = env.sizes
@@ -174,7 +174,7 @@ def test_an_episode_of_one_seat(toy: FakeVector) -> None:
     env.close()
 
 
-def test_many_games_go_on_in_the_same_step(toy: FakeVector) -> None:
+def test_the_next_episode_starts_in_the_same_step(toy: FakeVector) -> None:
     env = ChefsHatVectorEnv(toy.address, 3, seat=2, observation=hands)
     seen, infos = env.reset(seed=4)
     # Seat 2 decides first at decision 2, 1 and 0.
@@ -260,7 +260,7 @@ def test_make_makes_every_kind(toy: FakeVector, kind: Any) -> None:
         (lambda address: chefshat_v1.env(address, render_mode="rgb_array"), '"human"'),
     ],
 )
-def test_what_cannot_be_made_is_told(toy: FakeVector, make: Any, says: str) -> None:
+def test_invalid_options_are_reported(toy: FakeVector, make: Any, says: str) -> None:
     with pytest.raises(ValueError, match=says):
         make(toy.address)
 
@@ -274,7 +274,7 @@ def test_many_games_begin_with_a_reset(toy: FakeVector) -> None:
 
 
 @pytest.mark.parametrize("make", [ChefsHatEnv, ChefsHatVectorEnv, chefshat_v1.raw_env])
-def test_what_is_closed_stays_closed(toy: FakeVector, make: Any) -> None:
+def test_a_closed_environment_stays_closed(toy: FakeVector, make: Any) -> None:
     env = make(toy.address)
     env.reset()
     env.close()
@@ -297,7 +297,7 @@ def without(missing: str, use: str) -> "subprocess.CompletedProcess[str]":
     return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=Path(chefshat.__file__).parents[1])
 
 
-def test_nothing_is_loaded_that_is_not_needed(toy: FakeVector) -> None:
+def test_only_needed_packages_are_imported(toy: FakeVector) -> None:
     by_name = f"import gymnasium; gymnasium.make('chefshat.envs:{ENV_ID}', address='{toy.address}', observation='table')"
     for missing in ("jax", "pettingzoo", "pyarrow"):
         done = without(missing, by_name)

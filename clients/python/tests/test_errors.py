@@ -118,7 +118,7 @@ def test_commands_tell_errors_in_words_or_as_json(
     assert capsys.readouterr() == ("", words)
 
 
-def test_other_errors_are_told_where_a_command_names_them() -> None:
+def test_expected_errors_are_printed() -> None:
     def fails() -> int:
         raise ValueError("wrong")
 
@@ -128,7 +128,7 @@ def test_other_errors_are_told_where_a_command_names_them() -> None:
 
 
 @pytest.mark.parametrize(("words", "said"), [("", "interrupted\n"), ("a place is left", "interrupted; a place is left\n")])
-def test_ctrl_c_is_told_with_what_is_left(words: str, said: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_ctrl_c_prints_the_message_of_the_interrupt(words: str, said: str, capsys: pytest.CaptureFixture[str]) -> None:
     def interrupted() -> int:
         raise KeyboardInterrupt(*filter(None, [words]))
 

@@ -162,7 +162,7 @@ def test_a_plot_is_a_picture_that_does_not_change(tmp_path: Path) -> None:
     assert png_size(plots.png(other))[0] < width
 
 
-def test_no_legend_stands_on_a_line() -> None:
+def test_legends_do_not_cover_lines() -> None:
     (figure,) = a_result().figures
     names = [[text.get_text() for text in legend.get_texts()] for legend in legends_beside_panels(figure)]
     assert names == [["learner", "paper"], ["ours"]]
@@ -204,7 +204,7 @@ def test_a_page_is_filled_between_the_marks_alone() -> None:
             page.fill(broken, [result])
 
 
-def test_report_shows_and_fills_kept_results(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_report_shows_and_fills_saved_results(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     kept = tmp_path / "kept"
     kept.mkdir()
     assert main(["report", str(kept)]) == 1
@@ -226,7 +226,7 @@ def test_report_shows_and_fills_kept_results(tmp_path: Path, capsys: pytest.Capt
     assert "| all | 28% |" in text.read_text(encoding="utf-8")
 
 
-def test_the_page_of_this_project_is_made_from_its_results() -> None:
+def test_the_page_of_this_project_matches_its_results() -> None:
     if not PAGE.is_file():
         pytest.skip("the page is in a checkout of the whole project alone")
     text = PAGE.read_text(encoding="utf-8")
@@ -336,7 +336,7 @@ def test_the_papers_figures_stand_beside_ours(quick_run: Path, name: str, report
 
 
 @pytest.mark.server
-def test_what_mechanics_counts(quick_run: Path) -> None:
+def test_mechanics_counts_shifts(quick_run: Path) -> None:
     result = results.read(command.results_file(quick_run, "mechanics"))
     assert len(result.values) == len(mechanics.PRESETS) * (len(mechanics.CONDITIONS) + len(mechanics.OF_DEFAULTS))
     for counted in result.values.values():
@@ -355,7 +355,7 @@ def test_what_mechanics_counts(quick_run: Path) -> None:
 
 
 @pytest.mark.server
-def test_what_is_taken_by_chance_after_ten_wrong_actions_is_not_wrong(quick_run: Path) -> None:
+def test_after_ten_illegal_actions_a_random_legal_one_is_taken(quick_run: Path) -> None:
     values = results.read(command.results_file(quick_run, "rules")).values
     assert values["may not pass idly"]["most_attempts_at_a_decision"] == rules.CONDITIONS["may not pass idly"].agent.wrong_limit
     # Where idle passes are right, there is no such limit.
@@ -378,7 +378,7 @@ def test_the_same_seed_gives_the_same_result(
 
 
 @pytest.mark.server
-def test_a_server_is_started_where_none_is_named(real_address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_server_is_started_without_an_address(real_address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["mechanics", "--quick", "--out", str(tmp_path), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["results"][0]["values"]
 

@@ -49,7 +49,7 @@ def legal(case: HandMade, row: int, count: int) -> list[float]:
 
 
 @pytest.mark.parametrize(("players", "faces", "jokers"), DECKS)
-def test_table_is_what_its_words_say(players: int, faces: int, jokers: int) -> None:
+def test_table_has_the_documented_numbers(players: int, faces: int, jokers: int) -> None:
     case = hand_made(40, seed=1, players=players, faces=faces, jokers=jokers)
     size = features.dealt(players, faces, jokers)
     rows = features.table(case, case.seats, case.kinds, case.mask_bits, players=players, faces=faces, hand_size=size)
@@ -59,7 +59,7 @@ def test_table_is_what_its_words_say(players: int, faces: int, jokers: int) -> N
 
 
 @pytest.mark.parametrize(("players", "faces", "jokers"), DECKS)
-def test_classic_is_what_its_words_say(players: int, faces: int, jokers: int) -> None:
+def test_classic_has_the_documented_numbers(players: int, faces: int, jokers: int) -> None:
     case = hand_made(40, seed=2, players=players, faces=faces, jokers=jokers)
     size = features.dealt(players, faces, jokers)
     rows = features.classic(case, case.mask_bits, faces=faces, hand_size=size)

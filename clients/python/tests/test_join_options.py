@@ -102,7 +102,7 @@ def kill_and_go_on(address: str, way: list[str], processes: Processes, file: Pat
 
 
 @pytest.mark.parametrize("in_file", [False, True], ids=["printed", "in a file"])
-def test_a_command_that_was_killed_goes_on_in_its_seat(
+def test_a_killed_command_resumes_its_seat(
     address: str, in_file: bool, tmp_path: Path, processes: Processes, request: pytest.FixtureRequest
 ) -> None:
     is_real = request.node.callspec.params["address"] == "real"
@@ -119,9 +119,7 @@ def test_a_command_that_was_killed_goes_on_in_its_seat(
 
 
 @pytest.mark.parametrize("in_file", [False, True], ids=["printed", "in a file"])
-def test_a_command_that_was_killed_goes_on_in_its_tournament(
-    address: str, in_file: bool, tmp_path: Path, processes: Processes
-) -> None:
+def test_a_killed_command_resumes_its_tournament(address: str, in_file: bool, tmp_path: Path, processes: Processes) -> None:
     with chefshat.Client(address) as client:
         cup = new_cup(client)
         tournament_id = cup.tournament.tournament_id
@@ -148,7 +146,7 @@ def close(game: FakeGame, seat: FakeSeat, answer: pb.Answer) -> str:
     return ""
 
 
-def test_a_ticket_is_kept_as_long_as_the_place(fake: FakeServer, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_ticket_is_stored_until_the_game_is_over(fake: FakeServer, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "ticket"
     file.write_text("nobody's\n")
     with chefshat.Client(fake.address) as client:
@@ -186,7 +184,7 @@ def test_without_a_place_for_the_ticket_no_seat_is_taken(
 
 
 @pytest.mark.parametrize("fails", ["fsync", "replace"])
-def test_a_ticket_that_cannot_be_kept_is_printed(
+def test_a_ticket_that_cannot_be_stored_is_printed(
     fails: str, fake: FakeServer, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def full(*_: object) -> None:
@@ -205,7 +203,7 @@ def test_a_ticket_that_cannot_be_kept_is_printed(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_finished_game_is_no_error_where_the_ticket_cannot_be_removed(
+def test_an_undeletable_ticket_file_is_a_warning(
     fake: FakeServer, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     file = tmp_path / "ticket"
@@ -242,14 +240,14 @@ def test_two_commands_do_not_share_a_ticket_file(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_ticket_that_is_no_text_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_ticket_file_that_is_not_a_text_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "ticket"
     file.write_bytes(b"\xff\xfe")
     assert command.main(["--address", "127.0.0.1:1", "--ticket-file", str(file)]) == 1
     assert f"error: {file} is not a text file" in capsys.readouterr().err
 
 
-def test_ctrl_c_ends_a_command_with_130_and_says_what_becomes_of_its_place(fake: FakeServer, processes: Processes) -> None:
+def test_ctrl_c_exits_with_130_and_reports_the_substitute(fake: FakeServer, processes: Processes) -> None:
     with chefshat.Client(fake.address) as client:
         code = new_room(client).join_code
     process = start(processes, "--address", fake.address, "--code", code, "--name", "Ada", "--agent", "stalling:Stalling")
@@ -260,7 +258,7 @@ def test_ctrl_c_ends_a_command_with_130_and_says_what_becomes_of_its_place(fake:
     assert said == "interrupted; a substitute plays until the ticket is used again\n"
 
 
-def test_a_seat_s_ticket_is_no_participant_s(address: str) -> None:
+def test_the_ticket_of_a_seat_is_not_a_participants(address: str) -> None:
     with chefshat.Client(address) as client:
         seat = client.join_room(new_room(client).join_code, "Ada")
         (result,) = client.play_tournament(seat.ticket, lambda info: RandomAgent(info.seat))

@@ -40,7 +40,7 @@ def learned(places: list[list[list[int]]]) -> Learned:
 SOME = learned([[[1, 2, 3, 4], [2, 1, 3, 4], [1, 2, 4, 3]], [[4, 1, 2, 3], [4, 2, 1, 3], [1, 2, 3, 4]]])
 
 
-def test_what_is_worked_out_of_places_and_counts() -> None:
+def test_statistics_follow_from_places_and_counts() -> None:
     assert SOME.wins(0) == [2, 1]
     assert SOME.wins(1) == [1, 1]
     assert SOME.starter_wins() == pytest.approx([2 / 3, 1 / 3])
@@ -51,7 +51,7 @@ def test_what_is_worked_out_of_places_and_counts() -> None:
     assert SOME.share_of_turns("passes", 3) == [0.5, 0.5]
 
 
-def test_the_tables_say_what_was_counted(tmp_path: Path) -> None:
+def test_the_tables_have_the_counts(tmp_path: Path) -> None:
     config = Config("", (1, 2), True, tmp_path)
     both = dict.fromkeys(rules.CONDITIONS, SOME)
     actions = {str(row[0]): row[2] for row in rules._actions(config, both).rows}
@@ -65,7 +65,7 @@ def test_the_tables_say_what_was_counted(tmp_path: Path) -> None:
     assert table.rows[1][6] == Estimate(0.0, 0, 0)
 
 
-def test_a_pass_is_wrong_where_something_else_is_legal() -> None:
+def test_an_idle_pass_can_count_as_illegal() -> None:
     masks = np.array([[False, True, True], [False, False, True], [True, False, False]])
     right = deep_q_training._without_idle_passes(masks)
     assert right.tolist() == [[False, True, False], [False, False, True], [True, False, False]]
@@ -95,7 +95,7 @@ def test_experiment_3_begins_with_the_networks_of_2(real_address: str, tmp_path:
 
 
 @pytest.mark.server
-def test_networks_made_otherwise_are_learned_again(real_address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_networks_of_other_settings_are_learned_again(real_address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     quick = Config(real_address, (1, 2), True, tmp_path)
     ruleset = pb.RuleSet(players=4, faces=11, jokers=2)
     made = rules.CONDITIONS[rules.FIRST].agent

@@ -12,7 +12,7 @@ from chefshat.limits import MAX_ANNOTATIONS_BYTES, MAX_COMMANDS, MAX_ENTROPY_BYT
 from chefshat.session import PlaySession
 
 
-def test_a_request_holds_no_more_commands_than_the_protocol_allows() -> None:
+def test_requests_respect_the_limit_of_commands() -> None:
     tickets = [f"{number}" for number in range(MAX_COMMANDS + 1)]
     session = PlaySession({ticket: Scribe() for ticket in tickets}, PlayOptions(entropy=b""))
     session.connected()
@@ -79,7 +79,7 @@ def test_annotations_travel_with_the_answer(stage: Stage) -> None:
     ],
     ids=["a byte too long", "far too long", "not a number", "infinite", "too large a number", "a score is no number"],
 )
-def test_annotations_nobody_would_record_are_not_sent_but_the_answer_is(
+def test_invalid_annotations_are_dropped_and_the_answer_is_sent(
     stage: Stage, caplog: pytest.LogCaptureFixture, annotations: pb.Annotations, why: str
 ) -> None:
     caplog.set_level(logging.WARNING, "chefshat")

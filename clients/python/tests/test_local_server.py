@@ -68,7 +68,7 @@ def test_the_program_is_looked_for_in_this_order(nowhere: Path, tmp_path: Path, 
     assert local_server.find_binary() == named
 
 
-def test_it_is_said_what_to_do_without_a_program(nowhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_program_is_reported_with_a_remedy(nowhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     makers: list[Callable[[], object]] = [LocalServer, chefshat.VectorEnv, lambda: chefshat.make("vector")]
     for make in makers:
         with pytest.raises(ChefsHatError, match=rf"BINARY_MISSING.*cargo build.*{BINARY}.*address"):
@@ -78,7 +78,7 @@ def test_it_is_said_what_to_do_without_a_program(nowhere: Path, monkeypatch: pyt
         LocalServer()
 
 
-def test_a_program_that_does_not_serve_is_told_with_what_it_said(tmp_path: Path) -> None:
+def test_a_program_that_does_not_serve_is_reported_with_its_output(tmp_path: Path) -> None:
     for text, says in [("echo 'no such option' >&2; exit 2", "no such option"), ("exec true", "did not start listening")]:
         with pytest.raises(ChefsHatError, match=says) as refused:
             LocalServer(program(tmp_path / "wrong", text)).start()
@@ -87,7 +87,7 @@ def test_a_program_that_does_not_serve_is_told_with_what_it_said(tmp_path: Path)
         LocalServer(tmp_path).start()
 
 
-def test_the_checkout_is_where_cargo_is_looked_for() -> None:
+def test_builds_are_found_in_the_checkout() -> None:
     found = [path.relative_to(Path(__file__).resolve().parents[3]) for path in local_server._cargo_targets()]
     assert found == [Path("target/release/chefshat"), Path("target/debug/chefshat")]
 

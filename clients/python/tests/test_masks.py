@@ -46,7 +46,7 @@ def test_the_same_seed_draws_the_same() -> None:
     assert first.tolist() != sample_legal(bits, np.random.default_rng(5)).tolist()
 
 
-def test_what_is_not_legal_is_told_apart() -> None:
+def test_illegal_actions_are_detected() -> None:
     masks = np.zeros((2, 20), np.bool_)
     masks[0, 9] = masks[1, 19] = True
     bits = np.packbits(masks, axis=1, bitorder="little")

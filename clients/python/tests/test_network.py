@@ -63,7 +63,7 @@ def test_wrong_metadata_is_refused_in_words(tmp_path: Path, change: dict[str, st
     assert "n.safetensors" in str(refused.value)
 
 
-def test_what_is_no_network_is_refused_in_words(tmp_path: Path) -> None:
+def test_other_files_are_refused_with_a_reason(tmp_path: Path) -> None:
     path = tmp_path / "n.safetensors"
     path.write_bytes(b"cards")
     with pytest.raises(NetworkFileError, match="is not a network"):
@@ -123,7 +123,7 @@ def test_outputs_are_compared_before_tanh() -> None:
     assert net.actions(case, case.seats, case.kinds, case.mask_bits).tolist() == last
 
 
-def test_outputs_that_are_no_numbers_never_win() -> None:
+def test_nan_outputs_never_win() -> None:
     nan, inf = np.nan, np.inf
     outputs = np.array([[9, nan, 1, 2], [9, 1, nan, 2], [9, nan, 1, nan], [9, nan, nan, nan], [9, -inf, nan, -inf]], np.float32)
     masks = np.full((len(outputs), 1), 0b1110, np.uint8)
@@ -131,7 +131,7 @@ def test_outputs_that_are_no_numbers_never_win() -> None:
     assert network.best_legal(outputs, masks * 0).tolist() == [0] * 5
 
 
-def test_a_hidden_unit_that_is_no_number_says_nothing() -> None:
+def test_a_nan_hidden_unit_counts_as_zero() -> None:
     """Finite weights may have sums that are none: inf - inf. `chefshat` takes 0 there too; otherwise all outputs would be lost."""
     huge = np.finfo(np.float32).max
     layers = chance_layers(INFO)
@@ -160,7 +160,7 @@ def test_a_network_fits_rules_with_as_many_players_faces_and_cards_dealt() -> No
 
 
 @pytest.mark.parametrize("name", ["table-actions", "classic-turns", "small-table"])
-def test_the_fixtures_say_what_they_said(name: str) -> None:
+def test_the_fixtures_still_hold(name: str) -> None:
     net = network.load(FIXTURES / f"{name}.safetensors")
     assert net.info.name == name
     rows = json.loads((FIXTURES / f"{name}.json").read_text())

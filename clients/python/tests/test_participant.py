@@ -80,7 +80,7 @@ def test_every_game_has_an_agent_of_its_own() -> None:
     assert [(result.game_id, result.place, result.entropy) for result in played] == [("a", 2, b"mine"), ("b", 1, b"mine")]
 
 
-def test_a_new_connection_goes_on_with_the_same_agents() -> None:
+def test_a_new_connection_continues_with_the_same_agents() -> None:
     cup = Cup()
     (ask,) = cup.say(seated(CALLED, "a"), seated(CALLED + 1, "b"), events(1, 2, handle=CALLED), decision(4, CALLED))
     cup.session.answer(ask, 1)
@@ -115,7 +115,7 @@ def test_a_seat_attached_twice_is_one_seat() -> None:
     assert cup.scribes["a"].log == [("attached", 0), ("event", 1), ("attached", 0), ("event", 2)]
 
 
-def test_the_end_of_the_tournament_waits_for_what_is_left_of_its_games() -> None:
+def test_the_end_of_the_tournament_waits_for_open_games() -> None:
     cup = Cup()
     cup.say(seated(CALLED, "a"), detached("TOURNAMENT_OVER"))
     assert not cup.session.done
@@ -128,7 +128,7 @@ def test_the_end_of_the_tournament_waits_for_what_is_left_of_its_games() -> None
     assert (result.abort_reason, result.finished) == ("CLOSED", False)
 
 
-def test_a_game_whose_room_is_gone_stops_no_other() -> None:
+def test_a_lost_room_does_not_stop_other_games() -> None:
     cup = Cup()
     cup.say(seated(CALLED, "a"))
     cup.session.lost()
@@ -145,7 +145,7 @@ def test_a_game_whose_room_is_gone_stops_no_other() -> None:
     ("update", "reason"),
     [(refused(REQUEST_ID), "TICKET_UNKNOWN"), (detached("SUPERSEDED"), "SUPERSEDED"), (detached("REQUESTED"), "DETACHED")],
 )
-def test_a_participant_that_must_leave_says_why(update: pb.SeatUpdate, reason: str) -> None:
+def test_a_lost_participant_has_an_error(update: pb.SeatUpdate, reason: str) -> None:
     cup = Cup()
     cup.say(seated(CALLED, "a"), update)
     assert not cup.session.done, "its game may go on"
@@ -199,7 +199,7 @@ def test_the_ticket_of_a_seat_plays_this_seat_alone() -> None:
     assert (result.game_id, result.seat, result.reconnects, entries) == ("a", 2, 1, [])
 
 
-def test_who_takes_part_is_told_where_on_each_connection() -> None:
+def test_on_entered_is_called_on_each_connection() -> None:
     entries: list[pb.Entered] = []
     session = PlaySession.of_participant("cup", lambda seat: Scribe(), on_entered=entries.append)
     for connections in (1, 2):
@@ -209,7 +209,7 @@ def test_who_takes_part_is_told_where_on_each_connection() -> None:
         assert [(entry.tournament_id, entry.participant) for entry in entries] == [("tournament", 3)] * connections
 
 
-def test_the_ticket_of_a_participant_is_no_seat() -> None:
+def test_the_ticket_of_a_participant_is_not_a_seats() -> None:
     session = PlaySession({"cup": Scribe(), "t": Scribe()})
     session.connected()
     session.take_requests()
@@ -225,7 +225,7 @@ def test_the_ticket_of_a_participant_is_no_seat() -> None:
     assert error.reason == "TICKET_OF_PARTICIPANT"
 
 
-def test_nobody_is_seated_by_the_server_without_taking_part() -> None:
+def test_unknown_seats_are_ignored() -> None:
     session = PlaySession({"t": Scribe()})
     session.connected()
     assert session.receive(pb.PlayResponse(updates=[seated(CALLED, "a"), decision(1, CALLED)])) == []

@@ -93,7 +93,7 @@ def test_a_coroutine_in_the_blocking_client_is_refused(fake: FakeServer) -> None
 
 @pytest.mark.parametrize("moment", ["before", "after"])
 @pytest.mark.parametrize(("play", "agent_class"), [(play_blocking, Listener), (play_asyncio, Listener), (play_asyncio, Thinker)])
-def test_a_broken_stream_is_made_again(fake: FakeServer, play: Player, moment: str, agent_class: type[Listener]) -> None:
+def test_a_broken_stream_is_restored(fake: FakeServer, play: Player, moment: str, agent_class: type[Listener]) -> None:
     broken: set[tuple[int, int]] = set()
 
     def fault(game: FakeGame, seat: FakeSeat, answer: pb.Answer) -> str:
@@ -131,7 +131,7 @@ def test_a_broken_stream_is_made_again(fake: FakeServer, play: Player, moment: s
         assert wanted[-1] > 4 * QUESTIONS - 4
 
 
-def test_connecting_that_leads_nowhere_is_given_up(fake: FakeServer, play: Player) -> None:
+def test_connections_without_progress_are_given_up(fake: FakeServer, play: Player) -> None:
     fake.fault = lambda game, seat, answer: "before"
     (ticket,) = seats(fake, played=1)
     result = play(fake.address, {ticket: Listener()})[ticket]
@@ -172,7 +172,7 @@ class Stubborn(Agent):
         return int((~request.mask).nonzero()[0][0])
 
 
-def test_invalid_answers_are_asked_again_as_often_as_the_server_allows(fake: FakeServer, play: Player) -> None:
+def test_invalid_answers_are_asked_again_up_to_the_limit(fake: FakeServer, play: Player) -> None:
     (ticket,) = seats(fake, played=1)
     agent = Stubborn()
     result = play(fake.address, {ticket: agent})[ticket]
@@ -196,13 +196,13 @@ class BrokenLater(Broken):
         return super().decide(request)
 
 
-def test_what_an_agent_raises_reaches_the_caller(fake: FakeServer, play: Player) -> None:
+def test_exceptions_of_agents_propagate(fake: FakeServer, play: Player) -> None:
     (ticket,) = seats(fake, played=1)
     with pytest.raises(ZeroDivisionError, match="own mistake"):
         play(fake.address, {ticket: Broken()})
 
 
-def test_what_a_coroutine_raises_reaches_the_caller(fake: FakeServer) -> None:
+def test_exceptions_of_coroutines_propagate(fake: FakeServer) -> None:
     (ticket,) = seats(fake, played=1)
     with pytest.raises(ZeroDivisionError, match="own mistake"):
         play_asyncio(fake.address, {ticket: BrokenLater()})

@@ -79,9 +79,7 @@ def test_four_commands_play_a_game_with_each_other(real_address: str) -> None:
         assert (one["invalid"], one["failures"], one["replaced"], one["restarts"]) == (0, 0, 0, 0)
 
 
-def test_a_player_goes_from_room_to_room_and_is_told_when_one_is_over(
-    real_address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_player_plays_room_after_room(real_address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     codes = [room(real_address, [None, "random", "random", "random"]) for _ in range(2)]
     log = tmp_path / "log"
     arguments = command(real_address, codes[0], "Scribe", "--code", codes[1], "--arguments", json.dumps({"log_file": str(log)}))
@@ -92,7 +90,7 @@ def test_a_player_goes_from_room_to_room_and_is_told_when_one_is_over(
     assert log.read_text().count('["update_game_over"]') == 2
 
 
-def test_a_player_is_told_the_game_as_the_reference_tells_it(real_address: str, tmp_path: Path) -> None:
+def test_a_player_gets_the_calls_of_the_reference(real_address: str, tmp_path: Path) -> None:
     log = tmp_path / "log"
     specs = [AgentSpec("club_players:Scribe", "Ada", {"log_file": str(log)}, paths=(TESTS,))]
     specs += [AgentSpec("club_players:Rarest", name, paths=(TESTS,)) for name in ("Bob", "Cleo")]
@@ -179,7 +177,7 @@ def test_illegal_choices_are_counted_as_often_as_the_reference_would_ask(
     assert said["replaced"] <= said["decisions"]
 
 
-def test_the_game_goes_on_with_a_player_that_only_fails(real_address: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_game_continues_with_a_failing_player(real_address: str, capsys: pytest.CaptureFixture[str]) -> None:
     code = room(real_address, [None, "random", "random", "random"], rules=pb.RuleSet(target_shifts=2))
     assert main(command(real_address, code, "Raising", "--json")) == 0
     said = one_line(capsys)
@@ -188,7 +186,7 @@ def test_the_game_goes_on_with_a_player_that_only_fails(real_address: str, capsy
     assert said["restarts"] == 0
 
 
-def test_the_game_goes_on_when_the_player_has_been_given_up(real_address: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_game_continues_when_the_player_is_given_up(real_address: str, capsys: pytest.CaptureFixture[str]) -> None:
     code = room(real_address, [None, "random", "random", "random"], rules=pb.RuleSet(target_shifts=6))
     assert main(command(real_address, code, "Mortal", "--json", "--restarts", "1")) == 1
     said = one_line(capsys)
@@ -198,7 +196,7 @@ def test_the_game_goes_on_when_the_player_has_been_given_up(real_address: str, c
     assert 0 < said["replaced"] < said["decisions"]
 
 
-def test_a_command_that_is_interrupted_leaves_nobody_behind(
+def test_an_interrupted_command_leaves_no_process(
     real_address: str, tmp_path: Path, processes: list["subprocess.Popen[str]"]
 ) -> None:
     with chefshat.Client(real_address) as client:
@@ -218,9 +216,7 @@ def test_a_command_that_is_interrupted_leaves_nobody_behind(
         os.kill(int((tmp_path / "pid").read_text()), 0)
 
 
-def test_a_command_that_is_interrupted_while_players_are_made_leaves_nobody_behind(
-    tmp_path: Path, processes: list["subprocess.Popen[str]"]
-) -> None:
+def test_an_interrupted_start_leaves_no_process(tmp_path: Path, processes: list["subprocess.Popen[str]"]) -> None:
     given = json.dumps({"file": str(tmp_path / "pid.{process}")})
     # They are ended because the command is, not because they take too long.
     way = ["--server", "127.0.0.1:1", "--tournament", "X", "--games", "2", "--start-limit", "100000"]
@@ -238,7 +234,7 @@ def test_a_command_that_is_interrupted_while_players_are_made_leaves_nobody_behi
             os.kill(int(file.read_text()), 0)
 
 
-def test_a_player_that_cannot_be_made_takes_no_seat(real_address: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_player_that_fails_to_start_takes_no_seat(real_address: str, capsys: pytest.CaptureFixture[str]) -> None:
     code = room(real_address, [None, "random", "random", "random"])
     assert main(command(real_address, code, "Unmade", "--json")) == 1
     assert "creating it raised FileNotFoundError: no model there" in one_line(capsys)["message"]
@@ -316,7 +312,7 @@ def test_a_player_takes_part_in_a_tournament_with_two_processes(
     assert all(game.rated for game in games)
 
 
-def test_who_goes_on_has_as_many_processes_as_were_said_when_the_place_was_taken(
+def test_a_resumed_command_has_as_many_processes_as_declared(
     real_address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with chefshat.Client(real_address) as client:
@@ -345,7 +341,7 @@ def test_a_tournament_that_such_players_do_not_know_is_refused(real_address: str
 
 
 @pytest.mark.parametrize("where", ["room", "tournament"])
-def test_a_command_that_was_killed_goes_on_in_its_place(
+def test_a_killed_command_resumes(
     real_address: str, where: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], processes: list["subprocess.Popen[str]"]
 ) -> None:
     stalls, log, ticket = tmp_path / "stalls", tmp_path / "log", tmp_path / "ticket"

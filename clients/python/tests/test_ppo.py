@@ -25,7 +25,7 @@ def rows(count: int, seed: int) -> np.ndarray:
     return features.table(case, case.seats, case.kinds, case.mask_bits, players=4, faces=11, hand_size=17)
 
 
-def test_what_is_drawn_is_legal_and_as_likely_as_it_says() -> None:
+def test_samples_are_legal_and_match_their_probabilities() -> None:
     learner = ppo.start(1, 334, 214, HYPER)
     # Weights far from the small ones of the start, so that legal actions differ.
     params = jax.tree.map(lambda weights: weights * 30, learner.params)
@@ -68,7 +68,7 @@ def test_it_learns_which_action_pays() -> None:
     assert share(learner.params) > max(0.8, before + 0.2)
 
 
-def test_rows_without_weight_teach_nothing() -> None:
+def test_rows_without_weight_are_ignored() -> None:
     learner = ppo.start(1, 334, 214, HYPER)
     inputs = jnp.asarray(rows(32, seed=4))
     actions, log_probabilities, _ = ppo.act(learner.params, jax.random.key(1), inputs)
@@ -81,7 +81,7 @@ def test_rows_without_weight_teach_nothing() -> None:
     assert float(losses.value) == 0
 
 
-def test_a_training_goes_on_from_a_file_as_if_nothing_had_been(tmp_path: Path) -> None:
+def test_a_training_resumes_exactly_from_a_file(tmp_path: Path) -> None:
     plan = Plan(games=8, steps=16, hyper=HYPER)
     training = ppo_checkpoint.begin(plan, 7, RULES, "a command")
     inputs = jnp.asarray(rows(32, seed=4))
@@ -123,7 +123,7 @@ def test_a_training_of_an_older_version_continues(tmp_path: Path) -> None:
     jax.tree.map(np.testing.assert_array_equal, again.learner.params, learned.learner.params)
 
 
-def test_what_is_no_training_is_refused_in_words(tmp_path: Path) -> None:
+def test_other_files_are_refused_with_a_reason(tmp_path: Path) -> None:
     path = tmp_path / "t"
     path.write_bytes(b"cards")
     with pytest.raises(TrainingFileError, match="is not a training"):

@@ -47,7 +47,7 @@ def test_some_games_may_be_against_built_in_agents(real_address: str) -> None:
         assert trainer.training.progress.decisions == 16 * 16
 
 
-def test_the_command_writes_its_files_and_goes_on(real_address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_writes_its_files_and_resumes(real_address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "small.safetensors"
     options = ["ppo", "--out", str(out), "--address", real_address, "--seed", "3", "--name", "small", "--json"]
     plan = ["--games", "16", "--steps", "16", "--minibatches", "2", "--width", "8", "--evaluations", "2", "--evaluation-games", "4"]
@@ -82,7 +82,7 @@ def test_the_command_writes_its_files_and_goes_on(real_address: str, tmp_path: P
     assert (found["opponents"], found["games"], sum(found["places"])) == (["greedy"] * 3, 3, found["shifts"])
 
 
-def test_the_command_says_what_is_wrong(real_address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_reports_errors(real_address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     nothing = str(tmp_path / "nothing.safetensors")
     assert command.main(["ppo", "--out", nothing, "--decisions", "1", "--resume", "--address", real_address]) == 1
     assert "leave out --resume" in capsys.readouterr().err

@@ -35,7 +35,7 @@ def test_an_unacknowledged_answer_is_repeated_once_and_not_thought_over(stage: S
     assert stage.session.results()["t"].decisions == 1
 
 
-def test_a_decision_put_again_while_the_agent_thinks_is_answered_on_the_new_connection(stage: Stage) -> None:
+def test_a_repeated_decision_is_answered_on_the_new_connection(stage: Stage) -> None:
     (ask,) = stage.say(decision(1))
     stage.session.lost()
     stage.connect()
@@ -55,7 +55,7 @@ def test_an_answer_given_between_connections_is_sent_on_the_next(stage: Stage) -
     assert stage.answers() == [(0, 1, 1)]
 
 
-def test_a_decision_nobody_was_asked_for_is_asked_when_it_is_put_again(stage: Stage) -> None:
+def test_an_unasked_decision_is_asked_when_repeated(stage: Stage) -> None:
     asks = stage.say(decision(1))
     stage.session.lost(unasked=asks)
     stage.connect()
@@ -63,7 +63,7 @@ def test_a_decision_nobody_was_asked_for_is_asked_when_it_is_put_again(stage: St
     assert again.decision.decision_id == 1
 
 
-def test_handles_of_a_lost_connection_mean_nothing() -> None:
+def test_handles_of_a_lost_connection_are_ignored() -> None:
     stage = Stage("t", "u")
     stage.connect()
     stage.say(attached(1, seat=0), attached(2, seat=3))
@@ -78,14 +78,14 @@ def test_handles_of_a_lost_connection_mean_nothing() -> None:
     assert stage.say(decision(1, handle=1)) == []
 
 
-def test_a_connection_lost_after_the_games_end_is_not_made_again(stage: Stage) -> None:
+def test_no_reconnection_after_the_end_of_the_games(stage: Stage) -> None:
     stage.say(ended(1))
     stage.session.lost()
     assert stage.session.done
     assert stage.session.results()["t"].finished
 
 
-def test_giving_up_ends_what_is_open(stage: Stage) -> None:
+def test_giving_up_ends_open_seats(stage: Stage) -> None:
     stage.session.lost()
     stage.session.give_up(ChefsHatError("UNAVAILABLE"))
     assert stage.session.done
@@ -93,7 +93,7 @@ def test_giving_up_ends_what_is_open(stage: Stage) -> None:
         stage.session.results()["t"].raise_for_error()
 
 
-def test_progress_is_made_by_events_and_accepted_answers_alone(stage: Stage) -> None:
+def test_only_events_and_accepted_answers_are_progress(stage: Stage) -> None:
     steps: list[tuple[Callable[[], object], bool]] = [
         (lambda: stage.say(events(1)), True),
         (lambda: stage.say(events(1)), False),
@@ -108,7 +108,7 @@ def test_progress_is_made_by_events_and_accepted_answers_alone(stage: Stage) -> 
         assert (stage.session.progress > before) is moves, number
 
 
-def test_a_substituted_seat_says_once_that_it_is_here(stage: Stage) -> None:
+def test_a_substituted_seat_resumes_once(stage: Stage) -> None:
     stage.say(substituted(1, seat=3))
     assert stage.said() == []
     stage.say(substituted(2))
@@ -136,7 +136,7 @@ def test_a_substitution_that_is_over_is_not_answered(stage: Stage) -> None:
     assert stage.said() == [(0, "resume")]
 
 
-def test_a_substituted_seat_whose_game_or_connection_is_over_says_nothing(stage: Stage) -> None:
+def test_a_substituted_seat_without_game_or_connection_does_not_resume(stage: Stage) -> None:
     stage.say(substituted(1), ended(2))
     assert stage.said() == []
     stage.say(detached("GAME_OVER"))
@@ -148,7 +148,7 @@ def test_a_substituted_seat_whose_game_or_connection_is_over_says_nothing(stage:
     assert other.said() == []
 
 
-def test_every_substituted_seat_of_a_stream_comes_back_on_its_own_handle() -> None:
+def test_every_substituted_seat_resumes_on_its_own_handle() -> None:
     stage = Stage("t", "u")
     stage.connect()
     stage.say(attached(1, seat=2), attached(2, seat=3))

@@ -96,7 +96,7 @@ def test_decisions_are_paired_by_seat_and_shift(tmp_path: Path) -> None:
         replay.from_dataset(tmp_path, agents=["Ada", "Bob"])
 
 
-def test_there_may_be_nothing_to_learn_from(tmp_path: Path) -> None:
+def test_an_empty_dataset_has_no_transitions(tmp_path: Path) -> None:
     unfinished = {"shift_place": None, "finished": False, "game_place": None}
     nothing = replay.from_dataset(dataset(tmp_path, unfinished))
     assert len(nothing) == 0
@@ -127,13 +127,13 @@ def test_invalid_attempts_are_transitions_of_their_own(tmp_path: Path) -> None:
     assert replay.from_dataset(folder, invalid_attempts=False).actions.tolist() == [1, 7, 199]
 
 
-def test_hands_that_nobody_knows_are_left_out(tmp_path: Path) -> None:
+def test_unknown_hands_are_omitted(tmp_path: Path) -> None:
     unknown: dict[str, Any] = {"mask": None, "hand": None, "golden": None}
     made = replay.from_dataset(dataset(tmp_path, {"action": 1}, {"action": 2, **unknown}, {"action": 3}, {"action": 4}))
     assert made.actions.tolist() == [3, 4]
 
 
-def test_rewards_of_ones_own(tmp_path: Path) -> None:
+def test_custom_rewards(tmp_path: Path) -> None:
     made = replay.from_dataset(dataset(tmp_path, {}, {}), rewards=lambda transitions: transitions.ended * 7.0)
     assert made.rewards.tolist() == [0, 7]
 
@@ -149,7 +149,7 @@ def test_rewards_of_ones_own(tmp_path: Path) -> None:
         ([], {}, "no rows"),
     ],
 )
-def test_what_is_no_dataset_is_told(tmp_path: Path, rows: list[Any], options: Any, says: str) -> None:
+def test_other_files_are_refused(tmp_path: Path, rows: list[Any], options: Any, says: str) -> None:
     with pytest.raises(ValueError, match=says):
         replay.from_dataset(dataset(tmp_path, *rows), **options)
     with pytest.raises(FileNotFoundError, match="chefshat export"):
@@ -187,7 +187,7 @@ def test_a_buffer_keeps_the_latest_and_draws_them_all(tmp_path: Path) -> None:
         replay.ReplayBuffer(0)
 
 
-def test_a_buffer_takes_what_an_env_gives() -> None:
+def test_a_buffer_stores_transitions_of_an_env() -> None:
     buffer = replay.ReplayBuffer(1000, seed=2)
     with FakeVector() as server, VectorEnv(server.address, 8, transitions=True) as env:
         count = 0
@@ -296,7 +296,7 @@ def test_games_of_a_server(real_address: str, binary: str) -> None:
 
 
 @pytest.mark.server
-def test_damaged_records_are_told(binary: str, tmp_path: Path) -> None:
+def test_damaged_records_are_reported(binary: str, tmp_path: Path) -> None:
     (tmp_path / "broken.jsonl").write_text("{}\n", encoding="utf-8")
     with pytest.raises(ChefsHatError, match=r"RECORDS_REFUSED.*damaged"):
         replay.from_records(tmp_path)

@@ -122,7 +122,7 @@ def test_agents_play_on_through_restarts(play: Player, tmp_path: Path) -> None:
         assert agent.sequences == list(range(1, len(agent.sequences) + 1))
 
 
-def test_a_tournament_goes_on_through_restarts(tmp_path: Path) -> None:
+def test_a_tournament_survives_restarts(tmp_path: Path) -> None:
     binary = os.environ.get(BINARY)
     if not binary:
         pytest.skip(f"{BINARY} is not set: name the chefshat binary to play against the real server")

@@ -77,7 +77,7 @@ def test_command_prints_a_table(fake: FakeServer, capsys: pytest.CaptureFixture[
     assert lines[-1] == "5 decisions, 0 invalid answers, 0 too late"
 
 
-def test_command_says_what_was_refused(fake: FakeServer, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_reports_refusals(fake: FakeServer, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["--address", fake.address, "--code", "WRONG", "--name", "Ada"]
     assert command.main(arguments) == 1
     assert "JOIN_CODE_WRONG" in capsys.readouterr().err
@@ -86,7 +86,7 @@ def test_command_says_what_was_refused(fake: FakeServer, capsys: pytest.CaptureF
 
 
 @pytest.mark.parametrize("agent", ["greedy", "no_such_module:Agent", "json:JSONDecoder", "samples.careful_agent:Nobody"])
-def test_command_refuses_what_is_no_agent(agent: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_refuses_other_classes(agent: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.chdir(PACKAGE)
     with pytest.raises(SystemExit) as exit_info:
         command.main(["--address", "127.0.0.1:1", "--code", "X", "--name", "Ada", "--agent", agent])
@@ -94,5 +94,5 @@ def test_command_refuses_what_is_no_agent(agent: str, monkeypatch: pytest.Monkey
     assert agent in capsys.readouterr().err
 
 
-def test_there_is_no_path_of_this_machine_in_the_readme() -> None:
+def test_the_readme_has_no_local_path() -> None:
     assert os.sep + "home" not in (PACKAGE / "README.md").read_text(encoding="utf-8")

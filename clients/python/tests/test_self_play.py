@@ -73,7 +73,7 @@ def test_advantages_are_those_of_a_plain_loop(seed: int) -> None:
     assert not found[~known].any()
 
 
-def test_places_are_worth_something_that_adds_up_to_nothing() -> None:
+def test_place_rewards_add_up_to_zero() -> None:
     worth = place_rewards([5, 3, 1, 0])
     np.testing.assert_allclose(worth, [0.55, 0.15, -0.25, -0.45], rtol=1e-6)
     assert worth.sum() == pytest.approx(0, abs=1e-6)

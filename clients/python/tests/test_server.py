@@ -166,7 +166,7 @@ def play_asyncio(address: str, agents: dict[str, Checking]) -> dict[str, chefsha
 
 
 @pytest.mark.parametrize("play", [play_blocking, play_asyncio])
-def test_lost_connections_are_made_again_and_nothing_is_missed(
+def test_reconnections_miss_no_event(
     real_address: str, play: Callable[[str, dict[str, Checking]], dict[str, chefshat.SeatResult]]
 ) -> None:
     with chefshat.Client(real_address) as client, Proxy(real_address) as proxy:

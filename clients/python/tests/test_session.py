@@ -30,7 +30,7 @@ def test_a_game_from_attaching_to_its_end() -> None:
     assert stage.log == [("attached", 0), ("event", 1), ("result", "ACCEPTED"), ("event", 2), ("over", True)]
 
 
-def test_every_seat_adds_entropy_of_its_own_and_is_told_which() -> None:
+def test_every_seat_has_its_own_entropy() -> None:
     session = PlaySession({ticket: Scribe() for ticket in "tuv"})
     session.connected()
     first = [command.attach.entropy for request in session.take_requests() for command in request.commands]
@@ -44,7 +44,7 @@ def test_every_seat_adds_entropy_of_its_own_and_is_told_which() -> None:
     assert [over.entropy for over in session.results().values()] == first
 
 
-def test_entropy_can_be_chosen_or_left_out() -> None:
+def test_entropy_can_be_set_or_empty() -> None:
     for chosen in (b"mine", b""):
         session = PlaySession({"t": Scribe(), "u": Scribe()}, PlayOptions(entropy=chosen))
         session.connected()
@@ -52,7 +52,7 @@ def test_entropy_can_be_chosen_or_left_out() -> None:
         assert [command.attach.entropy for command in request.commands] == [chosen, chosen]
 
 
-def test_the_result_holds_what_the_reveal_is_checked_with(stage: Stage) -> None:
+def test_the_result_has_the_entropy_of_the_reveal(stage: Stage) -> None:
     stage.say(ended(1), detached("GAME_OVER"))
     over = stage.session.results()["t"]
     assert over.reveal is not None
@@ -81,7 +81,7 @@ def test_an_invalid_answer_is_asked_again_until_the_servers_limit(stage: Stage) 
     assert stage.session.results()["t"].invalid == 2
 
 
-def test_an_unlimited_number_of_attempts_is_asked_on(stage: Stage) -> None:
+def test_unlimited_attempts_are_asked_again(stage: Stage) -> None:
     (ask,) = stage.say(decision(1))
     for _ in range(20):
         stage.answer(ask)
@@ -139,13 +139,13 @@ def test_a_refused_ticket_stops_that_seat_alone() -> None:
     assert ask.agent is stage.scribes["u"]
 
 
-def test_another_refused_command_is_told_and_nothing_else(stage: Stage) -> None:
+def test_other_refused_commands_are_only_reported(stage: Stage) -> None:
     stage.say(pb.SeatUpdate(handle=0, refused=pb.Refused(reason="EXPRESSION_REFUSED", message="too long")))
     assert stage.log[-1] == ("refused", "EXPRESSION_REFUSED")
     assert not stage.session.done
 
 
-def test_a_snapshot_stands_for_the_events_before_it(stage: Stage) -> None:
+def test_a_snapshot_replaces_earlier_events(stage: Stage) -> None:
     started = pb.GameStarted(hand_size=17)
     stage.say(pb.SeatUpdate(snapshot=pb.Snapshot(game_started=started, next_sequence=40)))
     (ask,) = stage.say(events(39, 40), decision(3))

@@ -33,7 +33,7 @@ def test_a_ticket_replaces_an_empty_file_and_is_its_owner_s_alone(path: Path) ->
     assert list(path.parent.iterdir()) == []
 
 
-def test_one_at_a_time_holds_the_file_before_and_after_there_is_a_ticket(path: Path) -> None:
+def test_only_one_command_locks_the_file(path: Path) -> None:
     with TicketFile(path) as file:
         with pytest.raises(BlockingIOError, match=HELD), TicketFile(path):
             pass
@@ -46,7 +46,7 @@ def test_one_at_a_time_holds_the_file_before_and_after_there_is_a_ticket(path: P
         assert file.ticket == "mine"
 
 
-def test_what_a_killed_command_left_behind_is_taken_and_not_shown(path: Path) -> None:
+def test_files_of_a_killed_command_are_reused_privately(path: Path) -> None:
     left = path.with_name(".ticket.new")
     left.write_text("half of a longer ticket")
     left.chmod(0o644)
@@ -67,7 +67,7 @@ def test_another_s_ticket_is_not_removed(path: Path) -> None:
         file.forget()
 
 
-def test_a_link_is_not_followed_to_where_a_ticket_would_be_seen(path: Path) -> None:
+def test_links_are_not_followed(path: Path) -> None:
     elsewhere = path.with_name("elsewhere")
     elsewhere.write_text("")
     os.symlink(elsewhere, path.with_name(".ticket.new"))

@@ -118,7 +118,7 @@ def test_four_participants_play_a_tournament_to_its_end(address: str, play: Play
 
 
 @pytest.mark.parametrize("moment", ["before", "after"])
-def test_a_broken_stream_is_made_again(fake: FakeServer, play: Player, moment: str) -> None:
+def test_a_broken_stream_is_restored(fake: FakeServer, play: Player, moment: str) -> None:
     broken: set[tuple[str, int]] = set()
 
     def fault(game: FakeGame, seat: FakeSeat, answer: pb.Answer) -> str:
@@ -153,7 +153,7 @@ class Cutter(Checking):
 
 
 @pytest.mark.server
-def test_a_cut_connection_is_made_again_with_the_real_server(real_address: str, play: Player) -> None:
+def test_a_cut_connection_is_restored_with_the_real_server(real_address: str, play: Player) -> None:
     agents: list[Cutter] = []
     with chefshat.Client(real_address) as client, Proxy(real_address) as proxy:
 
@@ -230,7 +230,7 @@ def test_an_unknown_ticket_is_refused(address: str, play: Player) -> None:
         play(address, "nobody's", Checking)
 
 
-def test_what_an_agent_cannot_be_made_for_reaches_the_caller(fake: FakeServer, play: Player) -> None:
+def test_exceptions_of_make_agent_propagate(fake: FakeServer, play: Player) -> None:
     def make(seat: SeatInfo) -> RandomAgent:
         raise LookupError(f"no agent for seat {seat.seat}")
 

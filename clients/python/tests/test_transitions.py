@@ -85,7 +85,7 @@ def test_invalid_attempts_are_transitions_to_the_same_decision(toy: FakeVector) 
         assert second.transitions.actions.tolist() == [151]
 
 
-def test_a_reset_forgets_what_was_waiting(toy: FakeVector) -> None:
+def test_a_reset_drops_open_decisions(toy: FakeVector) -> None:
     with VectorEnv(toy.address, 3, transitions=True) as env:
         env.step(legal(env.batch))
         batch = env.reset(games=[1])
@@ -99,7 +99,7 @@ def test_a_reset_forgets_what_was_waiting(toy: FakeVector) -> None:
     assert [sum(pair == [1, 0] for pair in step) for step in found] == [0, 0, 0, 1]
 
 
-def test_rewards_of_ones_own_replace_the_servers(toy: FakeVector) -> None:
+def test_custom_rewards_replace_the_servers(toy: FakeVector) -> None:
     def cards_shed(transitions: Transitions) -> NDArray[np.float32]:
         before, after = transitions.before.observations, transitions.after.observations
         return (after.hands[:, 2].astype(np.float32) - before.hands[:, 2]) / np.float32(2)
@@ -115,7 +115,7 @@ def test_rewards_of_ones_own_replace_the_servers(toy: FakeVector) -> None:
     assert batches[4].rewards.tolist() == [0, 2]
 
 
-def test_a_reward_function_of_the_wrong_shape_is_told(toy: FakeVector) -> None:
+def test_a_reward_function_of_the_wrong_shape_is_reported(toy: FakeVector) -> None:
     with pytest.raises(ValueError, match="one reward for each row"):
         VectorEnv(toy.address, 2, reward_function=lambda transitions: np.zeros(7, np.float32))
 
@@ -135,12 +135,12 @@ def test_a_reward_function_that_fails_ends_the_env(toy: FakeVector) -> None:
             env.step(legal(env.batch))
 
 
-def test_transitions_are_kept_only_where_asked_for(toy: FakeVector) -> None:
+def test_transitions_are_optional(toy: FakeVector) -> None:
     with VectorEnv(toy.address) as env, pytest.raises(AttributeError, match="transitions=True"):
         assert env.batch.transitions
 
 
-def test_tables_can_be_cut_and_put_together(toy: FakeVector) -> None:
+def test_tables_can_be_sliced_and_concatenated(toy: FakeVector) -> None:
     with VectorEnv(toy.address, 3, transitions=True) as env:
         first, second = [transitions for transitions, _ in collect(env, 6)][4:]
     together = np.arange(len(second))

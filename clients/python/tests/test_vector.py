@@ -20,7 +20,7 @@ def legal(batch: Batch) -> NDArray[np.uint16]:
     return np.full(len(batch), 199, np.uint16)
 
 
-def test_the_setup_says_what_was_asked(toy: FakeVector) -> None:
+def test_the_setup_has_the_options(toy: FakeVector) -> None:
     rules = {"faces": 9, "opening": "any_top_face", "pass_scope": "PASS_SCOPE_TURN", "target_shifts": 3}
     VectorEnv(
         toy.address,
@@ -88,7 +88,7 @@ def test_the_setup_says_what_was_asked(toy: FakeVector) -> None:
         ({"branch": pb.BranchPoint(), "rules": "paper"}, "leave rules out"),
     ],
 )
-def test_what_cannot_be_asked_is_refused_before_anything_is_sent(arguments: dict[str, Any], says: str) -> None:
+def test_invalid_options_are_refused_before_sending(arguments: dict[str, Any], says: str) -> None:
     # No server listens there.
     with pytest.raises(ValueError, match=says):
         VectorEnv("127.0.0.1:1", **arguments)
@@ -213,7 +213,7 @@ def test_records_arrive_whole(toy: FakeVector, tmp_path: Path) -> None:
         ([5, 65536], "row 1 has the action 65536"),
     ],
 )
-def test_actions_that_are_none_are_refused_and_nothing_is_lost(toy: FakeVector, actions: object, says: str) -> None:
+def test_invalid_actions_are_refused_without_effect(toy: FakeVector, actions: object, says: str) -> None:
     with VectorEnv(toy.address, 2) as env:
         with pytest.raises(ValueError, match=says):
             env.step(actions)  # type: ignore[arg-type]
@@ -221,7 +221,7 @@ def test_actions_that_are_none_are_refused_and_nothing_is_lost(toy: FakeVector, 
         assert env.step(np.array([199, 199])).step == 2
 
 
-def test_a_refusal_ends_the_env_and_says_so(toy: FakeVector) -> None:
+def test_a_refusal_ends_the_env(toy: FakeVector) -> None:
     env = VectorEnv(toy.address, 2)
     with pytest.raises(ChefsHatError) as refused:
         env.step([199, 150])
@@ -237,7 +237,7 @@ def test_a_refusal_ends_the_env_and_says_so(toy: FakeVector) -> None:
         VectorEnv(toy.address, 0)
 
 
-def test_a_closed_env_says_so_and_ends_its_stream(toy: FakeVector) -> None:
+def test_closing_an_env_ends_its_stream(toy: FakeVector) -> None:
     env = VectorEnv(toy.address, 2)
     env.close()
     env.close()
@@ -251,7 +251,7 @@ def test_a_closed_env_says_so_and_ends_its_stream(toy: FakeVector) -> None:
     assert toy.ended.wait(10)
 
 
-def test_when_all_games_are_over_only_a_reset_goes_on(toy: FakeVector) -> None:
+def test_after_all_games_only_a_reset_continues(toy: FakeVector) -> None:
     def over(response: pb.RunResponse) -> Iterable[pb.RunResponse]:
         if response.HasField("batch") and response.batch.step == 2:
             yield pb.RunResponse(batch=pb.VectorBatch(step=2, done=True))
@@ -271,7 +271,7 @@ def test_when_all_games_are_over_only_a_reset_goes_on(toy: FakeVector) -> None:
         assert len(env.reset()) == 2
 
 
-def test_a_server_that_breaks_the_protocol_is_told_apart(toy: FakeVector) -> None:
+def test_protocol_violations_are_reported(toy: FakeVector) -> None:
     def short(response: pb.RunResponse) -> Iterable[pb.RunResponse]:
         response.batch.seats = response.batch.seats[:-1] if response.HasField("batch") else b""
         yield response
@@ -284,7 +284,7 @@ def test_a_server_that_breaks_the_protocol_is_told_apart(toy: FakeVector) -> Non
         assert len(env.batch.seats)
 
 
-def test_a_server_that_is_not_there_is_told() -> None:
+def test_a_missing_server_is_reported() -> None:
     with pytest.raises(ChefsHatError) as lost:
         VectorEnv("127.0.0.1:1", 2)
     assert lost.value.reason == "UNAVAILABLE"

@@ -13,7 +13,7 @@ from chefshat import ChefsHatError, Transitions, VectorEnv, pb, sample_legal
 pytestmark = pytest.mark.server
 
 
-def test_what_holds_in_every_game(real_address: str) -> None:
+def test_invariants_hold_in_every_game(real_address: str) -> None:
     rng = np.random.default_rng(1)
     decided, ended, games_over = 0, 0, 0
     points = np.zeros(4)
@@ -79,7 +79,7 @@ def test_a_game_of_a_batch_can_be_played_again_alone(real_address: str) -> None:
         ]
 
 
-def test_a_custom_reward_can_say_what_a_scheme_says(real_address: str) -> None:
+def test_a_custom_reward_can_equal_a_scheme(real_address: str) -> None:
     def validity(transitions: Transitions) -> NDArray[np.float32]:
         turns = transitions.kinds == pb.DECISION_KIND_TURN
         return np.where(turns, np.where(transitions.invalid, -1, 1), 0).astype(np.float32)
@@ -143,7 +143,7 @@ def test_other_tables_have_other_widths(real_address: str) -> None:
         assert batch.transitions.before.observations.points.shape[1] == 6
 
 
-def test_games_go_on_from_a_record(real_address: str) -> None:
+def test_games_continue_from_a_record(real_address: str) -> None:
     with chefshat.Client(real_address) as client:
         room = client.create_room("to branch from", seats=[None, "greedy", "random", "random"])
         client.play(chefshat.RandomAgent(seed=1), client.join_room(room.join_code, "Ada").ticket)
