@@ -1,51 +1,34 @@
 """Random columns of observations, for tests and fixtures that need no server. They need not be reachable in a game."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from chefshat import pb
+from chefshat.columns import Observations, Sizes
 from chefshat.learn import features
-from chefshat.learn.features import Bytes, Counts
+from chefshat.learn.features import Bytes
 from chefshat.learn.network import Network
 
 
-@dataclass(frozen=True)
-class HandMade:
+class HandMade(Observations):
     """Columns of observations, and of their decisions."""
 
-    players: int
-    faces: int
-    pizzas: Counts
-    hands: Bytes
-    golden: Bytes
-    boards: Bytes
-    cards_left: Bytes
-    passed: Bytes
-    places: Bytes
-    roles: Bytes
-    points: Counts
-    played: Bytes
-    gave: Bytes
-    received: Bytes
     seats: Bytes
     kinds: Bytes
     mask_bits: Bytes
 
-    def __len__(self) -> int:
-        return len(self.seats)
-
     def default_actions(self) -> list[int]:
         """The default action of each row, which a server sends with the request."""
-        turns = features.turn_actions(self.faces)
+        turns = features.turn_actions(self.sizes.faces)
         found = []
         for row, kind in enumerate(self.kinds):
             legal = np.flatnonzero(np.unpackbits(self.mask_bits[row], bitorder="little"))
             plain = self.hands[row].copy()
-            plain[self.faces - 1] -= self.golden[row]
-            held = np.flatnonzero(plain[: self.faces])
-            gift = held[-1] if len(held) else self.faces - 1 if self.golden[row] else self.faces
-            wanted = {pb.DECISION_KIND_TURN: turns - 1, pb.DECISION_KIND_EXCHANGE: turns + gift}.get(kind, turns + self.faces + 1)
+            plain[self.sizes.faces - 1] -= self.golden[row]
+            held = np.flatnonzero(plain[: self.sizes.faces])
+            gift = held[-1] if len(held) else self.sizes.faces - 1 if self.golden[row] else self.sizes.faces
+            wanted = {pb.DECISION_KIND_TURN: turns - 1, pb.DECISION_KIND_EXCHANGE: turns + gift}.get(
+                kind, turns + self.sizes.faces + 1
+            )
             found.append(int(wanted if wanted in legal else legal[0]))
         return found
 
@@ -94,22 +77,21 @@ def hand_made(rows: int, *, seed: int, players: int = 4, faces: int = 11, jokers
     seats = chance.integers(0, players, rows, dtype=np.uint8)
     cards_left = chance.integers(0, size + 1, (rows, players), dtype=np.uint8)
     cards_left[np.arange(rows), seats] = hand.sum(axis=1)
-    return HandMade(
-        players=players,
-        faces=faces,
-        pizzas=chance.integers(0, 45, rows, dtype=np.uint32),
-        hands=hand,
-        golden=((hand[:, faces - 1] > 0) & (chance.random(rows) < 0.5)).astype(np.uint8),
-        boards=np.array(boards, np.uint8),
-        cards_left=cards_left,
-        passed=chance.integers(0, 2, (rows, players), dtype=np.uint8),
-        places=chance.integers(0, players + 1, (rows, players), dtype=np.uint8),
-        roles=chance.integers(0, 6, (rows, players), dtype=np.uint8),
-        points=chance.integers(0, 25, (rows, players), dtype=np.uint32),
-        played=np.array(played),
-        gave=np.array(gave),
-        received=np.array(received),
-        seats=seats,
-        kinds=kinds,
-        mask_bits=np.array(masks),
-    )
+    columns = {
+        "pizzas": chance.integers(0, 45, rows, dtype=np.uint32),
+        "hands": hand,
+        "golden": ((hand[:, faces - 1] > 0) & (chance.random(rows) < 0.5)).astype(np.uint8),
+        "boards": np.array(boards, np.uint8),
+        "cards_left": cards_left,
+        "passed": chance.integers(0, 2, (rows, players), dtype=np.uint8),
+        "places": chance.integers(0, players + 1, (rows, players), dtype=np.uint8),
+        "roles": chance.integers(0, 6, (rows, players), dtype=np.uint8),
+        "points": chance.integers(0, 25, (rows, players), dtype=np.uint32),
+        "played": np.array(played),
+        "gave": np.array(gave),
+        "received": np.array(received),
+        "seats": seats,
+        "kinds": kinds,
+        "mask_bits": np.array(masks),
+    }
+    return HandMade.of(rows, Sizes(players, faces, jokers, size, actions, turns), columns)

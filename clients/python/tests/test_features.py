@@ -11,7 +11,7 @@ DECKS = [(4, 11, 2), (2, 4, 0), (6, 15, 2), (3, 5, 1)]
 
 def plain_table(case: HandMade, row: int, hand_size: int) -> list[float]:
     """`features.table` for one row, as its words say."""
-    players, faces = case.players, case.faces
+    players, faces = case.sizes.players, case.sizes.faces
     around = [(int(case.seats[row]) + step) % players for step in range(players)]
     deck = [*range(1, faces + 1), 2]
     face, size, jokers = (int(number) for number in case.boards[row])
@@ -35,7 +35,7 @@ def plain_table(case: HandMade, row: int, hand_size: int) -> list[float]:
 
 def plain_classic(case: HandMade, row: int, hand_size: int) -> list[float]:
     """`features.classic` for one row, as its words say."""
-    faces = case.faces
+    faces = case.sizes.faces
     face, size, jokers = (int(number) for number in case.boards[row])
     board = [face] * (size - jokers) + [faces + 1] * jokers if face else [faces + 2]
     hand = [index + 1 for index, count in enumerate(case.hands[row]) for _ in range(count)]

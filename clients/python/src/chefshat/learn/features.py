@@ -6,10 +6,11 @@ both are equal to the last bit.
 """
 
 from functools import cache
-from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
+
+from chefshat.columns import Observations
 
 # Maximum number of jokers in a deck; counts of jokers are divided by it.
 MAX_JOKERS = 2
@@ -22,60 +23,7 @@ MAX_POINTS = 15
 MAX_PIZZAS = 30
 
 Bytes = npt.NDArray[np.uint8]
-Counts = npt.NDArray[np.uint32]
 Floats = npt.NDArray[np.float32]
-
-
-class Columns(Protocol):
-    """The columns that features need; `chefshat.vector.Observations` has them. R rows, N seats, F faces."""
-
-    @property
-    def pizzas(self) -> Counts:
-        """(R,): number of the pizza in its Shift."""
-
-    @property
-    def hands(self) -> Bytes:
-        """(R, F+1): own hand by face, jokers last."""
-
-    @property
-    def golden(self) -> Bytes:
-        """(R,): 1 if the own hand holds the Golden card."""
-
-    @property
-    def boards(self) -> Bytes:
-        """(R, 3): face on the board, number of cards, jokers among them."""
-
-    @property
-    def cards_left(self) -> Bytes:
-        """(R, N): cards in each hand."""
-
-    @property
-    def passed(self) -> Bytes:
-        """(R, N): 1 where a seat has passed."""
-
-    @property
-    def places(self) -> Bytes:
-        """(R, N): places of seats that have finished, from 1; else 0."""
-
-    @property
-    def roles(self) -> Bytes:
-        """(R, N): values of Role."""
-
-    @property
-    def points(self) -> Counts:
-        """(R, N): points so far."""
-
-    @property
-    def played(self) -> Bytes:
-        """(R, F+1): cards played in this Shift."""
-
-    @property
-    def gave(self) -> Bytes:
-        """(R, F+1): cards given in this Shift's exchange."""
-
-    @property
-    def received(self) -> Bytes:
-        """(R, F+1): cards received in this Shift's exchange."""
 
 
 def turn_actions(faces: int) -> int:
@@ -103,7 +51,7 @@ def table_width(players: int, faces: int) -> int:
     return 6 * (faces + 1) + 5 + (4 + ROLES) * players + KINDS + num_actions(faces)
 
 
-def classic(observations: Columns, mask_bits: Bytes, *, faces: int, hand_size: int, out: Floats | None = None) -> Floats:
+def classic(observations: Observations, mask_bits: Bytes, *, faces: int, hand_size: int, out: Floats | None = None) -> Floats:
     """Computes the paper's vector: the board, the own hand, the legal actions of a turn.
 
     Board (F slots): the cards of the play ascending, jokers as F+1, cut off after F slots; an empty board is F+2 in slot 0. Hand (H
@@ -144,7 +92,7 @@ def classic(observations: Columns, mask_bits: Bytes, *, faces: int, hand_size: i
 
 
 def table(
-    observations: Columns,
+    observations: Observations,
     seats: Bytes,
     kinds: Bytes,
     mask_bits: Bytes,

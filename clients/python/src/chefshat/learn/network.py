@@ -16,6 +16,7 @@ import numpy.typing as npt
 import safetensors
 import safetensors.numpy
 
+from chefshat.columns import Observations
 from chefshat.files import check_readable, write_atomically
 from chefshat.learn import features
 
@@ -149,9 +150,7 @@ class Network:
         if width != info.output_width:
             raise ValueError(f"its last layer has {width} outputs, not the {info.output_width} of its {info.output}")
 
-    def inputs(
-        self, observations: features.Columns, seats: features.Bytes, kinds: features.Bytes, mask_bits: features.Bytes
-    ) -> Floats:
+    def inputs(self, observations: Observations, seats: features.Bytes, kinds: features.Bytes, mask_bits: features.Bytes) -> Floats:
         """Computes the network's input, (R, `info.input_width`) float32."""
         info = self.info
         if info.input == "classic":
@@ -173,7 +172,7 @@ class Network:
         return values
 
     def actions(
-        self, observations: features.Columns, seats: features.Bytes, kinds: features.Bytes, mask_bits: features.Bytes
+        self, observations: Observations, seats: features.Bytes, kinds: features.Bytes, mask_bits: features.Bytes
     ) -> Actions:
         """Returns the action of each row, (R,) u16: the legal one with the highest output, the lowest index of equal ones.
 

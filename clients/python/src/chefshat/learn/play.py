@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from chefshat import Agent, Client, Decision, SeatInfo, join_options, outcome, pb
+from chefshat.columns import Observations, Sizes
 from chefshat.errors import exit_code
 from chefshat.learn import features, network
 from chefshat.learn.network import Network, NetworkFileError
@@ -37,7 +38,7 @@ class NetworkAgent(Agent):
         kinds = np.array([request.kind], np.uint8)
         seats = np.array([request.seat], np.uint8)
         mask_bits = np.frombuffer(request.mask_bytes, np.uint8)[np.newaxis]
-        return int(self._network.actions(Row(request), seats, kinds, mask_bits)[0])
+        return int(self._network.actions(observations_of(request), seats, kinds, mask_bits)[0])
 
     def _check(self, seat: SeatInfo) -> None:
         if seat.game_started is not None:
@@ -57,24 +58,16 @@ class NetworkAgent(Agent):
             )
 
 
-class Row:
-    """The observation of one decision as columns of one row, for `features`."""
-
-    def __init__(self, request: Decision) -> None:
-        none = np.zeros(request.faces + 1, np.uint8)
-        self.pizzas = np.array([request.pizza], np.uint32)
-        self.hands = _row(request.hand)
-        self.golden = np.array([request.golden], np.uint8)
-        self.boards = np.array([[request.board_face, request.board_size, request.board_jokers]], np.uint8)
-        self.cards_left = _row(request.cards_left)
-        self.passed = _row(request.passed)
-        self.places = _row(request.places)
-        self.roles = _row(request.roles)
-        self.points = np.minimum(request.points, np.iinfo(np.uint32).max).astype(np.uint32)[np.newaxis]
-        self.played = _row(request.played)
-        # The message omits empty gifts.
-        self.gave = _row(request.gave if len(request.gave) else none)
-        self.received = _row(request.received if len(request.received) else none)
+def observations_of(request: Decision) -> Observations:
+    """Converts the observation of a decision to a table of one row."""
+    sizes = Sizes(len(request.cards_left), request.faces, features.MAX_JOKERS, 0, request.size, request.turn_actions)
+    columns: dict[str, npt.ArrayLike] = {name: getattr(request, name) for name in Observations.columns() if hasattr(request, name)}
+    columns |= {"shifts": request.shift, "pizzas": request.pizza}
+    columns["boards"] = [request.board_face, request.board_size, request.board_jokers]
+    columns["points"] = np.minimum(request.points, np.iinfo(np.uint32).max)
+    # The message omits empty gifts, which are then zeros.
+    rows = {name: np.array(value)[np.newaxis] for name, value in columns.items() if np.size(value)}
+    return Observations.of(1, sizes, rows)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -88,7 +81,3 @@ def run(options: argparse.Namespace) -> int:
             return outcome.report(played, as_json=options.json)
 
     return exit_code(play, NetworkFileError, RulesDoNotFit, as_json=options.json)
-
-
-def _row(values: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
-    return values[np.newaxis]
