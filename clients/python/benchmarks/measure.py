@@ -1,6 +1,6 @@
-"""What the benchmarks of this folder share: rounds of a fixed time, the median of them, a line of text or of JSON.
+"""The shared part of the benchmarks: rounds of a fixed time, their median, and output as text or JSON.
 
-It imports nothing but the standard library, so that it runs beside any package in any environment.
+It imports only the standard library, so that it runs in any environment.
 """
 
 import argparse
@@ -18,7 +18,7 @@ DEFAULT_SECONDS = 2.0
 
 @dataclass(frozen=True)
 class Measured:
-    """Decisions per second in each round, and the number of decisions in all."""
+    """Decisions per second in each round, and the total number of decisions."""
 
     name: str
     per_second: list[float]
@@ -30,26 +30,28 @@ class Measured:
 
 
 def parser(description: str, example: str) -> argparse.ArgumentParser:
-    """A parser with the options every benchmark has."""
+    """Creates a parser with the options of all benchmarks."""
     made = argparse.ArgumentParser(
         description=description, epilog=f"example:\n  {example}", formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    made.add_argument("--rounds", type=int, default=DEFAULT_ROUNDS, help="rounds; the median is told (default: %(default)s)")
+    made.add_argument(
+        "--rounds", type=int, default=DEFAULT_ROUNDS, help="rounds, of which the median counts (default: %(default)s)"
+    )
     made.add_argument("--seconds", type=float, default=DEFAULT_SECONDS, help="length of a round (default: %(default)s)")
-    made.add_argument("--seed", type=int, default=1, help="seed of all chance (default: %(default)s)")
+    made.add_argument("--seed", type=int, default=1, help="the seed (default: %(default)s)")
     made.add_argument("--json", action="store_true", help="print one object of JSON")
     return made
 
 
 def measure(name: str, play: Callable[[], int], options: argparse.Namespace) -> Measured:
-    """Measures `play`, which plays on for a little and returns how many decisions it took. A first, short round does not count."""
+    """Measures `play`, which plays briefly and returns its number of decisions. A first, short round does not count."""
     _round(play, options.seconds / 4)
     rounds = [_round(play, options.seconds) for _ in range(options.rounds)]
     return Measured(name, [decisions / seconds for decisions, seconds in rounds], sum(decisions for decisions, _ in rounds))
 
 
 def show(measured: list[Measured], options: argparse.Namespace, **facts: object) -> None:
-    """Prints what was measured; `facts` (versions) are told with it."""
+    """Prints the results, with `facts` (versions)."""
     if options.json:
         rows = [
             {

@@ -25,7 +25,7 @@ NAMES = ["Ada", "Ben", "Cleo", "Dan"]
 
 
 class Games:
-    """Games to 15 points or of so many Shifts, one after another.
+    """Games to 15 points or of a number of Shifts, one after another.
 
     Attributes:
         env: the package's environment.
@@ -55,7 +55,7 @@ class Games:
         return 1
 
     def act(self) -> dict[str, Any] | None:
-        """As `step`; returns what the package tells of the turn if it ended a Shift."""
+        """Like `step`; returns the package's info of the turn if it ended a Shift."""
         # Plays with two jokers are marked with a 2 there, but refused.
         legal = np.flatnonzero(self._observation[-TURN_ACTIONS:] == 1)
         action = np.zeros(TURN_ACTIONS)

@@ -18,7 +18,7 @@ SEATS = 4
 
 
 def play(folder: str, shifts: int, seed: int, exchange: bool) -> None:
-    """Plays so many Shifts and prints what they come to."""
+    """Plays Shifts and prints their statistics."""
     # One more than is played, so that the game does not end.
     games = Games(folder, seed, shifts=shifts + 1, exchange=exchange)
     won = 0

@@ -1,6 +1,6 @@
-"""Decisions per second of this package's `VectorEnv` against a server, the client playing all four seats by a random masked policy.
+"""Decisions per second of this package's `VectorEnv`, with a random masked policy on all four seats.
 
-One process, one stream. Every decision counted is one that the server says it took.
+One process, one stream. The server's counts confirm the number of decisions.
 """
 
 import importlib.metadata
@@ -17,7 +17,7 @@ DEFAULT_GAMES = [1, 64, 1024]
 
 
 class Batches:
-    """Games of a batch, stepped without end."""
+    """A batch of games."""
 
     def __init__(self, env: VectorEnv, seed: int) -> None:
         self._env = env
@@ -33,7 +33,7 @@ class Batches:
         return len(actions)
 
     def check(self) -> None:
-        """Fails unless the server took as many decisions as were sent, all of them by the client, none of them invalid."""
+        """Checks that the server took all decisions sent, all of them by the client, none of them invalid."""
         totals = self._batch.totals
         counted = (totals.client_decisions, totals.decisions, totals.invalid_attempts)
         if counted != (self.decisions, self.decisions, 0):
@@ -43,9 +43,9 @@ class Batches:
 def main() -> int:
     """Measures and prints."""
     parser = measure.parser(__doc__.split("\n\n")[0], "python benchmarks/vector.py --games 1 64 1024 --rounds 5 --json")
-    parser.add_argument("--address", metavar="HOST:PORT", help="the server (default: one is started)")
+    parser.add_argument("--address", metavar="HOST:PORT", help="the server (default: a new one)")
     parser.add_argument(
-        "--games", type=int, nargs="+", default=DEFAULT_GAMES, metavar="N", help="games side by side (default: 1 64 1024)"
+        "--games", type=int, nargs="+", default=DEFAULT_GAMES, metavar="N", help="parallel games (default: 1 64 1024)"
     )
     options = parser.parse_args()
     measured = []

@@ -34,7 +34,7 @@ class Player:
 
 
 class Largest(Player):
-    """Plays the last of the legal actions that is not passing. Answers with an array of its own."""
+    """Takes the last legal action other than passing. Answers with an array-like object."""
 
     def get_action(self, observations: Any) -> Any:
         legal = np.flatnonzero(observations[28:] == 1)
@@ -57,7 +57,7 @@ class Rarest(Player):
 
 
 class Scribe(Largest):
-    """The same as `Largest`, and writes every call with what came with it to a file, one JSON array each."""
+    """Like `Largest`, and writes every call with its arguments to a file, one JSON array each."""
 
     def __init__(self, name: str, log_file: str) -> None:
         super().__init__(name)
@@ -122,7 +122,7 @@ class Slow(Present):
 
 
 class Knowing(Largest):
-    """Writes what it could take its command's place with to a file."""
+    """Writes the environment variables with a ticket to a file."""
 
     def __init__(self, name: str, file: str) -> None:
         super().__init__(name)
@@ -131,7 +131,7 @@ class Knowing(Largest):
 
 
 class Babbling(Largest):
-    """Prints what looks like answers, with Python and without, and asks for input that never comes."""
+    """Prints text that looks like answers, by `print` and to the descriptor, and reads its empty input."""
 
     def get_action(self, observations: Any) -> Any:
         print('{"id": 1, "value": null}')
@@ -144,7 +144,7 @@ class Babbling(Largest):
 
 
 class Stubborn(Player):
-    """Wants most what is never legal, an ace with two jokers that it does not hold; then passing."""
+    """Prefers an action that is never legal, an ace with two jokers; then passing."""
 
     def get_action(self, observations: Any) -> list[float]:
         return [0.0, 0.0, 2.0] + [0.0] * 196 + [1.0]
@@ -183,7 +183,7 @@ class Mortal(Largest):
 
 
 class Hanging(Largest):
-    """Never comes back from an action."""
+    """Hangs in an action."""
 
     def get_action(self, observations: Any) -> Any:
         time.sleep(3600)
@@ -210,7 +210,7 @@ class Stalling(Largest):
 
 
 class Answering(Largest):
-    """Answers an action with whatever it was made with."""
+    """Answers an action with its constructor's argument."""
 
     def __init__(self, name: str, answer: object) -> None:
         super().__init__(name)
@@ -224,7 +224,7 @@ class Answering(Largest):
 
 
 class Unspeakable(Largest):
-    """Answers an action with an object that is no number."""
+    """Answers an action with an object that is not a number."""
 
     def get_action(self, observations: Any) -> Any:
         return object()

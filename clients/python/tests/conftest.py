@@ -16,7 +16,7 @@ from chefshat.local_server import BINARY
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Lets jax keep what it compiles, on which nearly all the time of the learning tests goes, from run to run."""
+    """Caches JAX's compilations, which take most of the time of the learning tests, between runs."""
     if config.pluginmanager.hasplugin("cacheprovider"):
         os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(config.cache.mkdir("jax")))
         os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
@@ -25,7 +25,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.fixture(autouse=True)
 def no_ticket(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where the tests run there may be a ticket; it is not theirs."""
+    """Removes a ticket from the environment."""
     monkeypatch.delenv(TICKET, raising=False)
 
 
@@ -38,7 +38,7 @@ def fake() -> Iterator[FakeServer]:
 
 @pytest.fixture
 def toy() -> Iterator[FakeVector]:
-    """A fake server of the vector service's toy alone, which notes what it is asked."""
+    """A fake server with only the toy vector service, which stores its requests."""
     with FakeVector() as server:
         yield server
 

@@ -1,4 +1,4 @@
-"""The toy game of the fake server: who is asked what, what became of the answers, and when it is over.
+"""The toy game of the fake server: its decisions, the results of answers, and its end.
 
 It asks every seat that is played over the wire the same number of questions, seat after seat, and ends with a table in seat order.
 It knows nothing of cards: which actions are legal is made up. It remembers what arrived, so that tests can ask.
@@ -14,7 +14,7 @@ from chefshat import pb
 SEATS = 4
 SIZE = 214
 MAX_INVALID = 3
-# Questions a seat is asked unless the test says otherwise.
+# Default number of decisions of a seat.
 QUESTIONS = 5
 
 Outbox = queue.SimpleQueue[pb.SeatUpdate | None]
@@ -76,7 +76,7 @@ class FakeGame:
             seat.outbox.put(pb.SeatUpdate(handle=seat.handle, **update))
 
     def tell_events(self, seat: FakeSeat) -> None:
-        """Tells a seat the events it has not been told."""
+        """Sends a seat the events it has not seen."""
         if self.events[seat.told :]:
             self.tell(seat, events=pb.EventBatch(events=self.events[seat.told :]))
             seat.told = len(self.events)
@@ -119,7 +119,7 @@ class FakeGame:
         self.ask(seat)
 
     def ask(self, seat: FakeSeat) -> None:
-        """Puts the open decision to its seat."""
+        """Sends the open decision to its seat."""
         self.tell_events(seat)
         observation = pb.Observation(
             shift=1,
@@ -145,7 +145,7 @@ class FakeGame:
         self.tell(seat, decision=request)
 
     def answer(self, seat: FakeSeat, answer: pb.Answer) -> pb.AnswerResult:
-        """Takes an answer; the result is the caller's to pass on, and `advance` is called already."""
+        """Takes an answer and calls `advance`. The caller sends the result."""
         seat.answers.append(answer)
         result = pb.AnswerResult(decision_id=answer.decision_id, action=answer.action)
         if seat.last is not None and (seat.last.decision_id, seat.last.action) == (answer.decision_id, answer.action):

@@ -1,4 +1,4 @@
-"""A server in Python that plays the toy game of `fake_game` over the real protocol, and can be told to misbehave."""
+"""A server in Python that plays the toy game of `fake_game` over the real protocol, and can misbehave on request."""
 
 import queue
 import threading
@@ -140,7 +140,7 @@ class FakeServer(
         return pb.GetActionTableResponse(action_space=space, texts=["C1;Q1;J0", *["?"] * (SIZE - 1)])
 
     def ListRecords(self, request: pb.ListRecordsRequest, context: Context) -> pb.ListRecordsResponse:
-        """The games of rooms with the name that is wanted, whether over or not, two a page."""
+        """The games of rooms with a name, finished or not, two a page."""
         wanted = request.filter.room_name
         games = [game for game in self.games if not wanted or game.room.name == wanted]
         if request.newest_first:
@@ -249,7 +249,7 @@ class FakeServer(
             game.attach(seat, attach, stream.outbox, handle)
 
     def _answer(self, command: pb.SeatCommand, stream: Stream) -> bool:
-        """Takes an answer; returns whether the stream goes on."""
+        """Takes an answer. Returns whether the stream continues."""
         game, seat = stream.seats[command.handle]
         with game.lock:
             fault = self.fault(game, seat, command.answer)
@@ -269,7 +269,7 @@ class FakeServer(
 
 
 class _Spectators(spectator_grpc.SpectatorServiceServicer):
-    """Watching; a class of its own because both services have a `Watch`."""
+    """The spectator service, in a separate class because both services have a `Watch`."""
 
     def __init__(self, server: FakeServer) -> None:
         self._server = server

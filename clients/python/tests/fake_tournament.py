@@ -1,4 +1,4 @@
-"""Tournaments of the fake server: all participants meet in every game, as many games at a time as each of them can play.
+"""Tournaments of the fake server: all participants play in every game, as many games at a time as each of them can play.
 
 Of the protocol only what the package uses is here; how a tournament is drawn is the real server's business.
 """
@@ -66,7 +66,7 @@ class FakeTournaments(tournament_grpc.TournamentServiceServicer):
         return pb.GetTournamentResponse(tournament=self._find(request.tournament_id, context).shown)
 
     def ListTournaments(self, request: pb.ListTournamentsRequest, context: Context) -> pb.ListTournamentsResponse:
-        """Tournaments, newest first, those in one state alone if it is given, two a page."""
+        """Tournaments, newest first, optionally only those in one state, two a page."""
         at = int(request.page_token or "0")
         found = [made.shown for made in reversed(self._all) if request.state in (0, made.shown.state)]
         return pb.ListTournamentsResponse(
@@ -124,14 +124,14 @@ class FakeTournaments(tournament_grpc.TournamentServiceServicer):
         return pb.ListTournamentGamesResponse(games=games[at : at + 2], next_page_token=str(at + 2) if at + 2 < len(games) else "")
 
     def GetLeaderboard(self, request: pb.GetLeaderboardRequest, context: Context) -> pb.GetLeaderboardResponse:
-        """Everybody who has taken part, in no order."""
+        """All participants, in any order."""
         names = [entrant.name for tournament in self._all for entrant in tournament.shown.participants]
         return pb.GetLeaderboardResponse(rated=[pb.Rated(name=name) for name in names], games=len(names))
 
     # What the server's streams tell it.
 
     def enter(self, attach: pb.Attach, stream: Stream, handle: int) -> bool:
-        """Attaches a stream to the participant with this ticket; False if nobody has it."""
+        """Attaches a stream to the participant with this ticket. Returns False if there is none."""
         with self._lock:
             for tournament in self._all:
                 for number, entrant in enumerate(tournament.entrants):
@@ -203,14 +203,14 @@ class FakeTournament:
         return number, entrant
 
     def begin(self) -> None:
-        """Begins it, with the built-in agents behind those who joined."""
+        """Starts the tournament, with the built-in agents after the participants."""
         for name in self.shown.settings.built_in_agents:
             self.shown.participants.add(participant=len(self.shown.participants), name=name, built_in_agent=name)
         self.shown.state = pb.TOURNAMENT_STATE_PLAYING
         self.settle()
 
     def enter(self, entrant: Entrant, stream: Stream, handle: int) -> None:
-        """Attaches a stream to a participant and seats it where its games go on."""
+        """Attaches a stream to a participant and to the seats of its games."""
         if entrant.stream is not None:
             entrant.stream.tell(entrant.handle, detached=pb.Detached(reason=pb.DETACH_REASON_SUPERSEDED))
         if self.over:
@@ -242,7 +242,7 @@ class FakeTournament:
                 self._seat(entrant, game)
 
     def end(self, state: pb.TournamentState.ValueType) -> None:
-        """Ends it and says so."""
+        """Ends the tournament and notifies the participants."""
         self.shown.state = state
         for entrant in self.entrants:
             if entrant.stream is not None:

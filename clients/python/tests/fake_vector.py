@@ -67,7 +67,7 @@ class ToyGame:
         self.begin()
 
     def begin(self) -> None:
-        """Begins anew."""
+        """Starts the next game."""
         self.begun += 1
         self.episode = 1
         self.begin_episode()
@@ -240,7 +240,7 @@ class ToyStream:
 
 
 class ToyVector(vector_grpc.VectorServiceServicer):
-    """The service. `spoil` may change what is sent."""
+    """The service. `spoil` may change its messages."""
 
     def __init__(self) -> None:
         self.setups: list[pb.VectorSetup] = []
@@ -266,7 +266,7 @@ class ToyVector(vector_grpc.VectorServiceServicer):
 
 
 class FakeVector(ToyVector):
-    """The service on a server of its own; a context manager."""
+    """A server with only this service; a context manager."""
 
     def __init__(self) -> None:
         super().__init__()

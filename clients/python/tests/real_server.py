@@ -9,7 +9,7 @@ START_S = 60.0
 
 
 class RealServer(LocalServer):
-    """`chefshat serve` on a free port, with a data directory of its own; a context manager.
+    """`chefshat serve` on a free port, with a separate data directory; a context manager.
 
     It can be killed and started again, on the same address and data directory.
     """

@@ -1,4 +1,4 @@
-"""How fake services refuse: with the details the protocol says."""
+"""Refusals of fake services, with the protocol's details."""
 
 from typing import NoReturn
 
@@ -10,7 +10,7 @@ Context = grpc.ServicerContext
 
 
 def refuse(context: Context, code: grpc.StatusCode, reason: str, message: str, **metadata: str) -> NoReturn:
-    """Ends a call the way the protocol says: with google.rpc.ErrorInfo."""
+    """Ends a call with google.rpc.ErrorInfo."""
     detail = any_pb2.Any()
     detail.Pack(error_details_pb2.ErrorInfo(reason=reason, domain="chefshat", metadata=metadata))
     status = status_pb2.Status(code=code.value[0], message=message, details=[detail])

@@ -1,4 +1,4 @@
-"""A session on a stage: scripted responses in, requests out, and an agent that writes down what it is told. No tests of its own."""
+"""A session with scripted responses, and an agent that logs its hooks. Contains no tests."""
 
 from chefshat import Agent, ChefsHatError, Decision, PlayOptions, SeatInfo, SeatResult, pb
 from chefshat.seat_session import Ask
@@ -9,7 +9,7 @@ HAND = bytes(12)
 
 
 class Scribe(Agent):
-    """Writes down what it is told."""
+    """Logs its hooks."""
 
     def __init__(self) -> None:
         self.log: list[object] = []
@@ -79,7 +79,7 @@ def returned(sequence: int, seat: int = 0) -> pb.SeatUpdate:
 
 
 class Stage:
-    """A session and its driver's part."""
+    """A session and its driver."""
 
     def __init__(self, *tickets: str) -> None:
         self.scribes = {ticket: Scribe() for ticket in tickets or ("t",)}

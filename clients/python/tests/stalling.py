@@ -1,16 +1,16 @@
-"""An agent that is killed in the middle of a game, which it cannot finish itself. No tests of its own."""
+"""An agent that stalls in the middle of a game, to be killed there. Contains no tests."""
 
 import sys
 import threading
 
 import chefshat
 
-#: What it says on standard error when it is to be killed.
+#: Its message on standard error when it stalls.
 STALLS = "stalls"
 
 
 class Stalling(chefshat.RandomAgent):
-    """Plays two decisions of a game, says that it stalls, and never comes back from the third."""
+    """Takes two decisions, prints that it stalls, and hangs in the third."""
 
     def __init__(self) -> None:
         super().__init__(seed=1)

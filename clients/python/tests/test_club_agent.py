@@ -1,4 +1,4 @@
-"""What becomes of a player's answers, without a server and without a process: a puppet answers what the test says."""
+"""The agent of a player without a server and without a process: a puppet gives scripted answers."""
 
 import logging
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ RULES = pb.RuleSet(players=4, faces=11, jokers=2)
 
 
 class Puppet(AgentProcess):
-    """Answers by the script, in order, and notes what it was asked. An exception in the script is raised."""
+    """Answers by the script, in order, and stores its calls. Raises exceptions in the script."""
 
     def __init__(self, *script: object) -> None:
         super().__init__(AgentSpec("puppet:Puppet", "Puppet"))
@@ -45,7 +45,7 @@ def seated(*script: object, seat: int = 2, attempts: int = 5) -> PlayersClubAgen
 
 
 def begin(agent: PlayersClubAgent, seat: int) -> None:
-    """Tells the agent that its game and the first Shift of it begin."""
+    """Starts the game and its first Shift."""
     request = decision()
     request.seat_info.seat = seat
     agent.on_attached(request.seat_info)
@@ -69,7 +69,7 @@ def asked(
 
 
 def wanting(*actions: int) -> list[float]:
-    """200 numbers, the first action wanted most."""
+    """Returns 200 scores, highest for the first action."""
     numbers = [0.0] * T
     for rank, action in enumerate(actions):
         numbers[action] = 1.0 - rank / 10
@@ -156,7 +156,7 @@ def test_only_the_first_failures_are_logged(caplog: pytest.LogCaptureFixture) ->
 
 
 def gift(*cards: int, number: int = 9, seat: int = CHEF, given: int = 0) -> Decision:
-    """An exchange with these cards as legal gifts; the hand is that of `test_decision`. Of the face 1 some were given already."""
+    """Returns an exchange with these legal gifts and the hand of `test_decision`; `given` cards of face 1 were given before."""
     request = asked(*[T - 1 + card for card in cards], number=number, kind=pb.DECISION_KIND_EXCHANGE, seat=seat)
     request.request.observation.gave = bytes([given] + [0] * 11) if given else b""
     return request
@@ -231,7 +231,7 @@ def test_games_of_other_sizes_are_refused() -> None:
 
 
 def club() -> Players:
-    """Two processes, neither of them started: who is seated needs none."""
+    """Two processes that are not started."""
     return Players(AgentSpec("club_players:Largest", "Ada"), 2, attempts=5)
 
 

@@ -1,4 +1,4 @@
-"""What a player of the reference implementation is told of a game, event by event, against calls worked out by hand."""
+"""The calls to a player of the reference implementation, event by event, compared with calls written by hand."""
 
 from typing import Any, TypeAlias
 
@@ -113,7 +113,7 @@ def test_own_actions_are_reported_with_both_observations() -> None:
     assert info["Action_Random"] is False
     assert info["Observation_Before"] == asked
     assert info["Author_Possible_Actions"] == list(ACTIONS[::2])
-    # Nothing is decided out of turn: passing stands for that.
+    # Outside of its turn the mask has only passing.
     assert info["Observation_After"] == vector([11, 11, 11, 12] + [0] * 7, [*HAND[:12], 12], 199)
     assert info["Next_Player"] == HIS
 

@@ -1,4 +1,4 @@
-"""The sample for Ray clusters: what its runners play, without Ray; and all of it on a local cluster, only where Ray is installed.
+"""The sample for Ray clusters: its runners without Ray; and the whole sample on a local cluster if Ray is installed.
 
 Ray (extra `ray`) is heavy, so the tests do not ask for it.
 """

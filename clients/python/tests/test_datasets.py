@@ -29,7 +29,7 @@ pytestmark = pytest.mark.server
 
 DOCS = Path(__file__).resolve().parents[3] / "docs" / "datasets.md"
 TABLES = ["decisions", "expressions"]
-# Games simulated, and who plays them.
+# Simulated games, and their agents.
 GAMES = 6
 AGENTS = ["greedy", "random_unmasked", "random", "random"]
 
@@ -85,7 +85,7 @@ def documented_columns(table: str) -> list[tuple[str, str]]:
 
 
 def run(binary: Path, *arguments: object) -> Any:
-    """What the program says as JSON."""
+    """Returns the program's JSON output."""
     command = [str(binary), *(str(argument) for argument in arguments), "--json"]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
@@ -93,7 +93,7 @@ def run(binary: Path, *arguments: object) -> Any:
 
 
 class Talkative(RandomAgent):
-    """Plays at random, and says now and then how it feels."""
+    """Plays at random, and sends expressions."""
 
     def __init__(self, client: chefshat.Client, ticket: str) -> None:
         super().__init__(1)
@@ -111,7 +111,7 @@ class Talkative(RandomAgent):
 
 
 class Stubborn(Agent):
-    """Answers what is not legal."""
+    """Answers with illegal actions."""
 
     def decide(self, request: Decision) -> int:
         return int((~request.mask).nonzero()[0][0])
@@ -119,11 +119,11 @@ class Stubborn(Agent):
 
 @dataclass
 class Dataset:
-    """A folder in which datasets were made of the same records: `dataset` (all formats) and `gym`."""
+    """A folder with datasets of the same records: `dataset` (all formats) and `gym`."""
 
     folder: Path
     records: Path
-    # What `simulate` said, where the games were simulated.
+    # The output of `simulate`.
     metrics: Any = None
 
     def parquet(self, table: str) -> Path:

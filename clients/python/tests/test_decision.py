@@ -110,7 +110,7 @@ def test_attempts_left_may_be_unlimited() -> None:
         ({}, [13]),
         ({"board_face": 4, "board_size": 3, "board_jokers": 1}, [4, 4, 12]),
         ({"board_face": 12, "board_size": 1, "board_jokers": 1}, [12]),
-        # Eleven elevens and two jokers are thirteen cards: what is beyond eleven slots is cut off.
+        # Eleven elevens and two jokers are thirteen cards, of which the board shows eleven.
         ({"board_face": 11, "board_size": 13, "board_jokers": 2}, [11] * 11),
         ({"board_face": 10, "board_size": 12, "board_jokers": 2}, [10] * 10 + [12]),
     ],

@@ -1,4 +1,4 @@
-"""The Deep Q agent: what its parameters may be, that it learns, and that agents in a stack are agents alone."""
+"""The Deep Q agent: limits of its parameters, learning, and independence of agents in a stack."""
 
 import dataclasses
 from typing import Any
@@ -15,7 +15,7 @@ TINY = DeepQConfig(inputs=4, outputs=3, hidden=(16,), batch_size=8, memory_size=
 
 
 def transitions(config: DeepQConfig, rows: int, seed: int) -> Transitions:
-    """Made-up transitions."""
+    """Random transitions."""
     chance = np.random.default_rng(seed)
     made: dict[str, Any] = {
         "states": chance.random((rows, config.inputs), np.float32),
@@ -38,7 +38,7 @@ def ids(*numbers: int) -> Any:
 
 
 def plain(agents: Agents) -> Agents:
-    """With keys that numpy can read."""
+    """Converts keys for numpy."""
     return agents._replace(keys=jax.random.key_data(agents.keys))
 
 
@@ -49,7 +49,7 @@ def same(one: Agents, other: Agents) -> bool:
 
 
 def values(config: DeepQConfig, agents: Agents, state: list[float]) -> np.ndarray[Any, Any]:
-    """What each agent thinks the actions are worth."""
+    """Returns the action values of each agent."""
     seen = np.array([state], np.float32)
     return np.stack(
         [
@@ -89,7 +89,7 @@ def test_parameters_out_of_range_are_refused(changed: dict[str, Any], said: str)
 
 
 def test_a_bandit_is_learned() -> None:
-    """Which of three arms pays depends on what is seen; every pull is an episode."""
+    """The state determines which of three arms pays; every pull is an episode."""
     config = dataclasses.replace(TINY, epsilon_decay=0.99)
     agents = deep_q.start(config, [1, 2, 3])
     chance = np.random.default_rng(0)
@@ -114,7 +114,7 @@ def test_a_bandit_is_learned() -> None:
 
 @pytest.mark.parametrize("double", [False, True])
 def test_values_of_a_chain_are_discounted_from_its_end(double: bool) -> None:
-    """Three states in a row; only leaving the last one by action 1 pays. The value of going on halves with each step away."""
+    """A chain of three states; only leaving the last one by action 1 pays. The value halves with each step before it."""
     config = dataclasses.replace(TINY, discount=0.5, double=double)
     agents = deep_q.start(config, [5])
     steps = [(place, action) for place in range(3) for action in range(3)]
@@ -136,7 +136,7 @@ def test_values_of_a_chain_are_discounted_from_its_end(double: bool) -> None:
 
 
 def test_with_a_mask_the_next_value_is_that_of_a_legal_action() -> None:
-    """The best action of the next state is worth 0.9, the only legal one -0.6: what leads there is worth half of the latter."""
+    """The best action of the next state is worth 0.9, the only legal one -0.6: the previous action is worth half of the latter."""
     made: dict[str, Any] = {
         "states": np.eye(4, dtype=np.float32)[[0, 1, 1]],
         "actions": np.array([0, 0, 1], np.int32),
@@ -203,7 +203,7 @@ def test_epsilon_decays_with_every_update_and_stops() -> None:
     for number in range(20):
         agents = deep_q.learn(config, agents, ids(0), transitions(config, 1, number))
         seen.append(float(agents.epsilon[0]))
-    # Seven transitions are no batch yet.
+    # Seven transitions are fewer than a batch.
     assert seen[:7] == [1.0] * 7
     assert seen[7:14] == pytest.approx([0.9, 0.81, 0.729, 0.6561, 0.59049, 0.531441, 0.5])
     assert seen[14:] == [0.5] * 6
@@ -293,7 +293,7 @@ def test_agents_begin_with_networks_that_were_learned_before() -> None:
     assert np.array_equal(np.asarray(fresh.online["Dense_0"]["kernel"]), np.asarray(agents.online["Dense_0"]["kernel"]))
     assert np.asarray(fresh.epsilon).tolist() == [1.0, 1.0]
     assert np.asarray(fresh.remembered).tolist() == [0, 0]
-    # What learns on does not consume what it began with.
+    # Learning does not consume the initial networks.
     deep_q.learn(TINY, fresh, ids(0, 1), transitions(TINY, 2, 0))
     assert np.isfinite(np.asarray(agents.online["Dense_0"]["kernel"])).all()
     with pytest.raises(ValueError, match="2 networks and 1 seeds"):

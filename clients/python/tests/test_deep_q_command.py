@@ -1,4 +1,4 @@
-"""The command `deep-q` and its files: Ctrl-C keeps what was learned, and a training goes on as it was begun or not at all."""
+"""The command `deep-q` and its files: Ctrl-C saves the training, and a resumed training keeps its settings."""
 
 import dataclasses
 import json
@@ -45,11 +45,11 @@ def place(tmp_path: Path, real_address: str) -> Place:
 def test_a_training_resumes_after_ctrl_c(
     place: Place, processes: list["subprocess.Popen[str]"], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    # More Shifts than anybody would wait for: it ends because it is told to.
+    # Far more Shifts than are played before Ctrl-C.
     command = [sys.executable, "-m", "chefshat.learn", *place.arguments(1_000_000, "--save-every", "1", "--seed", "5")]
     running = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     processes.append(running)
-    # The network is written last: both files are there while the training goes on.
+    # The network is written last, so both files exist during the training.
     wait_until(place.out.exists, "the network is written", running)
     during = checkpoint.load(place.state)
     running.send_signal(signal.SIGINT)

@@ -1,4 +1,4 @@
-"""Deep Q agents in files: a training goes on to the last bit where it was, a network decides as the agent does."""
+"""Deep Q agents in files: a training resumes to the last bit, and a network decides like its agent."""
 
 import dataclasses
 from pathlib import Path
@@ -22,7 +22,7 @@ SMALL = DeepQConfig(hidden=(16, 8), batch_size=4, memory_size=16, target_every=3
 
 @pytest.fixture(scope="module")
 def training() -> Training:
-    """Two agents that have learned a little."""
+    """Two agents after some updates."""
     agents = deep_q.start(SMALL, [1, 2])
     for number in range(20):
         agents = deep_q.learn(SMALL, agents, ids(0, 1), transitions(SMALL, 2, number))

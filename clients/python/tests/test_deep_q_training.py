@@ -1,4 +1,4 @@
-"""Deep Q agents at seats learn from what happened; against the real server: training, tuning and playing by command."""
+"""Deep Q agents learn at their seats; against the real server: training, tuning and playing by command."""
 
 import json
 import re
@@ -94,7 +94,7 @@ def test_a_game_is_the_same_whatever_is_played_beside_it(real_address: str) -> N
     attempts = played.of_seats["valid"] + played.of_seats["wrong"]
     assert np.asarray(agents.remembered).tolist() == attempts[:, :, [0, 2]].sum(axis=1).ravel().tolist()
     assert np.asarray(alone.remembered).tolist() == np.asarray(agents.remembered[2:4]).tolist()
-    # Memory holds what the server rewarded: 1 for a valid action, -1 for a wrong one.
+    # The memory has the server's rewards: 1 for a valid action, -1 for an invalid one.
     assert set(np.asarray(agents.memory.rewards).ravel().tolist()) == {1.0, -1.0}
 
 
@@ -199,7 +199,7 @@ def test_parameters_are_tuned_and_trained_with(real_address: str, tmp_path: Path
     assert (first["hidden"], first["batch_size"], first["discount"]) == ([128, 256], 32, 0.95)
     assert first != second
     assert kept["parameters"] == kept["trials"][kept["best"]]["parameters"]
-    # The best and the paper's once more; what they achieved is not what they were chosen by.
+    # The best and the paper's parameters once more, with values that were not selected.
     again = kept["trained_afresh"]
     assert [trial["number"] for trial in again] == sorted({0, kept["best"]})
     for trial in again:

@@ -1,4 +1,4 @@
-"""The picture of what duplicate deals are worth."""
+"""The picture of the effect of duplicate deals."""
 
 import json
 from pathlib import Path

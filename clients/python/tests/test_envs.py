@@ -24,7 +24,7 @@ from chefshat.learn import features
 
 
 def hands(situations: Situations) -> NDArray[np.float32]:
-    """An observation of one's own."""
+    """A custom observation."""
     return np.asarray(situations.observations.hands, np.float32)
 
 
@@ -39,7 +39,7 @@ def test_gymnasium_finds_nothing_wrong(real_address: str, observation: Any, epis
     env = gymnasium.make(ENV_ID, address=real_address, observation=observation, episode=episode)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        # A function of one's own may make any number.
+        # The range of a custom function is unknown.
         warnings.filterwarnings("ignore", message=".*A Box observation space m.*imum value is")
         with redirect_stdout(io.StringIO()):
             check_env(env.unwrapped)

@@ -1,4 +1,4 @@
-"""What is made of the points of many Shifts."""
+"""The summary of an evaluation."""
 
 import numpy as np
 import pytest

@@ -15,7 +15,7 @@ from matplotlib.legend import Legend
 from chefshat.experiments import Estimate, Figure, Level, Line, Panel, Points, Result, Table, paper, results, stats
 from chefshat.experiments.__main__ import main, parse
 
-# What these are made with comes with the extra `learn`.
+# These need the extra `learn`.
 from chefshat.experiments import command, mechanics, page, plots, rules, tables  # isort: skip
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "experiments.md"
@@ -358,7 +358,7 @@ def test_mechanics_counts_shifts(quick_run: Path) -> None:
 def test_after_ten_illegal_actions_a_random_legal_one_is_taken(quick_run: Path) -> None:
     values = results.read(command.results_file(quick_run, "rules")).values
     assert values["may not pass idly"]["most_attempts_at_a_decision"] == rules.CONDITIONS["may not pass idly"].agent.wrong_limit
-    # Where idle passes are right, there is no such limit.
+    # Without the limit idle passes are legal.
     assert values["sees what is legal"]["most_attempts_at_a_decision"] > 10
 
 

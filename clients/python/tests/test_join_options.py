@@ -23,7 +23,7 @@ from chefshat import agent as command
 from chefshat.join_options import TICKET
 
 TESTS = Path(__file__).parent
-# Far longer than a test: who is killed comes back in time, however slow the machine is.
+# Far longer than a test, so that a killed command resumes in time on a slow machine.
 PATIENT = pb.RoomPolicy(decision_time_ms=600_000)
 GAMES = 6
 Processes = list["subprocess.Popen[str]"]
@@ -57,7 +57,7 @@ def start(processes: Processes, *arguments: str, ticket: str = "") -> "subproces
 
 
 def wait_until_it_stalls(process: "subprocess.Popen[str]") -> list[str]:
-    """Waits until the command is in the middle of a game. Returns what it had said by then, line by line."""
+    """Waits until the command is in the middle of a game. Returns its output so far, by line."""
     assert process.stderr is not None
     said: list[str] = []
     for line in process.stderr:
@@ -68,7 +68,7 @@ def wait_until_it_stalls(process: "subprocess.Popen[str]") -> list[str]:
 
 
 def kill_when_it_stalls(process: "subprocess.Popen[str]") -> list[str]:
-    """Kills the command in the middle of a game. Returns what it had said by then, line by line."""
+    """Kills the command in the middle of a game. Returns its output so far, by line."""
     said = wait_until_it_stalls(process)
     process.kill()
     process.wait(LIMIT_S)
@@ -76,7 +76,7 @@ def kill_when_it_stalls(process: "subprocess.Popen[str]") -> list[str]:
 
 
 def one_line(process: "subprocess.Popen[str]") -> dict[str, Any]:
-    """The line of JSON that a command prints when all has gone well."""
+    """Returns the line of JSON that a successful command prints."""
     printed, said = process.communicate(timeout=LIMIT_S)
     assert process.returncode == 0, said
     assert printed.count("\n") == 1
@@ -85,7 +85,7 @@ def one_line(process: "subprocess.Popen[str]") -> dict[str, Any]:
 
 
 def kill_and_go_on(address: str, way: list[str], processes: Processes, file: Path | None) -> dict[str, Any]:
-    """Takes the place, is killed in mid-game, and goes on with the ticket it printed or with that in the file."""
+    """Joins, is killed in mid-game, and resumes with the printed ticket or with that in the file."""
     kept = [] if file is None else ["--ticket-file", str(file)]
     joining = ["--address", address, *way, *kept]
     said = kill_when_it_stalls(start(processes, *joining, "--agent", "stalling:Stalling"))
@@ -130,12 +130,12 @@ def test_a_killed_command_resumes_its_tournament(address: str, in_file: bool, tm
     assert (told["event"], told["tournament_id"]) == ("finished", tournament_id)
     assert results.tournament.participants[told["participant"]].name == "Ada"
     assert len(games) == GAMES
-    # Two of them were begun before; all were finished after.
+    # Two of them began before the kill; all finished after it.
     assert {game["game_id"] for game in told["games"]} == set(games)
     for game in told["games"]:
         seat = games[game["game_id"]].seats[game["seat"]]
         assert (seat.participant, seat.place, seat.points) == (told["participant"], game["place"], game["points"])
-    # Nobody's place was taken by a substitute or a filler meanwhile.
+    # No seat was substituted meanwhile.
     assert [line.forfeited for line in results.standings] == [0] * 4
     assert [line.substituted for line in results.standings] == [0] * 4
 
@@ -233,7 +233,7 @@ def test_two_commands_do_not_share_a_ticket_file(
         assert command.main(joining) == 1
         assert f"another command uses {file}" in capsys.readouterr().err
         assert file.read_text() == ticket
-        # What held it is gone with its process.
+        # The end of the process releases the lock.
         first.kill()
         first.wait(LIMIT_S)
         assert command.main(joining) == 0

@@ -1,4 +1,4 @@
-"""Experiments 2 and 3: what is worked out of what the server counts, and where the networks of 3 come from."""
+"""Experiments 2 and 3: statistics from the server's counts, and the initial networks of Experiment 3."""
 
 import dataclasses
 import importlib.metadata
@@ -87,7 +87,7 @@ def test_experiment_3_begins_with_the_networks_of_2(real_address: str, tmp_path:
     with monkeypatch.context() as patched:
         patched.setattr(learning, "learn", never)
         again = rules.networks(Config(real_address, (1, 2), True, tmp_path), quiet)
-    # A seed alone learns what it learns beside another.
+    # A seed gives the same result alone and next to another.
     (tmp_path / "alone").mkdir()
     alone = rules.networks(Config(real_address, (2,), True, tmp_path / "alone"), quiet)
     jax.tree.map(np.testing.assert_array_equal, both, again)

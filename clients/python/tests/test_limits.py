@@ -1,4 +1,4 @@
-"""What is never sent because it would be too much: large requests, annotations nobody would record, long entropy."""
+"""Limits of messages: large requests, invalid annotations, long entropy."""
 
 import itertools
 import logging
@@ -50,7 +50,7 @@ def test_the_largest_annotations_of_many_seats_are_cut_too() -> None:
 
 
 def annotations_of(size: int) -> pb.Annotations:
-    """Annotations of so many bytes."""
+    """Returns annotations of a given size."""
     annotations = pb.Annotations(extra={"why": "x" * (size - 20)})
     annotations.extra["why"] += "x" * (size - annotations.ByteSize())
     assert annotations.ByteSize() == size

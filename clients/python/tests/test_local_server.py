@@ -1,4 +1,4 @@
-"""A server of one's own: how the program is found, what is said if there is none, and that it goes when its process does."""
+"""The local server: finding the program, the error without it, and stopping with the process."""
 
 import os
 import signal
@@ -14,10 +14,10 @@ from chefshat import ChefsHatError, LocalServer, local_server
 from chefshat.local_server import BINARY
 
 SOURCE = str(Path(chefshat.__file__).parents[1])
-# Seconds to wait for what must happen: generous, because nothing is measured by it.
+# Time limit in seconds: generous, because nothing is measured by it.
 WAIT_S = 60
 
-# Prints where the shared server listens and the number of its process, then ends in the way it is told.
+# Prints the address and the process id of the shared server, then ends in a given way.
 ORPHAN = """
 import os, signal, sys
 import chefshat
@@ -134,6 +134,6 @@ def test_the_shared_server_goes_with_its_process(way: str) -> None:
     codes = {"return": 0, "kill": -signal.SIGKILL}
     assert done.returncode == codes.get(way, done.returncode)
     _, process = done.stdout.split()
-    # The server is the child of a process that is gone, so that only its absence can be waited for.
+    # The server's parent has ended, so the test can only wait for its absence.
     watch = f"while kill -0 {process} 2>/dev/null; do sleep 0.05; done"
     subprocess.run(["sh", "-c", watch], check=True, timeout=WAIT_S)

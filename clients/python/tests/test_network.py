@@ -1,4 +1,4 @@
-"""Network files: what is written is read, what is wrong is refused in words, and the fixtures shared with Rust still hold."""
+"""Network files: writing and reading, errors, and the fixtures shared with Rust."""
 
 import contextlib
 import itertools
@@ -132,7 +132,7 @@ def test_nan_outputs_never_win() -> None:
 
 
 def test_a_nan_hidden_unit_counts_as_zero() -> None:
-    """Finite weights may have sums that are none: inf - inf. `chefshat` takes 0 there too; otherwise all outputs would be lost."""
+    """Finite weights may overflow to NaN (inf - inf). Both implementations use 0 there; otherwise all outputs would be NaN."""
     huge = np.finfo(np.float32).max
     layers = chance_layers(INFO)
     layers[0].weight[0, :2] = huge, -huge

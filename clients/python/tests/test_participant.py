@@ -1,4 +1,4 @@
-"""Participants of tournaments without a connection: who is attached when, which agent plays which game, how it ends."""
+"""Tournament participants without a connection: attaching, agents of games, and the end."""
 
 import pytest
 from stage import Scribe, decision, detached, ended, events
@@ -26,7 +26,7 @@ class Cup:
         return self.scribes.setdefault(seat.game_id, Scribe())
 
     def connect(self) -> list[tuple[str, int]]:
-        """A new connection: what is attached on it, in order, and from which event on."""
+        """Connects. Returns the attachments in order, with their first events."""
         self.session.connected()
         attaches = [command.attach for request in self.session.take_requests() for command in request.commands]
         assert all(attach.entropy == b"mine" for attach in attaches)

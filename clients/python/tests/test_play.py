@@ -124,7 +124,7 @@ def test_a_broken_stream_is_restored(fake: FakeServer, play: Player, moment: str
         assert results[ticket].decisions == QUESTIONS - unheard
         assert results[ticket].invalid == results[ticket].late == 0
     for seat in game.seats.values():
-        # Each connection asks for what the ones before did not bring.
+        # Each connection asks for the events that are missing.
         wanted = [attach.from_sequence for attach in seat.attaches]
         assert wanted[0] == 0
         assert wanted == sorted(wanted)
@@ -162,7 +162,7 @@ def test_annotations_that_are_too_much_cost_neither_the_answer_nor_the_stream(fa
 
 
 class Stubborn(Agent):
-    """Answers what is never legal, and counts."""
+    """Answers with illegal actions, and counts them."""
 
     def __init__(self) -> None:
         self.attempts_left: list[int | None] = []
@@ -217,7 +217,7 @@ def test_an_unknown_ticket_stops_its_seat_alone(fake: FakeServer, play: Player) 
 
 
 class Waiting(Agent):
-    """Waits before its first answer until the test lets it go on."""
+    """Waits for the test before its first answer."""
 
     def __init__(self) -> None:
         self.reached = threading.Event()

@@ -111,7 +111,7 @@ def test_a_player_gets_the_calls_of_the_reference(real_address: str, tmp_path: P
 
 
 def check_order(methods: list[str]) -> None:
-    """Matches begin, have actions, and end; between two of them there may be an exchange and a special action."""
+    """Checks the order of calls: matches with actions, and exchanges and special actions between them."""
     beginning = [index for index, method in enumerate(methods) if method == "update_start_match"]
     ending = [index for index, method in enumerate(methods) if method == "update_end_match"]
     assert len(beginning) == len(ending) >= 3
@@ -126,7 +126,7 @@ def check_order(methods: list[str]) -> None:
 
 
 def check_asking(calls: list[list[Any]]) -> None:
-    """What is chosen is what is told afterwards, with what was seen before; what is given is what is told to be given."""
+    """Compares choices and gifts with the calls that report them."""
     chosen = [(call[1], call[2]) for call in calls if call[0] == "get_action"]
     done = [call[1] for call in calls if call[0] == "update_my_action"]
     assert len(chosen) == len(done) > 10
@@ -172,7 +172,7 @@ def test_illegal_choices_are_counted_as_often_as_the_reference_would_ask(
     code = room(real_address, [None, "random", "random", "random"], rules=pb.RuleSet(target_shifts=3))
     assert main(command(real_address, code, "Stubborn", "--json", "--attempts", "2")) == 0
     said = one_line(capsys)
-    # Never what it wants most: two attempts in vain at every turn, and at every card it has to give.
+    # Never its first choice: two invalid attempts at every turn and at every gift.
     assert said["invalid"] == 2 * said["replaced"] > 0
     assert said["replaced"] <= said["decisions"]
 
@@ -192,7 +192,7 @@ def test_the_game_continues_when_the_player_is_given_up(real_address: str, capsy
     said = one_line(capsys)
     assert said["event"] == "finished"
     assert said["restarts"] == 1
-    # Four actions of each life are its own, and what it chose otherwise.
+    # Four actions of each process are its own.
     assert 0 < said["replaced"] < said["decisions"]
 
 
@@ -384,7 +384,7 @@ def test_a_killed_command_resumes(
     assert own >= 4
     if where == "room":
         assert games[0]["seat"] == 1
-        # The player of the second process was told the game from the beginning.
+        # The player of the second process got all events of the game.
         check_order(
             [call[0] for line in log.read_text().splitlines() if not (call := json.loads(line))[0].startswith(("get", "do"))]
         )

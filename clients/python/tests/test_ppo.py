@@ -1,4 +1,4 @@
-"""PPO: what it draws is always legal, it learns what pays, and it goes on from a file as if nothing had been."""
+"""PPO: legal samples, learning, and resuming from a file."""
 
 import dataclasses
 from pathlib import Path
@@ -27,7 +27,7 @@ def rows(count: int, seed: int) -> np.ndarray:
 
 def test_samples_are_legal_and_match_their_probabilities() -> None:
     learner = ppo.start(1, 334, 214, HYPER)
-    # Weights far from the small ones of the start, so that legal actions differ.
+    # Larger weights than the initial ones, so that legal actions differ.
     params = jax.tree.map(lambda weights: weights * 30, learner.params)
     inputs = rows(64, seed=1)
     legal = inputs[:, -214:] > 0
@@ -37,7 +37,7 @@ def test_samples_are_legal_and_match_their_probabilities() -> None:
     assert np.take_along_axis(legal[np.newaxis], actions[:, :, np.newaxis], axis=2).all()
     assert (log_probabilities <= 1e-6).all()
     assert np.isfinite(values).all()
-    # The row with the most to choose from; of its actions the one drawn first.
+    # The row with the most legal actions, and its first sample.
     row = int(np.argmax(legal.sum(axis=1)))
     likely = float(np.exp(log_probabilities[0, row]))
     seen = float((actions[:, row] == actions[0, row]).mean())
@@ -48,7 +48,7 @@ def test_it_learns_which_action_pays() -> None:
     learner = ppo.start(1, 334, 214, HYPER)
     inputs = rows(256, seed=3)
     legal = inputs[:, -214:] > 0
-    # The legal action with the lowest index pays, every other one costs.
+    # The legal action with the lowest index has a positive reward, every other one a negative.
     best = legal.argmax(axis=1)
 
     def share(params: ppo.Params) -> float:
@@ -74,7 +74,7 @@ def test_rows_without_weight_are_ignored() -> None:
     actions, log_probabilities, _ = ppo.act(learner.params, jax.random.key(1), inputs)
     gains = jnp.linspace(-1, 1, 32)
     nothing = Samples(inputs, actions, log_probabilities, gains, gains, jnp.zeros(32))
-    # Adam divides nothing by nothing but its epsilon: the networks stay as they were.
+    # Adam's epsilon prevents a division by zero: the networks do not change.
     after, losses = ppo.learn(learner, nothing, jnp.float32(1.0), jnp.float32(1.0), HYPER)
     for old, new in zip(jax.tree.leaves(learner.params), jax.tree.leaves(after.params), strict=True):
         np.testing.assert_array_equal(old, new)

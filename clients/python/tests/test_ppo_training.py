@@ -1,4 +1,4 @@
-"""Training by self-play against the real server: a small game is learned, the command writes its files and goes on from them."""
+"""Training by self-play against the real server: learning a small game, and the command with its files."""
 
 import json
 from dataclasses import replace
@@ -36,7 +36,7 @@ def test_a_small_game_is_learned(real_address: str) -> None:
         evaluate(training.network("small"), "random", games=150, seed=2, rules=rules, address=real_address).points
         for training in (before, after)
     ]
-    # Half of the 5 points is what chance has; the untrained network is no better than that by much.
+    # A random player gets half of the 5 points; the untrained network is hardly better.
     assert points[1] > max(3.0, points[0] + 0.3), points
 
 

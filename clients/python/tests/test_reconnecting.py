@@ -1,4 +1,4 @@
-"""Lost connections and substitutes, without a connection: what is said again on the next one, and what is not."""
+"""Lost connections and substitutes, without a connection: what the session repeats."""
 
 from collections.abc import Callable
 
@@ -13,7 +13,7 @@ def test_reconnecting_resumes_after_the_last_event(stage: Stage) -> None:
     stage.session.lost()
     stage.connect()
     assert stage.sent[0].attach.from_sequence == 4
-    # An event that comes twice all the same is told once.
+    # A repeated event is reported once.
     stage.say(attached(), events(3, 4))
     assert [line for line in stage.log if line[0] == "event"] == [("event", number) for number in (1, 2, 3, 4)]  # type: ignore[index]
     stage.say(ended(5), detached("GAME_OVER"))
@@ -127,7 +127,7 @@ def test_a_substitution_that_is_over_is_not_answered(stage: Stage) -> None:
     assert stage.said() == []
     stage.answer(ask)
     assert stage.said() == [(0, "answer")]
-    # Attaching ends it, so what happened before is over too.
+    # Attaching ends substitutions of the past.
     stage.session.lost()
     stage.connect()
     stage.say(attached(next_sequence=10), substituted(9))

@@ -17,7 +17,7 @@ from chefshat import ChefsHatError, Transitions, VectorEnv, local_server, pb, re
 from chefshat.local_server import BINARY
 from chefshat.transitions import concatenate
 
-# A row of a dataset, but for what a test changes.
+# The default row of a dataset.
 RULES = json.dumps({"players": 4, "faces": 11, "jokers": 2, "targetPoints": 15})
 ROW: dict[str, Any] = {
     "game_id": "a",
@@ -120,7 +120,7 @@ def test_invalid_attempts_are_transitions_of_their_own(tmp_path: Path) -> None:
     assert made.actions.tolist() == [1, 5, 65535, 7, 5, 65535]
     assert made.attempts.tolist() == [0, 0, 1, 2, 0, 1]
     assert made.invalid.tolist() == [False, True, True, False, True, True]
-    # The last attempt brings what the default decision brought, too.
+    # The last attempt also gets the reward of the default action.
     assert made.rewards.tolist() == [-0.25, -1, -1, -0.25, -1, -1.25]
     assert made.ended.tolist() == [False, False, False, False, False, True]
     assert made.after.observations.hands[:, 0].tolist() == [1, 1, 1, 1, 1, 0]

@@ -1,4 +1,4 @@
-"""Games and tournaments that go on while their server dies and comes back: the agents notice nothing but lost connections."""
+"""Games and tournaments that continue when their server is killed and restarted: agents only lose connections."""
 
 import asyncio
 import os
@@ -19,9 +19,9 @@ pytestmark = pytest.mark.server
 
 # Keeps trying for as long as a server may take to start on a slow machine.
 PATIENT = Backoff(first_s=0.005, max_s=0.05, attempts=2000)
-# After so many acknowledged decisions of the game the server is killed.
+# Acknowledged decisions of the game after which the server is killed.
 KILLS = (5, 20, 21, 60)
-# Seconds to wait for what must happen: generous, because nothing is measured by it.
+# Time limit in seconds: generous, because nothing is measured by it.
 WAIT_S = 120.0
 
 Agents = dict[str, Agent]
@@ -42,10 +42,10 @@ def play_asyncio(address: str, agents: Agents) -> dict[str, SeatResult]:
 
 
 class Ledger:
-    """What all agents were told. At certain counts they wait until the server has been killed."""
+    """The log of all agents. At certain counts they wait until the server has been killed."""
 
     def __init__(self) -> None:
-        # The action of each acknowledged decision, by who took it (the seat, or the game and the seat) and its number.
+        # The action of each acknowledged decision, by seat (or game and seat) and number.
         self.accepted: dict[tuple[object, int], int] = {}
         self.lock = threading.Lock()
         self.reached = {count: threading.Event() for count in KILLS}
@@ -63,7 +63,7 @@ class Ledger:
 
 
 class Noting(RandomAgent):
-    """Plays at random and notes what is acknowledged."""
+    """Plays at random and stores the acknowledgements."""
 
     def __init__(self, seed: int, ledger: Ledger, who: object) -> None:
         super().__init__(seed)
@@ -90,7 +90,7 @@ def test_agents_play_on_through_restarts(play: Player, tmp_path: Path) -> None:
         pytest.skip(f"{BINARY} is not set: name the chefshat binary to play against the real server")
     ledger = Ledger()
     results: dict[str, SeatResult] = {}
-    # An address of its own: connections come from another one, and can never be given the server's port while it is away.
+    # A separate address, so that no outgoing connection takes the server's port while it is down.
     with RealServer(Path(binary), tmp_path, host="127.0.0.2") as server:
         with chefshat.Client(server.address) as client:
             room = client.create_room(rules=pb.RuleSet(target_shifts=2))
@@ -117,7 +117,7 @@ def test_agents_play_on_through_restarts(play: Player, tmp_path: Path) -> None:
     for ticket, agent in agents.items():
         assert results[ticket].finished
         assert results[ticket].reconnects >= len(KILLS)
-        # Nobody was asked twice, and no event was missed or told twice.
+        # No decision was asked twice, and no event was missed or repeated.
         assert set(agent.asked.values()) == {1}
         assert agent.sequences == list(range(1, len(agent.sequences) + 1))
 
@@ -142,7 +142,7 @@ def test_a_tournament_survives_restarts(tmp_path: Path) -> None:
         name="Coppa",
         format=pb.TOURNAMENT_FORMAT_ROUND_ROBIN,
         rules=pb.RuleSet(target_shifts=1),
-        # Generous times: what is tested is that nothing is lost, not how fast connections are made.
+        # Generous times: the test is about losses, not about the speed of connections.
         policy=pb.RoomPolicy(decision_time_ms=600_000),
         rounds=2,
         games_per_pairing=2,

@@ -28,7 +28,7 @@ LIMIT_S = 120
 
 
 def run_python(*arguments: str, folder: Path = PACKAGE) -> str:
-    """Runs a Python of its own in a folder, and returns what it printed."""
+    """Runs Python in a folder, and returns its output."""
     done = subprocess.run([sys.executable, *arguments], capture_output=True, text=True, timeout=LIMIT_S, cwd=folder)
     assert done.returncode == 0, done.stderr
     return done.stdout

@@ -1,4 +1,4 @@
-"""Advantages against a plain loop over each seat's own chain, and what places are worth."""
+"""Advantages compared with a plain loop over each seat's chain, and rewards of places."""
 
 import itertools
 from collections import defaultdict
@@ -34,7 +34,7 @@ def made_up(seed: int) -> Rollout:
 
 def plain(rollout: Rollout, discount: float, gae_lambda: float) -> dict[tuple[int, int], float]:
     """The advantage of every decision of which it is known, by step and game."""
-    # For each game and seat what happened to it, in order: its decisions (step) and the rewards of its ends (None, reward).
+    # For each game and seat, in order: its decisions (step) and the rewards of its ends (None, reward).
     stories: dict[tuple[int, int], list[int | float]] = defaultdict(list)
     for step in range(STEPS):
         for game in range(GAMES):
@@ -51,7 +51,7 @@ def plain(rollout: Rollout, discount: float, gae_lambda: float) -> dict[tuple[in
                 chain.append(what)
                 continue
             values = [float(rollout.values[step, game]) for step in chain]
-            # What goes on after the rollout leads to its last decision.
+            # A chain that continues bootstraps from its last decision.
             deltas = [discount * later - value for value, later in itertools.pairwise(values)]
             if what is not None and values:
                 deltas.append(what - values[-1])

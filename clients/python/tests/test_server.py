@@ -28,7 +28,7 @@ sys.exit(main())
 
 
 class Checking(RandomAgent):
-    """Plays at random and checks what it is told against itself."""
+    """Plays at random and checks the consistency of its events."""
 
     def __init__(self, seed: int) -> None:
         super().__init__(seed)
@@ -82,7 +82,7 @@ def test_a_game_over_one_blocking_stream(real_address: str) -> None:
         results = client.play_many(agents)
         check(agents, results)
         assert client.get_room(room.room.room_id).state == pb.ROOM_STATE_FINISHED
-        # Built-in agents played nothing here, so the record holds the decisions of these four.
+        # There are no built-in agents, so the record has the decisions of these four.
         lines = list(client.record(room.room.game_id))
         assert lines[0].header.game_id == room.room.game_id
         assert lines[-1].footer.decisions == sum(result.decisions for result in results.values())
@@ -170,7 +170,7 @@ def test_reconnections_miss_no_event(
     real_address: str, play: Callable[[str, dict[str, Checking]], dict[str, chefshat.SeatResult]]
 ) -> None:
     with chefshat.Client(real_address) as client, Proxy(real_address) as proxy:
-        # Generous times: what is tested is that no decision is lost, not how fast connections are made.
+        # Generous times: the test is about lost decisions, not about the speed of connections.
         policy = pb.RoomPolicy(decision_time_ms=60_000)
         room = client.create_room("cut", rules=pb.RuleSet(target_shifts=2), policy=policy)
         agents: dict[str, Checking] = {}
@@ -192,7 +192,7 @@ def test_reconnections_miss_no_event(
 
 
 class Stubborn(Agent):
-    """Answers what is not legal whenever it may, and counts."""
+    """Answers with illegal actions while attempts remain, and counts them."""
 
     def __init__(self) -> None:
         self.asked = 0

@@ -36,7 +36,7 @@ def test_every_seat_has_its_own_entropy() -> None:
     first = [command.attach.entropy for request in session.take_requests() for command in request.commands]
     assert [len(entropy) for entropy in first] == [32, 32, 32]
     assert len(set(first)) == 3
-    # The game may have begun with what was said on the first connection, so it is said again and not drawn anew.
+    # The game may have begun with the entropy of the first connection, so it is repeated.
     session.lost()
     session.connected()
     assert [command.attach.entropy for request in session.take_requests() for command in request.commands] == first

@@ -1,4 +1,4 @@
-"""The file of a ticket: what is in it, who holds it, and what is left of it."""
+"""The file of a ticket: contents, lock and deletion."""
 
 import os
 import stat

@@ -1,4 +1,4 @@
-"""Tournaments with both clients and the command, on the fake server and the real one. Participants alone: `test_participant`."""
+"""Tournaments with both clients and the command, on the fake and the real server. Without a server: `test_participant`."""
 
 import asyncio
 import json
@@ -22,7 +22,7 @@ from chefshat.participant import MakeAgent
 
 PACKAGE = Path(__file__).resolve().parents[1]
 QUICK = Backoff(first_s=0.001, max_s=0.05, attempts=100)
-# Seconds to wait for what must happen: generous, because nothing is measured by it.
+# Time limit in seconds: generous, because nothing is measured by it.
 LIMIT_S = 120
 GAMES = 6
 
@@ -51,7 +51,7 @@ def play(request: pytest.FixtureRequest) -> Player:
 
 
 class Checking(RandomAgent):
-    """Plays at random in one game, and looks at what it is told."""
+    """Plays at random in one game, and checks its events."""
 
     def __init__(self, seat: SeatInfo) -> None:
         super().__init__(seat.seat)
@@ -87,7 +87,7 @@ def settings(*built_in: str, start_when_joined: int = 4) -> pb.TournamentSetting
 
 
 def compare(client: chefshat.Client, tournament_id: str, played: list[list[SeatResult]]) -> None:
-    """What participants tell of their games is what the server has counted."""
+    """Compares the participants' results with the server's counts."""
     games = list(client.tournament_games(tournament_id))
     assert len(games) == GAMES
     for game in games:
@@ -221,7 +221,7 @@ def test_a_tournament_that_is_closed_ends_for_its_participants(address: str, pla
         (result,) = playing.result(LIMIT_S)
         assert (result.finished, result.abort_reason) == (False, "CLOSED")
         assert client.get_tournament(tournament_id).state == pb.TOURNAMENT_STATE_CLOSED
-        # Who comes later finds nothing more to play.
+        # A late participant has no games.
         assert play(address, ticket, Checking) == []
 
 

@@ -1,4 +1,4 @@
-"""Transitions against a toy: which decision leads where, rewards of one's own, and tables that are cut and put together."""
+"""Transitions of a toy game: pairs of decisions, custom rewards, and slicing and concatenating tables."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ def legal(batch: Batch) -> NDArray[np.uint16]:
 
 
 def collect(env: VectorEnv, steps: int) -> list[tuple[Transitions, Batch]]:
-    """Steps with the action 199, and what became complete with each step."""
+    """Takes steps with the action 199. Returns the transitions of each step."""
     found = []
     for _ in range(steps):
         batch = env.step(legal(env.batch))
@@ -67,7 +67,7 @@ def test_transitions_pair_each_decision_with_the_seats_next(toy: FakeVector) -> 
             assert not transitions.invalid.any()
             for game in np.unique(batch.endings.games).tolist():
                 played[game] += 1
-    # Everything but what still waits: at most one decision of each seat.
+    # All decisions except for the open ones: at most one of each seat.
     assert games * steps - games * PLAYERS <= found < games * steps
 
 
@@ -111,7 +111,7 @@ def test_custom_rewards_replace_the_servers(toy: FakeVector) -> None:
     assert batches[3].rewards.tolist() == [2, 2]
     assert batches[4].endings.rewards.tolist() == [0.5, 2, 1.5, 1]
     assert batches[4].transitions.rewards.tolist() == [0.5, 2, 1.5, 1, 2]
-    # Game 0 has begun its next episode, in which nothing has been decided; game 1 goes on.
+    # Game 0 has started its next episode, without a decision so far; game 1 continues.
     assert batches[4].rewards.tolist() == [0, 2]
 
 
@@ -163,5 +163,5 @@ def test_tables_can_be_sliced_and_concatenated(toy: FakeVector) -> None:
     ]
     with pytest.raises(ValueError, match="nothing to concatenate"):
         concatenate([])
-    # Both are flattened by name alone.
+    # Both are flattened by name.
     assert not Observations.columns().keys() & Endings.columns().keys()

@@ -1,4 +1,4 @@
-"""`VectorEnv` against a toy: what is asked, what each column holds, what follows from it, what is said when it goes wrong."""
+"""`VectorEnv` with a toy server: requests, columns, results and errors."""
 
 import gc
 from collections.abc import Iterable

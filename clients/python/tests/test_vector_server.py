@@ -1,4 +1,4 @@
-"""`VectorEnv` against the real server: what holds in every game, and what is refused."""
+"""`VectorEnv` with the real server: invariants of games, and refusals."""
 
 from collections import Counter
 from typing import Any
