@@ -244,7 +244,7 @@ def test_a_player_that_fails_to_start_takes_no_seat(real_address: str, capsys: p
 def test_rooms_that_such_players_do_not_know_are_refused(real_address: str, capsys: pytest.CaptureFixture[str]) -> None:
     code = room(real_address, [None, "random", "random"], rules=pb.RuleSet(players=3))
     assert main(command(real_address, code, "Largest")) == 1
-    assert "games of 4 players, 11 faces and 2 jokers alone; this one has 3, 11 and 2" in capsys.readouterr().err
+    assert "only play games of 4 players, 11 faces and 2 jokers; this one has 3, 11 and 2" in capsys.readouterr().err
 
 
 def test_the_actions_are_those_of_the_server(real_address: str) -> None:
@@ -337,7 +337,7 @@ def test_a_tournament_that_such_players_do_not_know_is_refused(real_address: str
         assert main(in_cup(real_address, made.join_code, "Largest")) == 1
         client.close_tournament(made.tournament.tournament_id, made.owner_token)
     said = one_line(capsys)
-    assert "this one has 3, 11 and 2; its games in the tournament will be played without it" in said["message"]
+    assert "this one has 3, 11 and 2; the tournament will be played without it" in said["message"]
 
 
 @pytest.mark.parametrize("where", ["room", "tournament"])
