@@ -13,9 +13,9 @@ pub enum Action {
     Play {
         /// The face.
         face: Face,
-        /// How many cards of it, 1..=face.
+        /// Number of its cards, 1..=face.
         quantity: u8,
-        /// How many jokers go with them, 0..=2.
+        /// Number of jokers, 0..=2.
         jokers: u8,
     },
     /// Play one joker alone.
@@ -51,8 +51,8 @@ impl fmt::Display for Action {
     }
 }
 
-/// The numbering of actions for a number of faces F. With T = 3F(F+1)/2 + 2 (standard 200) the
-/// actions of a turn are 0..T, in the order of the paper's look-up table; exchange and special
+/// The numbering of actions for a number of faces F. With T = 3F(F+1)/2 + 2 (by default 200) the
+/// actions of a turn are 0..T, in the order of the paper's look-up table. Gifts and the special
 /// action follow.
 #[derive(Copy, Clone, Eq, PartialEq, Hash, Debug)]
 pub struct ActionSpace {
@@ -60,7 +60,7 @@ pub struct ActionSpace {
 }
 
 impl ActionSpace {
-    /// The numbering for so many faces, 4..=15, or `None`.
+    /// The numbering for this many faces, or `None` unless there are 4..=15.
     pub const fn new(faces: u8) -> Option<ActionSpace> {
         if faces >= 4 && faces <= MAX_FACES {
             Some(ActionSpace { faces })
@@ -69,7 +69,7 @@ impl ActionSpace {
         }
     }
 
-    /// The numbering for a number of faces that is known to be in range.
+    /// The numbering for this many faces, which is known to be in range.
     pub(crate) const fn of(faces: u8) -> ActionSpace {
         ActionSpace { faces }
     }
@@ -79,17 +79,17 @@ impl ActionSpace {
         self.faces
     }
 
-    /// Number of plays of cards with a face.
+    /// Number of plays other than the lone joker.
     const fn plays(self) -> u16 {
         play_offset(self.faces + 1)
     }
 
-    /// T: the actions of a turn are 0..T, the last of them passing.
+    /// T: the actions of a turn are 0..T, and T-1 is passing.
     pub const fn turn_actions(self) -> u16 {
         self.plays() + 2
     }
 
-    /// Number of actions in all.
+    /// Number of all actions.
     pub const fn size(self) -> u16 {
         self.turn_actions() + self.faces as u16 + 3
     }
@@ -99,17 +99,17 @@ impl ActionSpace {
         format!("chefshat-{}", self.faces)
     }
 
-    /// Playing one joker alone.
+    /// The index of playing one joker alone.
     pub const fn lone_joker(self) -> ActionId {
         ActionId::new(self.plays())
     }
 
-    /// Passing.
+    /// The index of passing.
     pub const fn pass(self) -> ActionId {
         ActionId::new(self.plays() + 1)
     }
 
-    /// Giving one card of a face, or `None` if the deck has no such face.
+    /// The index of giving one card of a face, or `None` if the deck has no such face.
     pub const fn give(self, face: Face) -> Option<ActionId> {
         if face.get() <= self.faces {
             Some(ActionId::new(self.turn_actions() + face.get() as u16 - 1))
@@ -118,17 +118,17 @@ impl ActionSpace {
         }
     }
 
-    /// Giving one joker.
+    /// The index of giving one joker.
     pub const fn give_joker(self) -> ActionId {
         ActionId::new(self.turn_actions() + self.faces as u16)
     }
 
-    /// Declining the special action.
+    /// The index of declining the special action.
     pub const fn decline(self) -> ActionId {
         ActionId::new(self.turn_actions() + self.faces as u16 + 1)
     }
 
-    /// Declaring the special action.
+    /// The index of declaring the special action.
     pub const fn declare(self) -> ActionId {
         ActionId::new(self.turn_actions() + self.faces as u16 + 2)
     }

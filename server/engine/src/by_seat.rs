@@ -1,4 +1,4 @@
-//! Data that there is one of for each seat of a game.
+//! One value for each seat of a game.
 
 use std::fmt;
 use std::hash::{Hash, Hasher};
@@ -6,8 +6,8 @@ use std::ops::{Index, IndexMut};
 
 use crate::{MAX_SEATS, Seat};
 
-/// One value for each seat of a game. Fixed in size, so that it is copied and never allocates; only
-/// the seats that the game has are compared, hashed and shown.
+/// One value for each seat of a game. Has a fixed size, is copied and never allocates. Comparing,
+/// hashing and formatting use only the seats that the game has.
 #[derive(Copy, Clone)]
 pub struct BySeat<T> {
     values: [T; MAX_SEATS],
@@ -15,7 +15,7 @@ pub struct BySeat<T> {
 }
 
 impl<T: Copy + Default> BySeat<T> {
-    /// `players` values, each made from its seat.
+    /// `players` values, each computed from its seat.
     ///
     /// # Panics
     /// If `players` is above [`MAX_SEATS`].
@@ -61,7 +61,7 @@ impl<T> BySeat<T> {
         usize::from(self.len)
     }
 
-    /// Whether there are no seats (never so in a game).
+    /// Whether there are no seats. Never true in a game.
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }
@@ -71,7 +71,7 @@ impl<T> BySeat<T> {
         &self.values[..self.len()]
     }
 
-    /// The seats with their values, in the order of the seats.
+    /// The seats and their values, in the order of the seats.
     pub fn iter(&self) -> impl DoubleEndedIterator<Item = (Seat, &T)> + ExactSizeIterator {
         self.as_slice()
             .iter()

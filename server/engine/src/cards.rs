@@ -1,5 +1,5 @@
-//! Cards as the engine counts them: a multiset packed in one number. The order in which cards were
-//! dealt is not kept here (see [`crate::Deal`]).
+//! A multiset of cards, packed into one number. It has no order; [`crate::Deal`] has the order in
+//! which cards were dealt.
 
 use std::fmt;
 
@@ -26,9 +26,9 @@ impl Cards {
     /// No cards.
     pub const EMPTY: Cards = Cards(0);
 
-    /// The cards with these counts (faces 1..=F ascending, then jokers: F+1 numbers), one of face F
-    /// the Golden card if `golden`. `None` if a count is larger than any deck has, the number of
-    /// counts is wrong or there is no card of face F to be golden.
+    /// Creates cards from F+1 counts: faces 1..=F ascending, then jokers. If `golden`, one card of face
+    /// F is the Golden card. `None` if there are not F+1 counts, a count exceeds every deck, or there
+    /// is no card of face F to be golden.
     pub fn from_counts(faces: u8, counts: &[u8], golden: bool) -> Option<Cards> {
         if faces == 0 || faces > MAX_FACES || counts.len() != usize::from(faces) + 1 {
             return None;
@@ -51,7 +51,7 @@ impl Cards {
         Some(cards)
     }
 
-    /// The whole deck of so many faces and jokers.
+    /// The deck with this many faces and jokers.
     pub(crate) fn deck(faces: u8, jokers: u8) -> Cards {
         let mut cards = Cards(GOLDEN);
         (1..=faces).for_each(|number| cards.add_face(Face::of(number), number));
@@ -59,17 +59,17 @@ impl Cards {
         cards
     }
 
-    /// How many cards of a face, the Golden one included.
+    /// Number of cards of a face, the Golden card included.
     pub const fn count(self, face: Face) -> u8 {
         self.count_of(face.get())
     }
 
-    /// How many cards of the face with this number, 1..=15.
+    /// Number of cards of the face with this number, 1..=15.
     pub(crate) const fn count_of(self, number: u8) -> u8 {
         ((self.0 >> (BITS * (number as u32 - 1))) & 0xF) as u8
     }
 
-    /// How many jokers.
+    /// Number of jokers.
     pub const fn jokers(self) -> u8 {
         ((self.0 >> JOKER_SHIFT) & 0x3) as u8
     }
@@ -79,12 +79,12 @@ impl Cards {
         self.0 & GOLDEN != 0
     }
 
-    /// How many cards in all.
+    /// Number of cards, jokers included.
     pub const fn len(self) -> u8 {
         self.faces_len() + self.jokers()
     }
 
-    /// How many ingredient cards, that is, cards that are no jokers.
+    /// Number of ingredient cards, that is, of cards other than jokers.
     pub const fn faces_len(self) -> u8 {
         let faces = self.0 & FACE_BITS;
         let pairs = (faces & LOW_NIBBLES) + ((faces >> BITS) & LOW_NIBBLES);
@@ -96,13 +96,13 @@ impl Cards {
         self.0 == 0
     }
 
-    /// The rarest face (the lowest number) among the cards, or `None` if there are none but jokers.
+    /// The rarest face (the lowest number) among the cards, or `None` if there are only jokers.
     pub fn rarest(self) -> Option<Face> {
         let faces = self.0 & FACE_BITS;
         (faces != 0).then(|| Face::of((faces.trailing_zeros() / BITS) as u8 + 1))
     }
 
-    /// The highest face among the cards, or `None` if there are none but jokers.
+    /// The highest face among the cards, or `None` if there are only jokers.
     pub fn highest(self) -> Option<Face> {
         let faces = self.0 & FACE_BITS;
         (faces != 0).then(|| Face::of(((63 - faces.leading_zeros()) / BITS) as u8 + 1))
@@ -126,8 +126,8 @@ impl Cards {
             .flat_map(|(count, number)| std::iter::repeat_n(number, usize::from(count)))
     }
 
-    /// These and other cards together. `None` if a count would be larger than any deck has or there
-    /// would be two Golden cards.
+    /// Both multisets together. `None` if a count would exceed every deck or there would be two Golden
+    /// cards.
     pub fn union(self, other: Cards) -> Option<Cards> {
         let mut sum = self;
         for number in 1..=MAX_FACES {
@@ -144,7 +144,7 @@ impl Cards {
         Some(sum)
     }
 
-    /// Whether all of `other` is among these cards, the Golden one not considered.
+    /// Whether these cards include all of `other`. Ignores which card is golden.
     pub fn contains(self, other: Cards) -> bool {
         self.jokers() >= other.jokers()
             && (1..=MAX_FACES).all(|number| self.count_of(number) >= other.count_of(number))
@@ -166,8 +166,8 @@ impl Cards {
         }
     }
 
-    /// These cards without `n` of a face; the Golden card goes last of its face. `None` if there
-    /// are not so many.
+    /// These cards without `n` cards of a face; the Golden card is removed last. `None` if there are
+    /// fewer than `n`.
     pub fn without_face(self, face: Face, n: u8) -> Option<Cards> {
         let mut left = self;
         (self.count(face) >= n).then(|| {
@@ -176,7 +176,7 @@ impl Cards {
         })
     }
 
-    /// These cards without `n` jokers. `None` if there are not so many.
+    /// These cards without `n` jokers. `None` if there are fewer than `n`.
     pub fn without_jokers(self, n: u8) -> Option<Cards> {
         (self.jokers() >= n).then(|| Cards(self.0 - u64::from(n) * JOKER_ONE))
     }
@@ -189,20 +189,19 @@ impl Cards {
         self.0 += u64::from(n) * JOKER_ONE;
     }
 
-    /// Adds cards that are known to fit: all are of one deck.
+    /// Adds cards of the same deck, so the counts cannot overflow.
     pub(crate) fn add(&mut self, other: Cards) {
         debug_assert!(!(self.has_golden() && other.has_golden()));
         self.0 += other.0;
     }
 
-    /// Takes cards that are known to be among these, without regard to the Golden flag, which stays
-    /// as it is.
+    /// Removes cards that these are known to include. Does not change the Golden flag.
     pub(crate) fn remove_counts(&mut self, face: u8, n: u8, jokers: u8) {
         let counts = (u64::from(n) << (BITS * u32::from(face - 1))) + u64::from(jokers) * JOKER_ONE;
         self.0 -= counts;
     }
 
-    /// Adds counts to cards that have no Golden flag.
+    /// Adds cards. Does not change the Golden flag.
     pub(crate) fn add_counts(&mut self, face: u8, n: u8, jokers: u8) {
         self.0 += (u64::from(n) << (BITS * u32::from(face - 1))) + u64::from(jokers) * JOKER_ONE;
     }
@@ -215,12 +214,11 @@ impl Cards {
         };
     }
 
-    /// Takes `n` cards of a face that are known to be there and returns them; the Golden card goes
-    /// last of its face.
+    /// Removes and returns `n` cards of a face, which are known to be present; the Golden card last.
     pub(crate) fn take_face(&mut self, face: Face, n: u8) -> Cards {
         let mut taken = Cards::EMPTY;
-        // The Golden card is of the top face of the deck, so it lies among the highest cards of any
-        // hand that holds it.
+        // The Golden card has the top face of the deck, which is the highest face of every hand
+        // that holds it.
         let golden_goes =
             self.has_golden() && self.highest() == Some(face) && self.count(face) == n;
         self.remove_counts(face.get(), n, 0);
@@ -232,13 +230,13 @@ impl Cards {
         taken
     }
 
-    /// Takes a joker that is known to be there and returns it.
+    /// Removes and returns a joker, which is known to be present.
     pub(crate) fn take_joker(&mut self) -> Cards {
         self.0 -= JOKER_ONE;
         Cards(JOKER_ONE)
     }
 
-    /// Takes the `n` rarest ingredient cards, or all if there are fewer, and returns them.
+    /// Removes and returns the `n` rarest ingredient cards, or all if there are fewer.
     pub(crate) fn take_rarest(&mut self, n: u8) -> Cards {
         let mut taken = Cards::EMPTY;
         for _ in 0..n {
@@ -262,15 +260,15 @@ impl Cards {
         if need > MAX_FACES {
             return false;
         }
-        // Adding 16 - need to a count carries into the bit above its four exactly if the count is
-        // at least `need`.
+        // Adding 16 - need to a count carries out of its four bits exactly if the count is at least
+        // `need`.
         let carry = (16 - need as u64) * BYTE_ONES;
         let (even, odd) = (self.0 & LOW_NIBBLES, self.0 >> BITS & LOW_NIBBLES);
         ((even + carry) | (odd + carry)) & (BYTE_ONES << BITS) != 0
     }
 }
 
-/// The card of a face, a joker or the Golden card as one addition to a packed number.
+/// What a card of a face adds to the packed number.
 pub(crate) const fn packed_face(number: u8) -> u64 {
     1 << (BITS * (number as u32 - 1))
 }
@@ -279,7 +277,7 @@ pub(crate) const PACKED_JOKER: u64 = JOKER_ONE;
 pub(crate) const PACKED_GOLDEN_FLAG: u64 = GOLDEN;
 
 impl Cards {
-    /// Cards from a sum of packed ones that are all of one deck.
+    /// Cards from a sum of packed cards of one deck.
     pub(crate) const fn from_packed(sum: u64) -> Cards {
         Cards(sum)
     }

@@ -12,25 +12,25 @@ use crate::{BySeat, Cards, Face, MAX_FACES, Opening, RuleSet, Seat};
 
 /// Cards of the largest deck.
 const MAX_DECK: usize = 122;
-/// Codes of cards: faces by their number, then these two. The Golden card is one of the top face.
+/// Codes of cards: a face is its number; these two are the others.
 const GOLDEN: u8 = 0;
 const JOKER: u8 = MAX_FACES + 1;
 
-/// The 32 bytes that all deals of a game come from. Never shown while the game is played.
+/// The 32 bytes that determine all deals of a game. Secret until the game has ended.
 #[derive(Copy, Clone, Eq, PartialEq)]
 pub struct Seed(pub [u8; 32]);
 
 impl fmt::Debug for Seed {
-    /// Without the bytes, so that no log tells the hands of a running game.
+    /// Omits the bytes, so that no log reveals the hands of a running game.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("Seed(..)")
     }
 }
 
-/// One card as it was dealt.
+/// A dealt card.
 #[derive(Copy, Clone, Eq, PartialEq, Debug)]
 pub enum Card {
-    /// An ingredient card of a face, other than the Golden one.
+    /// An ingredient card other than the Golden card.
     Plain(Face),
     /// The Golden card, of the top face.
     Golden,
@@ -38,7 +38,7 @@ pub enum Card {
     Joker,
 }
 
-/// The cards of one Shift as dealt, in order.
+/// The cards of one Shift in the order dealt.
 #[derive(Copy, Clone)]
 pub struct Deal {
     cards: [u8; MAX_DECK],
@@ -47,7 +47,7 @@ pub struct Deal {
 }
 
 impl Deal {
-    /// Deals a Shift, counted from 1.
+    /// Deals the Shift with this number, from 1.
     pub fn new(rules: &RuleSet, seed: Seed, shift: u32) -> Deal {
         let mut draws = Draws::new(seed, shift);
         let mut cards = ordered_deck(rules);
@@ -104,7 +104,7 @@ impl Deal {
         self.drawn
     }
 
-    /// Who would take the Shift's first turn if no cards were exchanged.
+    /// The seat that takes the Shift's first turn if no cards are exchanged.
     pub fn leader(&self) -> Seat {
         opening_leader(&self.rules, &self.hands(), self.drawn)
     }
@@ -128,7 +128,8 @@ pub(crate) fn opening_leader(rules: &RuleSet, hands: &BySeat<Cards>, drawn: Opti
         .expect("the Golden card is always dealt to a seat")
 }
 
-/// Faces 1..=F ascending, the last card of face F the Golden one, then the jokers.
+/// The deck before it is shuffled: faces 1..=F ascending, the last card of face F the Golden card, then
+/// the jokers.
 fn ordered_deck(rules: &RuleSet) -> [u8; MAX_DECK] {
     let mut cards = [JOKER; MAX_DECK];
     let faces =
@@ -142,7 +143,7 @@ fn ordered_deck(rules: &RuleSet) -> [u8; MAX_DECK] {
     cards
 }
 
-/// By code, what a card adds to a packed hand.
+/// What a card adds to a packed hand, by code.
 fn packed_values(faces: u8) -> [u64; 32] {
     let mut values = [0; 32];
     for number in 1..=faces {
@@ -153,8 +154,7 @@ fn packed_values(faces: u8) -> [u64; 32] {
     values
 }
 
-/// Uniform numbers from the words of ChaCha20, keyed with the seed, the number of the Shift as
-/// stream.
+/// Uniform numbers drawn from ChaCha20, keyed with the seed. The Shift's number is the stream.
 struct Draws(ChaCha20Rng);
 
 impl Draws {
@@ -164,7 +164,7 @@ impl Draws {
         Draws(generator)
     }
 
-    /// A uniform number below `n`: words at or above the largest multiple of `n` are passed over.
+    /// A uniform number below `n`. Skips words at or above the largest multiple of `n`.
     fn below(&mut self, n: u32) -> u32 {
         let limit = (1u64 << 32) / u64::from(n) * u64::from(n);
         loop {

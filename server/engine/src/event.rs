@@ -1,48 +1,48 @@
-//! What happens in a game, and the one place that decides what a viewer may see of it. Events of
-//! rooms (somebody sat down, a connection was lost) do not live here.
+//! Events of a game, and the one place that decides what a viewer may see of them. Events of rooms
+//! (a participant took a seat, a connection was lost) live elsewhere.
 
 use crate::{ActionId, BySeat, Cards, Role, Seat, SeatOrder, SpecialAction, Standings};
 
-/// One thing that happened in a game. What only some viewers may see stands in fields that can be
-/// left out ([`Event::seen_by`]); what must not even be known to have happened, such as a declined
-/// special action, is no event. Large parts are boxed, so that the many small events stay small.
+/// An event of a game. Private content is in optional fields, which [`Event::seen_by`] removes. What
+/// others must not even know to have happened, such as a declined special action, is not an event.
+/// Large parts are boxed, so that the many small events stay small.
 #[derive(Clone, Eq, PartialEq, Debug)]
 pub enum Event {
     /// Cards were dealt.
     ShiftStarted {
         /// Number of the Shift, from 1.
         shift: u32,
-        /// Private: each hand for its own seat.
+        /// Private to each seat: its hand.
         hands: Box<BySeat<Option<Cards>>>,
     },
-    /// Roles were given, from the second Shift on, or reversed by a Food Fight.
+    /// Roles were assigned, from the second Shift on, or reversed by a Food Fight.
     RolesAssigned {
         /// The role of each seat.
         roles: BySeat<Option<Role>>,
     },
     /// A special action was declared.
     SpecialActionDeclared {
-        /// By whom.
+        /// The seat that declared it.
         seat: Seat,
-        /// Which.
+        /// The special action.
         special: SpecialAction,
     },
-    /// Cards went from one seat to another. Told when the whole exchange is complete.
+    /// A seat gave cards to another. Reported when the exchange is complete.
     CardsExchanged {
-        /// Who gave.
+        /// The seat that gave.
         giver: Seat,
-        /// Who received.
+        /// The seat that received.
         receiver: Seat,
-        /// How many cards.
+        /// Number of cards.
         count: u8,
-        /// Private: which cards, for giver and receiver.
+        /// Private to giver and receiver: the cards.
         cards: Option<Cards>,
     },
     /// A seat played.
     Played {
         /// The seat.
         seat: Seat,
-        /// The action it took.
+        /// The index of the action.
         action: ActionId,
         /// The face played, F+1 for a joker alone.
         face: u8,
@@ -60,20 +60,20 @@ pub enum Event {
         /// Cards left in its hand.
         cards_left: u8,
     },
-    /// A seat got rid of its last card.
+    /// A seat played its last card.
     SeatFinished {
         /// The seat.
         seat: Seat,
         /// Its place in this Shift, from 1.
         place: u8,
     },
-    /// A pizza was done, the board cleared, and another pizza of the same Shift follows.
+    /// A pizza was done and the board was cleared. Another pizza of the same Shift follows.
     PizzaDone {
         /// Number of the pizza in its Shift, from 1.
         pizza: u32,
-        /// Who played last; `None` if nobody played.
+        /// The seat that played last; `None` if nobody played.
         last_to_play: Option<Seat>,
-        /// Who leads the next pizza.
+        /// The seat that leads the next pizza.
         next_leader: Seat,
     },
     /// The Shift ended.
@@ -85,19 +85,18 @@ pub enum Event {
     },
 }
 
-/// How a Shift ended.
+/// The end of a Shift.
 #[derive(Copy, Clone, Eq, PartialEq, Debug)]
 pub struct ShiftEnd {
     /// Number of the Shift, from 1.
     pub shift: u32,
     /// Seats by place.
     pub order: SeatOrder,
-    /// How many seats got rid of their cards: those with the places 1..=finished. One less than
-    /// there are seats, unless adjudicated.
+    /// Number of seats without cards, which have the places 1..=finished. N-1 unless adjudicated.
     pub finished: u8,
-    /// Points of this Shift.
+    /// Points of each seat in this Shift.
     pub points: BySeat<u32>,
-    /// Points of the game so far.
+    /// Points of each seat in the game so far, this Shift included.
     pub scores: BySeat<u64>,
     /// Seat that took the first turn.
     pub starter: Seat,
@@ -113,14 +112,14 @@ pub struct ShiftEnd {
     pub adjudicated: bool,
 }
 
-/// Who looks at a game.
+/// Who views a game.
 #[derive(Copy, Clone, Eq, PartialEq, Debug)]
 pub enum Viewer {
-    /// The player on a seat.
+    /// The player of a seat.
     Seat(Seat),
-    /// Somebody who sees what everybody may see.
+    /// Sees public information alone.
     Spectator,
-    /// Somebody who sees all hands, for instance the record.
+    /// Sees everything, as the record does.
     Everything,
 }
 
@@ -131,8 +130,7 @@ impl Viewer {
 }
 
 impl Event {
-    /// The event as a viewer may see it: the same variant, private fields left out where they are
-    /// not the viewer's.
+    /// Redacts the event for a viewer: the same variant, without private fields of others.
     pub fn seen_by(&self, viewer: Viewer) -> Event {
         if viewer == Viewer::Everything {
             return self.clone();
@@ -155,8 +153,7 @@ impl Event {
                 count,
                 cards: cards.filter(|_| viewer.is(giver) || viewer.is(receiver)),
             },
-            // Named one by one, so that a new event with a private field is not shown to everybody
-            // by oversight.
+            // Listed one by one, so that a new event with a private field is not public by mistake.
             public @ (Event::RolesAssigned { .. }
             | Event::SpecialActionDeclared { .. }
             | Event::Played { .. }

@@ -1,12 +1,11 @@
-//! The small numbers of the game, each a type of its own: seats, faces and actions. What an action
-//! means is said by [`crate::ActionSpace`], not here.
+//! Newtypes for the numbers of the game: seats, faces and indices of actions. [`crate::ActionSpace`]
+//! says what an index means.
 
 use std::fmt;
 
 use crate::{MAX_FACES, MAX_SEATS};
 
-/// A place at the table, numbered from 0. The seat to the left of seat s is s+1, that of the last
-/// is seat 0.
+/// A position at the table, numbered from 0. The seat to the left of seat s is s+1 modulo N.
 #[derive(Copy, Clone, Eq, PartialEq, Ord, PartialOrd, Hash, Debug, Default)]
 pub struct Seat(u8);
 
@@ -14,8 +13,8 @@ impl Seat {
     /// The seat with this number.
     ///
     /// # Panics
-    /// If `index` is not below [`MAX_SEATS`]; check numbers that come from outside against the
-    /// number of players first.
+    /// If `index` is not below [`MAX_SEATS`]. Check untrusted numbers against the number of players
+    /// first.
     pub const fn new(index: usize) -> Seat {
         assert!(index < MAX_SEATS, "a seat's number is below MAX_SEATS");
         Seat(index as u8)
@@ -38,7 +37,7 @@ impl fmt::Display for Seat {
 pub struct Face(u8);
 
 impl Face {
-    /// The face with this number, or `None` if there is no such face in any deck.
+    /// The face with this number, or `None` if it is not in 1..=[`MAX_FACES`].
     pub const fn new(number: u8) -> Option<Face> {
         if number >= 1 && number <= MAX_FACES {
             Some(Face(number))

@@ -1,13 +1,13 @@
 //! The rule engine of Chef's Hat: pure values, nothing else.
 //!
-//! A validated [`RuleSet`] and a [`Seed`] make a [`Game`]. A game says whose decision is open
-//! ([`Game::decision`]) and what is legal ([`Game::legal_actions`]), takes an [`ActionId`]
-//! ([`Game::apply`]), tells what happened as [`Event`]s and gives any seat its [`Observation`].
-//! What a viewer may see of an event is decided in [`Event::seen_by`] alone.
+//! A [`Game`] is created from a validated [`RuleSet`] and a [`Seed`]. It says whose decision is open
+//! ([`Game::decision`]), what is legal ([`Game::legal_actions`]) and what the rules require
+//! ([`Game::requirement`]), applies an [`ActionId`] ([`Game::apply`]), reports [`Event`]s, and gives
+//! each seat its [`Observation`]. [`Event::seen_by`] alone decides what a viewer may see.
 //!
-//! What deliberately does not live here: files, sockets, clocks, serialisation, threads, global
-//! randomness, agents. A game is a function of its rule set, its seed and the decisions taken, on
-//! every machine.
+//! The rules are in `docs/rules.md`; comments cite its sections as §4.3. No files, sockets, clocks,
+//! serialisation, threads, global randomness or agents live here: on every machine, a game is a
+//! function of its rule set, its seed and its decisions.
 //!
 //! ```
 //! use chefshat_engine::{Game, RuleSetSpec, Seed};
@@ -62,7 +62,7 @@ pub use rewards::RewardScheme;
 pub use roles::{Role, SpecialAction};
 pub use rules::{Opening, PassScope, RuleSet, RuleSetError, RuleSetSpec, Stop};
 
-/// Version of the rules this crate plays by. A record names the version it was played by.
+/// Version of the rules that this crate implements. Every record names the version it was played by.
 pub const RULES_VERSION: u32 = 1;
 /// The most seats a game can have.
 pub const MAX_SEATS: usize = 6;

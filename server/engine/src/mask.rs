@@ -1,4 +1,4 @@
-//! Sets of actions. Which actions belong in one is decided by the game.
+//! Sets of action indices.
 
 use std::fmt;
 
@@ -7,8 +7,8 @@ use crate::ActionId;
 /// Words of a set.
 pub(crate) const WORDS: usize = 6;
 
-/// A set of up to 384 actions, one bit each. Knows its size, so that a uniform choice is one
-/// look-up.
+/// A set of up to 384 action indices, one bit each. It stores its length, so that a uniform choice needs
+/// one look-up.
 #[derive(Copy, Clone, Eq, PartialEq, Hash, Default)]
 pub struct Mask {
     words: [u64; WORDS],
@@ -16,15 +16,15 @@ pub struct Mask {
 }
 
 impl Mask {
-    /// No action.
+    /// The empty set.
     pub const EMPTY: Mask = Mask {
         words: [0; WORDS],
         len: 0,
     };
-    /// Number of actions there is room for.
+    /// Number of indices that fit.
     pub const CAPACITY: u16 = 64 * WORDS as u16;
 
-    /// The actions of an iterator; those beyond [`Mask::CAPACITY`] are left out.
+    /// The set of the given actions. Ignores those at or above [`Mask::CAPACITY`].
     pub fn from_actions(actions: impl IntoIterator<Item = ActionId>) -> Mask {
         let mut mask = Mask::EMPTY;
         for action in actions {
@@ -67,14 +67,14 @@ impl Mask {
             })
     }
 
-    /// The action that `k` others of the set come before, or `None` if there are no more than `k`.
+    /// The action with `k` smaller ones in the set, or `None` if the set has no more than `k`.
     #[inline]
     pub fn nth(&self, k: usize) -> Option<ActionId> {
         if k >= self.len() {
             return None;
         }
         if self.len == 1 {
-            // Passing, mostly: where it is need not be counted.
+            // Mostly a pass. Nothing to count.
             return self.iter().next();
         }
         let mut left = k as u32;
@@ -89,14 +89,13 @@ impl Mask {
         None
     }
 
-    /// The words of the set: bit i%64 of word i/64 is action i.
+    /// The set as words: bit i%64 of word i/64 is action i.
     pub fn words(&self) -> &[u64; WORDS] {
         &self.words
     }
 
-    /// Writes the set to a caller's buffer, as many bytes as it has room for: bit i%8 of byte i/8
-    /// is action i. A space of `size` actions fills `size.div_ceil(8)` bytes; bytes beyond the
-    /// capacity are set to 0.
+    /// Fills a buffer: bit i%8 of byte i/8 is action i. A space of `size` actions needs
+    /// `size.div_ceil(8)` bytes. Bytes beyond the capacity become 0.
     pub fn write_bytes(&self, out: &mut [u8]) {
         out.fill(0);
         for (chunk, word) in out.chunks_mut(8).zip(self.words) {
@@ -112,7 +111,7 @@ impl Mask {
         bytes
     }
 
-    /// The set from bytes as [`Mask::to_bytes`] writes them, or `None` if there are more than 48.
+    /// Reads what [`Mask::to_bytes`] writes, or `None` if there are more than 48 bytes.
     pub fn from_bytes(bytes: &[u8]) -> Option<Mask> {
         if bytes.len() > 8 * WORDS {
             return None;
@@ -125,7 +124,7 @@ impl Mask {
         Some(mask)
     }
 
-    /// Adds an action that is not in the set yet.
+    /// Adds an action that the set does not contain.
     pub(crate) fn insert(&mut self, action: ActionId) {
         let index = usize::from(action.index());
         debug_assert!(!self.contains(action));
@@ -133,7 +132,7 @@ impl Mask {
         self.len += 1;
     }
 
-    /// A set from its words, which are known to hold `len` actions.
+    /// Creates a set from its words, which contain `len` actions.
     pub(crate) const fn from_words(words: [u64; WORDS], len: u16) -> Mask {
         Mask { words, len }
     }
@@ -156,7 +155,7 @@ impl fmt::Debug for Mask {
 const BYTE_ONES: u64 = 0x0101_0101_0101_0101;
 const BYTE_TOPS: u64 = 0x8080_8080_8080_8080;
 
-/// In each byte, how many bits of the word are set up to the end of that byte.
+/// The number of set bits up to the end of each byte, byte by byte.
 #[inline]
 const fn byte_sums(word: u64) -> u64 {
     let pairs = word - (word >> 1 & 0x5555_5555_5555_5555);
@@ -164,9 +163,9 @@ const fn byte_sums(word: u64) -> u64 {
     ((fours + (fours >> 4)) & 0x0F0F_0F0F_0F0F_0F0F).wrapping_mul(BYTE_ONES)
 }
 
-/// Index of the set bit of a word that `k` others come before; there are more than `k`. Without a
-/// branch, for a random choice would be mispredicted: which byte it is in is counted over all bytes
-/// at once, and the bit is looked up.
+/// Index of the set bit with `k` set bits below it; the word has more than `k`. Branchless, because a
+/// random choice would be mispredicted: all bytes are compared at once to find the byte, and a
+/// table gives the bit.
 #[inline]
 fn select(word: u64, sums: u64, k: u32) -> u16 {
     let full_bytes = (((u64::from(k) * BYTE_ONES) | BYTE_TOPS) - sums) & BYTE_TOPS;
@@ -176,7 +175,7 @@ fn select(word: u64, sums: u64, k: u32) -> u16 {
     shift as u16 + u16::from(SELECT_IN_BYTE[(u64::from(k) - before) as usize & 7][byte])
 }
 
-/// By k and byte: index of the set bit that k others come before.
+/// By k and byte: the index of the set bit with k set bits below it.
 static SELECT_IN_BYTE: [[u8; 256]; 8] = {
     let mut table = [[0; 256]; 8];
     let mut byte = 0;

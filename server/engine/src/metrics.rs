@@ -5,7 +5,7 @@ use crate::{
     BySeat, Event, Game, RewardScheme, RuleSet, Seat, SeatOrder, ShiftEnd, SpecialAction, Viewer,
 };
 
-/// What one seat did in one Shift.
+/// Metrics of one seat in one Shift.
 #[derive(Copy, Clone, PartialEq, Debug, Default)]
 pub struct SeatMetrics {
     /// Its place, from 1.
@@ -20,7 +20,7 @@ pub struct SeatMetrics {
     pub passes: u32,
     /// Plays.
     pub plays: u32,
-    /// Sum of its rewards, what the end of the Shift brought included; 0 without a scheme.
+    /// Sum of its rewards, including those at the end of the Shift; 0 without a scheme.
     pub reward_sum: f64,
     /// Number of rewarded decisions: valid and wrong actions; 0 without a scheme.
     pub reward_count: u32,
@@ -29,13 +29,13 @@ pub struct SeatMetrics {
 }
 
 impl SeatMetrics {
-    /// Mean reward of a rewarded decision, or `None` if there was none.
+    /// Mean reward of the rewarded decisions, or `None` if there were none.
     pub fn mean_reward(&self) -> Option<f64> {
         (self.reward_count > 0).then(|| self.reward_sum / f64::from(self.reward_count))
     }
 }
 
-/// What is counted in one Shift.
+/// Metrics of one Shift.
 #[derive(Copy, Clone, PartialEq, Debug)]
 pub struct ShiftMetrics {
     /// Number of the Shift, from 1.
@@ -56,11 +56,11 @@ pub struct ShiftMetrics {
     pub special: Option<SpecialAction>,
     /// Whether the Shift reached its limit of turns.
     pub adjudicated: bool,
-    /// What each seat did.
+    /// Metrics of each seat.
     pub seats: BySeat<SeatMetrics>,
 }
 
-/// Gathers metrics from a game's events and from the wrong actions that are no events.
+/// Collects metrics from a game's events, and from wrong actions, which are not events.
 #[derive(Copy, Clone, Debug)]
 pub struct MetricsRecorder {
     rules: RuleSet,
@@ -72,7 +72,7 @@ pub struct MetricsRecorder {
 }
 
 impl MetricsRecorder {
-    /// A recorder for one game, to be fed from its start; rewards are summed if there is a scheme.
+    /// A recorder for one game from its start. Sums rewards if there is a scheme.
     pub fn new(rules: RuleSet, scheme: Option<RewardScheme>) -> MetricsRecorder {
         let players = rules.players();
         MetricsRecorder {
@@ -85,7 +85,7 @@ impl MetricsRecorder {
         }
     }
 
-    /// A recorder that is fed from where a game stands: what happened before in its Shift is not counted.
+    /// A recorder that joins a game in progress. Does not count what happened in the Shift before.
     pub fn joining(game: &Game, scheme: Option<RewardScheme>) -> MetricsRecorder {
         let places = game.observe(Viewer::Spectator).places;
         let finished = places.values().filter(|place| **place > 0).count();
@@ -95,8 +95,7 @@ impl MetricsRecorder {
         }
     }
 
-    /// Counts an invalid attempt of a seat at a turn (attempts at other decisions are neither
-    /// counted nor rewarded).
+    /// Counts an invalid attempt of a seat at a turn. Attempts at other decisions are not counted.
     pub fn wrong(&mut self, seat: Seat) {
         self.seats[seat].wrong += 1;
         if let Some(scheme) = self.scheme {
@@ -104,8 +103,7 @@ impl MetricsRecorder {
         }
     }
 
-    /// Counts an event; gives the metrics of the Shift when it ends. It does not matter as seen by
-    /// whom.
+    /// Counts an event, seen by any viewer. Returns the metrics of the Shift when it ends.
     pub fn on_event(&mut self, event: &Event) -> Option<ShiftMetrics> {
         match *event {
             Event::Played {

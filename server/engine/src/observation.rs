@@ -5,7 +5,7 @@
 use crate::game::default_gift;
 use crate::{ActionId, ActionSpace, BySeat, Cards, DecisionKind, Mask, Role, Seat};
 
-/// What lies on the board.
+/// The play on the board.
 #[derive(Copy, Clone, Eq, PartialEq, Debug, Default)]
 pub struct Board {
     /// The face, F+1 for a joker alone, 0 if the board is empty.
@@ -16,13 +16,13 @@ pub struct Board {
     pub jokers: u8,
 }
 
-/// Everything that a seat may know at one moment. For a spectator hand, gave and received are
+/// Everything that a seat may know at one moment. For a spectator `hand`, `gave` and `received` are
 /// empty.
 #[derive(Copy, Clone, Eq, PartialEq, Debug)]
 pub struct Observation {
-    /// Whose observation it is; `None` for a spectator.
+    /// The seat that observes; `None` for a spectator.
     pub seat: Option<Seat>,
-    /// The kind of decision that is open for this seat, if one is.
+    /// The kind of the decision that this seat has open, if any.
     pub kind: Option<DecisionKind>,
     /// Number of faces F of the deck.
     pub faces: u8,
@@ -36,10 +36,9 @@ pub struct Observation {
     pub hand: Cards,
     /// The board.
     pub board: Board,
-    /// Number of cards in each hand. A card given in the exchange leaves its giver's hand at once.
+    /// Number of cards in each hand. A card given in the exchange leaves the hand at once.
     pub cards_left: BySeat<u8>,
-    /// Which seats have passed since the pizza began; with [`crate::PassScope::Turn`] since the
-    /// last play.
+    /// Whether each seat has passed in this pizza; with [`crate::PassScope::Turn`], since the last play.
     pub passed: BySeat<bool>,
     /// Place of each seat that has finished the Shift, from 1; 0 for the others.
     pub places: BySeat<u8>,
@@ -47,17 +46,17 @@ pub struct Observation {
     pub roles: BySeat<Option<Role>>,
     /// Points of each seat in the game so far.
     pub points: BySeat<u64>,
-    /// Cards played so far in this Shift, by face: the Golden card is not told apart.
+    /// Cards played so far in this Shift. Does not say whether the Golden card is one of them.
     pub played: Cards,
-    /// What the seat gave in this Shift's exchange so far.
+    /// Cards that the seat gave in this Shift's exchange so far.
     pub gave: Cards,
-    /// What the seat received in this Shift's exchange.
+    /// Cards that the seat received in this Shift's exchange.
     pub received: Cards,
 }
 
 impl Observation {
     /// The default decision ([`crate::Game::default_action`], §8.3), from what the seat sees
-    /// and its legal actions. `None` if no decision is open for the seat, or nothing is legal.
+    /// and its legal actions. `None` if the seat has no open decision or nothing is legal.
     pub fn default_action(&self, legal: &Mask) -> Option<ActionId> {
         let space = ActionSpace::of(self.faces);
         let default = match self.kind? {
@@ -70,26 +69,26 @@ impl Observation {
             .or(legal.nth(0))
     }
 
-    /// Length of the classic vector: F + H + T, the paper's 228 for the standard deck.
+    /// Length of the classic vector: F + H + T, by default the paper's 228.
     pub fn classic_len(&self) -> usize {
         usize::from(self.faces)
             + usize::from(self.hand_size)
             + usize::from(ActionSpace::of(self.faces).turn_actions())
     }
 
-    /// The paper's vector of numbers in 0..=1: board (F slots, the play's cards ascending, jokers
-    /// as F+1, cut off; an empty board is F+2 in slot 0), hand (H slots, ascending, zeros first),
-    /// both divided by F+2; then the mask of a turn's actions as 0 and 1.
+    /// The paper's vector of numbers in 0..=1: the board (F slots: the cards ascending, jokers as F+1,
+    /// truncated; F+2 in slot 0 if empty), the hand (H slots: ascending, zeros first), both divided by
+    /// F+2, then the mask of a turn's actions as 0 and 1.
     pub fn classic_vector(&self, mask: &Mask) -> Vec<f32> {
         let mut vector = vec![0.0; self.classic_len()];
         self.write_classic_vector(mask, &mut vector);
         vector
     }
 
-    /// Writes the classic vector to a caller's buffer.
+    /// Writes the classic vector into a buffer.
     ///
     /// # Panics
-    /// If `out` is not [`Observation::classic_len`] numbers long.
+    /// If the length of `out` is not [`Observation::classic_len`].
     pub fn write_classic_vector(&self, mask: &Mask, out: &mut [f32]) {
         assert_eq!(
             out.len(),
@@ -114,8 +113,7 @@ impl Observation {
             *slot = f32::from(card) / scale;
         }
 
-        // A hand never holds more cards than were dealt: the exchange gives back as many as it
-        // takes.
+        // A hand never exceeds the cards dealt: the exchange gives as many as it takes.
         let zeros = hand.len().saturating_sub(usize::from(self.hand.len()));
         hand[..zeros].fill(0.0);
         for (slot, card) in hand[zeros..]

@@ -1,10 +1,10 @@
-//! Seats in an order: the places of a Shift and the final table of a game.
+//! Orders of seats: the places of a Shift and the final table of a game.
 
 use std::fmt;
 
 use crate::{BySeat, MAX_SEATS, Seat};
 
-/// All seats of a game in an order, best first: `as_slice()[p]` is the seat with place p+1.
+/// All seats of a game, best first: `as_slice()[p]` has place p+1.
 #[derive(Copy, Clone)]
 pub struct SeatOrder {
     seats: [Seat; MAX_SEATS],
@@ -17,7 +17,7 @@ impl SeatOrder {
         len: 0,
     };
 
-    /// The order of a slice, or `None` unless it names each of the seats 0..n once.
+    /// Creates an order, or `None` unless the slice contains each of the seats 0..n once.
     pub fn from_slice(seats: &[Seat]) -> Option<SeatOrder> {
         let mut order = SeatOrder::EMPTY;
         for &seat in seats {
@@ -39,7 +39,7 @@ impl SeatOrder {
         usize::from(self.len)
     }
 
-    /// Whether there are no seats (never so in an event).
+    /// Whether there are no seats. Never true in an event.
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }
@@ -96,12 +96,12 @@ impl Standings {
         self.order.as_slice()
     }
 
-    /// Who won the game.
+    /// The winner of the game.
     pub fn winner(&self) -> Seat {
         self.as_slice()[0]
     }
 
-    /// The lines of the table, best first: place from 1, seat, points.
+    /// The rows of the table, best first: place from 1, seat, points.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = (u8, Seat, u64)> {
         self.as_slice()
             .iter()

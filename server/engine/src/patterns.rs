@@ -1,5 +1,9 @@
-//! Tables computed at compile time: what each play's index means, and which plays a count of cards
-//! allows. The numbering they follow is described in `actions`.
+//! The fast path of legal turns: tables computed at compile time, and the mask built from them.
+//!
+//! `game::legal` states the rules. Here [`turn_mask`] lists what they allow without asking
+//! for every action: the plays of one face depend only on the number of its cards in the
+//! hand, on the jokers and on the least size, so a table has the bits of all of them. The tests
+//! `requirement` and `properties` compare the masks with the rules, action by action.
 
 use crate::mask::WORDS;
 use crate::{Cards, MAX_FACES, Mask, PlayRequirement};
@@ -14,7 +18,7 @@ pub(crate) const fn play_offset(face: u8) -> u16 {
     3 * (face as u16) * (face as u16 - 1) / 2
 }
 
-/// Face, quantity and jokers of each play.
+/// Face, quantity and jokers of each play, by index.
 pub(crate) static PLAYS: [[u8; 3]; MAX_PLAYS] = {
     let mut table = [[0; 3]; MAX_PLAYS];
     let (mut face, mut index) = (1, 0);
@@ -34,8 +38,8 @@ pub(crate) static PLAYS: [[u8; 3]; MAX_PLAYS] = {
     table
 };
 
-/// The plays of one face that a hand allows: bit i for the i-th play of the face, their number
-/// above [`PATTERN_BITS`] bits.
+/// The plays of one face that a hand allows: bit i is the i-th play of the face. The bits from
+/// [`PATTERN_BITS`] on are their number.
 #[derive(Copy, Clone)]
 pub(crate) struct Pattern(u64);
 
@@ -52,11 +56,11 @@ impl Pattern {
     }
 }
 
-/// The patterns for one number of jokers held and one least size of the play, by the number of
-/// cards held of a face.
+/// The patterns for one number of jokers and one least size of the play, by the number of cards of the
+/// face in the hand.
 pub(crate) type Patterns = [Pattern; 16];
 
-/// By jokers held (0..=2) and least size of the play (0..=17).
+/// By jokers in the hand (0..=2) and least size of the play (0..=17).
 pub(crate) static PATTERNS: [[Patterns; MAX_SIZE + 1]; 3] = {
     let mut table = [[[Pattern(0); 16]; MAX_SIZE + 1]; 3];
     let mut held = 0;
@@ -107,8 +111,8 @@ pub(crate) fn turn_mask(faces: u8, required: &PlayRequirement, hand: Cards) -> M
     };
     let patterns = &PATTERNS[usize::from(jokers)][usize::from(size)];
     let pass = required.may_pass;
-    // One function for each number of faces: every place in the mask is a constant then, and the
-    // words stay in registers.
+    // One function for each number of faces: all positions in the mask are constants, and the words
+    // stay in registers.
     match faces {
         4 => filled_mask::<4>(patterns, cards, lone_joker, pass),
         5 => filled_mask::<5>(patterns, cards, lone_joker, pass),
@@ -135,7 +139,7 @@ fn filled_mask<const F: u8>(
         words: [0; WORDS],
         len: 0,
     };
-    // Often nothing but passing is left: then no table is looked up.
+    // Often only passing is legal. Then no table is read.
     if !cards.is_empty() {
         macro_rules! insert_faces {
             ($($number:literal)*) => {
@@ -163,12 +167,11 @@ impl Filling {
         let pattern = patterns[usize::from(cards.count_of(NUMBER))];
         let (index, shift) = const { place(play_offset(NUMBER)) };
         self.words[index] |= pattern.bits() << shift;
-        // Three bits for each card the deck has of the face: those beyond the word go into the next
-        // one.
+        // A face has three bits for each of its cards in the deck. They may continue in the next word.
         if shift + 3 * u32::from(NUMBER) > 64 {
             self.words[index + 1] |= pattern.bits() >> (64 - shift);
         }
-        // Never more than there are plays, so that it cannot overflow.
+        // At most the number of plays, so it cannot overflow.
         self.len = self.len.wrapping_add(pattern.len());
     }
 

@@ -1,36 +1,36 @@
-//! Decisions of games that were played before, as values that agents, records and rooms share.
+//! Decisions of recorded games, as values that agents, records and rooms share.
 
 use crate::{ActionId, Mask, Observation, Seed};
 
-/// A decision that was taken, after the attempts that were refused.
+/// A decision and the invalid attempts before it.
 #[derive(Clone, Eq, PartialEq, Debug)]
 pub struct PlayedDecision {
     /// The action.
     pub action: ActionId,
     /// Invalid attempts before it.
     pub attempts: Vec<ActionId>,
-    /// Whether it is the default, taken because there were too many of them.
+    /// Whether it is the default decision, taken after too many invalid attempts.
     pub by_default: bool,
 }
 
 /// One decision of a recorded player.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RecordedDecision {
-    /// What its seat knew.
+    /// What the seat knew.
     pub observation: Observation,
-    /// What was legal.
+    /// The legal actions.
     pub legal: Mask,
-    /// What was decided.
+    /// The action taken.
     pub action: ActionId,
-    /// Whether the player decided it. Otherwise it was decided for the player (by the clock, after invalid attempts, by a substitute):
-    /// that is repeated where it was decided, and is no model elsewhere.
+    /// Whether the player decided. Otherwise the clock, too many invalid attempts or a substitute
+    /// did: a replay repeats such a decision, but does not imitate it elsewhere.
     pub own: bool,
 }
 
-/// Decisions of a recorded game that followed each other.
+/// Consecutive decisions of a recorded game that a branch takes over.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TakenOver {
-    /// Deals every Shift that begins with or between these decisions.
+    /// The seed of every Shift that starts with or between these decisions.
     pub seed: Seed,
     /// The decisions.
     pub actions: Vec<ActionId>,

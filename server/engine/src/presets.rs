@@ -4,7 +4,7 @@
 use crate::{Opening, PassScope, RuleSetSpec, Stop};
 
 impl RuleSetSpec {
-    /// The names of the presets, the standard first.
+    /// The names of the presets, the default first.
     pub const PRESETS: [&'static str; 3] = ["paper", "rulebook", "original2020"];
 
     /// The preset of this name, or `None` if there is none.

@@ -3,15 +3,14 @@
 
 use crate::{Event, RuleSet, Seat, ShiftEnd};
 
-/// How turns, and invalid attempts at turns, are rewarded. Exchange and special action give nothing
-/// in any scheme.
+/// How turns and invalid attempts at turns are rewarded. No scheme rewards gifts and special actions.
 #[derive(Copy, Clone, Eq, PartialEq, Hash, Debug)]
 pub enum RewardScheme {
     /// +1 for a valid action, -1 for an invalid one (the paper's Experiment 2).
     Validity,
     /// The paper's Experiment 3, exactly as printed.
     Paper,
-    /// The same with the share of cards already shed, which the printed formula seems to mean.
+    /// What the printed formula seems to mean: with the share of cards already played.
     PaperIntended,
     /// 1 for finishing first, else -0.001.
     Winning,
@@ -29,7 +28,7 @@ impl RewardScheme {
         RewardScheme::Points,
     ];
 
-    /// The scheme's name as the rules spell it.
+    /// The scheme's name.
     pub const fn name(self) -> &'static str {
         match self {
             RewardScheme::Validity => "validity",
@@ -56,8 +55,8 @@ impl RewardScheme {
         }
     }
 
-    /// Reward of a valid turn after which the seat has `cards_left` cards; `place` (from 1) if this
-    /// turn made it finish.
+    /// Reward of a valid turn after which the seat has `cards_left` cards. `place`, from 1, is set if
+    /// the seat finished with this turn.
     pub fn turn(self, rules: &RuleSet, cards_left: u8, place: Option<u8>) -> f32 {
         let (left, dealt) = (f64::from(cards_left), f64::from(rules.hand_size()));
         let finishing = place.map_or(0.0, |place| self.finishing(place));
@@ -72,24 +71,24 @@ impl RewardScheme {
         reward as f32
     }
 
-    /// What a seat gets when a Shift ends, in addition to its turns: `place` from 1, `points` of
-    /// the Shift, `finished` whether it got rid of its cards (a seat that did has had its finishing
-    /// part with its last turn). `None` if it gets nothing.
+    /// Reward of a seat at the end of a Shift, in addition to its turns: `place` from 1, `points` of
+    /// the Shift, `finished` whether it has no cards left. A seat that finished received its
+    /// finishing part with its last turn. `None` if there is no reward.
     pub fn shift_end(self, place: u8, points: u32, finished: bool) -> Option<f32> {
         match self {
             RewardScheme::Points => Some(points as f32),
             RewardScheme::Paper | RewardScheme::PaperIntended if !finished => {
                 Some(self.finishing(place) as f32)
             }
-            // Only in an adjudicated Shift can a seat with cards be first.
+            // A seat with cards is first only in an adjudicated Shift.
             RewardScheme::Winning if !finished && place == 1 => Some(self.finishing(place) as f32),
             _ => None,
         }
     }
 
-    /// The rewards that the events of ONE call of [`crate::Game::apply`] bring: calls back with the
-    /// seat, its reward, and the index of the event that brings it (a play, a pass or the end of a
-    /// Shift).
+    /// Computes the rewards of the events of ONE call of [`crate::Game::apply`]. Calls `give` with the
+    /// seat, its reward and the index of the event that causes it: a play, a pass or the end of a
+    /// Shift.
     pub fn of_events(
         self,
         rules: &RuleSet,
@@ -132,7 +131,7 @@ impl RewardScheme {
         }
     }
 
-    /// The part of a reward that finishing with a place, from 1, brings.
+    /// The part of the reward for finishing with a place, from 1.
     fn finishing(self, place: u8) -> f64 {
         match self {
             RewardScheme::Paper | RewardScheme::PaperIntended => {

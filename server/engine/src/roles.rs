@@ -60,7 +60,7 @@ impl Role {
     }
 }
 
-/// What a seat that was dealt two jokers may declare before the exchange.
+/// A declaration that a seat dealt two jokers may make before the exchange.
 #[derive(Copy, Clone, Eq, PartialEq, Ord, PartialOrd, Hash, Debug)]
 pub enum SpecialAction {
     /// By the Dishwasher: all roles are reversed for this Shift.

@@ -7,11 +7,11 @@ use thiserror::Error;
 
 use crate::{ActionSpace, MAX_FACES, MAX_JOKERS, MAX_SEATS};
 
-/// Numbers of players there are games for.
+/// Allowed numbers of players.
 const PLAYERS: RangeInclusive<u8> = 2..=MAX_SEATS as u8;
-/// Numbers of faces there are decks for.
+/// Allowed numbers of faces.
 const FACES: RangeInclusive<u8> = 4..=MAX_FACES;
-/// A hand has at least so many cards, else the exchange makes no sense.
+/// Fewest cards in a hand. The exchange needs them.
 const MIN_HAND: u8 = 3;
 
 /// When a game ends.
@@ -23,26 +23,26 @@ pub enum Stop {
     Shifts(u32),
 }
 
-/// Who leads the first pizza of a Shift, and with what.
+/// Who takes the first turn of a Shift, and what it must be (§3.5, §4.4, §7.3).
 #[derive(Copy, Clone, Eq, PartialEq, Debug)]
 pub enum Opening {
-    /// The holder of the Golden card, who must play it (rulebook).
+    /// The holder of the Golden card, who must play it.
     Golden,
-    /// The first seat from a drawn one that holds the top face, who may play only that face
-    /// (reference implementation).
+    /// The first seat from a drawn one that holds the top face, which must play that face. As in the
+    /// reference implementation.
     AnyTopFace,
 }
 
-/// How long a pass binds.
+/// How long a pass counts (§4.5, §7.3).
 #[derive(Copy, Clone, Eq, PartialEq, Debug)]
 pub enum PassScope {
     /// Until the next pizza.
     Pizza,
-    /// For that turn only (the implementation behind the paper's tables).
+    /// For that turn only. As in the implementation behind the paper's tables.
     Turn,
 }
 
-/// A rule set as somebody asks for it: any values, not yet checked.
+/// A rule set that has not been validated: any values.
 #[derive(Clone, Eq, PartialEq, Debug)]
 pub struct RuleSetSpec {
     /// Number of players N, 2..=6.
@@ -53,38 +53,38 @@ pub struct RuleSetSpec {
     pub jokers: u8,
     /// When the game ends.
     pub stop: Stop,
-    /// Points by place, N non-increasing numbers, the first >= 1. Empty stands for the standard
+    /// Points by place, N non-increasing numbers, the first >= 1. Empty: the default
     /// list for N.
     pub points: Vec<u32>,
-    /// Whether cards are exchanged before a Shift, from the second on.
+    /// Whether cards are exchanged, from the second Shift on.
     pub exchange: bool,
     /// Whether a seat dealt two jokers may declare a special action, from the second Shift on.
     pub special_actions: bool,
     /// Who leads the first pizza of a Shift.
     pub opening: Opening,
-    /// Whether the seat that takes a Shift's first turn may pass on it.
+    /// Whether the first turn of a Shift may be a pass.
     pub opening_pass: bool,
-    /// How long a pass binds.
+    /// How long a pass counts.
     pub pass_scope: PassScope,
-    /// After this many consecutive pizzas without a play the next leader must play, >= 1.
+    /// After this many consecutive pizzas without a play the next leader must play, >= 1 (§5.4).
     pub max_idle_pizzas: u32,
-    /// A Shift that reaches this many turns is adjudicated, >= 1.
+    /// A Shift that reaches this many turns is adjudicated, >= 1 (§5.4).
     pub max_turns: u32,
 }
 
-/// Why a rule set is refused: the field at fault and what to do about it.
+/// Why a rule set is refused: the field, and what to do.
 #[derive(Clone, Eq, PartialEq, Debug, Error)]
 pub enum RuleSetError {
-    /// No game for so many players.
+    /// The number of players is out of range.
     #[error("{0} players: choose 2 to 6")]
     Players(u8),
-    /// No deck of so many faces.
+    /// The number of faces is out of range.
     #[error("{0} faces: choose 4 to 15")]
     Faces(u8),
-    /// No deck with so many jokers.
+    /// The number of jokers is out of range.
     #[error("{0} jokers: choose 0 to 2")]
     Jokers(u8),
-    /// Too small a deck for so many players.
+    /// The deck is too small for the players.
     #[error(
         "{deck} cards among {players} players leave hands of {hand}: choose more faces or fewer players, so that a hand has at least 3 cards"
     )]
@@ -93,10 +93,10 @@ pub enum RuleSetError {
         deck: u8,
         /// Number of players.
         players: u8,
-        /// Cards each would be dealt.
+        /// Cards in each hand.
         hand: u8,
     },
-    /// Not one number of points for each place.
+    /// There is not one number of points for each place.
     #[error(
         "{given} numbers of points for {players} players: give one for each place, or none for the standard ones"
     )]
@@ -106,7 +106,7 @@ pub enum RuleSetError {
         /// Numbers needed.
         players: u8,
     },
-    /// A worse place would be worth more than a better one.
+    /// A place gets more points than the place before it.
     #[error(
         "place {place} gets more points than the place before it: give the points best place first, never rising"
     )]
@@ -114,25 +114,25 @@ pub enum RuleSetError {
         /// The place at fault, from 1.
         place: usize,
     },
-    /// The first place would be worth nothing.
+    /// The first place gets no points.
     #[error("the first place gets no points: give it at least 1")]
     PointsFirst,
-    /// A game to 0 points.
+    /// The target is 0 points.
     #[error("a game to 0 points would never begin: choose at least 1")]
     TargetPoints,
-    /// A game of 0 Shifts.
+    /// The target is 0 Shifts.
     #[error("a game of 0 Shifts would never begin: choose at least 1")]
     TargetShifts,
-    /// No idle pizza allowed.
+    /// `max_idle_pizzas` is 0.
     #[error("max_idle_pizzas is 0: choose at least 1 (standard 3)")]
     MaxIdlePizzas,
-    /// No turn allowed.
+    /// `max_turns` is 0.
     #[error("max_turns is 0: choose at least 1 (standard 10000)")]
     MaxTurns,
 }
 
 impl RuleSetError {
-    /// Name of the field at fault, as the rules spell it.
+    /// The name of the field.
     pub fn field(&self) -> &'static str {
         match self {
             RuleSetError::Players(_) => "players",
@@ -150,10 +150,10 @@ impl RuleSetError {
 }
 
 impl RuleSetSpec {
-    /// Checks every field and makes the rule set that a game is played by.
+    /// Validates every field.
     ///
     /// # Errors
-    /// The first field that makes no sense, with the reason.
+    /// The first field out of range, and why.
     pub fn validate(&self) -> Result<RuleSet, RuleSetError> {
         if !PLAYERS.contains(&self.players) {
             return Err(RuleSetError::Players(self.players));
@@ -206,7 +206,7 @@ impl RuleSetSpec {
         })
     }
 
-    /// The points by place, filled up with zeros behind the last place.
+    /// The points by place, padded with zeros.
     fn checked_points(&self) -> Result<[u32; MAX_SEATS], RuleSetError> {
         let given = if self.points.is_empty() {
             standard_points(self.players)
@@ -231,7 +231,7 @@ impl RuleSetSpec {
     }
 }
 
-/// The standard points by place for a number of players that there are games for.
+/// The default points by place for a valid number of players (§5.1).
 fn standard_points(players: u8) -> &'static [u32] {
     match players {
         2 => &[5, 0],
@@ -242,8 +242,7 @@ fn standard_points(players: u8) -> &'static [u32] {
     }
 }
 
-/// A validated rule set: every value makes sense together with the others. Made by
-/// [`RuleSetSpec::validate`] alone.
+/// A validated rule set. Only [`RuleSetSpec::validate`] creates it.
 #[derive(Copy, Clone, Eq, PartialEq, Debug)]
 pub struct RuleSet {
     stop: Stop,
@@ -283,12 +282,12 @@ impl RuleSet {
         self.stop
     }
 
-    /// The same rules, except for when a game ends. The number is at least 1.
+    /// The same rules with another stop rule, whose number is at least 1.
     pub(crate) fn with_stop(self, stop: Stop) -> RuleSet {
         RuleSet { stop, ..self }
     }
 
-    /// Points of a place, from 1; 0 for places that there are not.
+    /// Points of a place, from 1; 0 for a place that does not exist.
     pub fn points(&self, place: u8) -> u32 {
         usize::from(place)
             .checked_sub(1)
@@ -302,7 +301,7 @@ impl RuleSet {
         &self.points[..self.players()]
     }
 
-    /// Whether cards are exchanged before a Shift, from the second on.
+    /// Whether cards are exchanged, from the second Shift on.
     pub fn exchange(&self) -> bool {
         self.exchange
     }
@@ -317,12 +316,12 @@ impl RuleSet {
         self.opening
     }
 
-    /// Whether a Shift's first turn may be a pass.
+    /// Whether the first turn of a Shift may be a pass.
     pub fn opening_pass(&self) -> bool {
         self.opening_pass
     }
 
-    /// How long a pass binds.
+    /// How long a pass counts.
     pub fn pass_scope(&self) -> PassScope {
         self.pass_scope
     }
@@ -337,12 +336,12 @@ impl RuleSet {
         self.max_turns
     }
 
-    /// Cards dealt to each hand, 3..=61 (standard 17).
+    /// Cards dealt to each hand H, 3..=61 (by default 17).
     pub fn hand_size(&self) -> u8 {
         self.hand
     }
 
-    /// Cards in the deck, 10..=122 (standard 68).
+    /// Cards in the deck, 10..=122 (by default 68).
     pub fn deck_size(&self) -> u8 {
         self.deck
     }
@@ -352,7 +351,7 @@ impl RuleSet {
         ActionSpace::of(self.faces)
     }
 
-    /// The rule set as somebody would ask for it, every field explicit.
+    /// The specification of this rule set, every field explicit.
     pub fn spec(&self) -> RuleSetSpec {
         RuleSetSpec {
             players: self.players,

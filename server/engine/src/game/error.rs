@@ -1,20 +1,20 @@
-//! Why an action is not taken, in words that a player understands.
+//! Why an action is refused, in words for players.
 
 use thiserror::Error;
 
 use super::DecisionKind;
 use crate::{Action, ActionId, Face};
 
-/// Why an action was not taken. The game is as it was.
+/// Why an action was refused. The game is unchanged.
 #[derive(Copy, Clone, Eq, PartialEq, Debug, Error)]
 pub enum ActionError {
-    /// There is nothing left to decide.
+    /// The game has ended.
     #[error("the game has ended")]
     GameOver,
     /// There is no such action.
     #[error("action {action} does not exist: actions are numbered below {size}")]
     OutOfRange {
-        /// The action attempted.
+        /// The attempted action.
         action: ActionId,
         /// Number of actions.
         size: u16,
@@ -22,17 +22,17 @@ pub enum ActionError {
     /// The action belongs to another kind of decision.
     #[error("`{attempted}` is no answer to {}", question(*kind))]
     WrongKind {
-        /// The action attempted.
+        /// The attempted action.
         attempted: Action,
-        /// The kind of decision that is open.
+        /// The kind of the open decision.
         kind: DecisionKind,
     },
-    /// The rules forbid it now.
+    /// The rules forbid the action now.
     #[error("`{attempted}` is not legal: {reason}")]
     NotLegal {
-        /// The action attempted.
+        /// The attempted action.
         attempted: Action,
-        /// Why it is forbidden.
+        /// The reason.
         reason: Refusal,
     },
 }
@@ -69,19 +69,19 @@ pub enum Refusal {
         /// Number of cards on the board.
         board: u8,
     },
-    /// A joker alone cannot beat anything.
+    /// A joker alone beats nothing.
     #[error("a joker alone can only open a pizza")]
     JokerOnlyOpens,
-    /// The Shift opens with the Golden card.
+    /// The Shift's first turn must play the Golden card.
     #[error("the Shift's first turn must play the Golden card, so cards of face {0}")]
     MustPlayGolden(Face),
-    /// The Shift opens with the top face.
+    /// The Shift's first turn must play the top face.
     #[error("the Shift's first turn must play cards of face {0}")]
     MustPlayTopFace(Face),
-    /// The Shift's first turn is a play.
+    /// The Shift's first turn must be a play.
     #[error("passing is not allowed on the Shift's first turn")]
     MayNotPassFirst,
-    /// Too many pizzas in a row have ended without a play.
+    /// Too many consecutive pizzas ended without a play.
     #[error("passing is not allowed here: the last {0} pizzas ended without a play")]
     MayNotPassIdle(u32),
 }

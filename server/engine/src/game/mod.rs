@@ -1,7 +1,6 @@
-//! A game as a value: whose decision is open, taking a decision, and what can be asked of the
-//! state. The parts of a Shift lie in the modules below: `start` (deal, special action, exchange),
-//! `turn` (plays, passes, pizzas), `end` (places, points), `legal` (what is allowed), `view` (what
-//! a seat may know), `script` (games from given hands).
+//! A game as a value: its open decision, applying an action, and reading its state. The modules:
+//! `start` (deal, special action, exchange), `turn` (plays, passes, pizzas), `end` (places, points),
+//! `legal` (what is legal), `view` (what a seat may know), `script` (games from given hands).
 
 mod end;
 mod error;
@@ -23,7 +22,7 @@ use crate::{
 };
 use shift_state::ShiftState;
 
-/// What kind of decision is open.
+/// The kind of a decision.
 #[derive(Copy, Clone, Eq, PartialEq, Hash, Debug)]
 pub enum DecisionKind {
     /// Play or pass.
@@ -34,35 +33,34 @@ pub enum DecisionKind {
     SpecialAction,
 }
 
-/// The decision a game waits for.
+/// A decision that a game waits for.
 #[derive(Copy, Clone, Eq, PartialEq, Debug)]
 pub struct Decision {
-    /// Whose decision it is.
+    /// The seat that decides.
     pub seat: Seat,
-    /// What kind.
+    /// Its kind.
     pub kind: DecisionKind,
 }
 
 /// Where a game stands within a Shift.
 #[derive(Copy, Clone, Eq, PartialEq, Debug)]
 enum Stage {
-    /// This seat was dealt two jokers.
+    /// This seat was dealt two jokers and may declare a special action.
     Special(Seat),
-    /// This seat has to give a card; so many gifts of the Chef and of the Sous-Chef are still to
-    /// come, this one included.
+    /// This seat gives a card. The numbers of gifts that the Chef and the Sous-Chef still give
+    /// include this one.
     Exchange {
         giver: Seat,
         chef_left: u8,
         sous_chef_left: u8,
     },
-    /// This seat has to play or pass.
+    /// This seat plays or passes.
     Turn(Seat),
     /// The game has ended.
     Over,
 }
 
-/// A game being played, or played to its end. Fixed in size and without heap, so that a clone is a
-/// copy of memory.
+/// A game in progress or ended. Has a fixed size and no heap memory, so a clone is a memory copy.
 #[derive(Clone, Eq, PartialEq, Debug)]
 pub struct Game {
     rules: RuleSet,
@@ -72,7 +70,7 @@ pub struct Game {
     state: ShiftState,
     hands: BySeat<Cards>,
     cards_left: BySeat<u8>,
-    /// By face: the Golden card is not told apart.
+    /// Without the Golden card's flag.
     played: Cards,
     gave: BySeat<Cards>,
     received: BySeat<Cards>,
@@ -83,12 +81,12 @@ pub struct Game {
     special: Option<SpecialAction>,
     /// The seat drawn at the deal for the opening with any top face.
     drawn: Option<Seat>,
-    /// The order of the last Shift that ended; breaks ties.
+    /// The order of the last Shift that ended, which breaks ties.
     last_order: SeatOrder,
 }
 
 impl Game {
-    /// A new game: deals the first Shift.
+    /// Starts a game: deals the first Shift.
     pub fn new(rules: RuleSet, seed: Seed, mut on_event: impl FnMut(Event)) -> Game {
         let mut game = Game::blank(rules, seed);
         let deal = Deal::new(&rules, seed, 1);
@@ -124,7 +122,7 @@ impl Game {
         }
     }
 
-    /// The decision that is open, or `None` if the game has ended.
+    /// The open decision, or `None` if the game has ended.
     #[inline]
     pub fn decision(&self) -> Option<Decision> {
         match self.stage {
@@ -144,11 +142,11 @@ impl Game {
         }
     }
 
-    /// Takes the open decision. What happens is told in order, private fields included
+    /// Applies an action to the open decision. Reports the events in order, private fields included
     /// ([`Event::seen_by`]).
     ///
     /// # Errors
-    /// If the action is not legal; the game is left as it was and nothing is told.
+    /// If the action is not legal. The game stays unchanged and no event is reported.
     #[inline]
     pub fn apply(
         &mut self,
@@ -208,14 +206,14 @@ impl Game {
         Ok(())
     }
 
-    /// Lets this seed deal all later Shifts, so that a game can go on otherwise than the one it
-    /// was branched from. The Shift being played stays as it was dealt.
+    /// Deals all later Shifts from this seed, so that a branch can differ from the game it came from.
+    /// The current Shift stays as it was dealt.
     pub fn reseed(&mut self, seed: Seed) {
         self.seed = seed;
     }
 
-    /// The same game, except that it ends with this Shift, whatever the rule set says: to look at how the
-    /// Shift ends after an action, which here the deal of the next one wipes away.
+    /// A copy that ends with this Shift, whatever the rule set says. Its state after the Shift's last
+    /// action is that of the end, which in this game the next deal overwrites.
     pub fn closing_copy(&self) -> Game {
         Game {
             rules: self.rules.with_stop(Stop::Shifts(self.shift)),
@@ -228,13 +226,13 @@ impl Game {
         &self.rules
     }
 
-    /// The seed of the deals to come, and of all before unless [`Game::reseed`] changed it. Records
-    /// need it; nobody may see it before the game has ended.
+    /// The seed of the deals to come, and of all earlier ones unless [`Game::reseed`] changed it.
+    /// Secret until the game has ended.
     pub fn seed(&self) -> Seed {
         self.seed
     }
 
-    /// Number of the Shift being played, or of the last one if the game has ended, from 1.
+    /// Number of the current Shift, or of the last one if the game has ended, from 1.
     pub fn shift(&self) -> u32 {
         self.shift
     }
@@ -244,24 +242,23 @@ impl Game {
         self.state.turns
     }
 
-    /// All hands, which no seat may see. A card given in the exchange is in nobody's hand until the
-    /// exchange is complete.
+    /// All hands, which are secret. A card given in the exchange is in no hand until the exchange is
+    /// complete.
     pub fn hands(&self) -> &BySeat<Cards> {
         &self.hands
     }
 
-    /// Cards played in this Shift, by face: the Golden card is not told apart.
+    /// Cards played in this Shift, without the Golden card's flag.
     pub fn played(&self) -> Cards {
         self.played
     }
 
-    /// Cards given in this Shift's exchange by each seat, those of an exchange not yet complete
-    /// included.
+    /// Cards that each seat gave in this Shift's exchange, also before it is complete.
     pub fn gave(&self) -> &BySeat<Cards> {
         &self.gave
     }
 
-    /// Cards received in this Shift's exchange by each seat.
+    /// Cards that each seat received in this Shift's exchange.
     pub fn received(&self) -> &BySeat<Cards> {
         &self.received
     }
@@ -281,7 +278,7 @@ impl Game {
         self.stage == Stage::Over
     }
 
-    /// The final table, or `None` while the game is being played.
+    /// The final table, or `None` while the game is in progress.
     pub fn standings(&self) -> Option<Standings> {
         self.is_over().then(|| self.final_table())
     }

@@ -1,5 +1,4 @@
-//! Games from given hands instead of a deal: for puzzles, experiments, imagining what hidden cards
-//! may be, and tests.
+//! Games from given hands instead of a deal: for puzzles, experiments, determinization and tests.
 
 use thiserror::Error;
 
@@ -7,18 +6,18 @@ use super::{Game, Stage};
 use crate::deal::opening_leader;
 use crate::{BySeat, Cards, Event, Opening, RuleSet, Seat, SeatOrder, Seed};
 
-/// Where a scripted game begins: a Shift with given hands. Later Shifts are dealt from the seed.
+/// The start of a scripted game: a Shift with given hands. Later Shifts are dealt from the seed.
 #[derive(Clone, Eq, PartialEq, Debug)]
 pub struct Script {
     /// Number of the Shift, from 1.
     pub shift: u32,
     /// The hands as dealt, before any exchange; one of them holds the Golden card.
     pub hands: BySeat<Cards>,
-    /// The order of the Shift before, which gives the roles; `None` in the first Shift alone.
+    /// The order of the last Shift, which gives the roles; `None` in the first Shift only.
     pub last_order: Option<SeatOrder>,
     /// Points of each seat so far.
     pub scores: BySeat<u32>,
-    /// The seat drawn for [`Opening::AnyTopFace`], which needs one; other openings have none.
+    /// The drawn seat: required with [`Opening::AnyTopFace`], `None` with other openings.
     pub drawn: Option<Seat>,
 }
 
@@ -35,52 +34,52 @@ impl Script {
     }
 }
 
-/// Why hands or a script do not make a game.
+/// Why hands or a script are refused.
 #[derive(Copy, Clone, Eq, PartialEq, Debug, Error)]
 pub enum ScriptError {
-    /// Not one value for each seat.
+    /// There is not one value for each seat.
     #[error("hands, scores and the last order must have one entry for each of the {0} seats")]
     Seats(usize),
-    /// A hand of the wrong size.
+    /// A hand has the wrong size.
     #[error("seat {seat} must hold {expected} cards")]
     HandSize {
         /// The seat.
         seat: Seat,
-        /// Cards it must hold.
+        /// Number of cards it must hold.
         expected: u8,
     },
-    /// More cards of a kind than the deck has.
+    /// There are more cards of a kind than the deck has.
     #[error("the hands hold cards that are not left in the deck")]
     NotInDeck,
-    /// The Golden card is missing, or is not where it must be.
+    /// The Golden card is missing or misplaced.
     #[error(
         "the Golden card must be in exactly one hand, among cards of the top face, unless it has been played"
     )]
     Golden,
-    /// A Shift number without sense.
+    /// The Shift's number and the last order contradict each other.
     #[error(
         "the first Shift has number 1 and no last order; a later one needs the order of the Shift before"
     )]
     Shift,
-    /// The game would have ended before.
+    /// The game would have ended earlier.
     #[error("the game would have ended before this Shift")]
     Ended,
-    /// A drawn seat is missing or makes no sense.
+    /// The drawn seat is missing, unexpected or out of range.
     #[error("a seat of the game must be drawn for the opening with any top face, and for no other")]
     Drawn,
     /// Hidden cards can be replaced only while a turn is open.
     #[error("hands can be replaced only while a turn is open")]
     NotATurn,
-    /// The Shift's first turn would belong to another seat.
+    /// Another seat would take the Shift's first turn.
     #[error("with these hands another seat would take the Shift's first turn")]
     Leader,
 }
 
 impl Game {
-    /// A game that begins with a scripted Shift.
+    /// Starts a game with a scripted Shift.
     ///
     /// # Errors
-    /// If no game with this rule set can stand there.
+    /// If no game with this rule set can have this state.
     pub fn scripted(
         rules: RuleSet,
         seed: Seed,
@@ -129,11 +128,11 @@ impl Game {
         Ok(game)
     }
 
-    /// The same game with other hands, each of its present size: one that hidden cards may make of
-    /// it. What was given in this Shift's exchange is left as it was.
+    /// The same game with other hands of the same sizes: a determinization. What was given in this
+    /// Shift's exchange stays unchanged.
     ///
     /// # Errors
-    /// If the cards are not left in the deck, or the game could not have come this far with these
+    /// If the cards are not left in the deck, or the game cannot have reached this state with these
     /// hands.
     pub fn with_hands(&self, hands: BySeat<Cards>) -> Result<Game, ScriptError> {
         if !self.is_turn() {
@@ -162,7 +161,7 @@ impl Game {
     }
 }
 
-/// Checks that hands of these sizes can be held at the same time, beside what was played.
+/// Checks the sizes of hands, and that the deck has their cards beside those played.
 fn check_hands(
     rules: &RuleSet,
     hands: &BySeat<Cards>,

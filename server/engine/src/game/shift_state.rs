@@ -15,9 +15,9 @@ pub(super) struct ShiftState {
     pub(super) board: Board,
     /// Plays and passes so far.
     pub(super) turns: u32,
-    /// From 1 once the first turn is open.
+    /// Laps so far (§8.7), from 1 once the first turn is open.
     pub(super) laps: u32,
-    /// The pizza being made, from 1 once the first turn is open.
+    /// Number of the current pizza, from 1 once the first turn is open.
     pub(super) pizza: u32,
     /// Consecutive pizzas that ended without a play.
     pub(super) idle: u32,
@@ -25,11 +25,11 @@ pub(super) struct ShiftState {
     pub(super) starter: Seat,
     /// The seat that takes the pizza's first turn.
     pub(super) leader: Seat,
-    /// The last to play in this pizza.
+    /// The last seat to play in this pizza.
     pub(super) last_to_play: Option<Seat>,
     /// Set of seats that hold cards.
     pub(super) holding: u8,
-    /// Set of seats that have passed in this pizza, or since the last play if a pass binds for its
+    /// Set of seats that have passed in this pizza, or since the last play if a pass counts for one
     /// turn only.
     pub(super) passed: u8,
     /// Place of each seat that has finished, from 1; 0 for the others.
@@ -86,14 +86,14 @@ impl ShiftState {
         self.holding & !self.passed & !self.last_to_play.map_or(0, bit)
     }
 
-    /// How far to the left of a seat the next one of a set is that is not empty, 1..=N: the seat
-    /// itself is a full circle away.
+    /// The distance from a seat to the left to the next seat of a set that is not empty, 1..=N. The
+    /// seat itself is a full circle away.
     pub(super) fn distance_left(&self, from: Seat, set: u8) -> u8 {
         let twice = u32::from(set) | u32::from(set) << self.players;
         (twice >> (from.index() + 1)).trailing_zeros() as u8 + 1
     }
 
-    /// The seat so far to the left, 0..=N.
+    /// The seat at a distance to the left, 0..=N.
     pub(super) fn left_of(&self, from: Seat, distance: u8) -> Seat {
         let index = from.index() + usize::from(distance);
         let players = usize::from(self.players);
@@ -104,7 +104,7 @@ impl ShiftState {
         })
     }
 
-    /// Moves the turn so far to the left and counts a lap if it reaches or passes over the starter.
+    /// Moves the turn to the left by a distance. Counts a lap if it reaches or passes the starter.
     pub(super) fn move_turn(&mut self, from: Seat, distance: u8) -> Seat {
         if self.distance_left(from, bit(self.starter)) <= distance {
             self.laps += 1;

@@ -99,7 +99,7 @@ impl Game {
         };
     }
 
-    /// Takes a gift that has been found legal out of the giver's hand.
+    /// Moves a legal gift out of the giver's hand.
     pub(super) fn give(
         &mut self,
         giver: Seat,
@@ -122,7 +122,7 @@ impl Game {
         }
     }
 
-    /// Hands over all gifts at once: nobody has seen what it receives before.
+    /// Hands over all gifts at once, so that nobody chooses after seeing what it receives (§3.4).
     fn complete_exchange(&mut self, on_event: &mut impl FnMut(Event)) {
         let ranking = self.ranking;
         for pair in ExchangePair::all(&ranking) {

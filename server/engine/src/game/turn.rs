@@ -20,7 +20,7 @@ impl Game {
         let hand = &mut self.hands[seat];
         hand.remove_counts(number, quantity, jokers);
         if hand.has_golden() && number == self.rules.faces() {
-            // The opening plays the Golden card first of all, any later turn last.
+            // The opening plays the Golden card first, every later turn plays it last (§8.1).
             let opens = self.state.is_first_turn() && self.rules.opening() == Opening::Golden;
             if opens || hand.count(face) == 0 {
                 hand.set_golden(false);
@@ -97,7 +97,7 @@ impl Game {
         self.end_turn(seat, on_event);
     }
 
-    /// The turn goes left, to the next pizza, or to the Shift's end.
+    /// Gives the turn to the left, or ends the pizza or the Shift.
     #[inline]
     fn end_turn(&mut self, seat: Seat, on_event: &mut impl FnMut(Event)) {
         let state = &mut self.state;

@@ -1,13 +1,11 @@
-//! Filling in what a seat may know. Nothing that is not written here reaches an agent's
-//! observation.
+//! Fills in observations. Only what is written here reaches an agent's observation.
 
 use super::shift_state::bit;
 use super::{Game, Stage};
 use crate::{BySeat, Cards, Observation, Viewer};
 
 impl Game {
-    /// What a viewer may know now. A spectator, and one who sees everything in the events, gets no
-    /// hand.
+    /// What a viewer may know now. Spectators get no hand, and neither does [`Viewer::Everything`].
     ///
     /// # Panics
     /// If the game has no such seat.
@@ -44,7 +42,7 @@ impl Game {
         }
     }
 
-    /// Whether the open decision is a turn, so that hidden cards can be exchanged for others.
+    /// Whether the open decision is a turn.
     pub(super) fn is_turn(&self) -> bool {
         matches!(self.stage, Stage::Turn(_))
     }
