@@ -91,7 +91,7 @@ impl Game {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn play_requirement(&self) -> PlayRequirement {
         let (top, board) = (self.rules.faces(), self.state.board);
         let (opening, empty) = (self.state.is_first_turn(), board.face == 0);
@@ -137,19 +137,14 @@ impl Game {
         }
     }
 
-    /// Checks a turn of a seat.
-    #[inline]
+    /// Checks a turn of a seat. Always inlined: each caller checks one variant of the action, and the
+    /// rest is compiled away.
+    #[inline(always)]
     pub(super) fn check_turn(&self, seat: Seat, action: Action) -> Result<(), ActionError> {
-        let required = self.play_requirement();
-        if !self.hands[seat].holds(action) {
-            Err(ActionError::not_legal(action, Refusal::NotInHand))
-        } else if !required.allows(action) {
-            Err(ActionError::not_legal(
-                action,
-                self.refusal(&required, action),
-            ))
-        } else {
+        if self.hands[seat].holds(action) && self.play_requirement().allows(action) {
             Ok(())
+        } else {
+            Err(ActionError::not_legal(action, self.refusal(seat, action)))
         }
     }
 
@@ -162,10 +157,13 @@ impl Game {
         }
     }
 
-    /// Why a turn does not meet its requirement.
+    /// Why a turn is not legal.
     #[cold]
-    fn refusal(&self, required: &PlayRequirement, action: Action) -> Refusal {
-        let board = self.state.board;
+    fn refusal(&self, seat: Seat, action: Action) -> Refusal {
+        if !self.hands[seat].holds(action) {
+            return Refusal::NotInHand;
+        }
+        let (required, board) = (self.play_requirement(), self.state.board);
         match action {
             Action::Pass => self.pass_refusal().expect("a pass is refused for a reason"),
             _ if required.is_opening() => {
@@ -222,12 +220,16 @@ impl Game {
 }
 
 fn legal_gifts(hand: Cards, space: ActionSpace) -> Mask {
-    let gifts = (1..=space.faces()).map(|number| Action::Give(Face::of(number)));
-    gifts
-        .chain([Action::GiveJoker])
-        .filter(|&gift| hand.holds(gift))
-        .map(|gift| space.encode(gift).expect("a card of the deck"))
-        .collect()
+    let mut mask = Mask::EMPTY;
+    for face in (1..=space.faces()).map(Face::of) {
+        if hand.count(face) > 0 {
+            mask.insert(space.give(face).expect("a face of the deck"));
+        }
+    }
+    if hand.jokers() > 0 {
+        mask.insert(space.give_joker());
+    }
+    mask
 }
 
 /// The highest plain face, else the Golden card, else a joker.
