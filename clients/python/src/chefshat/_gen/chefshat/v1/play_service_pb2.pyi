@@ -28,25 +28,25 @@ class _EventDelivery:
 class _EventDeliveryEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_EventDelivery.ValueType], _builtins.type):
     DESCRIPTOR: _descriptor.EnumDescriptor
     EVENT_DELIVERY_UNSPECIFIED: _EventDelivery.ValueType  # 0
-    """As WITH_DECISIONS on Play, as AT_ONCE on Watch."""
+    """WITH_DECISIONS on Play, AT_ONCE on Watch."""
     EVENT_DELIVERY_WITH_DECISIONS: _EventDelivery.ValueType  # 1
-    """With the seat's next decision request, in one message; also when the seat finishes, at the end of a Shift and of the game, and when
-    much has gathered. For programs.
+    """In one message with the seat's next decision request; also when the seat finishes, at the end
+    of a Shift and of the game, and when many events are pending. For programs.
     """
     EVENT_DELIVERY_AT_ONCE: _EventDelivery.ValueType  # 2
-    """Each as it happens. For people, robots, viewers."""
+    """Each event immediately. For people and robots."""
 
 class EventDelivery(_EventDelivery, metaclass=_EventDeliveryEnumTypeWrapper):
-    """How events reach a seat."""
+    """When events are sent to a seat."""
 
 EVENT_DELIVERY_UNSPECIFIED: EventDelivery.ValueType  # 0
-"""As WITH_DECISIONS on Play, as AT_ONCE on Watch."""
+"""WITH_DECISIONS on Play, AT_ONCE on Watch."""
 EVENT_DELIVERY_WITH_DECISIONS: EventDelivery.ValueType  # 1
-"""With the seat's next decision request, in one message; also when the seat finishes, at the end of a Shift and of the game, and when
-much has gathered. For programs.
+"""In one message with the seat's next decision request; also when the seat finishes, at the end
+of a Shift and of the game, and when many events are pending. For programs.
 """
 EVENT_DELIVERY_AT_ONCE: EventDelivery.ValueType  # 2
-"""Each as it happens. For people, robots, viewers."""
+"""Each event immediately. For people and robots."""
 Global___EventDelivery: _TypeAlias = EventDelivery  # noqa: Y015
 
 class _DetachReason:
@@ -58,33 +58,34 @@ class _DetachReasonEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_DetachRe
     DETACH_REASON_UNSPECIFIED: _DetachReason.ValueType  # 0
     """Not set."""
     DETACH_REASON_REQUESTED: _DetachReason.ValueType  # 1
-    """The client asked."""
+    """The client requested it, or gave the seat back."""
     DETACH_REASON_SUPERSEDED: _DetachReason.ValueType  # 2
-    """A newer connection has the seat."""
+    """A newer connection attached the seat."""
     DETACH_REASON_GAME_OVER: _DetachReason.ValueType  # 3
-    """The game is over and everything has been said."""
+    """The game is over and all its events have been sent."""
     DETACH_REASON_TOURNAMENT_OVER: _DetachReason.ValueType  # 5
-    """The tournament is over: its participant will not be seated again."""
+    """The tournament is over. Its participant is not seated again."""
 
 class DetachReason(_DetachReason, metaclass=_DetachReasonEnumTypeWrapper):
-    """Why a seat left the stream."""
+    """Why a seat was detached."""
 
 DETACH_REASON_UNSPECIFIED: DetachReason.ValueType  # 0
 """Not set."""
 DETACH_REASON_REQUESTED: DetachReason.ValueType  # 1
-"""The client asked."""
+"""The client requested it, or gave the seat back."""
 DETACH_REASON_SUPERSEDED: DetachReason.ValueType  # 2
-"""A newer connection has the seat."""
+"""A newer connection attached the seat."""
 DETACH_REASON_GAME_OVER: DetachReason.ValueType  # 3
-"""The game is over and everything has been said."""
+"""The game is over and all its events have been sent."""
 DETACH_REASON_TOURNAMENT_OVER: DetachReason.ValueType  # 5
-"""The tournament is over: its participant will not be seated again."""
+"""The tournament is over. Its participant is not seated again."""
 Global___DetachReason: _TypeAlias = DetachReason  # noqa: Y015
 
 @_typing.final
 class Attach(_message.Message):
-    """Attaches the stream to a seat. The newest attachment of a seat wins; the older is told so. What follows: Attached (or Refused), the
-    events asked for, and the decision that is open for the seat, if any, with the time really left for it.
+    """Attaches a seat to the stream. The newest attachment of a seat wins; the older one receives
+    Detached (SUPERSEDED). The server replies with Attached or Refused, then sends the requested
+    events and the seat's open decision, if any, with the time left for it.
     """
 
     DESCRIPTOR: _descriptor.Descriptor
@@ -97,22 +98,27 @@ class Attach(_message.Message):
     NO_MASK_FIELD_NUMBER: _builtins.int
     ENTROPY_FIELD_NUMBER: _builtins.int
     ticket: _builtins.str
-    """The ticket of a seat, or of a participant in a tournament. The latter is answered with Entered; the server then seats the participant
-    in each of its games by itself: each such seat is announced by an Attached with a handle of its own, and all else of this message
-    holds for it too (but not `request_id`, which is 0 there). Games that go on already are attached at once.
+    """The ticket of a seat, or of a participant in a tournament. For the latter the server replies
+    with Entered, then attaches the participant to each of its games: an Attached with a handle of
+    its own announces each such seat. The other fields apply to those seats as well, except
+    `request_id`, which is 0. Games in progress are attached immediately.
     """
     request_id: _builtins.int
     """Chosen by the client, echoed in Attached, Entered and Refused."""
     from_sequence: _builtins.int
-    """First event wanted. 0 and 1: all. After a lost connection: the number of the last event seen, plus one."""
+    """Number of the first event to send; 0 and 1: all. After a lost connection: the number of the
+    last event received, plus one.
+    """
     snapshot: _builtins.bool
-    """Instead of the events so far, send one Snapshot and then what follows it."""
+    """Send one Snapshot instead of the past events."""
     delivery: Global___EventDelivery.ValueType
-    """How events reach the seat."""
+    """When events are sent."""
     no_mask: _builtins.bool
     """Leave `action_mask` out of decision requests."""
     entropy: _builtins.bytes
-    """The seat's own part of the game seed, 0..=32 bytes. Counts when given before the game starts, and in no game of a series."""
+    """The seat's contribution to the game seed, 0..=32 bytes. Used if sent before the game starts,
+    except in games of a series.
+    """
     def __init__(
         self,
         *,
@@ -134,7 +140,7 @@ Global___Attach: _TypeAlias = Attach  # noqa: Y015
 
 @_typing.final
 class ResumeSeat(_message.Message):
-    """Says that the seat's agent plays itself again after a substitute has."""
+    """Ends the substitution: the seat's own participant plays again."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -151,7 +157,7 @@ Global___ResumeSeat: _TypeAlias = ResumeSeat  # noqa: Y015
 
 @_typing.final
 class Detach(_message.Message):
-    """Leaves the seat without ending the stream."""
+    """Detaches the seat without ending the stream."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -168,7 +174,7 @@ Global___Detach: _TypeAlias = Detach  # noqa: Y015
 
 @_typing.final
 class SeatCommand(_message.Message):
-    """Something a seat does."""
+    """A command of a seat."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -190,15 +196,15 @@ class SeatCommand(_message.Message):
 
     @_builtins.property
     def express(self) -> _decision_pb2.Expression:
-        """Express something."""
+        """Send an expression."""
 
     @_builtins.property
     def resume(self) -> Global___ResumeSeat:
-        """Play itself again."""
+        """End a substitution."""
 
     @_builtins.property
     def detach(self) -> Global___Detach:
-        """Leave."""
+        """Detach."""
 
     def __init__(
         self,
@@ -222,14 +228,14 @@ Global___SeatCommand: _TypeAlias = SeatCommand  # noqa: Y015
 
 @_typing.final
 class PlayRequest(_message.Message):
-    """Any number of commands, carried out in order."""
+    """Commands, executed in order."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
     COMMANDS_FIELD_NUMBER: _builtins.int
     @_builtins.property
     def commands(self) -> _containers.RepeatedCompositeFieldContainer[Global___SeatCommand]:
-        """The commands; at most 1024 a message."""
+        """The commands, at most 1024 in a message."""
 
     def __init__(
         self,
@@ -268,9 +274,11 @@ class Attached(_message.Message):
     next_sequence: _builtins.int
     """Number of the next event of the game."""
     ticket: _builtins.str
-    """Where the server seated a participant of a tournament: the ticket of this seat, with which it can be attached by itself and acted for."""
+    """If the server attached a participant of a tournament: the ticket of this seat, for attaching it
+    directly and for Act. Else empty.
+    """
     tournament_id: _builtins.str
-    """Where the server seated a participant of a tournament: the tournament."""
+    """If the server attached a participant of a tournament: the tournament. Else empty."""
     def __init__(
         self,
         *,
@@ -292,7 +300,9 @@ Global___Attached: _TypeAlias = Attached  # noqa: Y015
 
 @_typing.final
 class Entered(_message.Message):
-    """The stream is attached to a participant of a tournament. The newest attachment of a participant wins; the older is told SUPERSEDED."""
+    """A participant of a tournament is attached to the stream. The newest attachment of a participant
+    wins; the older one receives Detached (SUPERSEDED).
+    """
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -304,7 +314,7 @@ class Entered(_message.Message):
     tournament_id: _builtins.str
     """Identifies the tournament."""
     participant: _builtins.int
-    """The participant's number in it."""
+    """Number of the participant in the tournament, from 0."""
     def __init__(
         self,
         *,
@@ -346,7 +356,7 @@ Global___EventBatch: _TypeAlias = EventBatch  # noqa: Y015
 
 @_typing.final
 class Snapshot(_message.Message):
-    """Where the game stands, in place of the events so far."""
+    """The state of the game, in place of the past events."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -357,11 +367,11 @@ class Snapshot(_message.Message):
     """Number of the next event."""
     @_builtins.property
     def game_started(self) -> _event_pb2.GameStarted:
-        """The start of the game; unset while the room waits."""
+        """The start of the game; unset before it begins."""
 
     @_builtins.property
     def observation(self) -> _decision_pb2.Observation:
-        """What the viewer may know; unset while the room waits."""
+        """What the viewer may know; unset before the game begins."""
 
     def __init__(
         self,
@@ -380,13 +390,13 @@ Global___Snapshot: _TypeAlias = Snapshot  # noqa: Y015
 
 @_typing.final
 class Detached(_message.Message):
-    """The seat has left the stream; its handle means nothing from here on."""
+    """The seat is detached from the stream. Its handle is invalid from here on."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
     REASON_FIELD_NUMBER: _builtins.int
     reason: Global___DetachReason.ValueType
-    """Why."""
+    """The reason."""
     def __init__(
         self,
         *,
@@ -402,7 +412,7 @@ Global___Detached: _TypeAlias = Detached  # noqa: Y015
 
 @_typing.final
 class Refused(_message.Message):
-    """A command was refused; the stream and its other seats are untouched."""
+    """A command was refused. The stream and its other seats are unaffected."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -434,13 +444,14 @@ class Refused(_message.Message):
     request_id: _builtins.int
     """For an Attach: echo of its request_id."""
     reason: _builtins.str
-    """Reason in UPPER_SNAKE. For an Attach TICKET_UNKNOWN, ENTROPY_REFUSED or TOO_MANY_SEATS; for other commands HANDLE_UNKNOWN,
-    COMMAND_MISSING, EXPRESSION_REFUSED, TOO_MANY_EXPRESSIONS, GAME_OVER or ROOM_GONE (connect again: a durable game goes on).
+    """Reason in UPPER_SNAKE. For an Attach TICKET_UNKNOWN, ENTROPY_REFUSED or TOO_MANY_SEATS; for
+    other commands HANDLE_UNKNOWN, COMMAND_MISSING, EXPRESSION_REFUSED, TOO_MANY_EXPRESSIONS,
+    GAME_OVER or ROOM_GONE (reconnect: a durable game resumes).
     """
     message: _builtins.str
-    """What is wrong and what to do, in words."""
+    """What is wrong and what to do, for people."""
     code: _builtins.int
-    """The gRPC status code a call of its own would have ended with."""
+    """The gRPC status code that a unary call would have returned."""
     @_builtins.property
     def metadata(self) -> _containers.ScalarMap[_builtins.str, _builtins.str]:
         """The offending field or limit."""
@@ -464,7 +475,7 @@ Global___Refused: _TypeAlias = Refused  # noqa: Y015
 
 @_typing.final
 class SeatUpdate(_message.Message):
-    """Something a seat is told."""
+    """An update for a seat."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -478,8 +489,9 @@ class SeatUpdate(_message.Message):
     REFUSED_FIELD_NUMBER: _builtins.int
     ENTERED_FIELD_NUMBER: _builtins.int
     handle: _builtins.int
-    """Handle of the seat on this stream: the number of its Attach on the stream, from 0 (a refused Attach has a number too, and so has that of
-    a participant). Seats that the server attaches by itself, in the games of a tournament, are numbered from 2147483648 on.
+    """Handle of the seat on this stream: the number of its Attach on the stream, from 0. Refused
+    Attaches and those of participants are counted. Seats that the server attaches, in games of a
+    tournament, are numbered from 2147483648.
     """
     @_builtins.property
     def attached(self) -> Global___Attached:
@@ -495,15 +507,15 @@ class SeatUpdate(_message.Message):
 
     @_builtins.property
     def result(self) -> _decision_pb2.AnswerResult:
-        """What became of an answer."""
+        """The outcome of an answer."""
 
     @_builtins.property
     def snapshot(self) -> Global___Snapshot:
-        """Where the game stands."""
+        """The state of the game."""
 
     @_builtins.property
     def detached(self) -> Global___Detached:
-        """The seat has left the stream."""
+        """The seat is detached."""
 
     @_builtins.property
     def refused(self) -> Global___Refused:
@@ -538,7 +550,7 @@ Global___SeatUpdate: _TypeAlias = SeatUpdate  # noqa: Y015
 
 @_typing.final
 class PlayResponse(_message.Message):
-    """Everything that was ready when the message was written."""
+    """All updates that were ready when the message was written."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -562,14 +574,14 @@ Global___PlayResponse: _TypeAlias = PlayResponse  # noqa: Y015
 
 @_typing.final
 class PlayServiceWatchRequest(_message.Message):
-    """Attaches seats for watching."""
+    """Attaches seats."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
     SEATS_FIELD_NUMBER: _builtins.int
     @_builtins.property
     def seats(self) -> _containers.RepeatedCompositeFieldContainer[Global___Attach]:
-        """The seats; handles are their indices here. 1..=64."""
+        """The seats, 1..=64. The handle of a seat is its index."""
 
     def __init__(
         self,
@@ -586,7 +598,7 @@ Global___PlayServiceWatchRequest: _TypeAlias = PlayServiceWatchRequest  # noqa: 
 
 @_typing.final
 class PlayServiceWatchResponse(_message.Message):
-    """Everything that was ready when the message was written."""
+    """All updates that were ready when the message was written."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -626,11 +638,11 @@ class ActRequest(_message.Message):
 
     @_builtins.property
     def express(self) -> _decision_pb2.Expression:
-        """Express something."""
+        """Send an expression."""
 
     @_builtins.property
     def resume(self) -> Global___ResumeSeat:
-        """Play itself again."""
+        """End a substitution."""
 
     def __init__(
         self,
@@ -652,14 +664,14 @@ Global___ActRequest: _TypeAlias = ActRequest  # noqa: Y015
 
 @_typing.final
 class ActResponse(_message.Message):
-    """What became of the command."""
+    """The outcome of the command."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
     RESULT_FIELD_NUMBER: _builtins.int
     @_builtins.property
     def result(self) -> _decision_pb2.AnswerResult:
-        """For an answer: the server's word on it."""
+        """For an answer: its outcome."""
 
     def __init__(
         self,

@@ -26,7 +26,7 @@ if _version_not_supported:
 
 
 class PlayServiceStub:
-    """Playing on seats one holds tickets for.
+    """Playing on seats, authorised by their tickets.
     """
 
     def __init__(self, channel):
@@ -53,29 +53,33 @@ class PlayServiceStub:
 
 
 class PlayServiceServicer:
-    """Playing on seats one holds tickets for.
+    """Playing on seats, authorised by their tickets.
     """
 
     def Play(self, request_iterator, context):
-        """One stream for an agent process: any number of seats in any number of games. Half-close to leave; the stream then ends. The server's
-        response headers come at once, before the first message. INVALID_ARGUMENT (TOO_MANY_COMMANDS) ends a stream; so does UNAVAILABLE
-        (SHUTTING_DOWN, STORE_FAILED) when the server stops while durable games go on: connect and attach again until it is back.
+        """One stream for an agent process: any number of seats in any number of games. Half-close to
+        leave; the stream then ends. The server sends response headers immediately, before the first
+        message. The stream ends with INVALID_ARGUMENT (TOO_MANY_COMMANDS), or with UNAVAILABLE
+        (SHUTTING_DOWN, STORE_FAILED) if the server stops while durable games are unfinished: reconnect
+        and attach again.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def Watch(self, request, context):
-        """The same for clients that cannot stream both ways (browsers): all updates of the seats named, until the client cancels. A message
-        without updates is a heartbeat. Answer with Act. INVALID_ARGUMENT (SEATS_REFUSED); UNAVAILABLE as for Play.
+        """For clients without bidirectional streams (browsers): all updates of the given seats, until the
+        client cancels. A message without updates is a heartbeat. Answer with Act. INVALID_ARGUMENT
+        (SEATS_REFUSED); UNAVAILABLE as for Play.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def Act(self, request, context):
-        """One command for one seat, without a stream of requests. UNAUTHENTICATED (TICKET_UNKNOWN); INVALID_ARGUMENT (COMMAND_MISSING,
-        EXPRESSION_REFUSED); FAILED_PRECONDITION (GAME_OVER); RESOURCE_EXHAUSTED (TOO_MANY_EXPRESSIONS).
+        """One command for one seat, without a stream of requests. UNAUTHENTICATED (TICKET_UNKNOWN);
+        INVALID_ARGUMENT (COMMAND_MISSING, EXPRESSION_REFUSED); FAILED_PRECONDITION (GAME_OVER);
+        RESOURCE_EXHAUSTED (TOO_MANY_EXPRESSIONS).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -108,7 +112,7 @@ def add_PlayServiceServicer_to_server(servicer, server):
 
  # This class is part of an EXPERIMENTAL API.
 class PlayService:
-    """Playing on seats one holds tickets for.
+    """Playing on seats, authorised by their tickets.
     """
 
     @staticmethod

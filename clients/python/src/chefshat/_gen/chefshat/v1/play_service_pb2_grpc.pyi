@@ -27,47 +27,55 @@ GRPC_GENERATED_VERSION: str
 GRPC_VERSION: str
 
 class PlayServiceStub:
-    """Playing on seats one holds tickets for."""
+    """Playing on seats, authorised by their tickets."""
 
     @_typing.overload
     def __new__(cls, channel: _grpc.Channel) -> _Self: ...
     @_typing.overload
     def __new__(cls, channel: _aio.Channel) -> PlayServiceAsyncStub: ...
     Play: _grpc.StreamStreamMultiCallable[_play_service_pb2.PlayRequest, _play_service_pb2.PlayResponse]
-    """One stream for an agent process: any number of seats in any number of games. Half-close to leave; the stream then ends. The server's
-    response headers come at once, before the first message. INVALID_ARGUMENT (TOO_MANY_COMMANDS) ends a stream; so does UNAVAILABLE
-    (SHUTTING_DOWN, STORE_FAILED) when the server stops while durable games go on: connect and attach again until it is back.
+    """One stream for an agent process: any number of seats in any number of games. Half-close to
+    leave; the stream then ends. The server sends response headers immediately, before the first
+    message. The stream ends with INVALID_ARGUMENT (TOO_MANY_COMMANDS), or with UNAVAILABLE
+    (SHUTTING_DOWN, STORE_FAILED) if the server stops while durable games are unfinished: reconnect
+    and attach again.
     """
     Watch: _grpc.UnaryStreamMultiCallable[_play_service_pb2.PlayServiceWatchRequest, _play_service_pb2.PlayServiceWatchResponse]
-    """The same for clients that cannot stream both ways (browsers): all updates of the seats named, until the client cancels. A message
-    without updates is a heartbeat. Answer with Act. INVALID_ARGUMENT (SEATS_REFUSED); UNAVAILABLE as for Play.
+    """For clients without bidirectional streams (browsers): all updates of the given seats, until the
+    client cancels. A message without updates is a heartbeat. Answer with Act. INVALID_ARGUMENT
+    (SEATS_REFUSED); UNAVAILABLE as for Play.
     """
     Act: _grpc.UnaryUnaryMultiCallable[_play_service_pb2.ActRequest, _play_service_pb2.ActResponse]
-    """One command for one seat, without a stream of requests. UNAUTHENTICATED (TICKET_UNKNOWN); INVALID_ARGUMENT (COMMAND_MISSING,
-    EXPRESSION_REFUSED); FAILED_PRECONDITION (GAME_OVER); RESOURCE_EXHAUSTED (TOO_MANY_EXPRESSIONS).
+    """One command for one seat, without a stream of requests. UNAUTHENTICATED (TICKET_UNKNOWN);
+    INVALID_ARGUMENT (COMMAND_MISSING, EXPRESSION_REFUSED); FAILED_PRECONDITION (GAME_OVER);
+    RESOURCE_EXHAUSTED (TOO_MANY_EXPRESSIONS).
     """
 
 @_typing.type_check_only
 class PlayServiceAsyncStub(PlayServiceStub):
-    """Playing on seats one holds tickets for."""
+    """Playing on seats, authorised by their tickets."""
 
     def __init__(self, channel: _aio.Channel) -> None: ...
     Play: _aio.StreamStreamMultiCallable[_play_service_pb2.PlayRequest, _play_service_pb2.PlayResponse]  # type: ignore[assignment]
-    """One stream for an agent process: any number of seats in any number of games. Half-close to leave; the stream then ends. The server's
-    response headers come at once, before the first message. INVALID_ARGUMENT (TOO_MANY_COMMANDS) ends a stream; so does UNAVAILABLE
-    (SHUTTING_DOWN, STORE_FAILED) when the server stops while durable games go on: connect and attach again until it is back.
+    """One stream for an agent process: any number of seats in any number of games. Half-close to
+    leave; the stream then ends. The server sends response headers immediately, before the first
+    message. The stream ends with INVALID_ARGUMENT (TOO_MANY_COMMANDS), or with UNAVAILABLE
+    (SHUTTING_DOWN, STORE_FAILED) if the server stops while durable games are unfinished: reconnect
+    and attach again.
     """
     Watch: _aio.UnaryStreamMultiCallable[_play_service_pb2.PlayServiceWatchRequest, _play_service_pb2.PlayServiceWatchResponse]  # type: ignore[assignment]
-    """The same for clients that cannot stream both ways (browsers): all updates of the seats named, until the client cancels. A message
-    without updates is a heartbeat. Answer with Act. INVALID_ARGUMENT (SEATS_REFUSED); UNAVAILABLE as for Play.
+    """For clients without bidirectional streams (browsers): all updates of the given seats, until the
+    client cancels. A message without updates is a heartbeat. Answer with Act. INVALID_ARGUMENT
+    (SEATS_REFUSED); UNAVAILABLE as for Play.
     """
     Act: _aio.UnaryUnaryMultiCallable[_play_service_pb2.ActRequest, _play_service_pb2.ActResponse]  # type: ignore[assignment]
-    """One command for one seat, without a stream of requests. UNAUTHENTICATED (TICKET_UNKNOWN); INVALID_ARGUMENT (COMMAND_MISSING,
-    EXPRESSION_REFUSED); FAILED_PRECONDITION (GAME_OVER); RESOURCE_EXHAUSTED (TOO_MANY_EXPRESSIONS).
+    """One command for one seat, without a stream of requests. UNAUTHENTICATED (TICKET_UNKNOWN);
+    INVALID_ARGUMENT (COMMAND_MISSING, EXPRESSION_REFUSED); FAILED_PRECONDITION (GAME_OVER);
+    RESOURCE_EXHAUSTED (TOO_MANY_EXPRESSIONS).
     """
 
 class PlayServiceServicer(metaclass=_abc_1.ABCMeta):
-    """Playing on seats one holds tickets for."""
+    """Playing on seats, authorised by their tickets."""
 
     @_abc_1.abstractmethod
     def Play(
@@ -75,9 +83,11 @@ class PlayServiceServicer(metaclass=_abc_1.ABCMeta):
         request_iterator: _MaybeAsyncIterator[_play_service_pb2.PlayRequest],
         context: _ServicerContext,
     ) -> _typing.Union[_abc.Iterator[_play_service_pb2.PlayResponse], _abc.AsyncIterator[_play_service_pb2.PlayResponse]]:
-        """One stream for an agent process: any number of seats in any number of games. Half-close to leave; the stream then ends. The server's
-        response headers come at once, before the first message. INVALID_ARGUMENT (TOO_MANY_COMMANDS) ends a stream; so does UNAVAILABLE
-        (SHUTTING_DOWN, STORE_FAILED) when the server stops while durable games go on: connect and attach again until it is back.
+        """One stream for an agent process: any number of seats in any number of games. Half-close to
+        leave; the stream then ends. The server sends response headers immediately, before the first
+        message. The stream ends with INVALID_ARGUMENT (TOO_MANY_COMMANDS), or with UNAVAILABLE
+        (SHUTTING_DOWN, STORE_FAILED) if the server stops while durable games are unfinished: reconnect
+        and attach again.
         """
 
     @_abc_1.abstractmethod
@@ -86,8 +96,9 @@ class PlayServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _play_service_pb2.PlayServiceWatchRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_abc.Iterator[_play_service_pb2.PlayServiceWatchResponse], _abc.AsyncIterator[_play_service_pb2.PlayServiceWatchResponse]]:
-        """The same for clients that cannot stream both ways (browsers): all updates of the seats named, until the client cancels. A message
-        without updates is a heartbeat. Answer with Act. INVALID_ARGUMENT (SEATS_REFUSED); UNAVAILABLE as for Play.
+        """For clients without bidirectional streams (browsers): all updates of the given seats, until the
+        client cancels. A message without updates is a heartbeat. Answer with Act. INVALID_ARGUMENT
+        (SEATS_REFUSED); UNAVAILABLE as for Play.
         """
 
     @_abc_1.abstractmethod
@@ -96,8 +107,9 @@ class PlayServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _play_service_pb2.ActRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_play_service_pb2.ActResponse, _abc.Awaitable[_play_service_pb2.ActResponse]]:
-        """One command for one seat, without a stream of requests. UNAUTHENTICATED (TICKET_UNKNOWN); INVALID_ARGUMENT (COMMAND_MISSING,
-        EXPRESSION_REFUSED); FAILED_PRECONDITION (GAME_OVER); RESOURCE_EXHAUSTED (TOO_MANY_EXPRESSIONS).
+        """One command for one seat, without a stream of requests. UNAUTHENTICATED (TICKET_UNKNOWN);
+        INVALID_ARGUMENT (COMMAND_MISSING, EXPRESSION_REFUSED); FAILED_PRECONDITION (GAME_OVER);
+        RESOURCE_EXHAUSTED (TOO_MANY_EXPRESSIONS).
         """
 
 def add_PlayServiceServicer_to_server(servicer: PlayServiceServicer, server: _typing.Union[_grpc.Server, _aio.Server]) -> None: ...

@@ -24,7 +24,7 @@ DESCRIPTOR: _descriptor.FileDescriptor
 
 @_typing.final
 class RecordFilter(_message.Message):
-    """Which records are wanted: all conditions that are set must hold."""
+    """Selects records: all conditions that are set must hold."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -39,9 +39,11 @@ class RecordFilter(_message.Message):
     state: _room_pb2.RoomState.ValueType
     """How the game ended: FINISHED or ABORTED; UNSPECIFIED: either way."""
     participant: _builtins.str
-    """Name of a participant, or of the built-in agent of a seat (which is itself whatever it was called); empty: any."""
+    """Name of a participant, or of the built-in agent of a seat, whatever its display name; empty:
+    any.
+    """
     kind: _room_pb2.ParticipantKind.ValueType
-    """A kind of participant of which there was at least one."""
+    """The kind of at least one participant; UNSPECIFIED: any."""
     room_name: _builtins.str
     """Name of the room; empty: any."""
     origin: _room_pb2.GameOrigin.ValueType
@@ -51,7 +53,7 @@ class RecordFilter(_message.Message):
     created_before_ms: _builtins.int
     """Created before this time, milliseconds since the Unix epoch; 0: no bound."""
     hosted_here: _builtins.bool
-    """Hosted by this server: not added with ImportRecord."""
+    """Only games hosted by this server, not added with ImportRecord."""
     def __init__(
         self,
         *,
@@ -74,7 +76,7 @@ Global___RecordFilter: _TypeAlias = RecordFilter  # noqa: Y015
 
 @_typing.final
 class RecordSummary(_message.Message):
-    """A record in short."""
+    """A summary of a record."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -109,17 +111,19 @@ class RecordSummary(_message.Message):
     ended_at_ms: _builtins.int
     """Milliseconds since the Unix epoch when the game ended."""
     shifts: _builtins.int
-    """Shifts that were begun."""
+    """Number of Shifts that began."""
     decisions: _builtins.int
     """Number of decisions."""
     added: _builtins.bool
-    """Added with ImportRecord: the game was played elsewhere, and all that is known of it is that its record fits together."""
+    """Whether it was added with ImportRecord. The game was played elsewhere; only the consistency of
+    its record is verified.
+    """
     abort_reason: _room_pb2.AbortReason.ValueType
-    """For a game without a result: why."""
+    """For a game without a result: the reason."""
     tournament_id: _builtins.str
-    """The tournament it belonged to; empty if it belonged to none."""
+    """The tournament of the game; empty if there was none."""
     substituted: _builtins.bool
-    """Whether a substitute took decisions in it."""
+    """Whether a substitute took any decision."""
     @_builtins.property
     def rules(self) -> _rules_pb2.RuleSet:
         """The rule set, every field set."""
@@ -162,7 +166,7 @@ Global___RecordSummary: _TypeAlias = RecordSummary  # noqa: Y015
 
 @_typing.final
 class ListRecordsRequest(_message.Message):
-    """Asks what records there are."""
+    """Requests a list of records."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -171,16 +175,16 @@ class ListRecordsRequest(_message.Message):
     PAGE_TOKEN_FIELD_NUMBER: _builtins.int
     NEWEST_FIRST_FIELD_NUMBER: _builtins.int
     page_size: _builtins.int
-    """Records a page, 1..=100; 0 means 50."""
+    """Records in a page, 1..=100; 0 means 50."""
     page_token: _builtins.str
-    """`next_page_token` of the page before, or empty."""
+    """`next_page_token` of the previous page; empty for the first."""
     newest_first: _builtins.bool
-    """Newest first; the same for all pages of a list. The order is that in which the server began to keep the games: with durable games when
-    they were made, else when they ended.
+    """Newest first. Must be the same for all pages. The order is that of storing the games: durable
+    games when they were created, others when they ended.
     """
     @_builtins.property
     def filter(self) -> Global___RecordFilter:
-        """Which are wanted; unset: all."""
+        """Selects records; unset: all."""
 
     def __init__(
         self,
@@ -207,7 +211,7 @@ class ListRecordsResponse(_message.Message):
     RECORDS_FIELD_NUMBER: _builtins.int
     NEXT_PAGE_TOKEN_FIELD_NUMBER: _builtins.int
     next_page_token: _builtins.str
-    """Token of the next page; empty on the last."""
+    """Token of the next page; empty if this is the last."""
     @_builtins.property
     def records(self) -> _containers.RepeatedCompositeFieldContainer[Global___RecordSummary]:
         """The records."""
@@ -228,7 +232,7 @@ Global___ListRecordsResponse: _TypeAlias = ListRecordsResponse  # noqa: Y015
 
 @_typing.final
 class GetRecordRequest(_message.Message):
-    """Asks for a record."""
+    """Requests a record."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -274,14 +278,14 @@ Global___GetRecordResponse: _TypeAlias = GetRecordResponse  # noqa: Y015
 
 @_typing.final
 class StreamRecordsRequest(_message.Message):
-    """Asks for many records."""
+    """Requests many records."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
     FILTER_FIELD_NUMBER: _builtins.int
     @_builtins.property
     def filter(self) -> Global___RecordFilter:
-        """Which are wanted; unset: all."""
+        """Selects records; unset: all."""
 
     def __init__(
         self,
@@ -298,7 +302,7 @@ Global___StreamRecordsRequest: _TypeAlias = StreamRecordsRequest  # noqa: Y015
 
 @_typing.final
 class StreamRecordsResponse(_message.Message):
-    """A part of a record. A header line begins the next record."""
+    """A part of the records. A header line begins the next record."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -322,7 +326,7 @@ Global___StreamRecordsResponse: _TypeAlias = StreamRecordsResponse  # noqa: Y015
 
 @_typing.final
 class ImportRecordRequest(_message.Message):
-    """A part of a record to add; the stream is one whole record."""
+    """A part of a record to add. The stream is one complete record."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -353,7 +357,7 @@ class ImportRecordResponse(_message.Message):
     RECORD_FIELD_NUMBER: _builtins.int
     @_builtins.property
     def record(self) -> Global___RecordSummary:
-        """It in short."""
+        """Its summary."""
 
     def __init__(
         self,

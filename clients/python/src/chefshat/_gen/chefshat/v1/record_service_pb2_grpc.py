@@ -62,32 +62,36 @@ class RecordServiceServicer:
     """
 
     def ListRecords(self, request, context):
-        """What the server holds, oldest first unless asked otherwise. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, FILTER_REFUSED).
+        """Lists the records of the server, by default oldest first. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED,
+        FILTER_REFUSED).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def GetRecord(self, request, context):
-        """The record of one game, in order, many lines a message. NOT_FOUND (GAME_UNKNOWN) if the server does not hold it;
-        FAILED_PRECONDITION (GAME_RUNNING) while it is being played, (SERIES_OPEN) while other games with the same deals are.
+        """Streams the record of one game, in order. NOT_FOUND (GAME_UNKNOWN); FAILED_PRECONDITION
+        (GAME_RUNNING) while the game is in progress, (SERIES_OPEN) while other games with the same
+        deals are.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def StreamRecords(self, request, context):
-        """All records that a filter lets through, oldest first, one whole record after the other. INVALID_ARGUMENT (FILTER_REFUSED).
+        """Streams all records that match a filter, oldest first, one after the other. INVALID_ARGUMENT
+        (FILTER_REFUSED).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def ImportRecord(self, request_iterator, context):
-        """Adds the record of a game played elsewhere: on another server, or at a real table. It is verified first. INVALID_ARGUMENT
-        (RECORD_REFUSED) names the first line that does not fit; ALREADY_EXISTS (GAME_KNOWN); RESOURCE_EXHAUSTED (RECORD_TOO_LARGE,
-        DISK_NEARLY_FULL); DEADLINE_EXCEEDED (IMPORT_TOO_SLOW);
-        PERMISSION_DENIED (IMPORT_OFF) where the server's host has not switched it on.
+        """Adds the record of a game played elsewhere: on another server, or at a physical table. Verifies
+        it first. INVALID_ARGUMENT (RECORD_REFUSED) names the first invalid line; ALREADY_EXISTS
+        (GAME_KNOWN); RESOURCE_EXHAUSTED (RECORD_TOO_LARGE, DISK_NEARLY_FULL); DEADLINE_EXCEEDED
+        (IMPORT_TOO_SLOW); PERMISSION_DENIED (IMPORT_OFF) unless the server was started with
+        --allow-import.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

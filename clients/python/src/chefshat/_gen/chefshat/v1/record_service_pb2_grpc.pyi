@@ -34,18 +34,24 @@ class RecordServiceStub:
     @_typing.overload
     def __new__(cls, channel: _aio.Channel) -> RecordServiceAsyncStub: ...
     ListRecords: _grpc.UnaryUnaryMultiCallable[_record_service_pb2.ListRecordsRequest, _record_service_pb2.ListRecordsResponse]
-    """What the server holds, oldest first unless asked otherwise. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, FILTER_REFUSED)."""
+    """Lists the records of the server, by default oldest first. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED,
+    FILTER_REFUSED).
+    """
     GetRecord: _grpc.UnaryStreamMultiCallable[_record_service_pb2.GetRecordRequest, _record_service_pb2.GetRecordResponse]
-    """The record of one game, in order, many lines a message. NOT_FOUND (GAME_UNKNOWN) if the server does not hold it;
-    FAILED_PRECONDITION (GAME_RUNNING) while it is being played, (SERIES_OPEN) while other games with the same deals are.
+    """Streams the record of one game, in order. NOT_FOUND (GAME_UNKNOWN); FAILED_PRECONDITION
+    (GAME_RUNNING) while the game is in progress, (SERIES_OPEN) while other games with the same
+    deals are.
     """
     StreamRecords: _grpc.UnaryStreamMultiCallable[_record_service_pb2.StreamRecordsRequest, _record_service_pb2.StreamRecordsResponse]
-    """All records that a filter lets through, oldest first, one whole record after the other. INVALID_ARGUMENT (FILTER_REFUSED)."""
+    """Streams all records that match a filter, oldest first, one after the other. INVALID_ARGUMENT
+    (FILTER_REFUSED).
+    """
     ImportRecord: _grpc.StreamUnaryMultiCallable[_record_service_pb2.ImportRecordRequest, _record_service_pb2.ImportRecordResponse]
-    """Adds the record of a game played elsewhere: on another server, or at a real table. It is verified first. INVALID_ARGUMENT
-    (RECORD_REFUSED) names the first line that does not fit; ALREADY_EXISTS (GAME_KNOWN); RESOURCE_EXHAUSTED (RECORD_TOO_LARGE,
-    DISK_NEARLY_FULL); DEADLINE_EXCEEDED (IMPORT_TOO_SLOW);
-    PERMISSION_DENIED (IMPORT_OFF) where the server's host has not switched it on.
+    """Adds the record of a game played elsewhere: on another server, or at a physical table. Verifies
+    it first. INVALID_ARGUMENT (RECORD_REFUSED) names the first invalid line; ALREADY_EXISTS
+    (GAME_KNOWN); RESOURCE_EXHAUSTED (RECORD_TOO_LARGE, DISK_NEARLY_FULL); DEADLINE_EXCEEDED
+    (IMPORT_TOO_SLOW); PERMISSION_DENIED (IMPORT_OFF) unless the server was started with
+    --allow-import.
     """
 
 @_typing.type_check_only
@@ -54,18 +60,24 @@ class RecordServiceAsyncStub(RecordServiceStub):
 
     def __init__(self, channel: _aio.Channel) -> None: ...
     ListRecords: _aio.UnaryUnaryMultiCallable[_record_service_pb2.ListRecordsRequest, _record_service_pb2.ListRecordsResponse]  # type: ignore[assignment]
-    """What the server holds, oldest first unless asked otherwise. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, FILTER_REFUSED)."""
+    """Lists the records of the server, by default oldest first. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED,
+    FILTER_REFUSED).
+    """
     GetRecord: _aio.UnaryStreamMultiCallable[_record_service_pb2.GetRecordRequest, _record_service_pb2.GetRecordResponse]  # type: ignore[assignment]
-    """The record of one game, in order, many lines a message. NOT_FOUND (GAME_UNKNOWN) if the server does not hold it;
-    FAILED_PRECONDITION (GAME_RUNNING) while it is being played, (SERIES_OPEN) while other games with the same deals are.
+    """Streams the record of one game, in order. NOT_FOUND (GAME_UNKNOWN); FAILED_PRECONDITION
+    (GAME_RUNNING) while the game is in progress, (SERIES_OPEN) while other games with the same
+    deals are.
     """
     StreamRecords: _aio.UnaryStreamMultiCallable[_record_service_pb2.StreamRecordsRequest, _record_service_pb2.StreamRecordsResponse]  # type: ignore[assignment]
-    """All records that a filter lets through, oldest first, one whole record after the other. INVALID_ARGUMENT (FILTER_REFUSED)."""
+    """Streams all records that match a filter, oldest first, one after the other. INVALID_ARGUMENT
+    (FILTER_REFUSED).
+    """
     ImportRecord: _aio.StreamUnaryMultiCallable[_record_service_pb2.ImportRecordRequest, _record_service_pb2.ImportRecordResponse]  # type: ignore[assignment]
-    """Adds the record of a game played elsewhere: on another server, or at a real table. It is verified first. INVALID_ARGUMENT
-    (RECORD_REFUSED) names the first line that does not fit; ALREADY_EXISTS (GAME_KNOWN); RESOURCE_EXHAUSTED (RECORD_TOO_LARGE,
-    DISK_NEARLY_FULL); DEADLINE_EXCEEDED (IMPORT_TOO_SLOW);
-    PERMISSION_DENIED (IMPORT_OFF) where the server's host has not switched it on.
+    """Adds the record of a game played elsewhere: on another server, or at a physical table. Verifies
+    it first. INVALID_ARGUMENT (RECORD_REFUSED) names the first invalid line; ALREADY_EXISTS
+    (GAME_KNOWN); RESOURCE_EXHAUSTED (RECORD_TOO_LARGE, DISK_NEARLY_FULL); DEADLINE_EXCEEDED
+    (IMPORT_TOO_SLOW); PERMISSION_DENIED (IMPORT_OFF) unless the server was started with
+    --allow-import.
     """
 
 class RecordServiceServicer(metaclass=_abc_1.ABCMeta):
@@ -77,7 +89,9 @@ class RecordServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _record_service_pb2.ListRecordsRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_record_service_pb2.ListRecordsResponse, _abc.Awaitable[_record_service_pb2.ListRecordsResponse]]:
-        """What the server holds, oldest first unless asked otherwise. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, FILTER_REFUSED)."""
+        """Lists the records of the server, by default oldest first. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED,
+        FILTER_REFUSED).
+        """
 
     @_abc_1.abstractmethod
     def GetRecord(
@@ -85,8 +99,9 @@ class RecordServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _record_service_pb2.GetRecordRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_abc.Iterator[_record_service_pb2.GetRecordResponse], _abc.AsyncIterator[_record_service_pb2.GetRecordResponse]]:
-        """The record of one game, in order, many lines a message. NOT_FOUND (GAME_UNKNOWN) if the server does not hold it;
-        FAILED_PRECONDITION (GAME_RUNNING) while it is being played, (SERIES_OPEN) while other games with the same deals are.
+        """Streams the record of one game, in order. NOT_FOUND (GAME_UNKNOWN); FAILED_PRECONDITION
+        (GAME_RUNNING) while the game is in progress, (SERIES_OPEN) while other games with the same
+        deals are.
         """
 
     @_abc_1.abstractmethod
@@ -95,7 +110,9 @@ class RecordServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _record_service_pb2.StreamRecordsRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_abc.Iterator[_record_service_pb2.StreamRecordsResponse], _abc.AsyncIterator[_record_service_pb2.StreamRecordsResponse]]:
-        """All records that a filter lets through, oldest first, one whole record after the other. INVALID_ARGUMENT (FILTER_REFUSED)."""
+        """Streams all records that match a filter, oldest first, one after the other. INVALID_ARGUMENT
+        (FILTER_REFUSED).
+        """
 
     @_abc_1.abstractmethod
     def ImportRecord(
@@ -103,10 +120,11 @@ class RecordServiceServicer(metaclass=_abc_1.ABCMeta):
         request_iterator: _MaybeAsyncIterator[_record_service_pb2.ImportRecordRequest],
         context: _ServicerContext,
     ) -> _typing.Union[_record_service_pb2.ImportRecordResponse, _abc.Awaitable[_record_service_pb2.ImportRecordResponse]]:
-        """Adds the record of a game played elsewhere: on another server, or at a real table. It is verified first. INVALID_ARGUMENT
-        (RECORD_REFUSED) names the first line that does not fit; ALREADY_EXISTS (GAME_KNOWN); RESOURCE_EXHAUSTED (RECORD_TOO_LARGE,
-        DISK_NEARLY_FULL); DEADLINE_EXCEEDED (IMPORT_TOO_SLOW);
-        PERMISSION_DENIED (IMPORT_OFF) where the server's host has not switched it on.
+        """Adds the record of a game played elsewhere: on another server, or at a physical table. Verifies
+        it first. INVALID_ARGUMENT (RECORD_REFUSED) names the first invalid line; ALREADY_EXISTS
+        (GAME_KNOWN); RESOURCE_EXHAUSTED (RECORD_TOO_LARGE, DISK_NEARLY_FULL); DEADLINE_EXCEEDED
+        (IMPORT_TOO_SLOW); PERMISSION_DENIED (IMPORT_OFF) unless the server was started with
+        --allow-import.
         """
 
 def add_RecordServiceServicer_to_server(servicer: RecordServiceServicer, server: _typing.Union[_grpc.Server, _aio.Server]) -> None: ...

@@ -72,34 +72,37 @@ class RoomServiceServicer:
     """
 
     def CreateRoom(self, request, context):
-        """Makes a room. INVALID_ARGUMENT (RULE_SET_REFUSED, POLICY_REFUSED, SEATS_REFUSED, SEED_REFUSED, NAME_REFUSED, SCRIPT_REFUSED,
-        BRANCH_REFUSED) names the field at fault; for a recorded game that is named NOT_FOUND (GAME_UNKNOWN) or FAILED_PRECONDITION
-        (GAME_RUNNING); RESOURCE_EXHAUSTED (TOO_MANY_ROOMS, DISK_NEARLY_FULL); UNAVAILABLE
-        (SHUTTING_DOWN, STORE_FAILED).
+        """Creates a room. INVALID_ARGUMENT (RULE_SET_REFUSED, POLICY_REFUSED, SEATS_REFUSED,
+        SEED_REFUSED, NAME_REFUSED, SCRIPT_REFUSED, BRANCH_REFUSED) names the field; NOT_FOUND
+        (GAME_UNKNOWN) or FAILED_PRECONDITION (GAME_RUNNING) for a recorded game in the request;
+        RESOURCE_EXHAUSTED (TOO_MANY_ROOMS, DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN,
+        STORE_FAILED).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def GetRoom(self, request, context):
-        """One room, by its id or its join code. NOT_FOUND (ROOM_UNKNOWN); PERMISSION_DENIED (JOIN_CODE_WRONG).
+        """One room, by its id or its join code. NOT_FOUND (ROOM_UNKNOWN); PERMISSION_DENIED
+        (JOIN_CODE_WRONG).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def ListRooms(self, request, context):
-        """Rooms of the server, newest first: a page goes on with those made before the last one of the page before, so that rooms made meanwhile
-        do not come up; page tokens hold until the server is started anew. A page may hold fewer rooms than asked for and still have a next one. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED,
-        STATE_REFUSED).
+        """Lists the rooms of the server, newest first. Later pages do not include rooms created after the
+        first. Page tokens are valid until the server restarts. A page may have fewer rooms than
+        requested without being the last. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def JoinRoom(self, request, context):
-        """Takes a seat and gives the ticket for it. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED (ROOM_FULL, TOO_MANY_SEATINGS);
-        FAILED_PRECONDITION (SEAT_TAKEN, KIND_NOT_ADMITTED, GAME_STARTED, GAME_OVER); INVALID_ARGUMENT (NO_SUCH_SEAT, NAME_REFUSED, KIND_REFUSED);
+        """Takes a seat and returns its ticket. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED
+        (ROOM_FULL, TOO_MANY_SEATINGS); FAILED_PRECONDITION (SEAT_TAKEN, KIND_NOT_ADMITTED,
+        GAME_STARTED, GAME_OVER); INVALID_ARGUMENT (NO_SUCH_SEAT, NAME_REFUSED, KIND_REFUSED);
         NOT_FOUND (ROOM_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
@@ -107,15 +110,17 @@ class RoomServiceServicer:
         raise NotImplementedError('Method not implemented!')
 
     def LeaveRoom(self, request, context):
-        """Gives back a seat before the game begins: it is free again, its ticket opens nothing any more, and a stream that was attached to it is told
-        so (Detached, REQUESTED). UNAUTHENTICATED (TICKET_UNKNOWN); FAILED_PRECONDITION (GAME_STARTED, GAME_OVER).
+        """Gives a seat back before the game begins: the seat is free, its ticket is invalid, and a stream
+        attached to it receives Detached (REQUESTED). UNAUTHENTICATED (TICKET_UNKNOWN);
+        FAILED_PRECONDITION (GAME_STARTED, GAME_OVER).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def CloseRoom(self, request, context):
-        """Closes a room; a running game is aborted. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND (ROOM_UNKNOWN).
+        """Closes a room. Aborts its game. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND
+        (ROOM_UNKNOWN).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

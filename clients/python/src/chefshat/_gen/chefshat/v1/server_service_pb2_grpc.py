@@ -52,14 +52,14 @@ class ServerServiceServicer:
     """
 
     def GetServerInfo(self, request, context):
-        """Version, limits, and what one may name in other requests.
+        """Returns version, limits, presets and built-in agents.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def GetActionTable(self, request, context):
-        """The texts of all actions, so that no client needs rules. INVALID_ARGUMENT (FACES_OUT_OF_RANGE).
+        """Returns the texts of all actions. INVALID_ARGUMENT (FACES_OUT_OF_RANGE).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

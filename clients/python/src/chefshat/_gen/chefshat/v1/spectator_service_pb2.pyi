@@ -23,7 +23,7 @@ DESCRIPTOR: _descriptor.FileDescriptor
 
 @_typing.final
 class SpectatorServiceWatchRequest(_message.Message):
-    """Asks to watch a room."""
+    """Requests to watch a room."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -33,9 +33,11 @@ class SpectatorServiceWatchRequest(_message.Message):
     room_id: _builtins.str
     """Identifies the room."""
     from_sequence: _builtins.int
-    """First event wanted; 0 and 1: all."""
+    """Number of the first event to send; 0 and 1: all."""
     snapshot: _builtins.bool
-    """Instead of the events so far, start with a snapshot. Only in rooms without a delay (FAILED_PRECONDITION, SNAPSHOT_DELAYED)."""
+    """Start with a snapshot instead of the past events. Only in rooms without a delay, else
+    FAILED_PRECONDITION (SNAPSHOT_DELAYED).
+    """
     def __init__(
         self,
         *,
@@ -53,7 +55,7 @@ Global___SpectatorServiceWatchRequest: _TypeAlias = SpectatorServiceWatchRequest
 
 @_typing.final
 class SpectatorServiceWatchResponse(_message.Message):
-    """The next part of what a spectator sees."""
+    """The next part of the stream."""
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -66,11 +68,11 @@ class SpectatorServiceWatchResponse(_message.Message):
 
     @_builtins.property
     def room(self) -> _room_pb2.Room:
-        """The room, in the first message."""
+        """The room; in the first message only."""
 
     @_builtins.property
     def snapshot(self) -> _play_service_pb2.Snapshot:
-        """The state of the game, in the first message, if asked for."""
+        """The state of the game; in the first message only, if requested."""
 
     def __init__(
         self,

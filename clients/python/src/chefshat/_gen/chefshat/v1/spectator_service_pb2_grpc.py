@@ -47,9 +47,10 @@ class SpectatorServiceServicer:
     """
 
     def Watch(self, request, context):
-        """The public events of a room as its policy allows, until the game is over. A message without events is a heartbeat. NOT_FOUND
-        (ROOM_UNKNOWN); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED); RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS); ends with RESOURCE_EXHAUSTED (SPECTATOR_TOO_SLOW) when the
-        spectator does not keep up: watch again from the number after the last event seen.
+        """Streams the events of a room, as its policy allows, until the game is over. A message without
+        events is a heartbeat. NOT_FOUND (ROOM_UNKNOWN); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED);
+        RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS). Ends with RESOURCE_EXHAUSTED (SPECTATOR_TOO_SLOW) if
+        the spectator does not keep up: watch again from the event after the last one received.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

@@ -34,9 +34,10 @@ class SpectatorServiceStub:
     @_typing.overload
     def __new__(cls, channel: _aio.Channel) -> SpectatorServiceAsyncStub: ...
     Watch: _grpc.UnaryStreamMultiCallable[_spectator_service_pb2.SpectatorServiceWatchRequest, _spectator_service_pb2.SpectatorServiceWatchResponse]
-    """The public events of a room as its policy allows, until the game is over. A message without events is a heartbeat. NOT_FOUND
-    (ROOM_UNKNOWN); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED); RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS); ends with RESOURCE_EXHAUSTED (SPECTATOR_TOO_SLOW) when the
-    spectator does not keep up: watch again from the number after the last event seen.
+    """Streams the events of a room, as its policy allows, until the game is over. A message without
+    events is a heartbeat. NOT_FOUND (ROOM_UNKNOWN); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED);
+    RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS). Ends with RESOURCE_EXHAUSTED (SPECTATOR_TOO_SLOW) if
+    the spectator does not keep up: watch again from the event after the last one received.
     """
 
 @_typing.type_check_only
@@ -45,9 +46,10 @@ class SpectatorServiceAsyncStub(SpectatorServiceStub):
 
     def __init__(self, channel: _aio.Channel) -> None: ...
     Watch: _aio.UnaryStreamMultiCallable[_spectator_service_pb2.SpectatorServiceWatchRequest, _spectator_service_pb2.SpectatorServiceWatchResponse]  # type: ignore[assignment]
-    """The public events of a room as its policy allows, until the game is over. A message without events is a heartbeat. NOT_FOUND
-    (ROOM_UNKNOWN); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED); RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS); ends with RESOURCE_EXHAUSTED (SPECTATOR_TOO_SLOW) when the
-    spectator does not keep up: watch again from the number after the last event seen.
+    """Streams the events of a room, as its policy allows, until the game is over. A message without
+    events is a heartbeat. NOT_FOUND (ROOM_UNKNOWN); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED);
+    RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS). Ends with RESOURCE_EXHAUSTED (SPECTATOR_TOO_SLOW) if
+    the spectator does not keep up: watch again from the event after the last one received.
     """
 
 class SpectatorServiceServicer(metaclass=_abc_1.ABCMeta):
@@ -59,9 +61,10 @@ class SpectatorServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _spectator_service_pb2.SpectatorServiceWatchRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_abc.Iterator[_spectator_service_pb2.SpectatorServiceWatchResponse], _abc.AsyncIterator[_spectator_service_pb2.SpectatorServiceWatchResponse]]:
-        """The public events of a room as its policy allows, until the game is over. A message without events is a heartbeat. NOT_FOUND
-        (ROOM_UNKNOWN); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED); RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS); ends with RESOURCE_EXHAUSTED (SPECTATOR_TOO_SLOW) when the
-        spectator does not keep up: watch again from the number after the last event seen.
+        """Streams the events of a room, as its policy allows, until the game is over. A message without
+        events is a heartbeat. NOT_FOUND (ROOM_UNKNOWN); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED);
+        RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS). Ends with RESOURCE_EXHAUSTED (SPECTATOR_TOO_SLOW) if
+        the spectator does not keep up: watch again from the event after the last one received.
         """
 
 def add_SpectatorServiceServicer_to_server(servicer: SpectatorServiceServicer, server: _typing.Union[_grpc.Server, _aio.Server]) -> None: ...

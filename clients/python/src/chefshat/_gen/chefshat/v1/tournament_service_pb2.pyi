@@ -87,7 +87,9 @@ class GetTournamentRequest(_message.Message):
     tournament_id: _builtins.str
     """Identifies it. May be empty: the join code alone finds it."""
     join_code: _builtins.str
-    """Its join code, for those who were given one and look before they join; else empty. Case does not matter."""
+    """Its join code, for those who were given one and look before they join; else empty. Case does
+    not matter.
+    """
     def __init__(
         self,
         *,
@@ -238,7 +240,9 @@ class JoinTournamentResponse(_message.Message):
     participant: _builtins.int
     """The participant's number."""
     ticket: _builtins.str
-    """Secret of the participant, for this tournament alone: attached in place of a seat's ticket. Valid until the tournament is gone."""
+    """Secret of the participant, for this tournament alone: attached in place of a seat's ticket.
+    Valid until the tournament is gone.
+    """
     @_builtins.property
     def tournament(self) -> _tournament_pb2.Tournament:
         """The tournament."""
@@ -395,12 +399,15 @@ class FollowTournamentResponse(_message.Message):
 
     @_builtins.property
     def standings(self) -> _containers.RepeatedCompositeFieldContainer[_tournament_pb2.TournamentStanding]:
-        """Its standings, best first; as long as no game has counted those who take part, in the order of joining, without places."""
+        """Its standings, best first; as long as no game has counted those who take part, in the order of
+        joining, without places.
+        """
 
     @_builtins.property
     def games(self) -> _containers.RepeatedCompositeFieldContainer[_tournament_pb2.TournamentGame]:
-        """The games of the round that is being played, in order; of ROUND_ROBIN those that are being played. At most 512: those that are being played,
-        then the last of those that are over, then those that are due; ListTournamentGames has all.
+        """The games of the round that is being played, in order; of ROUND_ROBIN those that are being
+        played. At most 512: those that are being played, then the last of those that are over, then
+        those that are due; ListTournamentGames has all.
         """
 
     def __init__(
@@ -455,11 +462,15 @@ class GetTournamentResultsResponse(_message.Message):
 
     @_builtins.property
     def standings(self) -> _containers.RepeatedCompositeFieldContainer[_tournament_pb2.TournamentStanding]:
-        """The standings, best first; as long as no game has counted those who take part, in the order of joining, without places."""
+        """The standings, best first; as long as no game has counted those who take part, in the order of
+        joining, without places.
+        """
 
     @_builtins.property
     def confidence(self) -> _containers.RepeatedCompositeFieldContainer[_tournament_pb2.OrderConfidence]:
-        """For each neighbouring pair of the standings, how sure their order is; empty as long as no game has counted."""
+        """For each neighbouring pair of the standings, how sure their order is; empty as long as no game
+        has counted.
+        """
 
     def __init__(
         self,
@@ -544,7 +555,9 @@ class GetLeaderboardRequest(_message.Message):
     MIN_GAMES_FIELD_NUMBER: _builtins.int
     LIMIT_FIELD_NUMBER: _builtins.int
     kind: _room_pb2.ParticipantKind.ValueType
-    """Participants of this kind alone, rated by the games they played, whoever played in them; UNSPECIFIED: all."""
+    """Participants of this kind alone, rated by the games they played, whoever played in them;
+    UNSPECIFIED: all.
+    """
     min_games: _builtins.int
     """Without those who have played fewer rated games."""
     limit: _builtins.int

@@ -92,82 +92,91 @@ class TournamentServiceServicer:
     """
 
     def CreateTournament(self, request, context):
-        """Makes a tournament. INVALID_ARGUMENT (RULE_SET_REFUSED, POLICY_REFUSED, SETTINGS_REFUSED, NAME_REFUSED) names the field of the settings
-        at fault, `rules` or `policy` included; the message names the one within;
-        RESOURCE_EXHAUSTED (TOO_MANY_TOURNAMENTS, DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
+        """Makes a tournament. INVALID_ARGUMENT (RULE_SET_REFUSED, POLICY_REFUSED, SETTINGS_REFUSED,
+        NAME_REFUSED) names the field of the settings at fault, `rules` or `policy` included; the
+        message names the one within; RESOURCE_EXHAUSTED (TOO_MANY_TOURNAMENTS, DISK_NEARLY_FULL);
+        UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def GetTournament(self, request, context):
-        """One tournament, by its id or its join code. NOT_FOUND (TOURNAMENT_UNKNOWN); PERMISSION_DENIED (JOIN_CODE_WRONG).
+        """One tournament, by its id or its join code. NOT_FOUND (TOURNAMENT_UNKNOWN); PERMISSION_DENIED
+        (JOIN_CODE_WRONG).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def ListTournaments(self, request, context):
-        """Tournaments of the server, newest first: a page goes on with those made before the last one of the page before, so that tournaments made
-        meanwhile do not come up; page tokens hold until the server is started anew. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
+        """Tournaments of the server, newest first: a page goes on with those made before the last one of
+        the page before, so that tournaments made meanwhile do not come up; page tokens hold until the
+        server is started anew. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def JoinTournament(self, request, context):
-        """Joins and gives the ticket: attached to a Play or Watch stream it has the server seat the participant in each of its games.
-        PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN,
-        NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN);
-        UNAVAILABLE (SHUTTING_DOWN).
+        """Joins and gives the ticket: attached to a Play or Watch stream it has the server seat the
+        participant in each of its games. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED
+        (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN, NOT_STATELESS,
+        TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED);
+        NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def StartTournament(self, request, context):
-        """Begins it. PERMISSION_DENIED (OWNER_TOKEN_WRONG); FAILED_PRECONDITION (TOO_FEW_PARTICIPANTS, TOURNAMENT_STARTED); NOT_FOUND
-        (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+        """Begins it. PERMISSION_DENIED (OWNER_TOKEN_WRONG); FAILED_PRECONDITION (TOO_FEW_PARTICIPANTS,
+        TOURNAMENT_STARTED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def CloseTournament(self, request, context):
-        """Closes it: games that are being played are aborted, what has been counted stays. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND
-        (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+        """Closes it: games that are being played are aborted, what has been counted stays.
+        PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE
+        (SHUTTING_DOWN).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def FollowTournament(self, request, context):
-        """The tournament now, then again whenever it has changed, at most about four times a second, until it is over; between, heartbeats without a
-        tournament. NOT_FOUND (TOURNAMENT_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_FOLLOWERS; FOLLOWER_TOO_SLOW if a message is not taken in
-        within 30 seconds).
+        """The tournament now, then again whenever it has changed, at most about four times a second,
+        until it is over; between, heartbeats without a tournament. NOT_FOUND (TOURNAMENT_UNKNOWN);
+        RESOURCE_EXHAUSTED (TOO_MANY_FOLLOWERS; FOLLOWER_TOO_SLOW if a message is not taken in within
+        30 seconds).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def GetTournamentResults(self, request, context):
-        """Standings, ratings, and how sure the order is; final once the tournament is over. NOT_FOUND (TOURNAMENT_UNKNOWN).
+        """Standings, ratings, and how sure the order is; final once the tournament is over. NOT_FOUND
+        (TOURNAMENT_UNKNOWN).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def ListTournamentGames(self, request, context):
-        """Games of a tournament, in order. NOT_FOUND (TOURNAMENT_UNKNOWN); INVALID_ARGUMENT (PAGE_TOKEN_REFUSED).
+        """Games of a tournament, in order. NOT_FOUND (TOURNAMENT_UNKNOWN); INVALID_ARGUMENT
+        (PAGE_TOKEN_REFUSED).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def GetLeaderboard(self, request, context):
-        """Everybody who has played a rated game on this server, best first. Rated are finished games that this server dealt, by its own seed, all of
-        whose seats were played by different participants, without substitutes. Names are not protected: who joins chooses one. It may lack the
-        games of the last seconds. INVALID_ARGUMENT (KIND_REFUSED).
+        """Everybody who has played a rated game on this server, best first. Rated are finished games that
+        this server dealt, by its own seed, all of whose seats were played by different participants,
+        without substitutes. Names are not protected: who joins chooses one. It may lack the games of
+        the last seconds. INVALID_ARGUMENT (KIND_REFUSED).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

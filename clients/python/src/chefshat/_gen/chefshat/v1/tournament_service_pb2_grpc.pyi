@@ -34,43 +34,55 @@ class TournamentServiceStub:
     @_typing.overload
     def __new__(cls, channel: _aio.Channel) -> TournamentServiceAsyncStub: ...
     CreateTournament: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.CreateTournamentRequest, _tournament_service_pb2.CreateTournamentResponse]
-    """Makes a tournament. INVALID_ARGUMENT (RULE_SET_REFUSED, POLICY_REFUSED, SETTINGS_REFUSED, NAME_REFUSED) names the field of the settings
-    at fault, `rules` or `policy` included; the message names the one within;
-    RESOURCE_EXHAUSTED (TOO_MANY_TOURNAMENTS, DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
+    """Makes a tournament. INVALID_ARGUMENT (RULE_SET_REFUSED, POLICY_REFUSED, SETTINGS_REFUSED,
+    NAME_REFUSED) names the field of the settings at fault, `rules` or `policy` included; the
+    message names the one within; RESOURCE_EXHAUSTED (TOO_MANY_TOURNAMENTS, DISK_NEARLY_FULL);
+    UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
     """
     GetTournament: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.GetTournamentRequest, _tournament_service_pb2.GetTournamentResponse]
-    """One tournament, by its id or its join code. NOT_FOUND (TOURNAMENT_UNKNOWN); PERMISSION_DENIED (JOIN_CODE_WRONG)."""
+    """One tournament, by its id or its join code. NOT_FOUND (TOURNAMENT_UNKNOWN); PERMISSION_DENIED
+    (JOIN_CODE_WRONG).
+    """
     ListTournaments: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.ListTournamentsRequest, _tournament_service_pb2.ListTournamentsResponse]
-    """Tournaments of the server, newest first: a page goes on with those made before the last one of the page before, so that tournaments made
-    meanwhile do not come up; page tokens hold until the server is started anew. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
+    """Tournaments of the server, newest first: a page goes on with those made before the last one of
+    the page before, so that tournaments made meanwhile do not come up; page tokens hold until the
+    server is started anew. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
     """
     JoinTournament: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.JoinTournamentRequest, _tournament_service_pb2.JoinTournamentResponse]
-    """Joins and gives the ticket: attached to a Play or Watch stream it has the server seat the participant in each of its games.
-    PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN,
-    NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN);
-    UNAVAILABLE (SHUTTING_DOWN).
+    """Joins and gives the ticket: attached to a Play or Watch stream it has the server seat the
+    participant in each of its games. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED
+    (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN, NOT_STATELESS,
+    TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED);
+    NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
     """
     StartTournament: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.StartTournamentRequest, _tournament_service_pb2.StartTournamentResponse]
-    """Begins it. PERMISSION_DENIED (OWNER_TOKEN_WRONG); FAILED_PRECONDITION (TOO_FEW_PARTICIPANTS, TOURNAMENT_STARTED); NOT_FOUND
-    (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+    """Begins it. PERMISSION_DENIED (OWNER_TOKEN_WRONG); FAILED_PRECONDITION (TOO_FEW_PARTICIPANTS,
+    TOURNAMENT_STARTED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
     """
     CloseTournament: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.CloseTournamentRequest, _tournament_service_pb2.CloseTournamentResponse]
-    """Closes it: games that are being played are aborted, what has been counted stays. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND
-    (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+    """Closes it: games that are being played are aborted, what has been counted stays.
+    PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE
+    (SHUTTING_DOWN).
     """
     FollowTournament: _grpc.UnaryStreamMultiCallable[_tournament_service_pb2.FollowTournamentRequest, _tournament_service_pb2.FollowTournamentResponse]
-    """The tournament now, then again whenever it has changed, at most about four times a second, until it is over; between, heartbeats without a
-    tournament. NOT_FOUND (TOURNAMENT_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_FOLLOWERS; FOLLOWER_TOO_SLOW if a message is not taken in
-    within 30 seconds).
+    """The tournament now, then again whenever it has changed, at most about four times a second,
+    until it is over; between, heartbeats without a tournament. NOT_FOUND (TOURNAMENT_UNKNOWN);
+    RESOURCE_EXHAUSTED (TOO_MANY_FOLLOWERS; FOLLOWER_TOO_SLOW if a message is not taken in within
+    30 seconds).
     """
     GetTournamentResults: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.GetTournamentResultsRequest, _tournament_service_pb2.GetTournamentResultsResponse]
-    """Standings, ratings, and how sure the order is; final once the tournament is over. NOT_FOUND (TOURNAMENT_UNKNOWN)."""
+    """Standings, ratings, and how sure the order is; final once the tournament is over. NOT_FOUND
+    (TOURNAMENT_UNKNOWN).
+    """
     ListTournamentGames: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.ListTournamentGamesRequest, _tournament_service_pb2.ListTournamentGamesResponse]
-    """Games of a tournament, in order. NOT_FOUND (TOURNAMENT_UNKNOWN); INVALID_ARGUMENT (PAGE_TOKEN_REFUSED)."""
+    """Games of a tournament, in order. NOT_FOUND (TOURNAMENT_UNKNOWN); INVALID_ARGUMENT
+    (PAGE_TOKEN_REFUSED).
+    """
     GetLeaderboard: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.GetLeaderboardRequest, _tournament_service_pb2.GetLeaderboardResponse]
-    """Everybody who has played a rated game on this server, best first. Rated are finished games that this server dealt, by its own seed, all of
-    whose seats were played by different participants, without substitutes. Names are not protected: who joins chooses one. It may lack the
-    games of the last seconds. INVALID_ARGUMENT (KIND_REFUSED).
+    """Everybody who has played a rated game on this server, best first. Rated are finished games that
+    this server dealt, by its own seed, all of whose seats were played by different participants,
+    without substitutes. Names are not protected: who joins chooses one. It may lack the games of
+    the last seconds. INVALID_ARGUMENT (KIND_REFUSED).
     """
 
 @_typing.type_check_only
@@ -79,43 +91,55 @@ class TournamentServiceAsyncStub(TournamentServiceStub):
 
     def __init__(self, channel: _aio.Channel) -> None: ...
     CreateTournament: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.CreateTournamentRequest, _tournament_service_pb2.CreateTournamentResponse]  # type: ignore[assignment]
-    """Makes a tournament. INVALID_ARGUMENT (RULE_SET_REFUSED, POLICY_REFUSED, SETTINGS_REFUSED, NAME_REFUSED) names the field of the settings
-    at fault, `rules` or `policy` included; the message names the one within;
-    RESOURCE_EXHAUSTED (TOO_MANY_TOURNAMENTS, DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
+    """Makes a tournament. INVALID_ARGUMENT (RULE_SET_REFUSED, POLICY_REFUSED, SETTINGS_REFUSED,
+    NAME_REFUSED) names the field of the settings at fault, `rules` or `policy` included; the
+    message names the one within; RESOURCE_EXHAUSTED (TOO_MANY_TOURNAMENTS, DISK_NEARLY_FULL);
+    UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
     """
     GetTournament: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.GetTournamentRequest, _tournament_service_pb2.GetTournamentResponse]  # type: ignore[assignment]
-    """One tournament, by its id or its join code. NOT_FOUND (TOURNAMENT_UNKNOWN); PERMISSION_DENIED (JOIN_CODE_WRONG)."""
+    """One tournament, by its id or its join code. NOT_FOUND (TOURNAMENT_UNKNOWN); PERMISSION_DENIED
+    (JOIN_CODE_WRONG).
+    """
     ListTournaments: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.ListTournamentsRequest, _tournament_service_pb2.ListTournamentsResponse]  # type: ignore[assignment]
-    """Tournaments of the server, newest first: a page goes on with those made before the last one of the page before, so that tournaments made
-    meanwhile do not come up; page tokens hold until the server is started anew. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
+    """Tournaments of the server, newest first: a page goes on with those made before the last one of
+    the page before, so that tournaments made meanwhile do not come up; page tokens hold until the
+    server is started anew. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
     """
     JoinTournament: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.JoinTournamentRequest, _tournament_service_pb2.JoinTournamentResponse]  # type: ignore[assignment]
-    """Joins and gives the ticket: attached to a Play or Watch stream it has the server seat the participant in each of its games.
-    PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN,
-    NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN);
-    UNAVAILABLE (SHUTTING_DOWN).
+    """Joins and gives the ticket: attached to a Play or Watch stream it has the server seat the
+    participant in each of its games. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED
+    (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN, NOT_STATELESS,
+    TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED);
+    NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
     """
     StartTournament: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.StartTournamentRequest, _tournament_service_pb2.StartTournamentResponse]  # type: ignore[assignment]
-    """Begins it. PERMISSION_DENIED (OWNER_TOKEN_WRONG); FAILED_PRECONDITION (TOO_FEW_PARTICIPANTS, TOURNAMENT_STARTED); NOT_FOUND
-    (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+    """Begins it. PERMISSION_DENIED (OWNER_TOKEN_WRONG); FAILED_PRECONDITION (TOO_FEW_PARTICIPANTS,
+    TOURNAMENT_STARTED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
     """
     CloseTournament: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.CloseTournamentRequest, _tournament_service_pb2.CloseTournamentResponse]  # type: ignore[assignment]
-    """Closes it: games that are being played are aborted, what has been counted stays. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND
-    (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+    """Closes it: games that are being played are aborted, what has been counted stays.
+    PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE
+    (SHUTTING_DOWN).
     """
     FollowTournament: _aio.UnaryStreamMultiCallable[_tournament_service_pb2.FollowTournamentRequest, _tournament_service_pb2.FollowTournamentResponse]  # type: ignore[assignment]
-    """The tournament now, then again whenever it has changed, at most about four times a second, until it is over; between, heartbeats without a
-    tournament. NOT_FOUND (TOURNAMENT_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_FOLLOWERS; FOLLOWER_TOO_SLOW if a message is not taken in
-    within 30 seconds).
+    """The tournament now, then again whenever it has changed, at most about four times a second,
+    until it is over; between, heartbeats without a tournament. NOT_FOUND (TOURNAMENT_UNKNOWN);
+    RESOURCE_EXHAUSTED (TOO_MANY_FOLLOWERS; FOLLOWER_TOO_SLOW if a message is not taken in within
+    30 seconds).
     """
     GetTournamentResults: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.GetTournamentResultsRequest, _tournament_service_pb2.GetTournamentResultsResponse]  # type: ignore[assignment]
-    """Standings, ratings, and how sure the order is; final once the tournament is over. NOT_FOUND (TOURNAMENT_UNKNOWN)."""
+    """Standings, ratings, and how sure the order is; final once the tournament is over. NOT_FOUND
+    (TOURNAMENT_UNKNOWN).
+    """
     ListTournamentGames: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.ListTournamentGamesRequest, _tournament_service_pb2.ListTournamentGamesResponse]  # type: ignore[assignment]
-    """Games of a tournament, in order. NOT_FOUND (TOURNAMENT_UNKNOWN); INVALID_ARGUMENT (PAGE_TOKEN_REFUSED)."""
+    """Games of a tournament, in order. NOT_FOUND (TOURNAMENT_UNKNOWN); INVALID_ARGUMENT
+    (PAGE_TOKEN_REFUSED).
+    """
     GetLeaderboard: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.GetLeaderboardRequest, _tournament_service_pb2.GetLeaderboardResponse]  # type: ignore[assignment]
-    """Everybody who has played a rated game on this server, best first. Rated are finished games that this server dealt, by its own seed, all of
-    whose seats were played by different participants, without substitutes. Names are not protected: who joins chooses one. It may lack the
-    games of the last seconds. INVALID_ARGUMENT (KIND_REFUSED).
+    """Everybody who has played a rated game on this server, best first. Rated are finished games that
+    this server dealt, by its own seed, all of whose seats were played by different participants,
+    without substitutes. Names are not protected: who joins chooses one. It may lack the games of
+    the last seconds. INVALID_ARGUMENT (KIND_REFUSED).
     """
 
 class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
@@ -127,9 +151,10 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _tournament_service_pb2.CreateTournamentRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_tournament_service_pb2.CreateTournamentResponse, _abc.Awaitable[_tournament_service_pb2.CreateTournamentResponse]]:
-        """Makes a tournament. INVALID_ARGUMENT (RULE_SET_REFUSED, POLICY_REFUSED, SETTINGS_REFUSED, NAME_REFUSED) names the field of the settings
-        at fault, `rules` or `policy` included; the message names the one within;
-        RESOURCE_EXHAUSTED (TOO_MANY_TOURNAMENTS, DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
+        """Makes a tournament. INVALID_ARGUMENT (RULE_SET_REFUSED, POLICY_REFUSED, SETTINGS_REFUSED,
+        NAME_REFUSED) names the field of the settings at fault, `rules` or `policy` included; the
+        message names the one within; RESOURCE_EXHAUSTED (TOO_MANY_TOURNAMENTS, DISK_NEARLY_FULL);
+        UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
         """
 
     @_abc_1.abstractmethod
@@ -138,7 +163,9 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _tournament_service_pb2.GetTournamentRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_tournament_service_pb2.GetTournamentResponse, _abc.Awaitable[_tournament_service_pb2.GetTournamentResponse]]:
-        """One tournament, by its id or its join code. NOT_FOUND (TOURNAMENT_UNKNOWN); PERMISSION_DENIED (JOIN_CODE_WRONG)."""
+        """One tournament, by its id or its join code. NOT_FOUND (TOURNAMENT_UNKNOWN); PERMISSION_DENIED
+        (JOIN_CODE_WRONG).
+        """
 
     @_abc_1.abstractmethod
     def ListTournaments(
@@ -146,8 +173,9 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _tournament_service_pb2.ListTournamentsRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_tournament_service_pb2.ListTournamentsResponse, _abc.Awaitable[_tournament_service_pb2.ListTournamentsResponse]]:
-        """Tournaments of the server, newest first: a page goes on with those made before the last one of the page before, so that tournaments made
-        meanwhile do not come up; page tokens hold until the server is started anew. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
+        """Tournaments of the server, newest first: a page goes on with those made before the last one of
+        the page before, so that tournaments made meanwhile do not come up; page tokens hold until the
+        server is started anew. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
         """
 
     @_abc_1.abstractmethod
@@ -156,10 +184,11 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _tournament_service_pb2.JoinTournamentRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_tournament_service_pb2.JoinTournamentResponse, _abc.Awaitable[_tournament_service_pb2.JoinTournamentResponse]]:
-        """Joins and gives the ticket: attached to a Play or Watch stream it has the server seat the participant in each of its games.
-        PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN,
-        NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN);
-        UNAVAILABLE (SHUTTING_DOWN).
+        """Joins and gives the ticket: attached to a Play or Watch stream it has the server seat the
+        participant in each of its games. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED
+        (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN, NOT_STATELESS,
+        TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED);
+        NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
         """
 
     @_abc_1.abstractmethod
@@ -168,8 +197,8 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _tournament_service_pb2.StartTournamentRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_tournament_service_pb2.StartTournamentResponse, _abc.Awaitable[_tournament_service_pb2.StartTournamentResponse]]:
-        """Begins it. PERMISSION_DENIED (OWNER_TOKEN_WRONG); FAILED_PRECONDITION (TOO_FEW_PARTICIPANTS, TOURNAMENT_STARTED); NOT_FOUND
-        (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+        """Begins it. PERMISSION_DENIED (OWNER_TOKEN_WRONG); FAILED_PRECONDITION (TOO_FEW_PARTICIPANTS,
+        TOURNAMENT_STARTED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
         """
 
     @_abc_1.abstractmethod
@@ -178,8 +207,9 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _tournament_service_pb2.CloseTournamentRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_tournament_service_pb2.CloseTournamentResponse, _abc.Awaitable[_tournament_service_pb2.CloseTournamentResponse]]:
-        """Closes it: games that are being played are aborted, what has been counted stays. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND
-        (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+        """Closes it: games that are being played are aborted, what has been counted stays.
+        PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE
+        (SHUTTING_DOWN).
         """
 
     @_abc_1.abstractmethod
@@ -188,9 +218,10 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _tournament_service_pb2.FollowTournamentRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_abc.Iterator[_tournament_service_pb2.FollowTournamentResponse], _abc.AsyncIterator[_tournament_service_pb2.FollowTournamentResponse]]:
-        """The tournament now, then again whenever it has changed, at most about four times a second, until it is over; between, heartbeats without a
-        tournament. NOT_FOUND (TOURNAMENT_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_FOLLOWERS; FOLLOWER_TOO_SLOW if a message is not taken in
-        within 30 seconds).
+        """The tournament now, then again whenever it has changed, at most about four times a second,
+        until it is over; between, heartbeats without a tournament. NOT_FOUND (TOURNAMENT_UNKNOWN);
+        RESOURCE_EXHAUSTED (TOO_MANY_FOLLOWERS; FOLLOWER_TOO_SLOW if a message is not taken in within
+        30 seconds).
         """
 
     @_abc_1.abstractmethod
@@ -199,7 +230,9 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _tournament_service_pb2.GetTournamentResultsRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_tournament_service_pb2.GetTournamentResultsResponse, _abc.Awaitable[_tournament_service_pb2.GetTournamentResultsResponse]]:
-        """Standings, ratings, and how sure the order is; final once the tournament is over. NOT_FOUND (TOURNAMENT_UNKNOWN)."""
+        """Standings, ratings, and how sure the order is; final once the tournament is over. NOT_FOUND
+        (TOURNAMENT_UNKNOWN).
+        """
 
     @_abc_1.abstractmethod
     def ListTournamentGames(
@@ -207,7 +240,9 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _tournament_service_pb2.ListTournamentGamesRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_tournament_service_pb2.ListTournamentGamesResponse, _abc.Awaitable[_tournament_service_pb2.ListTournamentGamesResponse]]:
-        """Games of a tournament, in order. NOT_FOUND (TOURNAMENT_UNKNOWN); INVALID_ARGUMENT (PAGE_TOKEN_REFUSED)."""
+        """Games of a tournament, in order. NOT_FOUND (TOURNAMENT_UNKNOWN); INVALID_ARGUMENT
+        (PAGE_TOKEN_REFUSED).
+        """
 
     @_abc_1.abstractmethod
     def GetLeaderboard(
@@ -215,9 +250,10 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _tournament_service_pb2.GetLeaderboardRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_tournament_service_pb2.GetLeaderboardResponse, _abc.Awaitable[_tournament_service_pb2.GetLeaderboardResponse]]:
-        """Everybody who has played a rated game on this server, best first. Rated are finished games that this server dealt, by its own seed, all of
-        whose seats were played by different participants, without substitutes. Names are not protected: who joins chooses one. It may lack the
-        games of the last seconds. INVALID_ARGUMENT (KIND_REFUSED).
+        """Everybody who has played a rated game on this server, best first. Rated are finished games that
+        this server dealt, by its own seed, all of whose seats were played by different participants,
+        without substitutes. Names are not protected: who joins chooses one. It may lack the games of
+        the last seconds. INVALID_ARGUMENT (KIND_REFUSED).
         """
 
 def add_TournamentServiceServicer_to_server(servicer: TournamentServiceServicer, server: _typing.Union[_grpc.Server, _aio.Server]) -> None: ...
