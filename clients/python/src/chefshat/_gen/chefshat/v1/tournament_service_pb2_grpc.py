@@ -26,7 +26,7 @@ if _version_not_supported:
 
 
 class TournamentServiceStub:
-    """Tournaments of a server. A tournament goes on where it stood when the server was down.
+    """Tournaments of a server. Tournaments survive restarts of the server.
     """
 
     def __init__(self, channel):
@@ -88,39 +88,39 @@ class TournamentServiceStub:
 
 
 class TournamentServiceServicer:
-    """Tournaments of a server. A tournament goes on where it stood when the server was down.
+    """Tournaments of a server. Tournaments survive restarts of the server.
     """
 
     def CreateTournament(self, request, context):
-        """Makes a tournament. INVALID_ARGUMENT (RULE_SET_REFUSED, POLICY_REFUSED, SETTINGS_REFUSED,
-        NAME_REFUSED) names the field of the settings at fault, `rules` or `policy` included; the
-        message names the one within; RESOURCE_EXHAUSTED (TOO_MANY_TOURNAMENTS, DISK_NEARLY_FULL);
-        UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
+        """Creates a tournament. INVALID_ARGUMENT (RULE_SET_REFUSED, POLICY_REFUSED, SETTINGS_REFUSED,
+        NAME_REFUSED) names the field of the settings, which may be `rules` or `policy`; the message
+        names the inner field; RESOURCE_EXHAUSTED (TOO_MANY_TOURNAMENTS, DISK_NEARLY_FULL); UNAVAILABLE
+        (SHUTTING_DOWN, STORE_FAILED).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def GetTournament(self, request, context):
-        """One tournament, by its id or its join code. NOT_FOUND (TOURNAMENT_UNKNOWN); PERMISSION_DENIED
-        (JOIN_CODE_WRONG).
+        """Returns a tournament, by its id or its join code. NOT_FOUND (TOURNAMENT_UNKNOWN);
+        PERMISSION_DENIED (JOIN_CODE_WRONG).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def ListTournaments(self, request, context):
-        """Tournaments of the server, newest first: a page goes on with those made before the last one of
-        the page before, so that tournaments made meanwhile do not come up; page tokens hold until the
-        server is started anew. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
+        """Lists the tournaments of the server, newest first. Later pages do not include tournaments
+        created after the first. Page tokens are valid until the server restarts. INVALID_ARGUMENT
+        (PAGE_TOKEN_REFUSED, STATE_REFUSED).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def JoinTournament(self, request, context):
-        """Joins and gives the ticket: attached to a Play or Watch stream it has the server seat the
-        participant in each of its games. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED
+        """Joins, and returns a ticket. Attached to a Play or Watch stream, it makes the server attach the
+        participant to each of its games. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED
         (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN, NOT_STATELESS,
         TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED);
         NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
@@ -130,7 +130,7 @@ class TournamentServiceServicer:
         raise NotImplementedError('Method not implemented!')
 
     def StartTournament(self, request, context):
-        """Begins it. PERMISSION_DENIED (OWNER_TOKEN_WRONG); FAILED_PRECONDITION (TOO_FEW_PARTICIPANTS,
+        """Starts it. PERMISSION_DENIED (OWNER_TOKEN_WRONG); FAILED_PRECONDITION (TOO_FEW_PARTICIPANTS,
         TOURNAMENT_STARTED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
@@ -138,34 +138,33 @@ class TournamentServiceServicer:
         raise NotImplementedError('Method not implemented!')
 
     def CloseTournament(self, request, context):
-        """Closes it: games that are being played are aborted, what has been counted stays.
-        PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE
-        (SHUTTING_DOWN).
+        """Closes it: aborts the games in progress and keeps the counted ones. PERMISSION_DENIED
+        (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def FollowTournament(self, request, context):
-        """The tournament now, then again whenever it has changed, at most about four times a second,
-        until it is over; between, heartbeats without a tournament. NOT_FOUND (TOURNAMENT_UNKNOWN);
-        RESOURCE_EXHAUSTED (TOO_MANY_FOLLOWERS; FOLLOWER_TOO_SLOW if a message is not taken in within
-        30 seconds).
+        """Streams the tournament now and after every change, at most about four times a second, until it
+        is over; in between heartbeats without a tournament. NOT_FOUND (TOURNAMENT_UNKNOWN);
+        RESOURCE_EXHAUSTED (TOO_MANY_FOLLOWERS; FOLLOWER_TOO_SLOW if the client does not read a message
+        within 30 seconds).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def GetTournamentResults(self, request, context):
-        """Standings, ratings, and how sure the order is; final once the tournament is over. NOT_FOUND
-        (TOURNAMENT_UNKNOWN).
+        """Returns standings, ratings and the confidence of their order; final when the tournament is
+        over. NOT_FOUND (TOURNAMENT_UNKNOWN).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
     def ListTournamentGames(self, request, context):
-        """Games of a tournament, in order. NOT_FOUND (TOURNAMENT_UNKNOWN); INVALID_ARGUMENT
+        """Lists the games of a tournament, in order. NOT_FOUND (TOURNAMENT_UNKNOWN); INVALID_ARGUMENT
         (PAGE_TOKEN_REFUSED).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
@@ -173,10 +172,10 @@ class TournamentServiceServicer:
         raise NotImplementedError('Method not implemented!')
 
     def GetLeaderboard(self, request, context):
-        """Everybody who has played a rated game on this server, best first. Rated are finished games that
-        this server dealt, by its own seed, all of whose seats were played by different participants,
-        without substitutes. Names are not protected: who joins chooses one. It may lack the games of
-        the last seconds. INVALID_ARGUMENT (KIND_REFUSED).
+        """Returns all who have played a rated game on this server, best first. A game is rated if it
+        finished, was dealt by this server from its own seed, and different participants played all
+        seats without substitutes. Names are not protected: participants choose them. The games of the
+        last seconds may be missing. INVALID_ARGUMENT (KIND_REFUSED).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -244,7 +243,7 @@ def add_TournamentServiceServicer_to_server(servicer, server):
 
  # This class is part of an EXPERIMENTAL API.
 class TournamentService:
-    """Tournaments of a server. A tournament goes on where it stood when the server was down.
+    """Tournaments of a server. Tournaments survive restarts of the server.
     """
 
     @staticmethod

@@ -47,16 +47,17 @@ class VectorServiceServicer:
     """
 
     def Run(self, request_iterator, context):
-        """Plays games of the client's own. The first request is the setup; the server answers it with
-        `started` and the first batch, and every later request (actions or reset) with the next batch.
-        Half-closing ends the stream and the games. Bad requests end it too: INVALID_ARGUMENT
-        (SETUP_MISSING, SETUP_REFUSED, RULE_SET_REFUSED, SCRIPT_REFUSED, BRANCH_REFUSED, SEED_REFUSED,
-        ACTIONS_REFUSED, ILLEGAL_ACTION, RESET_REFUSED), NOT_FOUND (GAME_UNKNOWN), FAILED_PRECONDITION
-        (GAME_RUNNING), RESOURCE_EXHAUSTED (TOO_MANY_VECTOR_STREAMS, TOO_MANY_VECTOR_GAMES,
-        RECORDS_TOO_LONG), DEADLINE_EXCEEDED (SETUP_TOO_LATE, CLIENT_IDLE, CLIENT_TOO_SLOW),
-        UNAVAILABLE (SHUTTING_DOWN); a request above max_vector_message_bytes ends it with
-        OUT_OF_RANGE. The limits are in ServerService.GetServerInfo. A batch has at most
-        max_vector_batch_bytes: let your client take as much.
+        """Plays games that the client owns. The first request is the setup. The server replies with
+        `started` and the first batch, and to every later request (actions or reset) with the next
+        batch. Half-closing ends the stream and the games. Invalid requests end it as well:
+        INVALID_ARGUMENT (SETUP_MISSING, SETUP_REFUSED, RULE_SET_REFUSED, SCRIPT_REFUSED,
+        BRANCH_REFUSED, SEED_REFUSED, ACTIONS_REFUSED, ILLEGAL_ACTION, RESET_REFUSED), NOT_FOUND
+        (GAME_UNKNOWN), FAILED_PRECONDITION (GAME_RUNNING), RESOURCE_EXHAUSTED
+        (TOO_MANY_VECTOR_STREAMS, TOO_MANY_VECTOR_GAMES, RECORDS_TOO_LONG), DEADLINE_EXCEEDED
+        (SETUP_TOO_LATE, CLIENT_IDLE, CLIENT_TOO_SLOW), UNAVAILABLE (SHUTTING_DOWN); a request above
+        max_vector_message_bytes ends it with OUT_OF_RANGE. The limits are in
+        ServerService.GetServerInfo. A batch has at most max_vector_batch_bytes: allow your client to
+        receive that much.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
