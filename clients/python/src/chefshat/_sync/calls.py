@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Self
 
 import grpc
+
 from chefshat import pb, requests
 from chefshat._gen.chefshat.v1.play_service_pb2_grpc import PlayServiceStub
 from chefshat._gen.chefshat.v1.record_service_pb2_grpc import RecordServiceStub
