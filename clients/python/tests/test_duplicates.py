@@ -55,6 +55,6 @@ def test_other_files_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[s
     report, out = tmp_path / "report.json", tmp_path / "duplicates.png"
     report.write_text(text)
     assert main([str(report), "--out", str(out)]) == 1
-    assert "chefshat experiment duplicates --json" in capsys.readouterr().err
+    assert "duplicates --json" in capsys.readouterr().err
     assert main([str(tmp_path / "none.json"), "--out", str(out)]) == 1
     assert not out.exists()

@@ -88,7 +88,7 @@ enum Command {
     Compare(compare::Compare),
     /// Recompute a leaderboard from records.
     Ratings(ratings::RatingsCommand),
-    /// Repeat an experiment of the paper, or one that says how far results can be trusted.
+    /// Run an experiment of the paper
     Experiment(experiment::ExperimentCommand),
     /// Check the rule engine against test vectors.
     Conformance(conformance::Conformance),

@@ -17,10 +17,10 @@ from chefshat.files import check_readable, write_atomically
 
 EXAMPLE = """\
 example:
-  chefshat experiment duplicates --json > duplicates.json
+  cargo run --release -p chefshat-simulation --example duplicates -- --json > duplicates.json
   python -m chefshat.experiments.duplicates duplicates.json --out duplicates.png
 """
-PRINTED = "`chefshat experiment duplicates --json` prints"
+PRINTED = "the example `duplicates --json` of chefshat-simulation prints"
 # Room above the highest line, as a share of it.
 HEADROOM = 1.08
 

@@ -1,5 +1,5 @@
-//! `chefshat experiment mechanics`: the paper's Experiment 1, its table next to ours. How the Shifts of a condition are played is decided in
-//! `chefshat-arena`.
+//! `chefshat experiment`: the paper's Experiment 1, its table next to ours. `chefshat-simulation` plays the Shifts; the experiments with
+//! learning agents are in the Python package.
 
 use std::io::Write as _;
 use std::process::ExitCode;
@@ -8,18 +8,18 @@ use chefshat_engine::{RuleSet, RuleSetSpec};
 use chefshat_simulation::RulesForm;
 use chefshat_simulation::mechanics::{Condition, MechanicsTable, SHIFTS_PER_GAME};
 use chefshat_tournament::statistics::Interval;
-use clap::Args;
 use clap::builder::PossibleValuesParser;
+use clap::{Args, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 
-use super::super::numbers::{counted, grouped};
-use super::super::sheet::{heading, line, table};
-use super::super::{CommandError, threads};
+use super::numbers::{counted, grouped};
+use super::sheet::{heading, line, table};
+use super::{CommandError, threads};
 
 const HELP: &str = "\
-What the paper calls a game is a Shift here, its rounds are laps. The Shifts of a condition are played as the paper's 250 are: one after \
-another, each with the roles that the one before brought about, 250 to a game. Conditions with the same deck play the same deals.
+What the paper calls a game is a Shift here; its rounds are laps. As in the paper, each Shift takes its roles from the result of the \
+previous one, with 250 Shifts to a game. Conditions with the same deck play the same deals.
 
 Examples:
   chefshat experiment mechanics
@@ -31,18 +31,43 @@ The same seed gives the same output, on any number of threads.";
 /// Shifts of each condition that `--large` adds.
 const LARGE: u64 = 100_000;
 
-/// Experiment 1 of the paper: four random agents play with all mechanics, without jokers, without the exchange, without special actions.
-/// How often does the starter win the Shift, and how many laps does a Shift have?
+/// Run an experiment of the paper.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example:\n  chefshat experiment mechanics --large\n\nThe paper's experiments with learning agents: \
+                  python -m chefshat.experiments --help"
+)]
+pub(super) struct ExperimentCommand {
+    #[command(subcommand)]
+    experiment: Experiment,
+}
+
+#[derive(Debug, Subcommand)]
+enum Experiment {
+    /// Experiment 1: measure the effect of jokers, exchange and special actions.
+    Mechanics(Mechanics),
+}
+
+impl ExperimentCommand {
+    pub(super) fn run(self) -> Result<ExitCode, CommandError> {
+        match self.experiment {
+            Experiment::Mechanics(command) => command.run(),
+        }
+    }
+}
+
+/// Experiment 1 of the paper: four random agents play with all mechanics, without jokers, without the exchange, and without special
+/// actions. Prints how often the starter wins the Shift and how many laps a Shift has.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
-pub(in super::super) struct Mechanics {
-    /// Shifts of each condition; the paper's are 250.
+struct Mechanics {
+    /// Shifts of each condition; the paper plays 250.
     #[arg(long, default_value_t = u64::from(SHIFTS_PER_GAME), value_parser = clap::value_parser!(u64).range(1..))]
     shifts: u64,
-    /// Play each condition again over 100,000 Shifts, to see what is signal.
+    /// Also play 100,000 Shifts of each condition, for narrow intervals.
     #[arg(long)]
     large: bool,
-    /// The rules the mechanics are taken from, separated by commas.
+    /// Presets of rules to test, separated by commas.
     #[arg(
         long,
         value_name = "LIST",
@@ -51,10 +76,10 @@ pub(in super::super) struct Mechanics {
         value_parser = PossibleValuesParser::new(RuleSetSpec::PRESETS)
     )]
     preset: Vec<String>,
-    /// The number that all chance is drawn from.
+    /// Seed of all random choices.
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Threads to play on, at most 256; 0 is one for each core.
+    /// Number of threads, at most 256; 0 means one per core.
     #[arg(long, value_name = "N", default_value_t = 0)]
     threads: usize,
     /// Print one JSON object.
@@ -67,12 +92,12 @@ struct Row {
     preset: String,
     condition: Condition,
     rules: RuleSet,
-    /// What came out, for each number of Shifts.
+    /// Results, one for each number of Shifts.
     tables: Vec<MechanicsTable>,
 }
 
 impl Mechanics {
-    pub(super) fn run(self) -> Result<ExitCode, CommandError> {
+    fn run(self) -> Result<ExitCode, CommandError> {
         let numbers: Vec<u64> = std::iter::once(self.shifts)
             .chain(self.large.then_some(LARGE))
             .collect();
@@ -200,7 +225,7 @@ impl Mechanics {
     }
 }
 
-/// One figure of all conditions.
+/// Adds the table of one figure for all conditions.
 fn figures(
     text: &mut String,
     rows: &[Row],
@@ -226,7 +251,7 @@ fn figures(
     table(text, &header, &[0, 1], rows);
 }
 
-/// `28.0 (22.8–33.9)`; the interval has one decimal more than a whole figure.
+/// `28.0 (22.8–33.9)`; the interval always has at least one decimal.
 fn with_interval(figure: f64, Interval { low, high }: Interval, decimals: usize) -> String {
     let finer = decimals.max(1);
     format!("{figure:.decimals$} ({low:.finer$}–{high:.finer$})")
