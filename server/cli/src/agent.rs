@@ -5,12 +5,13 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Duration;
 
+use crate::kind::KindArg;
 use chefshat_agents::{AgentKind, BuiltInAgent, RecordedPlayer};
 use chefshat_client::{Client, Outcome, PlayError, v1};
 use chefshat_record::jsonl;
 use clap::Args;
 
-use super::connect::{KindArg, Pass, ServerArg, WayIn, free_seats};
+use super::connect::{Pass, ServerArg, WayIn, free_seats};
 use super::remote::{MAX_PACE_MS, RemoteAgent, agent_kind, seed_for};
 use super::{CommandError, say};
 use chefshat_server::convert::recorded_player;
@@ -141,7 +142,7 @@ impl AgentCommand {
             .join(v1::JoinRoomRequest {
                 join_code: code.clone(),
                 name: name.to_owned(),
-                kind: self.kind_of.kind().into(),
+                kind: v1::ParticipantKind::from(self.kind_of).into(),
                 ..v1::JoinRoomRequest::default()
             })
             .await?;

@@ -5,8 +5,9 @@ use chefshat_proto::v1;
 use serde_json::{Value, json};
 
 use super::CommandError;
-use super::narrator::clean;
-use super::sheet::{line, table};
+use super::output::{line, table};
+use crate::kind::kind_name;
+use crate::narration::clean;
 
 /// Widest name in a table, columns.
 const NAME_COLUMNS: usize = 24;
@@ -37,7 +38,7 @@ pub(super) fn add_table(text: &mut String, board: &v1::GetLeaderboardResponse) {
         let mut row = vec![
             line.place.to_string(),
             clean(&line.name, NAME_COLUMNS),
-            kind_name(line).to_owned(),
+            rated_kind(line).to_owned(),
             mean,
             uncertainty,
             rating.games.to_string(),
@@ -55,7 +56,7 @@ pub(super) fn as_json(board: &v1::GetLeaderboardResponse) -> Vec<Value> {
         json!({
             "place": line.place,
             "name": line.name,
-            "kind": kind_name(line),
+            "kind": rated_kind(line),
             "mean": rating.mean,
             "deviation": rating.deviation,
             "games": rating.games,
@@ -81,7 +82,7 @@ pub(super) fn as_csv(board: &v1::GetLeaderboardResponse) -> Result<Vec<u8>, Comm
         let mut row = vec![
             line.place.to_string(),
             line.name.clone(),
-            kind_name(line).to_owned(),
+            rated_kind(line).to_owned(),
             rating.mean.to_string(),
             rating.deviation.to_string(),
             rating.games.to_string(),
@@ -97,12 +98,10 @@ fn times(line: &v1::Rated, places: usize) -> impl Iterator<Item = String> {
     (0..places).map(|index| line.places.get(index).copied().unwrap_or(0).to_string())
 }
 
-fn kind_name(line: &v1::Rated) -> &'static str {
-    match (line.built_in, line.kind()) {
-        (true, _) => "built-in",
-        (_, v1::ParticipantKind::Human) => "human",
-        (_, v1::ParticipantKind::Robot) => "robot",
-        _ => "agent",
+fn rated_kind(line: &v1::Rated) -> &'static str {
+    match line.built_in {
+        true => "built-in",
+        false => kind_name(line.kind()),
     }
 }
 

@@ -165,25 +165,3 @@ pub(super) fn free_seats(room: &v1::Room) -> usize {
     let free = |seat: &&v1::Participant| seat.name.is_empty();
     room.seats.iter().filter(free).count()
 }
-
-/// What a participant says it is, on the command line.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub(super) enum KindArg {
-    /// A program.
-    Agent,
-    /// A person.
-    Human,
-    /// A robot.
-    Robot,
-}
-
-impl KindArg {
-    /// The protocol's name for it.
-    pub(super) fn kind(self) -> v1::ParticipantKind {
-        match self {
-            Self::Agent => v1::ParticipantKind::Agent,
-            Self::Human => v1::ParticipantKind::Human,
-            Self::Robot => v1::ParticipantKind::Robot,
-        }
-    }
-}

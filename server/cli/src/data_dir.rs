@@ -1,27 +1,30 @@
-//! The folder in which a server keeps its records.
+//! The data directory, which has the database and the records.
 
 use std::path::PathBuf;
 
 use super::CommandError;
 
-/// The folder asked for, or the standard one, made ready for records.
+/// The given or default data directory, created with its folder of records.
 pub(super) fn prepare(wanted: Option<PathBuf>) -> Result<PathBuf, CommandError> {
     let folder = name(wanted)?;
     std::fs::create_dir_all(folder.join("records")).map_err(|error| {
         format!(
-            "the data folder {} cannot be used: {error}; choose another with --data-dir",
+            "cannot use the data directory {}: {error}; choose another with --data-dir",
             folder.display()
         )
     })?;
     Ok(folder)
 }
 
-/// The folder asked for, or the standard one, whether it is there or not.
+/// The given or default data directory; it may not exist.
 pub(super) fn name(wanted: Option<PathBuf>) -> Result<PathBuf, CommandError> {
-    wanted.map_or_else(standard, Ok)
+    wanted.map_or_else(default, Ok)
 }
 
-/// The folder of records in the data folder asked for, or in the standard one. It is not made.
+/// The existing folder of records in the given or default data directory.
+///
+/// # Errors
+/// It does not exist.
 pub(super) fn records(wanted: Option<PathBuf>) -> Result<PathBuf, CommandError> {
     let folder = name(wanted)?;
     let records = folder.join("records");
@@ -29,22 +32,20 @@ pub(super) fn records(wanted: Option<PathBuf>) -> Result<PathBuf, CommandError> 
         Ok(records)
     } else {
         Err(format!(
-            "there are no records in {} yet; name files or folders, or another data folder with --data-dir",
+            "there are no records in {} yet; name files or folders, or choose another data directory with --data-dir",
             folder.display()
         )
         .into())
     }
 }
 
-/// `chefshat` in the user's data folder, as the XDG base directory specification has it.
-fn standard() -> Result<PathBuf, CommandError> {
-    let absolute = |name| {
-        std::env::var_os(name)
-            .map(PathBuf::from)
-            .filter(|path| path.is_absolute())
-    };
-    absolute("XDG_DATA_HOME")
-        .or_else(|| absolute("HOME").map(|home| home.join(".local/share")))
-        .map(|folder| folder.join("chefshat"))
-        .ok_or_else(|| "there is no home folder for records; name one with --data-dir".into())
+/// `chefshat` in the user's data directory.
+fn default() -> Result<PathBuf, CommandError> {
+    let base = directories::BaseDirs::new()
+        .ok_or("there is no home directory for records; choose one with --data-dir")?;
+    let folder = base.data_dir().join("chefshat");
+    // Where versions before this one kept records on macOS.
+    let former = base.home_dir().join(".local/share/chefshat");
+    let keeps_former = cfg!(target_os = "macos") && !folder.exists() && former.exists();
+    Ok(if keeps_former { former } else { folder })
 }

@@ -14,7 +14,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 
 use super::numbers::{counted, grouped};
-use super::sheet::{heading, line, table};
+use super::output::{heading, line, table};
 use super::{CommandError, threads};
 
 const HELP: &str = "\

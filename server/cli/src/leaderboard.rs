@@ -3,12 +3,13 @@
 use std::io::Write as _;
 use std::process::ExitCode;
 
+use crate::kind::{KindArg, kind_filter};
 use chefshat_client::v1;
 use clap::Args;
 
-use super::connect::{KindArg, ServerArg};
+use super::connect::ServerArg;
 use super::numbers::counted;
-use super::sheet::heading;
+use super::output::heading;
 use super::{CommandError, board};
 
 /// Show the ratings of all who have played rated games on a server.
@@ -41,7 +42,7 @@ impl Leaderboard {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
         let client = self.server.connect().await?;
         let request = v1::GetLeaderboardRequest {
-            kind: self.kind.map_or(0, |kind| kind.kind().into()),
+            kind: kind_filter(self.kind).into(),
             min_games: self.min_games,
             limit: self.limit,
         };

@@ -7,7 +7,7 @@ use chefshat_record::convert::reward_scheme_to_proto;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, ValueEnum};
 
-use super::connect::KindArg;
+use crate::kind::KindArg;
 
 /// Names of the reward schemes, in the order of the protocol's numbers from 1.
 const REWARDS: [&str; 5] = ["validity", "paper", "paper_intended", "winning", "points"];
@@ -87,7 +87,7 @@ fn clock(words: &str) -> Result<v1::KindClock, String> {
     match (kind, times.next(), times.next(), times.next()) {
         (Some(kind), Some(Some(decision_time_ms)), bank_ms, None) if bank_ms != Some(None) => {
             Ok(v1::KindClock {
-                kind: kind.kind().into(),
+                kind: v1::ParticipantKind::from(kind).into(),
                 decision_time_ms: Some(decision_time_ms),
                 bank_ms: bank_ms.flatten(),
             })

@@ -17,10 +17,10 @@ use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
-use super::connect::KindArg;
 use super::numbers::counted;
-use super::sheet::{heading, line};
+use super::output::{heading, line};
 use super::{CommandError, board, data_dir};
+use crate::kind::{KindArg, kind_filter};
 use chefshat_server::convert::leaderboard;
 
 const HELP: &str = "\
@@ -80,9 +80,7 @@ impl RatingsCommand {
         };
         let files = find_records(&paths)?;
         let gathered = self.gather(&files)?;
-        let kind = self
-            .kind
-            .map_or(v1::ParticipantKind::Unspecified, KindArg::kind);
+        let kind = kind_filter(self.kind);
         let board = leaderboard(&gathered.ratings, kind, self.min_games, usize::MAX);
         let mut out = anstream::stdout().lock();
         if self.json {

@@ -5,7 +5,7 @@ use chefshat_simulation::{Comparison, Contender, Duplicate, Figure, RulesForm};
 use serde_json::{Value, json};
 
 use super::super::numbers::counted;
-use super::super::sheet::{self, heading, line, table};
+use super::super::output::{self, heading, line, table};
 use super::{Compare, Entrant, SeatsFlag};
 
 /// Longest name of an agent in a table.
@@ -73,9 +73,9 @@ impl Played<'_> {
                 counted(comparison.shifts, "Shift"),
             ),
         );
-        line(&mut text, &sheet::rules_in_short(self.duplicate.rules()));
-        let variations = sheet::variations(self.duplicate.rules());
-        for words in sheet::variation_lines(&variations) {
+        line(&mut text, &output::rules_in_short(self.duplicate.rules()));
+        let variations = output::variations(self.duplicate.rules());
+        for words in output::variation_lines(&variations) {
             line(&mut text, &words);
         }
         text.push('\n');

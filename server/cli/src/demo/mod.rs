@@ -16,10 +16,10 @@ use chefshat_client::v1::{self, game_event::Kind};
 use chefshat_record::jsonl;
 use clap::Args;
 
-use super::narrator::{Narrator, abort_reason, clean, heading, legend, row};
 use super::remote::{MAX_PACE_MS, agent_kind};
 use super::rules_args::{RulesArgs, rules_of};
 use super::{CommandError, data_dir};
+use crate::narration::{Narrator, abort_reason, clean, heading, legend, row};
 use chefshat_server::host::Host;
 use table::Table;
 
@@ -146,7 +146,7 @@ impl Demo {
     /// Shows every event as it comes, to the end of the game.
     async fn watch(&self, out: &mut impl Write, table: &Table) -> Result<Ending, CommandError> {
         let labels = table.agents.kinds.iter().map(|kind| kind.name().to_owned());
-        let mut narrator = Narrator::new().with_labels(labels);
+        let mut narrator = Narrator::default().with_labels(labels);
         let mut spectator: Spectator = table.client.spectate(table.room.room_id.as_str(), 1);
         let mut end = Ending::Aborted("the spectator was not told why");
         while let Some(event) = spectator.next().await? {

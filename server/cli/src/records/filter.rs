@@ -3,7 +3,7 @@
 use chefshat_client::v1;
 use clap::{Args, ValueEnum};
 
-use super::super::connect::KindArg;
+use crate::kind::{KindArg, kind_filter};
 
 /// Which records: all conditions that are given must hold.
 #[derive(Debug, Default, Args)]
@@ -93,11 +93,10 @@ impl FilterArgs {
             Some(OriginArg::Branched) => v1::GameOrigin::Branched,
             Some(OriginArg::Imported) => v1::GameOrigin::Imported,
         };
-        let any = v1::ParticipantKind::Unspecified;
         v1::RecordFilter {
             state: state.into(),
             participant: self.participant.clone(),
-            kind: self.kind.map_or(any, KindArg::kind).into(),
+            kind: kind_filter(self.kind).into(),
             room_name: self.room_name.clone(),
             origin: origin.into(),
             created_from_ms: self.created_from_ms,

@@ -6,10 +6,10 @@ use chefshat_client::{Error, v1};
 use clap::Args;
 
 use super::super::connect::ServerArg;
-use super::super::narrator::{abort_reason, clean};
 use super::super::{CommandError, say};
 use super::filter::FilterArgs;
 use super::service;
+use crate::narration::{abort_reason, clean};
 
 /// Records asked for at a time.
 const PAGE: u32 = 100;

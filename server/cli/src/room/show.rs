@@ -6,8 +6,9 @@ use chefshat_client::v1;
 use clap::{Args, ValueEnum};
 
 use super::super::connect::ServerArg;
-use super::super::narrator::{abort_reason, clean};
 use super::super::{CommandError, say};
+use crate::kind::kind_name;
+use crate::narration::{abort_reason, clean};
 
 /// Rooms asked for at a time.
 const PAGE: u32 = 100;
@@ -180,22 +181,16 @@ pub(super) fn beginning(room: &v1::Room) -> Option<String> {
 }
 
 fn seat_in_words(seat: &v1::Participant) -> String {
-    let kind = |kind| match kind {
-        v1::ParticipantKind::Unspecified => "anybody",
-        v1::ParticipantKind::Agent => "agent",
-        v1::ParticipantKind::Human => "human",
-        v1::ParticipantKind::Robot => "robot",
-    };
     if seat.name.is_empty() {
-        return format!("free for {}", kind(seat.reserved_for()));
+        return match seat.reserved_for() {
+            v1::ParticipantKind::Unspecified => "free for anyone".to_owned(),
+            kind => format!("free for {}s", kind_name(kind)),
+        };
     }
     let name = clean(&seat.name, 30);
     if let Some(player) = &seat.replay {
         let game = clean(&player.game_id, 40);
-        return format!(
-            "{name}, played by the server as seat {} of game {game} played",
-            player.seat
-        );
+        return format!("{name}, imitates seat {} of game {game}", player.seat);
     }
     if !seat.built_in_agent.is_empty() {
         return match name == seat.built_in_agent {
@@ -208,7 +203,7 @@ fn seat_in_words(seat: &v1::Participant) -> String {
         (false, true) => "connected",
         (false, false) => "not connected",
     };
-    format!("{name}, {}, {there}", kind(seat.kind()))
+    format!("{name}, {}, {there}", kind_name(seat.kind()))
 }
 
 #[cfg(test)]
@@ -255,8 +250,8 @@ mod tests {
              start as game c until after decision 40, later deals as there\n\
              deal  from a seed its creator fixed\n\
              kept  in memory until it ends; lost when the server stops\n\
-             seat 0 replay, played by the server as seat 2 of game c played\n\
-             seat 1 free for anybody\n"
+             seat 0 replay, imitates seat 2 of game c\n\
+             seat 1 free for anyone\n"
         );
         assert_eq!(in_a_line(&room), "a  playing   1/2 seats    (branched)");
         let scripted = v1::Room {

@@ -9,8 +9,8 @@ use clap::Args;
 
 use super::super::CommandError;
 use super::super::connect::{PATIENCE, ServerArg};
-use super::super::narrator::{Narrator, clean, heading};
 use super::show::beginning;
+use crate::narration::{Narrator, clean, heading};
 
 /// Follow the game of a room.
 #[derive(Debug, Args)]
@@ -48,7 +48,7 @@ impl Watch {
                 writeln!(out, "   begins {words}")?;
             }
         }
-        let mut narrator = Narrator::new();
+        let mut narrator = Narrator::default();
         let mut spectator = client.spectate(self.room_id, 1).with_backoff(Backoff {
             give_up_after: PATIENCE,
             ..Backoff::default()

@@ -6,7 +6,7 @@ use chefshat_simulation::{Batch, BatchTable, RulesForm};
 use serde_json::{Value, json};
 
 use super::super::numbers::{counted, grouped};
-use super::super::sheet::{self, heading, line, percent};
+use super::super::output::{self, heading, line, percent};
 
 /// The column that holds the agents; the others hold numbers.
 const AGENT_COLUMN: usize = 1;
@@ -83,15 +83,15 @@ pub(super) fn text(batch: &Batch, table: &BatchTable) -> String {
 
 /// The rule set: its size and end, then what differs from the standard.
 fn rules_lines(batch: &Batch) -> Vec<String> {
-    let mut variations = sheet::variations(batch.rules());
+    let mut variations = output::variations(batch.rules());
     if let Some(attempts) = batch.max_invalid_attempts() {
         variations.push(format!(
             "default decision after {}",
             counted(u64::from(attempts.get()), "invalid attempt")
         ));
     }
-    let mut lines = vec![sheet::rules_in_short(batch.rules())];
-    lines.extend(sheet::variation_lines(&variations));
+    let mut lines = vec![output::rules_in_short(batch.rules())];
+    lines.extend(output::variation_lines(&variations));
     lines
 }
 
@@ -161,7 +161,7 @@ fn results(text: &mut String, batch: &Batch, table: &BatchTable) {
             format!("{:.3}", table.performance(seat)),
         ]
     });
-    sheet::table(text, &header, &[AGENT_COLUMN], rows);
+    output::table(text, &header, &[AGENT_COLUMN], rows);
 }
 
 fn actions(text: &mut String, batch: &Batch, table: &BatchTable) {
@@ -194,5 +194,5 @@ fn actions(text: &mut String, batch: &Batch, table: &BatchTable) {
         }));
         row
     });
-    sheet::table(text, &header, &[AGENT_COLUMN], rows);
+    output::table(text, &header, &[AGENT_COLUMN], rows);
 }

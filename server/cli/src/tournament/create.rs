@@ -3,10 +3,11 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use crate::kind::KindArg;
 use chefshat_client::{Error, v1};
 use clap::Args;
 
-use super::super::connect::{KindArg, ServerArg};
+use super::super::connect::ServerArg;
 use super::super::policy_args::PolicyArgs;
 use super::super::remote::agent_kind;
 use super::super::rules_args::{RulesArgs, by_flag};
@@ -154,7 +155,11 @@ impl Create {
             rounds: asked("--rounds", self.rounds)?,
             games_per_pairing: asked("--games-per-pairing", self.games_per_pairing)?,
             deals: self.deals.deals().into(),
-            kinds: self.kinds.iter().map(|kind| kind.kind().into()).collect(),
+            kinds: self
+                .kinds
+                .iter()
+                .map(|kind| v1::ParticipantKind::from(*kind).into())
+                .collect(),
             max_participants: asked("--max-participants", self.max_participants)?,
             built_in_agents: self.built_in.iter().flat_map(named).collect(),
             start_when_joined: asked("--start-when", self.start_when)?,

@@ -8,7 +8,8 @@ use chefshat_record::atomic_file::AtomicFile;
 use csv::{Terminator, WriterBuilder};
 
 use super::super::CommandError;
-use super::tables::{Field, kind_name};
+use super::tables::Field;
+use crate::kind::kind_name;
 
 /// What the reference implementation (chefshatgym 2.4.0.4, `ChefsHatRoomTournament`) writes above its FinalResultsComp.csv.
 const FINAL_RESULTS: [&str; 4] = [

@@ -10,10 +10,10 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::super::connect::{PATIENCE, ServerArg};
-use super::super::narrator::clean;
 use super::super::{CommandError, say};
 use super::tables::{self, Field};
 use super::words::{is_over, state};
+use crate::narration::clean;
 
 /// Lines of the table that is shown while a tournament goes on.
 const LIVE_LINES: usize = 12;

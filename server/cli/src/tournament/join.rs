@@ -4,12 +4,13 @@
 use std::process::ExitCode;
 use std::time::Duration;
 
+use crate::kind::KindArg;
 use chefshat_agents::{AgentKind, BuiltInAgent};
 use chefshat_client::{ActionId, Agent, Client, Outcome, v1};
 use clap::Args;
 
 use super::super::agent::{outcome_in_words, outcome_json};
-use super::super::connect::{KindArg, Pass, ServerArg, WayIn};
+use super::super::connect::{Pass, ServerArg, WayIn};
 use super::super::numbers::counted;
 use super::super::remote::{MAX_PACE_MS, RemoteAgent, agent_kind, seed_for};
 use super::super::{CommandError, say};
@@ -99,7 +100,7 @@ impl Join {
             .join_tournament(v1::JoinTournamentRequest {
                 join_code: code,
                 name: name.to_owned(),
-                kind: self.kind_of.kind().into(),
+                kind: v1::ParticipantKind::from(self.kind_of).into(),
                 max_games: self.games,
                 // Each game has an agent of its own.
                 stateless: true,

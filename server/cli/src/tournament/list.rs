@@ -6,11 +6,11 @@ use chefshat_client::v1;
 use clap::Args;
 
 use super::super::connect::ServerArg;
-use super::super::narrator::clean;
 use super::super::numbers::{counted, ordinal};
 use super::super::{CommandError, say};
 use super::all_games;
 use super::words::{StateArg, format_name, state};
+use crate::narration::clean;
 
 /// Tournaments asked for at a time.
 const PAGE: u32 = 100;

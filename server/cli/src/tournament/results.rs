@@ -8,13 +8,13 @@ use chefshat_client::v1;
 use clap::Args;
 
 use super::super::connect::ServerArg;
-use super::super::narrator::clean;
 use super::super::numbers::counted;
-use super::super::sheet::{heading, line};
+use super::super::output::{heading, line};
 use super::super::{CommandError, say};
 use super::tables::{self, Field, NO_GAME_COUNTED};
 use super::words::{format_name, is_over, state};
 use super::{all_games, files};
+use crate::narration::clean;
 
 /// Show the standings of a tournament, how sure their order is, and how all played; final once it is over.
 #[derive(Debug, Args)]

@@ -20,8 +20,8 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 
 use super::super::numbers::{counted, grouped};
+use super::super::output::{self, heading, line};
 use super::super::rules_args::{RulesArgs, by_flag};
-use super::super::sheet::{self, heading, line};
 use super::super::{CommandError, threads};
 use super::create::{BuiltIn, built_in};
 use super::files;
@@ -213,8 +213,8 @@ impl Simulate {
                 grouped(tournament.games().len() as u64),
             ),
         );
-        line(&mut text, &sheet::rules_in_short(rules));
-        for words in sheet::variation_lines(&sheet::variations(rules)) {
+        line(&mut text, &output::rules_in_short(rules));
+        for words in output::variation_lines(&output::variations(rules)) {
             line(&mut text, &words);
         }
         if let Some(words) = of_deals(self.deals.deals()) {

@@ -3,9 +3,10 @@
 use chefshat_client::v1;
 
 use super::super::board::rating_in_words;
-use super::super::narrator::clean;
 use super::super::numbers::{counted, ordinal};
-use super::super::sheet::{heading, percent, table};
+use super::super::output::{heading, percent, table};
+use crate::kind::kind_name;
+use crate::narration::clean;
 
 /// What is said of the standings before a game has counted.
 pub(crate) const NO_GAME_COUNTED: &str = "no game was counted";
@@ -54,16 +55,6 @@ impl<'t> Field<'t> {
             Some(who) => kind_name(who.kind()).to_owned(),
             None => String::new(),
         }
-    }
-}
-
-/// The name of a kind of participants.
-pub(super) fn kind_name(kind: v1::ParticipantKind) -> &'static str {
-    match kind {
-        v1::ParticipantKind::Unspecified => "",
-        v1::ParticipantKind::Agent => "agent",
-        v1::ParticipantKind::Human => "human",
-        v1::ParticipantKind::Robot => "robot",
     }
 }
 

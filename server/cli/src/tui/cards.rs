@@ -3,9 +3,9 @@
 use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 
-use super::hand::Stack;
 use super::look::Look;
-use super::table::OnBoard;
+use crate::narration::hand::Stack;
+use crate::narration::view::OnBoard;
 
 /// Columns of a stack with the space behind it, at most.
 const STACK_COLUMNS: usize = 6;

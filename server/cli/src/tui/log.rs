@@ -7,11 +7,11 @@ use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
-use super::super::narrator::columns;
 use super::look::Look;
-use super::story;
-use super::table::Table;
 use super::view::boxed;
+use crate::narration::columns;
+use crate::narration::story;
+use crate::narration::view::GameView;
 
 /// Lines that a key goes back or on, at first and then: less than there is room for in the smallest window.
 const FIRST: usize = 5;
@@ -33,14 +33,14 @@ impl Scroll {
     }
 
     /// Takes a key; says whether it was meant for this: `PgUp` always is, every other one while earlier lines are shown.
-    pub(crate) fn key(&mut self, code: KeyCode, table: &Table) -> bool {
+    pub(crate) fn key(&mut self, code: KeyCode, table: &GameView) -> bool {
         // So much is to be seen at least, where so much was told.
-        let first = (table.told - table.story.len() + PAGE).min(table.told);
+        let first = (table.story_len - table.story.len() + PAGE).min(table.story_len);
         self.end = match (code, self.end) {
-            (KeyCode::PageUp, None) => Some(table.told.saturating_sub(FIRST).max(first)),
+            (KeyCode::PageUp, None) => Some(table.story_len.saturating_sub(FIRST).max(first)),
             (KeyCode::PageUp, Some(end)) => Some(end.saturating_sub(PAGE).max(first)),
             (KeyCode::Home, Some(_)) => Some(first),
-            (KeyCode::PageDown, Some(end)) => Some(end + PAGE).filter(|end| *end < table.told),
+            (KeyCode::PageDown, Some(end)) => Some(end + PAGE).filter(|end| *end < table.story_len),
             (_, Some(_)) => None,
             (_, None) => return false,
         };
@@ -49,8 +49,8 @@ impl Scroll {
 }
 
 /// Draws the newest lines.
-pub(super) fn draw(frame: &mut Frame<'_>, look: Look, table: &Table, area: Rect) {
-    let lines = last_lines(look, table, table.told, area);
+pub(super) fn draw(frame: &mut Frame<'_>, look: Look, table: &GameView, area: Rect) {
+    let lines = last_lines(look, table, table.story_len, area);
     let block = boxed(look, " what happened ");
     frame.render_widget(Paragraph::new(lines).block(block), area);
 }
@@ -59,13 +59,13 @@ pub(super) fn draw(frame: &mut Frame<'_>, look: Look, table: &Table, area: Rect)
 pub(super) fn draw_back(
     frame: &mut Frame<'_>,
     look: Look,
-    table: &Table,
+    table: &GameView,
     scroll: Scroll,
     area: Rect,
 ) {
-    let end = scroll.end.unwrap_or(table.told).min(table.told);
+    let end = scroll.end.unwrap_or(table.story_len).min(table.story_len);
     let lines = last_lines(look, table, end, area);
-    let after = match table.told - end {
+    let after = match table.story_len - end {
         0 => "the newest".to_owned(),
         after => format!("{after} more after these"),
     };
@@ -75,10 +75,10 @@ pub(super) fn draw_back(
 }
 
 /// As many lines before line number `end` as a box has room for, long ones wrapped.
-fn last_lines(look: Look, table: &Table, end: usize, area: Rect) -> Vec<Line<'static>> {
+fn last_lines(look: Look, table: &GameView, end: usize, area: Rect) -> Vec<Line<'static>> {
     let rows = usize::from(area.height.saturating_sub(2));
     let width = usize::from(area.width.saturating_sub(2));
-    let told_before = table.told - table.story.len();
+    let told_before = table.story_len - table.story.len();
     let shown = end.saturating_sub(told_before).min(table.story.len());
     let mut lines: Vec<Line<'static>> = Vec::new();
     for line in table.story.range(..shown).rev() {
@@ -94,7 +94,7 @@ fn last_lines(look: Look, table: &Table, end: usize, area: Rect) -> Vec<Line<'st
 }
 
 /// A line of the story in as many rows as it needs, broken between words.
-fn wrap(look: Look, table: &Table, line: &story::Line, width: usize) -> Vec<Line<'static>> {
+fn wrap(look: Look, table: &GameView, line: &story::Line, width: usize) -> Vec<Line<'static>> {
     let (lead, words) = match (line.heading, line.seat) {
         (true, _) => (None, format!("─ {}", line.words)),
         (false, Some(seat)) => (Some((table.name(seat), seat)), format!(" {}", line.words)),

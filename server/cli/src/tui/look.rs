@@ -4,7 +4,7 @@
 use chefshat_client::v1;
 use ratatui::style::{Color, Modifier, Style};
 
-use super::table::Place;
+use crate::narration::view::SeatView;
 
 /// The ingredients of the eleven faces of the standard deck, rarest first.
 const INGREDIENTS: [&str; 11] = [
@@ -120,7 +120,7 @@ pub(crate) fn ingredient(face: u32, faces: u32) -> Option<&'static str> {
 }
 
 /// What sits there, as a symbol and a word.
-pub(crate) fn kind(place: &Place) -> (&'static str, &'static str) {
+pub(crate) fn kind(place: &SeatView) -> (&'static str, &'static str) {
     match place.name.is_empty() {
         true => ("·", "free"),
         false => symbol(place.kind),

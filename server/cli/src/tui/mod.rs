@@ -1,15 +1,11 @@
-//! What `chefshat play` and `chefshat watch` share: the table as its events tell it (`table`, `hand`), what happened in words (`story`), how both are
-//! drawn (`look`, `cards`, `log`, `view`), and the terminal itself (`screen`). All but `screen` are values and functions of values; what a person
-//! may do is decided in `play` and `watch`.
+//! The terminal client of `chefshat play` and `chefshat watch`, and what both share: the table (`view`), cards, story and theme as widgets,
+//! and the terminal itself (`screen`). The state they draw is that of `narration`; what a person may do is decided in `play` and `watch`.
 
 pub(crate) mod cards;
-pub(crate) mod hand;
 pub(crate) mod log;
 pub(crate) mod look;
 pub(crate) mod play;
 pub(crate) mod screen;
-mod story;
-pub(crate) mod table;
 #[cfg(test)]
 pub(crate) mod testing;
 #[cfg(test)]

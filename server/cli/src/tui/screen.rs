@@ -1,4 +1,5 @@
-//! The terminal itself: made ready and given back as it was, keys as they come. What they mean is decided elsewhere.
+//! The terminal: opened and restored, with its keys, ticks and the signals that end the process. What a key means is decided in `play` and
+//! `watch`.
 
 use std::io::{self, IsTerminal as _};
 use std::process::ExitCode;
@@ -9,48 +10,89 @@ use ratatui::DefaultTerminal;
 use ratatui::Frame;
 use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 use ratatui::crossterm::terminal::is_raw_mode_enabled;
+use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::sync::mpsc;
+use tokio::time::{Instant, Interval, MissedTickBehavior, interval};
 
 use super::super::CommandError;
 
-/// Keys that may wait to be understood.
+/// Keys that may wait to be handled.
 const KEYS: usize = 64;
-/// How often the reader of keys looks whether it is still wanted.
-const LOOK: Duration = Duration::from_millis(100);
-/// Exit code of a command that has no terminal to draw on.
+/// How often the key reader checks whether the screen is still open.
+const POLL: Duration = Duration::from_millis(100);
+/// Exit code of a command without a terminal.
 const NO_TERMINAL: u8 = 2;
 
-/// What comes from the person.
+/// Input from the person.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Key {
-    /// A key.
     Code(KeyCode),
-    /// Ctrl-C, and what ends the terminal.
+    /// Ctrl-C, a signal, or the end of the terminal.
     Interrupt,
-    /// The window has another size.
     Resized,
 }
 
-/// The screen while it is ours; given back when dropped.
+/// Why `Screen::next` returned.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Wake {
+    Key(Key),
+    Tick,
+}
+
+/// The open screen. Dropping it restores the terminal.
 pub(crate) struct Screen {
     terminal: DefaultTerminal,
-    /// Keys, in order.
-    pub(crate) keys: mpsc::Receiver<Key>,
+    keys: mpsc::Receiver<Key>,
+    ticks: Interval,
+    opened: Instant,
+    /// Interrupt, terminate, hang up.
+    signals: [Signal; 3],
 }
 
 impl Screen {
-    /// Takes the terminal.
+    /// Opens the screen; `tick` is the time between two ticks. Signals are caught from here on, so that none leaves the terminal in raw
+    /// mode.
     ///
     /// # Errors
-    /// The terminal cannot be used.
-    pub(crate) fn open() -> Result<Self, CommandError> {
+    /// The terminal or the signals are unavailable.
+    pub(crate) fn open(tick: Duration) -> Result<Self, CommandError> {
+        let signals = [
+            signal(SignalKind::interrupt())?,
+            signal(SignalKind::terminate())?,
+            signal(SignalKind::hangup())?,
+        ];
+        let mut ticks = interval(tick);
+        ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
         let terminal = ratatui::try_init()?;
         let (sender, keys) = mpsc::channel(KEYS);
         thread::spawn(move || read(&sender));
-        Ok(Self { terminal, keys })
+        Ok(Self {
+            terminal,
+            keys,
+            ticks,
+            opened: Instant::now(),
+            signals,
+        })
     }
 
-    /// Draws a picture.
+    /// Milliseconds since the screen was opened.
+    pub(crate) fn now_ms(&self) -> u64 {
+        u64::try_from(self.opened.elapsed().as_millis()).unwrap_or(u64::MAX)
+    }
+
+    /// Waits for a key, a signal or the next tick. Cancel safe.
+    pub(crate) async fn next(&mut self) -> Wake {
+        let [interrupt, terminate, hang_up] = &mut self.signals;
+        tokio::select! {
+            key = self.keys.recv() => Wake::Key(key.unwrap_or(Key::Interrupt)),
+            _ = self.ticks.tick() => Wake::Tick,
+            _ = interrupt.recv() => Wake::Key(Key::Interrupt),
+            _ = terminate.recv() => Wake::Key(Key::Interrupt),
+            _ = hang_up.recv() => Wake::Key(Key::Interrupt),
+        }
+    }
+
+    /// Draws a frame.
     ///
     /// # Errors
     /// The terminal is gone.
@@ -61,45 +103,26 @@ impl Screen {
 
 impl Drop for Screen {
     fn drop(&mut self) {
-        // A panic, on whatever task, has given it back before it said why; a second time would put what comes next over its words.
+        // The panic hook has restored it already; a second restore would overwrite the panic message.
         if is_raw_mode_enabled().unwrap_or(true) {
             ratatui::restore();
         }
     }
 }
 
-/// Says that there is no terminal, where there is none, and with which code the command ends.
+/// Prints an error and returns the exit code if there is no interactive terminal; `instead` names commands that work without one.
 pub(crate) fn missing(instead: &str) -> Option<ExitCode> {
     if io::stdout().is_terminal() && io::stdin().is_terminal() {
         return None;
     }
-    anstream::eprintln!("chefshat: this command draws on a terminal, and here is none; {instead}");
+    anstream::eprintln!("chefshat: this command needs an interactive terminal; {instead}");
     Some(ExitCode::from(NO_TERMINAL))
 }
 
-/// Waits until somebody wants this process to end. The signals are caught from the call on: one that comes before the wait does not leave the
-/// terminal as it is. Ctrl-C is a key here; an interrupt comes from outside.
-///
-/// # Errors
-/// The operating system does not tell.
-pub(crate) fn asked_to_end() -> io::Result<impl Future<Output = ()>> {
-    use tokio::signal::unix::{SignalKind, signal};
-    let mut interrupt = signal(SignalKind::interrupt())?;
-    let mut terminate = signal(SignalKind::terminate())?;
-    let mut hang_up = signal(SignalKind::hangup())?;
-    Ok(async move {
-        tokio::select! {
-            _ = interrupt.recv() => {}
-            _ = terminate.recv() => {}
-            _ = hang_up.recv() => {}
-        }
-    })
-}
-
-/// Reads keys until nobody wants them any more.
+/// Reads keys until the screen is closed.
 fn read(keys: &mpsc::Sender<Key>) {
     while !keys.is_closed() {
-        let key = match event::poll(LOOK) {
+        let key = match event::poll(POLL) {
             Ok(false) => continue,
             Ok(true) => event::read(),
             Err(error) => Err(error),
@@ -108,7 +131,7 @@ fn read(keys: &mpsc::Sender<Key>) {
             Ok(Event::Key(key)) if key.kind != KeyEventKind::Release => key_of(key),
             Ok(Event::Resize(..)) => Some(Key::Resized),
             Ok(_) => None,
-            // The terminal is gone; closing the channel says so.
+            // The terminal is gone: the closed channel is the signal.
             Err(_) => return,
         };
         if let Some(key) = key

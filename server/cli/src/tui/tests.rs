@@ -3,8 +3,8 @@
 use chefshat_agents::{AgentKind, BuiltInAgent};
 use chefshat_engine::{DecisionKind, PassScope, RuleSetSpec, Seat, Viewer};
 
-use super::table::{End, Table};
 use super::testing::Dealt;
+use crate::narration::view::{End, GameView};
 
 /// Games of many kinds, each seen by seat 0 and by one who sees all hands.
 #[test]
@@ -16,7 +16,7 @@ fn the_table_is_what_the_engine_says() {
             let rules = RuleSetSpec::preset(preset).unwrap();
             for viewer in [Viewer::Seat(Seat::new(0)), Viewer::Everything] {
                 let (mut dealt, told) = Dealt::new(&rules, seed, viewer);
-                let mut table = Table::default();
+                let mut table = GameView::default();
                 let mut agent = BuiltInAgent::new(AgentKind::Random, [seed; 32]);
                 told.iter().for_each(|event| table.apply(event));
                 while let Some(decision) = dealt.game.decision() {
@@ -37,7 +37,7 @@ fn the_table_is_what_the_engine_says() {
     assert!(decisions > 24 * 100, "{decisions} decisions only");
 }
 
-fn agree(table: &Table, dealt: &Dealt, viewer: Viewer) {
+fn agree(table: &GameView, dealt: &Dealt, viewer: Viewer) {
     let seen = dealt.game.observe(viewer);
     let decision = dealt.game.decision().unwrap();
     assert_eq!(table.shift, seen.shift);

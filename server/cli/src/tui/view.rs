@@ -7,12 +7,13 @@ use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, BorderType, Clear, Paragraph, Wrap};
 
-use super::super::narrator::{MAX_NAME, abort_reason, clean, columns, title};
 use super::super::numbers::{counted, ordinal};
 use super::cards::fan;
 use super::log::{self, Scroll};
 use super::look::{Look, ingredient, kind};
-use super::table::{End, Table};
+use crate::narration::view::{End, GameView};
+use crate::narration::{MAX_NAME, aborted, clean, columns, title};
+use crate::output::stop_in_words;
 
 /// The least that a table needs.
 pub(crate) const MIN_COLUMNS: u16 = 80;
@@ -31,7 +32,7 @@ const UPPER_ROWS: u16 = 8;
 pub(crate) fn draw(
     frame: &mut Frame<'_>,
     look: Look,
-    table: &Table,
+    table: &GameView,
     me: Option<u32>,
     status: &str,
     scroll: Scroll,
@@ -106,12 +107,9 @@ pub(crate) fn popup(frame: &mut Frame<'_>, look: Look, title: &str, lines: Vec<L
 }
 
 /// The end of a game as lines: its standings, or why it has none.
-pub(crate) fn end_lines(look: Look, table: &Table, end: &End) -> Vec<Line<'static>> {
+pub(crate) fn end_lines(look: Look, table: &GameView, end: &End) -> Vec<Line<'static>> {
     match end {
-        End::Aborted(reason) => vec![Line::from(format!(
-            "The game was aborted and has no result: {}.",
-            abort_reason(*reason)
-        ))],
+        End::Aborted(reason) => vec![Line::from(aborted(*reason))],
         End::Finished(standings) => standings
             .iter()
             .map(|line| {
@@ -138,18 +136,13 @@ pub(crate) fn padded(text: &str, width: usize) -> String {
     format!("{text}{}", " ".repeat(missing))
 }
 
-fn draw_header(frame: &mut Frame<'_>, look: Look, table: &Table, status: &str, area: Rect) {
+fn draw_header(frame: &mut Frame<'_>, look: Look, table: &GameView, status: &str, area: Rect) {
     let mut progress = String::new();
     if table.shift > 0 {
         progress.push_str(&format!(" · Shift {} · pizza {}", table.shift, table.pizza));
     }
     if let Some(rules) = &table.rules {
-        progress.push_str(&match rules.stop() {
-            chefshat_engine::Stop::Points(points) => format!(" · to {points} points"),
-            chefshat_engine::Stop::Shifts(shifts) => {
-                format!(" · {}", counted(u64::from(shifts), "Shift"))
-            }
-        });
+        progress.push_str(&format!(" · {}", stop_in_words(rules.stop())));
     }
     let width = usize::from(area.width).saturating_sub(columns(status) + 1);
     let space = width.saturating_sub(columns(&progress) + 2);
@@ -168,7 +161,7 @@ fn draw_header(frame: &mut Frame<'_>, look: Look, table: &Table, status: &str, a
     frame.render_widget(Paragraph::new(line).style(look.header()), area);
 }
 
-fn draw_seats(frame: &mut Frame<'_>, look: Look, table: &Table, me: Option<u32>, area: Rect) {
+fn draw_seats(frame: &mut Frame<'_>, look: Look, table: &GameView, me: Option<u32>, area: Rect) {
     let lines = (0u32..).zip(&table.seats).map(|(seat, place)| {
         let marker = if table.turn == Some(seat) {
             "▶ "
@@ -217,7 +210,7 @@ fn draw_seats(frame: &mut Frame<'_>, look: Look, table: &Table, me: Option<u32>,
 }
 
 /// What matters more about a seat than its role.
-fn note_of(place: &super::table::Place) -> Option<String> {
+fn note_of(place: &crate::narration::view::SeatView) -> Option<String> {
     if place.substituted {
         return Some("substitute".to_owned());
     }
@@ -227,7 +220,7 @@ fn note_of(place: &super::table::Place) -> Option<String> {
     (place.passed && place.finished.is_none()).then(|| "passed".to_owned())
 }
 
-fn draw_pizza(frame: &mut Frame<'_>, look: Look, table: &Table, me: Option<u32>, area: Rect) {
+fn draw_pizza(frame: &mut Frame<'_>, look: Look, table: &GameView, me: Option<u32>, area: Rect) {
     let block = boxed(look, " the pizza ");
     let inner = block.inner(area);
     frame.render_widget(block, area);
@@ -291,7 +284,7 @@ fn draw_pizza(frame: &mut Frame<'_>, look: Look, table: &Table, me: Option<u32>,
 }
 
 /// What matters between two Shifts: how the last one ended, and what that makes of the person.
-fn between(look: Look, table: &Table, me: Option<u32>) -> Vec<Line<'static>> {
+fn between(look: Look, table: &GameView, me: Option<u32>) -> Vec<Line<'static>> {
     let last = table.shift.saturating_sub(1);
     let mut spans = vec![Span::raw(format!("  Shift {last} ended: "))];
     for (place, seat) in (1u32..).zip(&table.last_order) {
@@ -322,7 +315,7 @@ pub(crate) fn play_words(face: u32, quantity: u32, jokers: u32, faces: u32) -> S
     }
 }
 
-fn waiting(table: &Table) -> String {
+fn waiting(table: &GameView) -> String {
     match table.free_seats() {
         0 if table.seats.is_empty() => "Waiting for the table to be told.".to_owned(),
         0 => "All seats are taken: the game is about to begin.".to_owned(),

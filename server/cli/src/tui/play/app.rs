@@ -6,9 +6,9 @@ use ratatui::crossterm::event::KeyCode;
 
 use super::keys::{key_of, names_cards, not_held};
 use super::pick::Decision;
+use crate::narration::view::GameView;
 use crate::tui::log::Scroll;
 use crate::tui::screen::Key;
-use crate::tui::table::Table;
 
 /// What a person can show with one key: a label, valence and arousal, as the page for browsers has them.
 pub(super) const EXPRESSIONS: [(&str, f32, f32); 6] = [
@@ -81,7 +81,7 @@ pub(super) struct Open {
 /// A game at the terminal.
 #[derive(Debug)]
 pub(super) struct App {
-    pub(super) table: Table,
+    pub(super) table: GameView,
     pub(super) me: Option<u32>,
     pub(super) open: Option<Open>,
     pub(super) dialog: Option<Dialog>,
@@ -115,7 +115,7 @@ impl Link {
 
 impl App {
     /// At this table, before anything has come.
-    pub(super) fn new(table: Table, me: Option<u32>) -> Self {
+    pub(super) fn new(table: GameView, me: Option<u32>) -> Self {
         Self {
             table,
             me,
@@ -197,7 +197,7 @@ impl App {
             Update::Decision(request) => return self.asked(request, now_ms),
             Update::Result(result) => self.result(&result),
             Update::Refused(refused) => {
-                self.notice = crate::narrator::clean(&refused.message, 76);
+                self.notice = crate::narration::clean(&refused.message, 76);
             }
             Update::Snapshot(_) | Update::Detached(_) | Update::Entered(_) => {}
         }
@@ -241,7 +241,7 @@ impl App {
         let decision = self
             .table
             .rules
-            .and_then(|rules| Decision::open(request, rules));
+            .and_then(|rules| Decision::open(request, rules.actions()));
         if decision.is_none() {
             "the server's question cannot be read; its default decision will be taken"
                 .clone_into(&mut self.notice);
@@ -271,7 +271,7 @@ impl App {
                 {
                     open.sent = false;
                 }
-                self.notice = crate::narrator::clean(&result.detail, 76);
+                self.notice = crate::narration::clean(&result.detail, 76);
             }
             v1::AnswerStatus::Closed => {
                 self.open.take_if(ours);

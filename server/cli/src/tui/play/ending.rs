@@ -7,10 +7,10 @@ use chefshat_client::v1;
 use super::app::{App, Link};
 use super::lobby::Lobby;
 use super::part::Part;
-use crate::narrator::{MAX_NAME, abort_reason};
+use crate::narration::view::End;
+use crate::narration::{MAX_NAME, abort_reason};
 use crate::numbers::{counted, ordinal};
 use crate::tournament::tables::{NO_GAME_COUNTED, place_in_words};
-use crate::tui::table::End;
 use crate::tui::view::padded;
 use crate::{CommandError, say};
 

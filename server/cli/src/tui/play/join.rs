@@ -6,7 +6,7 @@ use chefshat_client::{Client, Error, v1};
 use super::app::App;
 use super::run::Taken;
 use crate::CommandError;
-use crate::tui::table::Table;
+use crate::narration::view::GameView;
 
 /// Time for a decision at a table of one's own: nobody waits but built-in agents.
 const OWN_DECISION_MS: u32 = 3_600_000;
@@ -76,7 +76,7 @@ async fn join_room(client: Client, code: &str, name: &str) -> Result<Taken, Erro
             ..v1::JoinRoomRequest::default()
         })
         .await?;
-    let table = Table::of_room(&joined.room.unwrap_or_default());
+    let table = GameView::of_room(&joined.room.unwrap_or_default());
     Ok(Taken {
         client,
         ticket: joined.ticket,

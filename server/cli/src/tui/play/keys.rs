@@ -1,6 +1,6 @@
 //! Which key names which cards of a hand. What becomes of a key is decided in `app`.
 
-use crate::tui::hand::Stack;
+use crate::narration::hand::Stack;
 
 /// Keys of the faces from 1 on. Those that a digit cannot name have a letter that means nothing else; it is drawn on the card.
 const FACE_KEYS: [char; 15] = [

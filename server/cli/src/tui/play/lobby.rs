@@ -5,11 +5,11 @@ use chefshat_client::v1::{self, TournamentGameState as GameState};
 use ratatui::crossterm::event::KeyCode;
 
 use super::app::App;
-use crate::narrator::{MAX_NAME, clean};
+use crate::narration::view::End;
+use crate::narration::{MAX_NAME, clean};
 use crate::numbers::{counted, ordinal};
 use crate::tournament::tables::{Field, place_in_words};
 use crate::tournament::words::is_over;
-use crate::tui::table::End;
 
 /// Lines of the standings that a key goes up or down.
 const PAGE: usize = 5;

@@ -9,7 +9,7 @@ use ratatui::widgets::{Paragraph, Wrap};
 use super::app::Link;
 use super::lobby::{Lobby, Report};
 use super::part::{Over, Part};
-use crate::narrator::{clean, columns};
+use crate::narration::{clean, columns};
 use crate::tournament::tables::{Field, mean_score};
 use crate::tournament::words::format_name;
 use crate::tui::look::{Look, symbol};

@@ -9,9 +9,9 @@ use ratatui::crossterm::event::KeyCode;
 
 use super::app::{App, Do, Input, Link};
 use super::lobby::{Lobby, Report};
+use crate::narration::view::GameView;
 use crate::numbers::counted;
 use crate::tui::screen::Key;
-use crate::tui::table::Table;
 
 /// How long the result of a game stays before the lobby or the next game takes its place.
 const RESULT_MS: u64 = 12_000;
@@ -160,8 +160,8 @@ impl Part {
             self.in_game(&id, attached(), now_ms);
             return;
         }
-        let table = room.map_or_else(Table::default, |room| Table::of_room(&room));
-        let table = Table {
+        let table = room.map_or_else(GameView::default, |room| GameView::of_room(&room));
+        let table = GameView {
             game_id: id,
             ..table
         };

@@ -1,21 +1,20 @@
-//! What a person has picked of an open decision: a stack of the hand, how many cards of it, how many jokers with them. Says which action that
-//! is, and why not, where the server does not take it. What is legal is the server's word (its mask); only the reasons are found here.
+//! A person's selection for an open decision: a stack of the hand, a number of its cards, a number of jokers with them. Maps the selection
+//! to an action. What is legal, and what a play must be, comes from the request; this module only words the refusals.
 
 use chefshat_client::v1;
-use chefshat_engine::{Action, ActionId, ActionSpace, Face, Mask, Opening, RuleSet};
+use chefshat_engine::{Action, ActionId, ActionSpace, Face, Mask};
 
+use crate::narration::hand::{Hand, Stack};
 use crate::numbers::counted;
-use crate::tui::hand::{Hand, Stack};
 use crate::tui::view::play_words;
 
-/// A decision that is open, and what is picked for it.
+/// An open decision and the selection for it.
 #[derive(Debug, Clone)]
 pub(super) struct Decision {
     pub(super) request: v1::DecisionRequest,
     pub(super) stacks: Vec<Stack>,
     legal: Mask,
     space: ActionSpace,
-    rules: RuleSet,
     jokers_held: u8,
     /// Index in `stacks`; at a special action 0 declares and 1 declines.
     pub(super) at: usize,
@@ -24,8 +23,8 @@ pub(super) struct Decision {
 }
 
 impl Decision {
-    /// Opens a decision, with the first legal thing picked; `None` if it cannot be read.
-    pub(super) fn open(request: v1::DecisionRequest, rules: RuleSet) -> Option<Self> {
+    /// Opens a decision with a legal action selected; `None` if the request is malformed.
+    pub(super) fn open(request: v1::DecisionRequest, space: ActionSpace) -> Option<Self> {
         let observation = request.observation.as_ref()?;
         let hand = Hand {
             counts: observation.hand.clone(),
@@ -36,19 +35,14 @@ impl Decision {
             stacks: hand.stacks(),
             jokers_held: hand.jokers(),
             legal,
-            space: rules.actions(),
-            rules,
+            space,
             at: 0,
             quantity: 1,
             jokers: 0,
             request,
         };
-        decision.pick_standard();
+        decision.pick_default();
         Some(decision)
-    }
-
-    fn observation(&self) -> v1::Observation {
-        self.request.observation.clone().unwrap_or_default()
     }
 
     pub(super) fn kind(&self) -> v1::DecisionKind {
@@ -65,7 +59,7 @@ impl Decision {
         self.stacks.get(self.at).copied()
     }
 
-    /// The action that is picked, legal or not.
+    /// The selected action, legal or not.
     pub(super) fn picked(&self) -> Option<ActionId> {
         if self.kind() == v1::DecisionKind::SpecialAction {
             return Some(if self.at == 0 {
@@ -91,17 +85,16 @@ impl Decision {
         })
     }
 
-    /// Passing, where this decision knows it.
     pub(super) fn pass(&self) -> ActionId {
         self.space.pass()
     }
 
-    /// Declaring the special action, and declining.
+    /// The actions that declare the special action and decline it.
     pub(super) fn declare(&self) -> [ActionId; 2] {
         [self.space.declare(), self.space.decline()]
     }
 
-    /// The legal actions with the cards of one stack, ascending: fewest cards first.
+    /// Numbers of cards and jokers that are legal with one stack, in the order of their actions.
     fn legal_with(&self, at: usize) -> impl Iterator<Item = (u8, u8)> + '_ {
         let stack = self.stacks.get(at).copied();
         self.legal.iter().filter_map(move |action| {
@@ -123,18 +116,18 @@ impl Decision {
         })
     }
 
-    /// Whether anything legal can be done with a stack.
+    /// Whether a legal action uses the stack.
     pub(super) fn is_active(&self, at: usize) -> bool {
         self.legal_with(at).next().is_some()
     }
 
-    /// Whether there is anything legal but to pass.
+    /// Whether anything but a pass is legal.
     pub(super) fn can_play(&self) -> bool {
         (0..self.stacks.len()).any(|at| self.is_active(at))
     }
 
-    /// Picks what is most often wanted: of the least rare legal face as few cards as are needed.
-    fn pick_standard(&mut self) {
+    /// Selects the smallest legal play of the highest legal face.
+    fn pick_default(&mut self) {
         if self.kind() == v1::DecisionKind::SpecialAction {
             return;
         }
@@ -145,7 +138,7 @@ impl Decision {
         self.pick(at.unwrap_or(0));
     }
 
-    /// Puts the cursor on a stack and picks the smallest play of it that is legal, with as few jokers as possible.
+    /// Moves the cursor to a stack and selects its smallest legal play, with as few jokers as possible.
     pub(super) fn pick(&mut self, at: usize) {
         if at >= self.choices() {
             return;
@@ -157,8 +150,8 @@ impl Decision {
         (self.quantity, self.jokers) = smallest.unwrap_or((1, 0));
     }
 
-    /// Takes the key of a stack: puts the cursor on it; when it is there already, takes one card more, and from all of them as few as are
-    /// needed.
+    /// Handles the key of a stack: moves the cursor to it, or, if it is there already, selects one card more and after the last one
+    /// starts again with the smallest legal play.
     pub(super) fn press(&mut self, at: usize) {
         let stack = self.stacks.get(at);
         let all = stack.is_none_or(|stack| stack.joker || self.quantity >= stack.count);
@@ -169,7 +162,7 @@ impl Decision {
         }
     }
 
-    /// Over how much the cursor goes.
+    /// Number of positions of the cursor.
     fn choices(&self) -> usize {
         match self.kind() {
             v1::DecisionKind::SpecialAction => 2,
@@ -177,14 +170,14 @@ impl Decision {
         }
     }
 
-    /// Moves the cursor to the left or right, round at the ends.
+    /// Moves the cursor left or right and wraps around at the ends.
     pub(super) fn step(&mut self, right: bool) {
         let choices = self.choices().max(1);
         let step = if right { 1 } else { choices - 1 };
         self.pick((self.at + step) % choices);
     }
 
-    /// Moves the cursor to the next stack with which something legal can be done.
+    /// Moves the cursor to the next stack with a legal action.
     pub(super) fn step_active(&mut self, right: bool) {
         for _ in 0..self.choices() {
             self.step(right);
@@ -194,7 +187,7 @@ impl Decision {
         }
     }
 
-    /// One card more or less of the stack.
+    /// Selects one card more or less of the stack.
     pub(super) fn more(&mut self, more: bool) {
         let Some(stack) = self.stack() else {
             return;
@@ -202,7 +195,7 @@ impl Decision {
         if self.kind() != v1::DecisionKind::Turn {
             return;
         }
-        // Of jokers alone no more than one can be played.
+        // A joker alone is played singly.
         let most = if stack.joker { 1 } else { stack.count };
         self.quantity = match more {
             true => self.quantity.saturating_add(1).min(most),
@@ -210,7 +203,7 @@ impl Decision {
         };
     }
 
-    /// One joker more with the cards, none after as many as there are; in an exchange a joker alone. Says whether there is one that can.
+    /// Adds a joker to the selected cards, or removes all when none is left to add; in the exchange selects a joker. False if there is none.
     pub(super) fn next_joker(&mut self) -> bool {
         let turn = self.kind() == v1::DecisionKind::Turn;
         let jokers = self.stacks.iter().position(|stack| stack.joker);
@@ -224,7 +217,7 @@ impl Decision {
         true
     }
 
-    /// What is picked, in words.
+    /// The selection in words.
     pub(super) fn words(&self) -> String {
         match self.kind() {
             v1::DecisionKind::SpecialAction if self.at == 0 => "declare".to_owned(),
@@ -247,92 +240,86 @@ impl Decision {
         }
     }
 
-    /// Why what is picked is not legal; `None` when it is.
+    /// Why the selection is illegal; `None` if it is legal.
     pub(super) fn objection(&self) -> Option<String> {
         if self.picked().is_some_and(|action| self.is_legal(action)) {
             return None;
         }
         let Some(stack) = self.stack() else {
-            return Some("there is nothing to pick".to_owned());
+            return Some("there is nothing to select".to_owned());
         };
-        if self.kind() != v1::DecisionKind::Turn {
-            return Some("this cannot be given now".to_owned());
-        }
-        Some(self.turn_objection(stack))
-    }
-
-    fn turn_objection(&self, stack: Stack) -> String {
-        let seen = self.observation();
-        let faces = u32::from(self.space.faces());
-        if self.opens(&seen) && stack.face != faces {
-            return match self.rules.opening() {
-                Opening::Golden => {
-                    format!("the Shift opens with the Golden {faces}: only {faces}s, and jokers")
-                }
-                Opening::AnyTopFace => format!("the Shift opens with face {faces}: no other face"),
-            };
-        }
-        if seen.board_face == 0 {
-            return "this cannot be played now".to_owned();
-        }
-        if stack.joker {
-            return "a joker alone can only open a pizza; with other cards: j".to_owned();
-        }
-        if stack.face >= seen.board_face {
-            let board = seen.board_face;
-            return format!(
-                "{} is not rarer than {board}: a lower face is needed",
-                stack.face
-            );
-        }
-        let have = u32::from(stack.count) + u32::from(self.jokers_held);
-        if have < seen.board_size {
-            let need = counted(u64::from(seen.board_size), "card");
-            return format!(
-                "{need} needed: of {} and jokers you have {have}",
-                stack.face
-            );
-        }
-        let need = counted(u64::from(seen.board_size), "card");
-        format!("{need} needed: more with ↑, a joker with j")
-    }
-
-    /// What the Shift's first turn is bound to, if this is it.
-    pub(super) fn opening(&self) -> Option<String> {
-        if self.kind() != v1::DecisionKind::Turn || !self.opens(&self.observation()) {
-            return None;
-        }
-        let face = self.space.faces();
-        Some(match self.rules.opening() {
-            Opening::Golden => format!("The Golden {face} opens the Shift."),
-            Opening::AnyTopFace => format!("Face {face} opens the Shift."),
+        Some(match (self.kind(), self.request.play_requirement) {
+            (v1::DecisionKind::Turn, Some(rule)) => self.unmet(&rule, stack),
+            (v1::DecisionKind::Turn, None) => "this cannot be played now".to_owned(),
+            _ => "this cannot be given now".to_owned(),
         })
     }
 
-    /// Why passing is not legal; `None` when it is.
+    /// Which part of the requirement the selection fails.
+    fn unmet(&self, rule: &v1::PlayRequirement, stack: Stack) -> String {
+        let (lowest, highest) = (rule.lowest_face, rule.highest_face);
+        if opens_shift(rule) && stack.face != lowest {
+            return match rule.golden_card {
+                true => format!(
+                    "the Shift opens with the Golden {lowest}: play {lowest}s, with or without jokers"
+                ),
+                false => format!(
+                    "the Shift opens with face {lowest}: play {lowest}s, with or without jokers"
+                ),
+            };
+        }
+        if stack.joker {
+            return "a joker alone can only open a pizza; add it to other cards with j".to_owned();
+        }
+        if highest == 0 {
+            return "nothing beats this: you have to pass".to_owned();
+        }
+        if stack.face > highest {
+            return format!("face {} is too high: play {highest} or lower", stack.face);
+        }
+        let need = counted(rule.fewest_cards.into(), "card");
+        let held = u32::from(stack.count) + u32::from(self.jokers_held);
+        if held < rule.fewest_cards {
+            let face = stack.face;
+            return format!(
+                "you need {need} of one face: with jokers you have {held} of face {face}"
+            );
+        }
+        format!("you need {need}: add one with ↑, a joker with j")
+    }
+
+    /// What the Shift's first turn must contain; `None` on other turns.
+    pub(super) fn opening(&self) -> Option<String> {
+        let rule = self.request.play_requirement?;
+        opens_shift(&rule).then(|| match rule.golden_card {
+            true => format!("The Golden {} opens the Shift.", rule.lowest_face),
+            false => format!("Face {} opens the Shift.", rule.lowest_face),
+        })
+    }
+
+    /// Why passing is illegal; `None` if it is legal.
     pub(super) fn pass_objection(&self) -> Option<&'static str> {
         if self.is_legal(self.pass()) {
             return None;
         }
-        Some(match self.kind() {
-            v1::DecisionKind::Turn if self.opens(&self.observation()) => {
-                "the Shift's first turn cannot be passed"
+        Some(match (self.kind(), self.request.play_requirement) {
+            (v1::DecisionKind::Turn, Some(rule)) if opens_shift(&rule) => {
+                "you cannot pass on the Shift's first turn"
             }
-            v1::DecisionKind::Turn => {
-                "nobody has played for too many pizzas: this turn must be played"
+            (v1::DecisionKind::Turn, _) => {
+                "nobody has played for several pizzas: you have to play now"
             }
-            v1::DecisionKind::Exchange => "a card must be given: Enter gives the one picked",
+            (v1::DecisionKind::Exchange, _) => {
+                "you have to give a card: Enter gives the selected one"
+            }
             _ => "declare with d or decline with n",
         })
     }
+}
 
-    /// Whether this is the first turn of a Shift.
-    fn opens(&self, seen: &v1::Observation) -> bool {
-        seen.board_face == 0
-            && seen.pizza <= 1
-            && seen.played.iter().all(|count| *count == 0)
-            && seen.passed.iter().all(|passed| *passed == 0)
-    }
+/// Whether a requirement is that of a Shift's first turn: only there is the lowest face above 1.
+fn opens_shift(rule: &v1::PlayRequirement) -> bool {
+    rule.lowest_face > 1
 }
 
 fn face(stack: Stack) -> Option<Face> {

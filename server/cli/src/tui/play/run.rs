@@ -1,5 +1,5 @@
-//! A part is played: keys, messages and pictures are carried to and fro until the person has seen the end or leaves. What they mean is in `part`,
-//! how it looks in `view`, the connection in `link`.
+//! The loop of `chefshat play`: passes keys, ticks and server messages to `part`, draws its state, and sends its commands. `link` holds the
+//! connection.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -7,7 +7,6 @@ use std::time::Duration;
 use chefshat_client::v1::{self, seat_command::Command};
 use chefshat_client::{Client, ENTROPY_BYTES};
 use tokio::sync::mpsc;
-use tokio::time::{Instant, MissedTickBehavior, interval};
 
 use super::app::{App, Do, EXPRESSIONS};
 use super::follow::follow;
@@ -16,25 +15,25 @@ use super::part::{Heard, Part};
 use super::view;
 use crate::CommandError;
 use crate::tui::look::Look;
-use crate::tui::screen::{Key, Screen, asked_to_end};
+use crate::tui::screen::{Screen, Wake};
 
-/// Messages that may wait to be taken.
+/// Messages that may wait to be handled.
 const HEARD: usize = 64;
-/// Orders that may wait for the connection.
+/// Commands that may wait for the connection.
 const ORDERS: usize = 16;
-/// How often the clock is drawn.
+/// Time between two drawings of the clock.
 const TICK: Duration = Duration::from_millis(250);
-/// Key under which the time before the person's eyes is recorded with a decision, as the page for browsers does it.
+/// Key of the annotation with the time a decision was on screen; the page uses the same.
 const PERSON_TIME_KEY: &str = "person_decision_time_ms";
 
-/// A ticket, and the table as it was when it was got, where it is a seat's.
+/// A ticket and, if it is for a seat, the table as of joining.
 pub(super) struct Taken {
     pub(super) client: Client,
     pub(super) ticket: String,
     pub(super) game: Option<App>,
 }
 
-/// Plays until the person has seen the end or leaves; with `times`, the person's own times are recorded.
+/// Plays until the person has seen the end or leaves. `times`: record how long each decision was on screen.
 ///
 /// # Errors
 /// The terminal cannot be used.
@@ -52,37 +51,33 @@ pub(super) async fn play(taken: Taken, times: bool) -> Result<Part, CommandError
 
     let look = Look::of_environment();
     let mut part = Part::new(game);
-    let begun = Instant::now();
-    let now = || u64::try_from(begun.elapsed().as_millis()).unwrap_or(u64::MAX);
-    let mut ticks = interval(TICK);
-    ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
-    let ended = asked_to_end()?;
-    tokio::pin!(ended);
     let mut following = None;
     let mut served = false;
-    let mut screen = Screen::open()?;
+    let mut screen = Screen::open(TICK)?;
     while !part.left {
-        screen.draw(|frame| view::draw(frame, look, &part, now()))?;
+        let now_ms = screen.now_ms();
+        screen.draw(|frame| view::draw(frame, look, &part, now_ms))?;
         let what = tokio::select! {
-            key = screen.keys.recv() => Heard::Key(key.unwrap_or(Key::Interrupt)),
+            wake = screen.next() => match wake {
+                Wake::Key(key) => Heard::Key(key),
+                Wake::Tick => Heard::Tick,
+            },
             Some(what) = heard.recv() => what,
             end = &mut serving, if !served => {
                 served = true;
-                // It has said why it ended, unless it failed: then the terminal has been given back, and nothing can be drawn.
-                end.map_err(|error| format!("the connection failed: {error}; go on with --ticket"))?;
+                // It reports why it ended unless it panicked; then the terminal has been restored.
+                end.map_err(|error| format!("the connection failed: {error}; resume with --ticket"))?;
                 continue;
             }
-            _ = ticks.tick() => Heard::Tick,
-            _ = &mut ended => Heard::Key(Key::Interrupt),
         };
         if let (Heard::Entered(entered), None) = (&what, &following) {
             let followed = follow(client.clone(), entered.clone(), sender.clone());
             following = Some(tokio::spawn(followed));
         }
-        let Some((game, what)) = part.take(what, now()) else {
+        let Some((game, what)) = part.take(what, screen.now_ms()) else {
             continue;
         };
-        // One that finds no connection is not needed: the decision is put anew.
+        // A command without a connection is dropped: the server sends the decision again.
         if let Some(command) = command(what, times) {
             let order: Order = (game, command);
             let _ = orders.try_send(order);
@@ -104,7 +99,7 @@ fn random_entropy() -> Vec<u8> {
     chefshat_room::ids::random_bytes::<ENTROPY_BYTES>().to_vec()
 }
 
-/// What the server is told. How long a person took is told only where that was asked for.
+/// The command for the server. The time a decision was on screen is sent only with `times`.
 pub(super) fn command(what: Do, times: bool) -> Option<Command> {
     match what {
         Do::Answer {
@@ -124,7 +119,6 @@ pub(super) fn command(what: Do, times: bool) -> Option<Command> {
         Do::Resume => Some(Command::Resume(v1::ResumeSeat {})),
         Do::Express(index) => {
             let (label, valence, arousal) = EXPRESSIONS.get(index).copied()?;
-            // Everybody sees it in the story, the person too; why one is refused is said.
             Some(Command::Express(v1::Expression {
                 label: label.to_owned(),
                 valence: Some(valence),

@@ -7,9 +7,9 @@ use ratatui::crossterm::event::KeyCode;
 use super::app::{App, Do, Input, Link};
 use super::run::command;
 use super::view;
+use crate::narration::view::GameView;
 use crate::tui::look::Look;
 use crate::tui::screen::Key;
-use crate::tui::table::Table;
 use crate::tui::testing::{Dealt, as_kept, text};
 
 const ME: Viewer = Viewer::Seat(Seat::new(0));
@@ -26,7 +26,7 @@ impl Evening {
         let (dealt, events) = Dealt::new(rules, seed, ME);
         let mut evening = Self {
             dealt,
-            app: App::new(Table::default(), Some(0)),
+            app: App::new(GameView::default(), Some(0)),
             now_ms: 0,
         };
         evening.tell(Update::Attached(v1::Attached::default()));

@@ -11,10 +11,10 @@ use super::app::{App, Dialog, EXPRESSIONS, Link, Open};
 use super::keys::key_of;
 use super::lobby_view;
 use super::part::Part;
+use crate::narration::view::End;
 use crate::tui::cards;
 use crate::tui::cards::Shown;
 use crate::tui::look::{Look, ingredient};
-use crate::tui::table::End;
 use crate::tui::view::{boxed, draw as draw_table, end_lines, popup};
 
 /// Rows below the table: the hand (7), what is asked (2), the keys (1).
@@ -210,35 +210,19 @@ fn asked(app: &App) -> String {
         return "Sent.".to_owned();
     }
     match decision.kind() {
-        v1::DecisionKind::SpecialAction => {
-            let dishwasher = app.me.and_then(|me| app.table.seat(me));
-            let dishwasher = dishwasher.is_some_and(|it| it.role == v1::Role::Dishwasher);
-            if dishwasher {
-                "Two jokers! Food Fight: all roles turn around?".to_owned()
-            } else {
-                "Two jokers! Dinner is Served: no exchange?".to_owned()
-            }
+        v1::DecisionKind::SpecialAction => match decision.request.special_action() {
+            v1::SpecialAction::FoodFight => "Two jokers! Food Fight: reverse all roles?",
+            v1::SpecialAction::DinnerIsServed => "Two jokers! Dinner is Served: skip the exchange?",
+            v1::SpecialAction::Unspecified => "Two jokers! Declare your special action?",
         }
+        .to_owned(),
         v1::DecisionKind::Exchange => {
-            format!("Give a card to {}: {}?", partner(app), decision.words())
+            let gift = decision.request.gift_requirement;
+            let receiver = gift.map_or("your partner".to_owned(), |it| app.table.name(it.receiver));
+            format!("Give a card to {receiver}: {}?", decision.words())
         }
-        _ if !decision.can_play() => "Your turn: nothing can be played, pass with p.".to_owned(),
+        _ if !decision.can_play() => "Your turn: you cannot play, pass with p.".to_owned(),
         _ => format!("Your turn: {}?", decision.words()),
-    }
-}
-
-/// Who gets what the person gives in the exchange.
-fn partner(app: &App) -> String {
-    let role = |seat| app.table.seat(seat).map(|place| place.role);
-    let theirs = match app.me.and_then(role) {
-        Some(v1::Role::Chef) => v1::Role::Dishwasher,
-        _ => v1::Role::Waiter,
-    };
-    let seats = (0u32..).zip(&app.table.seats);
-    let mut seats = seats.filter(|(_, place)| place.role == theirs);
-    match seats.next() {
-        Some((seat, _)) => app.table.name(seat),
-        None => "your partner".to_owned(),
     }
 }
 

@@ -1,5 +1,5 @@
-//! `chefshat watch`: a room as it is played, or a game that is over, at a terminal. This file finds out which and carries events, keys and
-//! pictures to and fro; the reel that is wound is in `reel`, how it looks in `view`.
+//! `chefshat watch`: shows a room live, or a finished game, in a terminal. This file finds the game and runs the loop of events, keys and
+//! frames; `reel` moves through the game, `view` draws it.
 
 mod reel;
 #[cfg(test)]
@@ -16,29 +16,28 @@ use chefshat_record::jsonl;
 use chefshat_record::replay::{ReplayError, replay};
 use clap::Args;
 use tokio::sync::mpsc;
-use tokio::time::{Instant, MissedTickBehavior, interval};
 
 use crate::CommandError;
 use crate::connect::{PATIENCE, ServerArg};
+use crate::narration::view::GameView;
 use crate::tui::look::Look;
-use crate::tui::screen::{Key, Screen, asked_to_end, missing};
-use crate::tui::table::Table;
+use crate::tui::screen::{Screen, Wake, missing};
 use reel::Reel;
 
 /// Events that may wait to be shown.
 const EVENTS: usize = 256;
-/// How often the reel is looked at.
+/// Time between two ticks.
 const TICK: Duration = Duration::from_millis(50);
 
-/// Watch a room or a recorded game at this terminal.
+/// Watch a room or a recorded game in this terminal.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  chefshat watch 5f0c6a4de2b14b7f8a3d9c1e7b60425d --server http://127.0.0.1:50051\n  \
                   chefshat watch records/229f59ae0b9ec1e5571bac0902b99674.jsonl\n\n\
-                  Press ? for the keys. `chefshat room watch` tells a room as lines of text."
+                  Press ? for the keys. To follow a room as lines of text, use `chefshat room watch`."
 )]
 pub(crate) struct Watch {
-    /// A room of the server, the game of a record it holds, or the file of a record.
+    /// A room of the server, a game whose record the server has, or a record file.
     #[arg(value_name = "ROOM-ID|GAME-ID|FILE")]
     what: String,
     #[command(flatten)]
@@ -47,8 +46,7 @@ pub(crate) struct Watch {
 
 impl Watch {
     pub(crate) async fn run(self) -> Result<ExitCode, CommandError> {
-        let instead =
-            "`chefshat room watch` tells a room as text, `chefshat render` draws a record";
+        let instead = "use `chefshat room watch` to follow a room as text, `chefshat render` to draw a record";
         if let Some(code) = missing(instead) {
             return Ok(code);
         }
@@ -57,7 +55,10 @@ impl Watch {
         let (reel, live) = if is_file {
             let reel = of_record(jsonl::read(path)?);
             let reel = reel.map_err(|error| {
-                format!("{}: {error}; `chefshat verify` says more", path.display())
+                format!(
+                    "{}: {error}; run `chefshat verify` for details",
+                    path.display()
+                )
             })?;
             (reel, None)
         } else {
@@ -67,7 +68,7 @@ impl Watch {
         show(reel, live).await
     }
 
-    /// A room that is played, or the record of a game that is over, in which all hands can be seen.
+    /// Finds a room to follow, or the record of a finished game, which shows all hands.
     async fn of_server(&self, client: &Client) -> Result<(Reel, Option<Spectator>), CommandError> {
         let room = match client.get_room(self.what.as_str()).await {
             Ok(room) => room,
@@ -75,8 +76,8 @@ impl Watch {
                 let lines = client.record(self.what.as_str()).await;
                 let lines = lines.map_err(|error| match error.reason() {
                     Some("GAME_UNKNOWN") => CommandError::from(format!(
-                        "{:?} is no file, and on the server neither a room nor a game; `chefshat room list` and `chefshat records list` say which \
-                         there are",
+                        "{:?} is neither a file nor a room or game of the server; list them with `chefshat room list` and `chefshat \
+                         records list`",
                         self.what
                     )),
                     _ => error.into(),
@@ -96,22 +97,22 @@ impl Watch {
                 give_up_after: PATIENCE,
                 ..Backoff::default()
             });
-        Ok((Reel::live(Table::of_room(&room)), Some(spectator)))
+        Ok((Reel::live(GameView::of_room(&room)), Some(spectator)))
     }
 }
 
-/// The reel of a record. A file can say anything: only what replays is shown.
+/// Makes the reel of a record. The record is verified first: a file may contain anything.
 ///
 /// # Errors
-/// The first line that does not fit.
+/// The first line that does not replay.
 fn of_record(lines: Vec<v1::RecordLine>) -> Result<Reel, ReplayError> {
     replay(&lines)?;
-    let mut table = Table::default();
+    let mut table = GameView::default();
     let mut events = Vec::new();
     for line in lines {
         match line.line {
             Some(record_line::Line::Header(header)) => {
-                table = Table::of_room(&v1::Room {
+                table = GameView::of_room(&v1::Room {
                     name: header.room_name,
                     game_id: header.game_id,
                     rules: header.rules,
@@ -125,27 +126,24 @@ fn of_record(lines: Vec<v1::RecordLine>) -> Result<Reel, ReplayError> {
     Ok(Reel::recorded(table, events))
 }
 
-/// Shows the reel until the person has seen enough.
+/// Shows the reel until the person quits.
 async fn show(mut reel: Reel, live: Option<Spectator>) -> Result<ExitCode, CommandError> {
     let look = Look::of_environment();
-    let begun = Instant::now();
-    let now = || u64::try_from(begun.elapsed().as_millis()).unwrap_or(u64::MAX);
-    let mut ticks = interval(TICK);
-    ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
-    let ended = asked_to_end()?;
-    tokio::pin!(ended);
     let mut following = live.map(follow);
-    let mut screen = Screen::open()?;
+    let mut screen = Screen::open(TICK)?;
     let mut dirty = true;
     while !reel.left {
         if std::mem::take(&mut dirty) {
             screen.draw(|frame| view::draw(frame, look, &reel))?;
         }
         tokio::select! {
-            key = screen.keys.recv() => {
-                reel.key(key.unwrap_or(Key::Interrupt), now());
-                dirty = true;
-            }
+            wake = screen.next() => match wake {
+                Wake::Key(key) => {
+                    reel.key(key, screen.now_ms());
+                    dirty = true;
+                }
+                Wake::Tick => dirty = reel.tick(screen.now_ms()),
+            },
             event = next(&mut following) => {
                 dirty = true;
                 match event {
@@ -157,17 +155,15 @@ async fn show(mut reel: Reel, live: Option<Spectator>) -> Result<ExitCode, Comma
                     }
                 }
             }
-            _ = ticks.tick() => dirty = reel.tick(now()),
-            _ = &mut ended => reel.key(Key::Interrupt, now()),
         }
     }
     Ok(ExitCode::SUCCESS)
 }
 
-/// An event of a room, or why there are no more.
+/// An event of a room, or why no more follow.
 type Heard = Result<v1::GameEvent, chefshat_client::Error>;
 
-/// Has a task of its own follow the room: keys and the clock would else interrupt its connecting and its waiting again and again.
+/// Follows the room in a separate task: keys and ticks would otherwise cancel its connection attempts.
 fn follow(mut spectator: Spectator) -> mpsc::Receiver<Heard> {
     let (sender, heard) = mpsc::channel(EVENTS);
     tokio::spawn(async move {
@@ -181,7 +177,7 @@ fn follow(mut spectator: Spectator) -> mpsc::Receiver<Heard> {
     heard
 }
 
-/// The next event of a room; of none, never.
+/// The next event of the room; pending forever without one.
 async fn next(following: &mut Option<mpsc::Receiver<Heard>>) -> Option<Heard> {
     match following {
         Some(heard) => heard.recv().await,

@@ -4,9 +4,9 @@
 use chefshat_client::v1::{self, game_event::Kind};
 use ratatui::crossterm::event::KeyCode;
 
+use crate::narration::view::GameView;
 use crate::tui::log::Scroll;
 use crate::tui::screen::Key;
-use crate::tui::table::Table;
 
 /// Milliseconds for an event at each speed, slowest first.
 const PACES_MS: [u64; 7] = [4000, 2000, 1000, 500, 250, 100, 25];
@@ -17,11 +17,11 @@ const STANDARD_PACE: usize = 2;
 #[derive(Debug)]
 pub(super) struct Reel {
     /// The table before the first event.
-    start: Table,
+    start: GameView,
     events: Vec<v1::GameEvent>,
     /// How many events the table has taken.
     pub(super) at: usize,
-    pub(super) table: Table,
+    pub(super) table: GameView,
     pub(super) running: bool,
     pace: usize,
     /// When it last moved by itself.
@@ -39,7 +39,7 @@ pub(super) struct Reel {
 
 impl Reel {
     /// Of a game that is over: from its first deal, running.
-    pub(super) fn recorded(start: Table, events: Vec<v1::GameEvent>) -> Self {
+    pub(super) fn recorded(start: GameView, events: Vec<v1::GameEvent>) -> Self {
         let first = events.iter().position(is_deal).map_or(0, |at| at + 1);
         let mut reel = Self::new(start, events, false);
         reel.wind_to(first);
@@ -47,11 +47,11 @@ impl Reel {
     }
 
     /// Of a game that is being played: at its newest event.
-    pub(super) fn live(start: Table) -> Self {
+    pub(super) fn live(start: GameView) -> Self {
         Self::new(start, Vec::new(), true)
     }
 
-    fn new(start: Table, events: Vec<v1::GameEvent>, live: bool) -> Self {
+    fn new(start: GameView, events: Vec<v1::GameEvent>, live: bool) -> Self {
         Self {
             table: start.clone(),
             start,

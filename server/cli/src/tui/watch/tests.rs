@@ -5,13 +5,13 @@ use ratatui::crossterm::event::KeyCode;
 
 use super::reel::Reel;
 use super::{of_record, view};
+use crate::narration::view::GameView;
 use crate::tui::look::Look;
 use crate::tui::screen::Key;
-use crate::tui::table::Table;
 use crate::tui::testing::{as_kept, lines, recorded, text};
 
 fn reel() -> Reel {
-    Reel::recorded(Table::default(), recorded("fixed.jsonl"))
+    Reel::recorded(GameView::default(), recorded("fixed.jsonl"))
 }
 
 fn press(reel: &mut Reel, code: KeyCode) {
@@ -92,7 +92,7 @@ fn a_record_that_does_not_replay_is_refused_and_none_is_drawn_without_bounds() {
         };
         spoil(play);
         // A live game is drawn as it comes, whatever the server says.
-        let mut reel = Reel::live(Table::default());
+        let mut reel = Reel::live(GameView::default());
         for line in &bad[..=at] {
             if let Some(record_line::Line::Event(event)) = &line.line {
                 reel.push(event.clone());
@@ -107,7 +107,7 @@ fn a_record_that_does_not_replay_is_refused_and_none_is_drawn_without_bounds() {
 
 #[test]
 fn a_live_game_is_followed_unless_it_is_stopped() {
-    let mut reel = Reel::live(Table::default());
+    let mut reel = Reel::live(GameView::default());
     let mut events = recorded("fixed.jsonl").into_iter();
     for event in events.by_ref().take(20) {
         reel.push(event);

@@ -6,10 +6,10 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
 use super::reel::Reel;
-use crate::narrator::MAX_NAME;
-use crate::tui::hand::Hand;
+use crate::narration::MAX_NAME;
+use crate::narration::hand::Hand;
+use crate::narration::view::GameView;
 use crate::tui::look::Look;
-use crate::tui::table::Table;
 use crate::tui::view::{boxed, draw as draw_table, end_lines, padded, popup};
 
 const KEYS: &str = " space stop  ←→ step  ↑↓ speed  s S Shift  PgUp story  h hands  ? keys  q end";
@@ -72,7 +72,7 @@ pub(super) fn draw(frame: &mut Frame<'_>, look: Look, reel: &Reel) {
     }
 }
 
-fn draw_hands(frame: &mut Frame<'_>, look: Look, table: &Table, area: Rect) {
+fn draw_hands(frame: &mut Frame<'_>, look: Look, table: &GameView, area: Rect) {
     let lines = (0u32..).zip(&table.seats).map(|(seat, place)| {
         let name = Span::styled(padded(&table.name(seat), MAX_NAME + 1), look.seat(seat));
         let mut spans = vec![Span::raw(" "), name];

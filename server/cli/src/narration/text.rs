@@ -174,7 +174,7 @@ fn steers(letter: char) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use crate::narrator::text::*;
+    use crate::narration::text::*;
 
     #[test]
     fn names_are_safe_and_short() {

@@ -1,5 +1,5 @@
-//! The table as a viewer knows it from the events of a game: who sits there, what lies on the board, who holds how much. Events go in one by
-//! one; nothing here draws, waits or decides.
+//! The state of a game as a viewer knows it from its events: seats, board, hands, turn. Both narrations, lines of text and the terminal
+//! client, are drawn from it. `story` has the sentences; nothing here draws or decides.
 
 use std::collections::VecDeque;
 
@@ -7,39 +7,39 @@ use chefshat_client::v1::{self, game_event::Kind};
 use chefshat_engine::{PassScope, RuleSet};
 use chefshat_record::convert::rules_from_proto;
 
-use super::super::narrator::{MAX_NAME, clean, names};
 use super::hand::Hand;
 use super::story::{self, Line};
+use super::text::{MAX_NAME, clean};
 
-/// Most columns of a room's name: the server takes no longer one.
+/// Maximum columns of a room's name, as in the server.
 const MAX_ROOM_NAME: usize = 64;
-/// Most lines of the story that are kept.
+/// Maximum number of lines of the story.
 const MAX_LINES: usize = 2000;
 
-/// One seat.
+/// A seat as the viewer knows it.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Place {
-    /// Name to show; empty while the seat is free.
+pub(crate) struct SeatView {
+    /// Display name; empty while the seat is free.
     pub(crate) name: String,
     pub(crate) kind: v1::ParticipantKind,
-    /// The built-in agent that plays it, or that stands in for its own; empty otherwise.
+    /// The built-in agent that plays it or substitutes for its participant; empty otherwise.
     pub(crate) built_in: String,
-    /// Somebody is connected to it.
+    /// Its participant is connected.
     pub(crate) connected: bool,
     pub(crate) substituted: bool,
     pub(crate) role: v1::Role,
-    /// Cards left.
+    /// Cards in hand.
     pub(crate) cards: u32,
     pub(crate) points: u64,
     /// Out of this pizza.
     pub(crate) passed: bool,
-    /// Place in this Shift, from 1, once it has finished.
+    /// SeatView in this Shift, from 1, once it has finished.
     pub(crate) finished: Option<u32>,
-    /// The hand, where it is known.
+    /// The hand, if the viewer may see it.
     pub(crate) hand: Option<Hand>,
 }
 
-/// What lies on the board, and whose it was.
+/// The play on the board and its seat.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct OnBoard {
     pub(crate) seat: u32,
@@ -58,15 +58,15 @@ pub(crate) enum End {
     Aborted(v1::AbortReason),
 }
 
-/// A table.
+/// A game as the viewer knows it.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Table {
+pub(crate) struct GameView {
     pub(crate) room_name: String,
     pub(crate) game_id: String,
     pub(crate) rules: Option<RuleSet>,
     pub(crate) hand_size: u32,
     /// Index = seat.
-    pub(crate) seats: Vec<Place>,
+    pub(crate) seats: Vec<SeatView>,
     pub(crate) started: bool,
     /// Shift, from 1; 0 before the first.
     pub(crate) shift: u32,
@@ -75,28 +75,28 @@ pub(crate) struct Table {
     /// Turns of this Shift so far.
     pub(crate) turns: u32,
     pub(crate) board: Option<OnBoard>,
-    /// Who is to act, where the events say so.
+    /// The seat to act, once the events determine it.
     pub(crate) turn: Option<u32>,
     /// Seats in the order in which they finished the last Shift.
     pub(crate) last_order: Vec<u32>,
-    /// What happened, oldest first: the last of the lines that were told.
+    /// The newest lines of the story, oldest first.
     pub(crate) story: VecDeque<Line>,
-    /// How many lines were told.
-    pub(crate) told: usize,
+    /// Number of lines of the story so far, with those no longer in `story`.
+    pub(crate) story_len: usize,
     pub(crate) end: Option<End>,
 }
 
-impl Table {
-    /// The table of a room before any of its events is known.
+impl GameView {
+    /// A room before its first event.
     pub(crate) fn of_room(room: &v1::Room) -> Self {
-        let mut table = Self {
+        let mut view = Self {
             room_name: clean(&room.name, MAX_ROOM_NAME),
             game_id: room.game_id.clone(),
             rules: room.rules.as_ref().and_then(|it| rules_from_proto(it).ok()),
             ..Self::default()
         };
-        table.seat_all(&room.seats);
-        table
+        view.seat_all(&room.seats);
+        view
     }
 
     /// Faces of the deck.
@@ -104,16 +104,16 @@ impl Table {
         self.rules.map_or(11, |rules| rules.faces().into())
     }
 
-    /// A seat, if the table has it.
-    pub(crate) fn seat(&self, seat: u32) -> Option<&Place> {
+    /// A seat, if the game has it.
+    pub(crate) fn seat(&self, seat: u32) -> Option<&SeatView> {
         self.seats.get(usize::try_from(seat).ok()?)
     }
 
-    fn seat_mut(&mut self, seat: u32) -> Option<&mut Place> {
+    fn seat_mut(&mut self, seat: u32) -> Option<&mut SeatView> {
         self.seats.get_mut(usize::try_from(seat).ok()?)
     }
 
-    /// What a seat is called.
+    /// Display name of a seat.
     pub(crate) fn name(&self, seat: u32) -> String {
         match self.seat(seat) {
             Some(place) if !place.name.is_empty() => place.name.clone(),
@@ -121,25 +121,31 @@ impl Table {
         }
     }
 
-    /// How many seats nobody has taken yet.
+    /// Number of free seats.
     pub(crate) fn free_seats(&self) -> usize {
-        let free = |place: &&Place| place.name.is_empty();
+        let free = |place: &&SeatView| place.name.is_empty();
         self.seats.iter().filter(free).count()
     }
 
-    /// Takes one event.
+    /// Applies an event and adds its lines to the story.
     pub(crate) fn apply(&mut self, event: &v1::GameEvent) {
         let Some(kind) = &event.kind else {
             return;
         };
-        // Told first: whose cards they were is forgotten afterwards.
-        let lines = story::of(self, kind);
-        self.fold(kind);
-        self.told += lines.len();
+        let lines = self.advance(kind);
+        self.story_len += lines.len();
         self.story.extend(lines);
         while self.story.len() > MAX_LINES {
             self.story.pop_front();
         }
+    }
+
+    /// Applies an event; returns its lines.
+    pub(super) fn advance(&mut self, kind: &Kind) -> Vec<Line> {
+        // The lines first: they need the state before the event.
+        let lines = story::of(self, kind);
+        self.fold(kind);
+        lines
     }
 
     fn fold(&mut self, kind: &Kind) {
@@ -153,7 +159,7 @@ impl Table {
             }
             Kind::Vacated(seat) => {
                 if let Some(place) = self.seat_mut(seat.seat) {
-                    *place = Place::default();
+                    *place = SeatView::default();
                 }
             }
             Kind::Disconnected(seat) => self.with(seat.seat, |place| place.connected = false),
@@ -195,7 +201,7 @@ impl Table {
                 self.with(finished.seat, |place| {
                     place.finished = Some(finished.place);
                 });
-                // Its turn may have been thought to come again.
+                // The turn may have been assigned to this seat.
                 self.turn = self.next_after(finished.seat);
             }
             Kind::ShiftEnded(end) => {
@@ -219,7 +225,7 @@ impl Table {
         }
     }
 
-    fn with(&mut self, seat: u32, change: impl FnOnce(&mut Place)) {
+    fn with(&mut self, seat: u32, change: impl FnOnce(&mut SeatView)) {
         if let Some(place) = self.seat_mut(seat) {
             change(place);
         }
@@ -234,7 +240,7 @@ impl Table {
     fn seat_all(&mut self, seats: &[v1::Participant]) {
         let named = names(seats).into_iter().zip(seats);
         self.seats = named
-            .map(|(name, seat)| Place {
+            .map(|(name, seat)| SeatView {
                 name: if seat.name.is_empty() {
                     String::new()
                 } else {
@@ -244,7 +250,7 @@ impl Table {
                 built_in: clean(&seat.built_in_agent, MAX_NAME),
                 connected: seat.connected,
                 substituted: seat.substituted,
-                ..Place::default()
+                ..SeatView::default()
             })
             .collect();
     }
@@ -326,8 +332,8 @@ impl Table {
         self.turn = self.next_after(play.seat);
     }
 
-    /// Whether the Golden card is among what is being played, as far as that is known: it opens a Shift where the rules say so; else it goes
-    /// last of its face, which only a known hand can tell.
+    /// Whether a play that comes next contains the Golden card: it opens a Shift if the rules say so; otherwise it is the last of its face to
+    /// be played, which only a known hand shows.
     pub(super) fn plays_golden(&self, play: &v1::Play) -> bool {
         if play.face != self.faces() {
             return false;
@@ -352,4 +358,25 @@ impl Table {
                     .is_some_and(|place| place.cards > 0 && !place.passed)
             })
     }
+}
+
+/// Display names: short, safe and unique.
+fn names(seats: &[v1::Participant]) -> Vec<String> {
+    let short: Vec<String> = seats
+        .iter()
+        .map(|seat| clean(&seat.name, MAX_NAME))
+        .collect();
+    (0..short.len())
+        .map(|seat| {
+            let name = &short[seat];
+            let alike = short.iter().filter(|other| *other == name).count();
+            if name.is_empty() {
+                format!("seat {seat}")
+            } else if alike > 1 {
+                format!("{}#{seat}", clean(name, MAX_NAME - 2))
+            } else {
+                name.clone()
+            }
+        })
+        .collect()
 }

@@ -1,14 +1,15 @@
-//! A scripted game told word for word, and played games of every size that keep to the width of the page.
+//! A scripted game with its exact text, and generated games of every size that keep within the page width.
 
 use chefshat_agents::{AgentKind, BuiltInAgent};
 use chefshat_client::v1::{self, game_event::Kind};
 use chefshat_engine::{Event, Game, RuleSet, RuleSetSpec, Seed, Viewer};
 use chefshat_record::convert::{By, event_kind, rules_to_proto};
 
-use super::{Narrator, text};
+use super::Narrator;
+use super::text::{WIDTH, columns};
 
-/// Tells events and takes the colours away.
-fn told(narrator: &mut Narrator, events: impl IntoIterator<Item = Kind>) -> String {
+/// The text of events without colours.
+fn text_of(narrator: &mut Narrator, events: impl IntoIterator<Item = Kind>) -> String {
     let mut out = String::new();
     for kind in events {
         out.push_str(&narrator.tell(&v1::GameEvent {
@@ -20,10 +21,10 @@ fn told(narrator: &mut Narrator, events: impl IntoIterator<Item = Kind>) -> Stri
 }
 
 fn check(events: impl IntoIterator<Item = Kind>, expected: &str) {
-    let told = told(&mut Narrator::new(), events);
-    let told: Vec<&str> = told.lines().map(str::trim_end).collect();
+    let text = text_of(&mut Narrator::default(), events);
+    let text: Vec<&str> = text.lines().map(str::trim_end).collect();
     let expected: Vec<&str> = expected.lines().map(str::trim_end).collect();
-    assert_eq!(told, expected, "told:\n{}", told.join("\n"));
+    assert_eq!(text, expected, "{}", text.join("\n"));
 }
 
 fn standard() -> RuleSet {
@@ -114,7 +115,7 @@ fn shift_ended(order: [u32; 4], points: [u32; 4], scores: [u64; 4]) -> Kind {
 }
 
 #[test]
-fn a_first_shift_is_told() {
+fn a_first_shift() {
     use v1::DecisionSource::{Agent, Invalid, Timeout};
     let events = [
         game_started(&standard(), &["Greta", "Rolf", "Gustav", "Rita"]),
@@ -154,7 +155,7 @@ fn a_first_shift_is_told() {
    the rules     to 15 points · 11 faces and 2 jokers · 17 cards each · 5, 3, 1, 0 points by place
 
 ━━ Shift 1 ━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━
-   nobody has a role yet; who holds the Golden 11 (★) must open with it
+   no roles in the first Shift; the holder of the Golden 11 (★) opens with it
 
 pizza                                                                Greta    Rolf  Gustav    Rita
     1  Gustav 3×11★ › (Rita) › Greta 2×8+J › Rolf 6×5                   14      11      14      17
@@ -173,7 +174,7 @@ pizza                                                                Greta    Ro
 }
 
 #[test]
-fn roles_special_actions_and_incidents_are_told() {
+fn roles_special_actions_and_incidents() {
     use v1::DecisionSource::Agent;
     use v1::Role::{Chef, Dishwasher, SousChef, Waiter};
     let events = [
@@ -220,14 +221,14 @@ fn roles_special_actions_and_incidents_are_told() {
 
 ━━ Shift 2 ━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━
    Chef Greta · Sous-Chef Rolf · Waiter Gustav · Dishwasher Rita
-   ✦ Food Fight! Dishwasher Rita has two jokers: all roles are turned around
+   Rita ✦ Food Fight! Two jokers: all roles are reversed
    now  Chef Rita · Sous-Chef Gustav · Waiter Rolf · Dishwasher Greta
    exchange  Greta 2 → Rita · Rita 2 → Greta · Rolf 1 → Gustav · Gustav 1 → Rolf
 
 pizza                                                                Greta    Rolf  Gustav    Rita
     1  Rita 2×11★
-   Greta has lost the connection
-   Greta is played by the built-in agent random from here on
+   Greta is disconnected
+   Greta is replaced by random
        Greta 2×6                                                        15      17      17      15
    Greta is back
     2  (Greta) › Rolf 1×8                                               15      16      17      15
@@ -238,7 +239,7 @@ The game was aborted and has no result: its room was closed.
 }
 
 #[test]
-fn a_branch_and_a_restart_are_told() {
+fn a_branch_and_a_restart() {
     use v1::DecisionSource::{Agent, Recorded};
     let by = |source: v1::DecisionSource, kind| match kind {
         Kind::Play(play) => Kind::Play(v1::Play {
@@ -270,9 +271,9 @@ fn a_branch_and_a_restart_are_told() {
 
 pizza                                                                Greta    Rolf  Gustav    Rita
     1  Rita 2×11★ › (Greta) › Rolf 2×9
-   so far as in a recorded game; from here on by those at the table
+   end of the recorded decisions; the players decide from here
        Gustav 2×8
-   the server was restarted; the game goes on where it stood
+   the server was restarted; the game resumes
        (Rita) › Greta 2×7                                               15      15      15      15
 ",
     );
@@ -285,13 +286,13 @@ fn standings_name_the_winner() {
         points,
         place,
     };
-    let mut narrator = Narrator::new().with_labels(["greedy".into(), "random".into()]);
+    let mut narrator = Narrator::default().with_labels(["greedy".into(), "random".into()]);
     let two = RuleSetSpec {
         players: 2,
         ..RuleSetSpec::default()
     };
     let rules = two.validate().expect("two may play");
-    let told = told(
+    let text = text_of(
         &mut narrator,
         [
             game_started(&rules, &["Greta", "Rolf"]),
@@ -301,7 +302,7 @@ fn standings_name_the_winner() {
             })),
         ],
     );
-    let lines: Vec<&str> = told.lines().collect();
+    let lines: Vec<&str> = text.lines().collect();
     let last = &lines[lines.len() - 2..];
     assert_eq!(
         last,
@@ -323,31 +324,31 @@ fn a_tie_is_explained() {
         standings: vec![standing(2, 1), standing(0, 2)],
         reveal: None,
     }));
-    let told = told(&mut Narrator::new(), [ended]);
-    assert!(told.contains("seat 2"), "{told}");
+    let text = text_of(&mut Narrator::default(), [ended]);
+    assert!(text.contains("seat 2"), "{text}");
     assert_eq!(
-        told.matches("wins by its place in the last Shift").count(),
+        text.matches("wins by its place in the last Shift").count(),
         1
     );
 }
 
 #[test]
-fn strangers_and_namesakes_are_told_apart() {
-    let told = told(
-        &mut Narrator::new(),
+fn names_are_safe_and_unique() {
+    let text = text_of(
+        &mut Narrator::default(),
         [game_started(
             &standard(),
             &["bot", "bot", "\u{1b}[2Jwipe", ""],
         )],
     );
-    let table = told.lines().next().unwrap_or_default();
+    let table = text.lines().next().unwrap_or_default();
     assert_eq!(
         table,
         "   at the table  bot#0 agent · bot#1 agent · [2Jwipe agent · seat 3 agent"
     );
 }
 
-/// Plays a game of the engine and tells it as a spectator sees it.
+/// Plays a game of the engine; the text a spectator reads.
 fn played(rules: RuleSet, names: &[&str], seed: u8) -> String {
     let mut agents: Vec<BuiltInAgent> = (0..names.len())
         .map(|seat| {
@@ -378,7 +379,7 @@ fn played(rules: RuleSet, names: &[&str], seed: u8) -> String {
         .iter()
         .filter_map(|event| event_kind(&event.seen_by(Viewer::Spectator), rules.actions(), by));
     let all = std::iter::once(game_started(&rules, names)).chain(kinds);
-    told(&mut Narrator::new(), all)
+    text_of(&mut Narrator::default(), all)
 }
 
 #[test]
@@ -399,23 +400,20 @@ fn no_line_is_wider_than_the_page() {
                 ..RuleSetSpec::default()
             };
             let rules = spec.validate().expect("any number of seats may play");
-            let told = played(rules, &names[..usize::from(players)], seed);
-            assert!(told.lines().count() > 40, "a game takes more lines");
-            for line in told.lines() {
-                assert!(
-                    text::columns(line) <= text::WIDTH,
-                    "{players} seats: {line}"
-                );
+            let text = played(rules, &names[..usize::from(players)], seed);
+            assert!(text.lines().count() > 40, "a game takes more lines");
+            for line in text.lines() {
+                assert!(columns(line) <= WIDTH, "{players} seats: {line}");
             }
         }
     }
 }
 
 #[test]
-fn an_open_line_can_be_broken_off() {
-    let mut narrator = Narrator::new();
+fn break_off_ends_an_open_line() {
+    let mut narrator = Narrator::default();
     assert_eq!(narrator.break_off(), "", "nothing is open");
-    told(
+    text_of(
         &mut narrator,
         [
             game_started(&standard(), &["Ada", "Ben", "Cleo", "Dan"]),

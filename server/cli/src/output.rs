@@ -1,5 +1,5 @@
-//! What the offline commands print for people: headings, lines and tables of at most 100 columns, a rule set in words. What stands in them
-//! is decided by the commands; numbers in words are in `numbers`.
+//! Output for people: headings, lines and tables of at most 100 columns, and rule sets in words. The commands decide the content;
+//! `numbers` has numbers in words.
 
 use std::fmt::Write as _;
 
@@ -9,21 +9,21 @@ use comfy_table::{CellAlignment, LineStyle, Table, TableStyle};
 
 use super::numbers::counted;
 
-/// A line below the header and nothing else, so that tables stay narrow.
+/// Only a line below the header, so that tables stay narrow.
 const STYLE: TableStyle = TableStyle::new().header_separator(LineStyle::none().fill('─'));
 
-/// A line that stands out, by escape codes (which the stream strips where they are unwanted).
+/// Adds a heading in bold; the stream strips the escape codes if needed.
 pub(super) fn heading(text: &mut String, words: &str) {
     let bold = Style::new().bold();
     writeln!(text, "{bold}{words}{bold:#}").expect("a String takes everything");
 }
 
-/// A line below a heading.
+/// Adds an indented line.
 pub(super) fn line(text: &mut String, words: &str) {
     writeln!(text, "  {words}").expect("a String takes everything");
 }
 
-/// A table below a heading. The columns whose indices are in `words` hold words; the others hold numbers, set to the right.
+/// Adds an indented table. The columns in `words` are aligned left; the others hold numbers and are aligned right.
 pub(super) fn table(
     text: &mut String,
     header: &[&str],
@@ -41,22 +41,30 @@ pub(super) fn table(
         }
     }
     for row in table.lines() {
-        // Every cell is preceded by a space.
+        // Each cell starts with a space.
         line(text, row.trim_end().strip_prefix(' ').unwrap_or(&row));
     }
 }
 
-/// A share from 0 to 1: `28.0 %`.
+/// Formats a share from 0 to 1: `28.0 %`.
 pub(super) fn percent(share: f64) -> String {
     format!("{:.1} %", 100.0 * share)
 }
 
-/// A rule set: its size and end.
+/// When a game ends: `to 15 points`, `4 Shifts`.
+pub(super) fn stop_in_words(stop: Stop) -> String {
+    match stop {
+        Stop::Points(points) => format!("to {points} points"),
+        Stop::Shifts(shifts) => counted(u64::from(shifts), "Shift"),
+    }
+}
+
+/// A rule set: its size, end and points.
 pub(super) fn rules_in_short(rules: &RuleSet) -> String {
     let spec = rules.spec();
     let stop = match spec.stop {
-        Stop::Points(points) => format!("to {points} points"),
-        Stop::Shifts(shifts) => format!("of {}", counted(u64::from(shifts), "Shift")),
+        stop @ Stop::Points(_) => stop_in_words(stop),
+        stop @ Stop::Shifts(_) => format!("of {}", stop_in_words(stop)),
     };
     let points: Vec<String> = spec.points.iter().map(u32::to_string).collect();
     format!(
@@ -68,7 +76,7 @@ pub(super) fn rules_in_short(rules: &RuleSet) -> String {
     )
 }
 
-/// What differs from the standard beyond size, end and points.
+/// How a rule set differs from the default beyond size, end and points.
 pub(super) fn variations(rules: &RuleSet) -> Vec<String> {
     let spec = rules.spec();
     let standard = RuleSetSpec::default();
@@ -99,7 +107,7 @@ pub(super) fn variations(rules: &RuleSet) -> Vec<String> {
     variations
 }
 
-/// Variations as lines: three to a line keep within 100 columns.
+/// Variations as lines: three per line fit in 100 columns.
 pub(super) fn variation_lines(variations: &[String]) -> impl Iterator<Item = String> {
     variations.chunks(3).map(|some| some.join(", "))
 }

@@ -1,25 +1,24 @@
-//! The tables of a game: who got which place in a Shift and how far everybody is, and the standings at the end.
+//! The tables of a game: places and points of a Shift with bars of the totals, and the final standings.
 
 use chefshat_client::v1;
 use chefshat_engine::Stop;
 
-use super::super::numbers::ordinal;
 use super::text::{BOLD, DIM, GOLD, PLAIN, Piece, clean, columns, heading, seat_style};
-use super::{INDENT, Narrator, name_of};
+use super::{INDENT, Narrator};
+use crate::numbers::{counted, ordinal};
 
-/// Columns of the bar that shows how far a seat is.
+/// Columns of the bar of points.
 const BAR: u64 = 45;
-/// Least width of a column of names.
+/// Minimum width of a column of names.
 const MIN_NAME_COLUMN: usize = 12;
 
 impl Narrator {
-    /// The end of a Shift: places, points, totals.
+    /// Places, points and totals of a Shift.
     pub(super) fn shift_ended(&mut self, end: &v1::ShiftEnded) -> String {
-        let mut out = self.chain.close(&self.names);
-        let before = std::mem::replace(&mut self.scores, end.points.clone());
+        let mut out = self.chain.close(&self.view);
         let mut words = format!("{} pizzas, {} turns", end.pizzas, end.turns);
         if end.adjudicated {
-            words.push_str("; stopped at the limit of turns: fewest cards first");
+            words.push_str("; stopped at the turn limit: fewest cards first");
         }
         out.push_str(&format!("\n{INDENT}{}\n", Piece::new(DIM, &words).as_str()));
         let full = self.full(end);
@@ -27,7 +26,7 @@ impl Narrator {
         for (place, seat) in (1u32..).zip(&end.order) {
             let score = of(&end.points, *seat);
             let points = of(&end.shift_points, *seat);
-            let old = of(&before, *seat).min(score);
+            let old = score.saturating_sub(points);
             let cells = |points: u64| points.saturating_mul(BAR).saturating_add(full / 2) / full;
             let style = seat_style(*seat);
             let bar = Piece::new(style, &"█".repeat(length(cells(old))))
@@ -46,9 +45,9 @@ impl Narrator {
         out
     }
 
-    /// The end of a game: its standings.
+    /// The final standings.
     pub(super) fn game_ended(&mut self, end: &v1::GameEnded) -> String {
-        let mut out = self.chain.close(&self.names);
+        let mut out = self.chain.close(&self.view);
         out.push_str(&heading("Standings"));
         let column = self.name_column();
         let tied = |points| {
@@ -62,15 +61,12 @@ impl Narrator {
             let first = line.place == 1;
             let style = seat_style(line.seat);
             let style = if first { style.bold() } else { style };
-            let name = Piece::new(style, &name_of(&self.names, line.seat)).padded(column + 2);
+            let name = Piece::new(style, &self.view.name(line.seat)).padded(column + 2);
             let label = usize::try_from(line.seat)
                 .ok()
                 .and_then(|seat| self.labels.get(seat))
                 .map_or("", String::as_str);
-            let points = match line.points {
-                1 => "1 point".to_owned(),
-                points => format!("{points} points"),
-            };
+            let points = counted(line.points, "point");
             let row = Piece::new(PLAIN, INDENT)
                 .and(PLAIN, &ordinal(line.place))
                 .and(PLAIN, "  ")
@@ -94,14 +90,14 @@ impl Narrator {
 
     /// Width of a column of names.
     fn name_column(&self) -> usize {
-        let widths = self.names.iter().map(|name| columns(name));
+        let widths = self.view.seats.iter().map(|seat| columns(&seat.name));
         widths.max().unwrap_or(0).max(MIN_NAME_COLUMN)
     }
 
-    /// Points that fill a bar: those that end the game, or the most that anybody has or may get.
+    /// Points of a full bar: the target, or the highest total if that is more.
     fn full(&self, end: &v1::ShiftEnded) -> u64 {
         let most = end.points.iter().copied().max().unwrap_or(0);
-        let goal = self.rules.map_or(0, |rules| match rules.stop() {
+        let goal = self.view.rules.map_or(0, |rules| match rules.stop() {
             Stop::Points(points) => u64::from(points),
             Stop::Shifts(shifts) => {
                 let first = rules.points_slice().first().copied().unwrap_or(0);
@@ -109,18 +105,6 @@ impl Narrator {
             }
         });
         most.max(goal).max(1)
-    }
-}
-
-/// Why a game has no result, in words.
-pub(crate) fn abort_reason(reason: v1::AbortReason) -> &'static str {
-    match reason {
-        v1::AbortReason::Unspecified => "the server does not say why",
-        v1::AbortReason::Closed => "its room was closed",
-        v1::AbortReason::Shutdown => "the server shut down",
-        v1::AbortReason::ParticipantsLost => "its participants were lost",
-        v1::AbortReason::NeverStarted => "its seats were never filled",
-        v1::AbortReason::TooLong => "it grew beyond the server's limit",
     }
 }
 

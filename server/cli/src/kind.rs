@@ -1,0 +1,38 @@
+//! Kinds of participants: as an argument of the command line and as a word of its output.
+
+use chefshat_client::v1::ParticipantKind;
+
+/// What a participant is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub(super) enum KindArg {
+    /// A program.
+    Agent,
+    /// A person.
+    Human,
+    /// A robot.
+    Robot,
+}
+
+impl From<KindArg> for ParticipantKind {
+    fn from(kind: KindArg) -> Self {
+        match kind {
+            KindArg::Agent => Self::Agent,
+            KindArg::Human => Self::Human,
+            KindArg::Robot => Self::Robot,
+        }
+    }
+}
+
+/// The kind to filter by, of all kinds by default.
+pub(super) fn kind_filter(kind: Option<KindArg>) -> ParticipantKind {
+    kind.map_or(ParticipantKind::Unspecified, ParticipantKind::from)
+}
+
+/// Name of a kind of participant.
+pub(super) fn kind_name(kind: ParticipantKind) -> &'static str {
+    match kind {
+        ParticipantKind::Human => "human",
+        ParticipantKind::Robot => "robot",
+        ParticipantKind::Agent | ParticipantKind::Unspecified => "agent",
+    }
+}

@@ -1,0 +1,194 @@
+//! The sentences of a game: each event as lines for a narrow column. A line keeps the seat it begins with, so that its name can be
+//! coloured.
+
+use chefshat_client::v1::{self, game_event::Kind};
+
+use super::text::{MAX_NAME, clean};
+use super::view::GameView;
+use crate::kind::kind_name;
+use crate::numbers::ordinal;
+
+/// A line of the story.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Line {
+    /// The seat whose name it begins with.
+    pub(crate) seat: Option<u32>,
+    /// The text without that name.
+    pub(crate) words: String,
+    /// It opens a section: a Shift, a pizza.
+    pub(crate) heading: bool,
+}
+
+/// The lines of an event, from the state before it.
+pub(super) fn of(view: &GameView, kind: &Kind) -> Vec<Line> {
+    let line = match kind {
+        Kind::Play(play) => {
+            let why = because(play.source());
+            let star = if view.plays_golden(play) { "★" } else { "" };
+            about(play.seat, format!("{}{star}{why}", cards(play)))
+        }
+        Kind::Pass(pass) => about(pass.seat, format!("passes{}", because(pass.source()))),
+        Kind::PizzaDone(done) => heading(format!(
+            "pizza {} · {}",
+            done.pizza.saturating_add(1),
+            view.name(done.next_leader)
+        )),
+        Kind::SeatFinished(finished) => about(
+            finished.seat,
+            format!("finishes {}", ordinal(finished.place)),
+        ),
+        Kind::ShiftStarted(start) => heading(format!("Shift {}", start.shift)),
+        Kind::RolesAssigned(assigned) => {
+            let roles = (0u32..).zip(assigned.roles());
+            let chef = roles.filter(|(_, role)| *role == v1::Role::Chef);
+            return chef
+                .map(|(seat, role)| about(seat, format!("is {}", title(role))))
+                .collect();
+        }
+        Kind::SpecialActionDeclared(declared) => {
+            let words = match declared.action() {
+                v1::SpecialAction::FoodFight => "Food Fight! Two jokers: all roles are reversed",
+                v1::SpecialAction::DinnerIsServed => "Dinner is Served! Two jokers: no exchange",
+                v1::SpecialAction::Unspecified => "A special action!",
+            };
+            about(declared.seat, format!("✦ {words}"))
+        }
+        Kind::CardsExchanged(cards) => about(cards.giver, exchanged(view, cards)),
+        Kind::ShiftEnded(end) => return shift_ended(end),
+        Kind::GameStarted(_) => heading("the game begins".into()),
+        Kind::GameEnded(_) => heading("the game is over".into()),
+        Kind::GameAborted(end) => heading(format!("aborted: {}", abort_reason(end.reason()))),
+        Kind::Seated(seated) => plain(format!(
+            "{} ({}) takes seat {}",
+            clean(&seated.name, MAX_NAME),
+            kind_name(seated.kind()),
+            seated.seat
+        )),
+        Kind::Vacated(seat) => plain(format!("{} leaves the table", view.name(seat.seat))),
+        Kind::Disconnected(seat) => about(seat.seat, "is disconnected".into()),
+        Kind::Returned(seat) => about(seat.seat, "is back".into()),
+        Kind::Substituted(seat) => {
+            let agent = clean(&seat.built_in_agent, MAX_NAME);
+            about(seat.seat, format!("is replaced by {agent}"))
+        }
+        Kind::ServerRestarted(_) => heading("the server was restarted; the game resumes".into()),
+        Kind::ExpressionShown(shown) => {
+            let label = shown.expression.as_ref().map_or("", |it| &it.label);
+            about(shown.seat, format!("shows {}", clean(label, 40)))
+        }
+    };
+    vec![line]
+}
+
+fn plain(words: String) -> Line {
+    Line {
+        seat: None,
+        words,
+        heading: false,
+    }
+}
+
+fn about(seat: u32, words: String) -> Line {
+    Line {
+        seat: Some(seat),
+        words,
+        heading: false,
+    }
+}
+
+fn heading(words: String) -> Line {
+    Line {
+        seat: None,
+        words,
+        heading: true,
+    }
+}
+
+/// The finishing order, with the points of each seat.
+fn shift_ended(end: &v1::ShiftEnded) -> Vec<Line> {
+    let mut lines = vec![heading(format!("Shift {} ends", end.shift))];
+    for (place, seat) in (1u32..).zip(&end.order) {
+        let index = usize::try_from(*seat).unwrap_or(usize::MAX);
+        let got = end.shift_points.get(index).copied().unwrap_or(0);
+        lines.push(about(*seat, format!("{}, +{got}", ordinal(place))));
+    }
+    lines
+}
+
+/// Why the server decided for the seat, in brackets.
+fn because(source: v1::DecisionSource) -> String {
+    reason(source).map_or_else(String::new, |why| format!(" ({why})"))
+}
+
+/// The receiver and the number of cards, or the cards themselves if the viewer may see them.
+fn exchanged(view: &GameView, cards: &v1::CardsExchanged) -> String {
+    let top = view.faces();
+    let receiver = view.name(cards.receiver);
+    if cards.cards.is_empty() {
+        return format!("gives {} to {receiver}", cards.count);
+    }
+    let named = cards.cards.iter().map(|card| {
+        if *card > top {
+            "J".to_owned()
+        } else if *card == top && cards.golden {
+            format!("★{card}")
+        } else {
+            card.to_string()
+        }
+    });
+    let named = named.collect::<Vec<_>>().join(", ");
+    format!("gives {named} to {receiver}")
+}
+
+/// The cards of a play: three 9s and a joker are `3×9+J`.
+pub(super) fn cards(play: &v1::Play) -> String {
+    match (play.quantity, play.jokers) {
+        (0, _) => "J".into(),
+        (quantity, 0) => format!("{quantity}×{}", play.face),
+        (quantity, 1) => format!("{quantity}×{}+J", play.face),
+        (quantity, jokers) => format!("{quantity}×{}+{jokers}J", play.face),
+    }
+}
+
+/// Why the server decided for the seat, in a word; `None` if the seat decided.
+pub(super) fn reason(source: v1::DecisionSource) -> Option<&'static str> {
+    match source {
+        v1::DecisionSource::Timeout => Some("too late"),
+        v1::DecisionSource::Invalid => Some("invalid"),
+        v1::DecisionSource::Disconnected => Some("absent"),
+        v1::DecisionSource::Agent
+        | v1::DecisionSource::Substitute
+        | v1::DecisionSource::Recorded
+        | v1::DecisionSource::Unspecified => None,
+    }
+}
+
+/// The sentence about an aborted game.
+pub(crate) fn aborted(reason: v1::AbortReason) -> String {
+    let reason = abort_reason(reason);
+    format!("The game was aborted and has no result: {reason}.")
+}
+
+/// Why a game has no result.
+pub(crate) fn abort_reason(reason: v1::AbortReason) -> &'static str {
+    match reason {
+        v1::AbortReason::Unspecified => "the server gave no reason",
+        v1::AbortReason::Closed => "its room was closed",
+        v1::AbortReason::Shutdown => "the server shut down",
+        v1::AbortReason::ParticipantsLost => "its participants were lost",
+        v1::AbortReason::NeverStarted => "its seats were never filled",
+        v1::AbortReason::TooLong => "it grew beyond the server's limit",
+    }
+}
+
+/// Name of a role.
+pub(crate) fn title(role: v1::Role) -> &'static str {
+    match role {
+        v1::Role::Unspecified => "no role",
+        v1::Role::Chef => "Chef",
+        v1::Role::SousChef => "Sous-Chef",
+        v1::Role::Cook => "Cook",
+        v1::Role::Waiter => "Waiter",
+        v1::Role::Dishwasher => "Dishwasher",
+    }
+}
