@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use etcetera::BaseStrategy as _;
+
 use super::CommandError;
 
 /// The given or default data directory, created with its folder of records.
@@ -39,13 +41,9 @@ pub(super) fn records(wanted: Option<PathBuf>) -> Result<PathBuf, CommandError> 
     }
 }
 
-/// `chefshat` in the user's data directory.
+/// `chefshat` in the user's data directory, by the XDG base directory specification.
 fn default() -> Result<PathBuf, CommandError> {
-    let base = directories::BaseDirs::new()
-        .ok_or("there is no home directory for records; choose one with --data-dir")?;
-    let folder = base.data_dir().join("chefshat");
-    // Where versions before this one kept records on macOS.
-    let former = base.home_dir().join(".local/share/chefshat");
-    let keeps_former = cfg!(target_os = "macos") && !folder.exists() && former.exists();
-    Ok(if keeps_former { former } else { folder })
+    let base = etcetera::choose_base_strategy()
+        .map_err(|_| "there is no home directory for records; choose one with --data-dir")?;
+    Ok(base.data_dir().join("chefshat"))
 }
