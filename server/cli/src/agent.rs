@@ -1,4 +1,4 @@
-//! `chefshat agent`: a built-in agent, or one that plays as a recorded player, as a remote client, over the Rust SDK like anybody's agent.
+//! `chefshat agent`: plays as a built-in agent, or as the player of a record, through the Rust SDK.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -16,59 +16,59 @@ use super::remote::{MAX_PACE_MS, RemoteAgent, agent_kind, seed_for};
 use super::{CommandError, say};
 use chefshat_server::convert::recorded_player;
 
-/// Play as a built-in agent on a server.
+/// Play on a server as a built-in agent.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  chefshat agent greedy --server http://127.0.0.1:50051 --code BCDF2345\n  \
                   chefshat agent random --code-file ./join-code --name Rolf --seed 7\n  \
                   chefshat agent replay --record 5f0c6a4de2b14b7f8a3d9c1e7b60425d.jsonl --seat 2 --code BCDF2345\n\n\
-                  replay does what the player of that seat did where it sees exactly what that player saw, and elsewhere what it did \
-                  where it saw what is most like it (docs/branching.md).\n\n\
+                  replay imitates the player who had that seat in a recorded game: where it sees exactly what the player saw, it takes the \
+                  same action, otherwise the action from the most similar situation (docs/branching.md).\n\n\
                   Exit code: 0 when the game finished, 1 when it was aborted or the seat was lost."
 )]
 pub(super) struct AgentCommand {
-    /// Which agent: random, random_unmasked, greedy or trained; or replay, which plays as a recorded player.
+    /// The agent: random, random_unmasked, greedy, trained, or replay (imitates the player of a record).
     #[arg(value_parser = agent_arg, value_name = "KIND")]
     agent: AgentArg,
     #[command(flatten)]
     server: ServerArg,
     #[command(flatten)]
     way_in: WayIn,
-    /// For replay: the record of the game in which the player played.
+    /// For replay: the record.
     #[arg(
         long,
         value_name = "FILE",
         required_if_eq("agent", BuiltInAgent::REPLAY)
     )]
     record: Option<PathBuf>,
-    /// For replay: the seat that the player had there, from 0.
+    /// For replay: the seat in the record, from 0.
     #[arg(
         long,
         value_name = "SEAT",
         required_if_eq("agent", BuiltInAgent::REPLAY)
     )]
     seat: Option<u32>,
-    /// Name to show; standard: the agent's.
+    /// Display name. Default: the agent's.
     #[arg(long)]
     name: Option<String>,
-    /// What to take part as.
+    /// Kind of participant.
     #[arg(long, value_enum, default_value_t = KindArg::Agent)]
     kind_of: KindArg,
-    /// Makes the agent's choices repeatable.
+    /// Seed of the agent's choices, for repeatable games.
     #[arg(long)]
     seed: Option<u64>,
-    /// Games to play one after the other; each needs a new join code in the file.
+    /// Number of games to play in sequence; the file has to get a new join code for each.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     games: u32,
-    /// Milliseconds to wait before each decision, so that people can follow.
+    /// Milliseconds to wait before each decision, so that people can follow the game.
     #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u64).range(0..=MAX_PACE_MS))]
     pace_ms: u64,
-    /// Print one JSON line a game.
+    /// Print one JSON line per game.
     #[arg(long)]
     json: bool,
 }
 
-/// The agent that is named.
+/// The agent as named on the command line.
 #[derive(Debug, Clone, Copy)]
 enum AgentArg {
     Kind(AgentKind),
@@ -87,7 +87,7 @@ impl AgentArg {
 impl AgentCommand {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
         if self.games > 1 && !self.way_in.goes_on() {
-            return Err("a code or ticket is for one game; for more --games give a --code-file into which new codes are written".into());
+            return Err("a code or ticket is valid for one game; to play more --games, give a --code-file that gets new codes".into());
         }
         let agent = self.built_in_agent()?;
         let client = self.server.connect_patiently().await?;
@@ -117,9 +117,7 @@ impl AgentCommand {
                 kind,
                 seed_for("chefshat agent", self.seed),
             )),
-            (AgentArg::Kind(_), ..) => Err(
-                "--record and --seat say whom the agent replay plays as; name that agent".into(),
-            ),
+            (AgentArg::Kind(_), ..) => Err("--record and --seat are for the agent replay".into()),
             (AgentArg::Replay, Some(record), Some(seat)) => {
                 Ok(BuiltInAgent::replay(player_of(record, seat)?))
             }
@@ -127,7 +125,7 @@ impl AgentCommand {
         }
     }
 
-    /// The ticket for the next game.
+    /// Returns the ticket for the next game.
     async fn ticket(
         &self,
         client: &Client,
@@ -153,9 +151,9 @@ impl AgentCommand {
             free => format!("waits for {free} other seats to be taken, then "),
         };
         anstream::eprintln!("{name} has seat {}; {waits}plays to the end", joined.seat);
-        // Whoever has it has the seat: it is told to the one who started the agent alone.
+        // The ticket grants the seat: it is shown only here, to the person who started the agent.
         anstream::eprintln!(
-            "should this agent end before its game, another goes on in its seat with --ticket {}",
+            "if this agent stops before the end of its game, resume its seat with --ticket {}",
             joined.ticket
         );
         Ok(joined.ticket)
@@ -170,7 +168,7 @@ fn agent_arg(name: &str) -> Result<AgentArg, String> {
     Ok(AgentArg::Kind(kind))
 }
 
-/// The player of a seat in a recorded game.
+/// Loads the player of a seat of a record.
 fn player_of(record: &Path, seat: u32) -> Result<Arc<RecordedPlayer>, CommandError> {
     let lines = jsonl::read(record)?;
     let name = record.display();
@@ -193,7 +191,7 @@ fn as_json(played: &Result<Outcome, PlayError>) -> serde_json::Value {
     }
 }
 
-/// How a game ended for a seat, in a line for people.
+/// The result of a game for a seat, as a line for people.
 pub(super) fn outcome_in_words(outcome: &Outcome) -> String {
     let (answers, game) = (outcome.answers, &outcome.game_id);
     match (outcome.standing(), outcome.aborted()) {
@@ -208,7 +206,7 @@ pub(super) fn outcome_in_words(outcome: &Outcome) -> String {
     }
 }
 
-/// How a game ended for a seat, for programs.
+/// The result of a game for a seat, as JSON.
 pub(super) fn outcome_json(outcome: &Outcome) -> serde_json::Value {
     let (room_id, game_id, seat) = (&outcome.room_id, &outcome.game_id, outcome.seat);
     match (outcome.standing(), outcome.aborted()) {
@@ -224,7 +222,7 @@ pub(super) fn outcome_json(outcome: &Outcome) -> serde_json::Value {
     }
 }
 
-/// The reason of an abort without the prefix of its enum.
+/// The name of an abort reason without the prefix of its enum.
 fn short(reason: v1::AbortReason) -> &'static str {
     let name = reason.as_str_name();
     name.strip_prefix("ABORT_REASON_").unwrap_or(name)

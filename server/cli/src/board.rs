@@ -1,4 +1,4 @@
-//! A leaderboard as a table for people, as JSON, as CSV: one form for the one a server tells and the one recomputed from records.
+//! A leaderboard as a table, as JSON and as CSV, for boards from a server and boards recomputed from records.
 
 use chefshat_engine::MAX_SEATS;
 use chefshat_proto::v1;
@@ -9,14 +9,14 @@ use super::output::{line, table};
 use crate::kind::kind_name;
 use crate::narration::clean;
 
-/// Widest name in a table, columns.
+/// Maximum columns of a name.
 const NAME_COLUMNS: usize = 24;
-/// 95 % of a normal distribution lie within so many deviations.
+/// Half the width of a 95 % interval of the normal distribution, in deviations.
 const Z95: f64 = 1.96;
-/// Places by name.
+/// Names of the places.
 const PLACES: [&str; MAX_SEATS] = ["1st", "2nd", "3rd", "4th", "5th", "6th"];
 
-/// A rating's mean, and what lies on each side of it with a confidence of 95 %.
+/// The mean of a rating and the half width of its 95 % interval.
 pub(super) fn rating_in_words(rating: &v1::Rating) -> [String; 2] {
     let half = Z95 * rating.deviation;
     [format!("{:.2}", rating.mean), format!("± {half:.2}")]
@@ -25,7 +25,7 @@ pub(super) fn rating_in_words(rating: &v1::Rating) -> [String; 2] {
 /// Adds the table of a leaderboard.
 pub(super) fn add_table(text: &mut String, board: &v1::GetLeaderboardResponse) {
     if board.rated.is_empty() {
-        line(text, "nobody to show");
+        line(text, "no participants");
         return;
     }
     let deepest = board.rated.iter().map(|line| line.places.len()).max();
@@ -49,7 +49,7 @@ pub(super) fn add_table(text: &mut String, board: &v1::GetLeaderboardResponse) {
     table(text, &header, &[1, 2], rows);
 }
 
-/// Its lines as a JSON array.
+/// The participants as a JSON array.
 pub(super) fn as_json(board: &v1::GetLeaderboardResponse) -> Vec<Value> {
     let lines = board.rated.iter().map(|line| {
         let rating = line.rating.unwrap_or_default();
@@ -66,10 +66,7 @@ pub(super) fn as_json(board: &v1::GetLeaderboardResponse) -> Vec<Value> {
     lines.collect()
 }
 
-/// Its lines as CSV, with a header.
-///
-/// # Errors
-/// None that is known; what is written to memory can be written.
+/// The participants as CSV with a header.
 pub(super) fn as_csv(board: &v1::GetLeaderboardResponse) -> Result<Vec<u8>, CommandError> {
     let mut sheet = csv::Writer::from_writer(Vec::new());
     let mut header: Vec<String> = ["place", "name", "kind", "mean", "deviation", "games"]
@@ -93,7 +90,7 @@ pub(super) fn as_csv(board: &v1::GetLeaderboardResponse) -> Result<Vec<u8>, Comm
     Ok(sheet.into_inner()?)
 }
 
-/// How often it had each of the first places.
+/// How often the participant took each of the first places.
 fn times(line: &v1::Rated, places: usize) -> impl Iterator<Item = String> {
     (0..places).map(|index| line.places.get(index).copied().unwrap_or(0).to_string())
 }
@@ -143,6 +140,6 @@ mod tests {
         board.rated.clear();
         text.clear();
         add_table(&mut text, &board);
-        assert_eq!(text, "  nobody to show\n");
+        assert_eq!(text, "  no participants\n");
     }
 }

@@ -1,5 +1,4 @@
-//! `chefshat check-agent`: the examination of an agent from the command line, and what is printed of it. What is examined, and how it is
-//! judged, is in `examiner`.
+//! `chefshat check-agent`: tests an agent and prints the result. The crate `chefshat-examiner` has the cases and judges them.
 
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -16,49 +15,49 @@ use super::{CommandError, say};
 use chefshat_examiner::case::{CASES, Case, Patience};
 use chefshat_examiner::{AgentCommand, Examination, Outcome, Waiting};
 
-/// How long an agent that is started by hand is waited for.
+/// Time to wait for an agent that a person starts.
 const BY_HAND: Duration = Duration::from_secs(600);
-/// Exit code when Ctrl-C ended the examination, as shells have it.
+/// Exit code after Ctrl-C, as shells use it.
 const INTERRUPTED: u8 = 130;
 
-/// Examine an agent: play cases with it over the real protocol and say what it got wrong.
+/// Test whether an agent, in any language, plays correctly, even when a move is rejected or the connection drops.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  chefshat check-agent -- python agent.py --server {address} --code {code}\n  \
                   chefshat check-agent --only refusal --only disconnect -- node agent.js --address {address} --code {code} --name {name}\n  \
                   chefshat check-agent --many 'python agent.py --server {address} --tournament {tournament}' -- python agent.py --server {address} --code {code}\n  \
                   chefshat check-agent --list\n  chefshat check-agent --only game        (waits for an agent started by hand)\n\n\
-                  In the command {address} stands for the examiner's host:port, {url} for http://host:port, {code} for the join code of \
-                  the case's room, {tournament} for that of a tournament, {name} for a name to show. The agent is started anew for each case. What each fault means is in \
+                  In the command, {address} stands for the examiner's host:port, {url} for http://host:port, {code} for the join code of \
+                  the case's room, {tournament} for that of a tournament, {name} for a display name. The agent is restarted for each case. The faults are explained in \
                   docs/check-agent.md.\n\n\
                   Exit code: 0 when the agent passed every case."
 )]
 pub(super) struct CheckAgent {
-    /// Play this case alone; may be given more than once.
+    /// Run only this case. Repeatable.
     #[arg(long, value_name = "CASE", value_parser = case_named)]
     only: Vec<&'static Case>,
-    /// List the cases and play none.
+    /// List the cases without running them.
     #[arg(long)]
     list: bool,
-    /// Seconds that the agent has for an answer, to come back, to leave, to end.
+    /// Seconds the agent has to answer, reconnect, leave and exit.
     #[arg(long, value_name = "SECONDS", default_value_t = 5.0, value_parser = seconds)]
     patience: f64,
-    /// Seconds that the agent has to start and take its seat; standard: 30, or 600 where it is started by hand.
+    /// Seconds the agent has to start and take its seat. Default: 30, or 600 if a person starts it.
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     start: Option<f64>,
-    /// Where to listen, for an agent that knows its server; standard: another port of 127.0.0.1 for each case.
+    /// Address to listen on, for agents with a fixed server address. Default: a free port of 127.0.0.1 for each case.
     #[arg(long, value_name = "ADDRESS")]
     listen: Option<SocketAddr>,
-    /// Folder for what the agent prints, one file for each case.
+    /// Directory for the agent's output, one file per case.
     #[arg(long, value_name = "FOLDER")]
     logs: Option<PathBuf>,
-    /// Command, for the shell, that starts the agent for a tournament: for the case many-seats, which is left out otherwise.
+    /// Shell command that starts the agent for a tournament. Without it the case many-seats is skipped.
     #[arg(long, value_name = "COMMAND LINE")]
     many: Option<String>,
-    /// Print one JSON line for each case, and one at the end.
+    /// Print one JSON line per case, and a summary.
     #[arg(long)]
     json: bool,
-    /// The command that starts the agent. Without one the address and join code of each case are printed.
+    /// Command that starts the agent. Without it, the address and join code of each case are printed.
     #[arg(last = true, value_name = "COMMAND")]
     command: Vec<String>,
 }
@@ -71,7 +70,7 @@ impl CheckAgent {
         let mut terminate = signal(SignalKind::terminate())?;
         tokio::select! {
             code = self.examine() => code,
-            // The agent's processes, which have a group of their own, are ended on the way out.
+            // Returning ends the agent's processes, which are in a process group of their own.
             pressed = tokio::signal::ctrl_c() => {
                 pressed?;
                 Ok(ExitCode::from(INTERRUPTED))
@@ -91,7 +90,7 @@ impl CheckAgent {
         if let Some(logs) = &self.logs {
             std::fs::create_dir_all(logs).map_err(|error| {
                 let folder = logs.display();
-                format!("the folder {folder} cannot be used: {error}; choose another with --logs")
+                format!("cannot use the directory {folder}: {error}; choose another with --logs")
             })?;
         }
         let start = match (self.start, in_rooms.as_ref().or(in_tournaments.as_ref())) {
@@ -130,11 +129,11 @@ impl CheckAgent {
         })
     }
 
-    /// The cases to play: those asked for, or all for which there is a command.
+    /// The cases to run: those given with --only, or all that have a command.
     fn cases(&self) -> Result<Vec<&'static Case>, CommandError> {
         let (rooms, many) = (!self.command.is_empty(), self.many.is_some());
         if self.only.is_empty() {
-            // Nothing but --many asks for that case alone; nothing at all, for agents started by hand in rooms.
+            // --many alone selects the tournament case; neither command selects the cases in rooms.
             let wanted = |case: &&Case| match case.is_tournament() {
                 true => many,
                 false => rooms || !many,
@@ -144,7 +143,7 @@ impl CheckAgent {
         let without = |case: &&&Case| case.is_tournament() && rooms && !many;
         match self.only.iter().find(without) {
             Some(case) => Err(format!(
-                "the case {} is played in a tournament; give its command with --many",
+                "the case {} runs in a tournament; give its command with --many",
                 case.name
             )
             .into()),
@@ -170,7 +169,7 @@ impl CheckAgent {
             let line = serde_json::json!({
                 "event": "waiting", "case": case.name, "address": address.to_string(), "code": code,
             });
-            // Whoever does not read it will not start an agent: the case says so when its time is up.
+            // If nobody reads this, no agent starts, and the case reports that after its time.
             let _unread = say(line);
         } else {
             anstream::eprintln!(
@@ -224,13 +223,13 @@ impl CheckAgent {
         }
         let rest = match all - played {
             0 => String::new(),
-            rest => format!("; {rest} not played, for there is no agent to examine"),
+            rest => format!("; {rest} skipped, because no agent connected"),
         };
         say(format!("{passed} of {all} cases passed{rest}"))
     }
 }
 
-/// Width of the column of names.
+/// Columns of a case's name.
 const WIDTH: usize = 15;
 
 fn as_json(case: &Case, outcome: &Outcome) -> serde_json::Value {
@@ -261,7 +260,7 @@ fn as_json(case: &Case, outcome: &Outcome) -> serde_json::Value {
 fn case_named(name: &str) -> Result<&'static Case, String> {
     Case::named(name).ok_or_else(|| {
         let names: Vec<&str> = CASES.iter().map(|case| case.name).collect();
-        format!("no such case; there are {}", names.join(", "))
+        format!("unknown case; use one of {}", names.join(", "))
     })
 }
 

@@ -1,5 +1,4 @@
-//! `chefshat compare A B`: two agents on duplicate deals. What is played and counted is decided in `chefshat-arena`, how the result is
-//! written in `report`.
+//! `chefshat compare A B`: compares two agents on duplicate deals. `chefshat-simulation` plays the games, `report` prints the result.
 
 mod report;
 
@@ -43,21 +42,21 @@ The same seed gives the same output, on any number of threads.";
 pub(super) struct Compare {
     /// A built-in agent or a network file.
     a: String,
-    /// The agent it is compared with.
+    /// The agent to compare it with.
     b: String,
-    /// Deals, each played in all seatings.
+    /// Number of deals, each played in all seatings.
     #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u64).range(2..))]
     deals: u64,
-    /// Shifts of each game.
+    /// Number of Shifts in each game.
     #[arg(long, default_value = "4")]
     shifts: NonZeroU32,
-    /// How the two share the seats.
+    /// How the two agents share the seats.
     #[arg(long, default_value = "half")]
     seats: SeatsFlag,
-    /// The number that all chance is drawn from.
+    /// Seed of all random choices.
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Threads to play on, at most 256 and one for each deal; 0 is one for each core.
+    /// Number of threads, at most 256 and one per deal; 0 means one per core.
     #[arg(long, value_name = "N", default_value_t = 0)]
     threads: usize,
     /// Print one JSON object.
@@ -69,17 +68,17 @@ pub(super) struct Compare {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum SeatsFlag {
-    /// Half of the seats each, in all ways there are (6 with four players).
+    /// Half of the seats each, in all combinations (6 with four players).
     Half,
-    /// One seat for A and the others for B, in all ways there are, as in the paper's tables.
+    /// One seat for A and the others for B, in all combinations, as in the paper's tables.
     One,
 }
 
-/// One of the two, as the report needs it.
+/// One of the two agents.
 struct Entrant {
-    /// As it was asked for.
+    /// As given on the command line.
     given: String,
-    /// A short name for tables.
+    /// Short name for tables.
     label: String,
     contender: Contender,
 }
@@ -88,7 +87,7 @@ impl Compare {
     pub(super) fn run(self) -> Result<ExitCode, CommandError> {
         if self.rules.message().stop.is_some() {
             return Err(
-                "--target-points, --target-shifts: here --shifts says how long games are".into(),
+                "--target-points, --target-shifts: use --shifts to set the length of games".into(),
             );
         }
         let rules = self.rules.rules()?;
@@ -133,7 +132,7 @@ impl Compare {
 }
 
 impl Entrant {
-    /// What somebody named: a built-in agent, else a file.
+    /// Reads a built-in agent, or else a network file.
     fn of(given: &str) -> Result<Entrant, CommandError> {
         if let Some(kind) = AgentKind::from_name(given) {
             return Ok(Entrant {

@@ -1,5 +1,4 @@
-//! `chefshat conformance FILE`: replays test vectors and says whether the engine agrees with them. How a line is replayed is decided in
-//! `chefshat-arena`.
+//! `chefshat conformance FILE`: checks the engine against test vectors. `chefshat-simulation` replays them.
 
 use std::fs::File;
 use std::io::{BufReader, Write};
@@ -22,11 +21,11 @@ Exit code 0: all agree. 1: one does not agree (the first is named), or the file 
 Example:
   chefshat conformance tests/fixtures/vectors/games.jsonl";
 
-/// Check the rule engine against deals and games that another engine made.
+/// Check the rule engine against deals and games of another engine.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(super) struct Conformance {
-    /// The file of vectors.
+    /// File of test vectors.
     file: PathBuf,
     /// Print one JSON object.
     #[arg(long)]
@@ -62,7 +61,7 @@ impl Conformance {
     }
 }
 
-/// For people. A file that is none of vectors is left to the error message.
+/// Writes the report for people. A file without vectors is reported as an error instead.
 fn write_report(out: &mut impl Write, file: &Path, report: &Report) -> std::io::Result<()> {
     let name = file.display();
     match &report.failure {
@@ -81,7 +80,7 @@ fn write_report(out: &mut impl Write, file: &Path, report: &Report) -> std::io::
     }
 }
 
-/// What agreed, in words.
+/// The number of vectors that agreed, in words.
 fn counted(agreed: &Agreed) -> String {
     let Agreed {
         deals,

@@ -1,4 +1,4 @@
-//! `chefshat export`: records as a dataset. What is in it and how it is written is decided in `chefshat-records`.
+//! `chefshat export`: exports records as a dataset. `chefshat-dataset` decides its contents.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -23,44 +23,44 @@ Examples:
   chefshat export records/ --out dataset --format parquet,csv --finished-only
   chefshat export game.jsonl --out dataset --layout chefshatgym";
 
-/// Kinds of players, as the tables spell them.
+/// Kinds of players as spelt in the tables.
 const KINDS: [&str; 4] = ["agent", "human", "robot", "built_in"];
 
-/// Make a dataset of records: Parquet, CSV or JSON Lines, with a dataset card.
+/// Export records as a dataset: Parquet, CSV or JSON Lines, with a dataset card.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(super) struct Export {
-    /// Records (GAME-ID.jsonl) or folders of them. Standard: the records in the data folder.
+    /// Records (GAME-ID.jsonl) or directories of them. Default: the records in the data directory.
     #[arg(value_name = "PATH")]
     paths: Vec<PathBuf>,
-    /// The folder to make; it must not exist, or be empty.
+    /// Directory to create; it must not exist or be empty.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Replace an earlier dataset in that folder; a folder with anything else in it is left as it is.
+    /// Replace an earlier dataset in that directory. A directory with other files is never changed.
     #[arg(long)]
     force: bool,
-    /// What to write: two tables over all games, or the columns of the package chefshatgym, a CSV file for each game.
+    /// Layout: two tables over all games, or the columns of the package chefshatgym, one CSV file per game.
     #[arg(long, value_enum, default_value_t)]
     layout: LayoutName,
-    /// The formats of the tables, separated by commas. Standard: parquet.
+    /// Formats of the tables, separated by commas. Default: parquet.
     #[arg(long = "format", value_name = "LIST", value_delimiter = ',', value_parser = formats())]
     formats: Vec<Format>,
-    /// Leave out games that were aborted.
+    /// Skip aborted games.
     #[arg(long)]
     finished_only: bool,
-    /// Only games of rooms of this name.
+    /// Only games of rooms with this name.
     #[arg(long, value_name = "NAME")]
     room: Option<String>,
     /// Only games with at least one player of this kind.
     #[arg(long, value_name = "KIND", value_parser = PossibleValuesParser::new(KINDS))]
     with: Option<String>,
-    /// Leave out damaged records, and say which.
+    /// Skip damaged records and report them.
     #[arg(long)]
     skip_damaged: bool,
     /// Licence of the dataset, for its card.
     #[arg(long, value_name = "SPDX", default_value = "CC-BY-4.0")]
     licence: String,
-    /// Folder in which the server keeps its records, if no PATH is given. Standard: chefshat in the user's data folder.
+    /// Data directory to read records from if no PATH is given. Default: chefshat in the user's data directory.
     #[arg(long, env = "CHEFSHAT_DATA_DIR")]
     data_dir: Option<PathBuf>,
     /// Print one JSON object.
@@ -123,21 +123,21 @@ impl Export {
         Ok(ExitCode::SUCCESS)
     }
 
-    /// The formats, each once.
+    /// The formats without duplicates.
     fn wanted_formats(&self) -> Result<Vec<Format>, CommandError> {
         let mut formats = self.formats.clone();
         formats.sort();
         formats.dedup();
         match self.layout {
             LayoutName::ChefsHatGym if formats.iter().any(|format| *format != Format::Csv) => {
-                Err("--layout chefshatgym is written as CSV alone: leave --format out".into())
+                Err("--layout chefshatgym is always CSV: leave out --format".into())
             }
             LayoutName::Tables if formats.is_empty() => Ok(vec![Format::Parquet]),
             _ => Ok(formats),
         }
     }
 
-    /// For people.
+    /// The report for people.
     fn write_report(&self, out: &mut impl Write, exported: &Exported) -> std::io::Result<()> {
         for left_out in &exported.left_out {
             anstream::eprintln!(
@@ -160,7 +160,7 @@ impl Export {
             counted(exported.decisions, "decision"),
             counted(exported.expressions, "expression")
         )?;
-        // A layout of a file for each game may have thousands of them.
+        // A layout with one file per game may have thousands.
         if self.layout == LayoutName::Tables {
             for file in &exported.files {
                 writeln!(out, "  {:<20} {:>12} bytes", file.path, file.bytes)?;

@@ -1,5 +1,5 @@
-//! `chefshat import`: puts the record of another server, or a game written down at a real table, among the records of a data folder. What a
-//! transcript may say, and whether it can have happened, is decided in `chefshat-records`.
+//! `chefshat import`: adds the record of another server, or the transcript of a game at a physical table, to the records of a data
+//! directory. `chefshat-record` reads and verifies them.
 
 use std::fs::File;
 use std::io::{Read as _, Write as _};
@@ -28,17 +28,17 @@ Examples:
   chefshat import table-3.csv --out ./records
   chefshat import 5f0c6a4de2b14b7f8a3d9c1e7b60425d.jsonl --data-dir ./chefshat-data";
 
-/// Add the record of a game played elsewhere, at a real table too.
+/// Import a record from elsewhere, including games at a physical table.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(super) struct Import {
     /// A record (.jsonl) or a transcript (.csv).
     #[arg(value_name = "FILE")]
     file: PathBuf,
-    /// Where to write the record: a file that ends in .jsonl, or a folder. Standard: the records of the data folder.
+    /// Where to write the record: a file that ends in .jsonl, or a directory. Default: the records of the data directory.
     #[arg(long, value_name = "PATH")]
     out: Option<PathBuf>,
-    /// Data folder to write to (records/GAME-ID.jsonl), where --out is not given. Standard: chefshat in the user's data folder.
+    /// Data directory to write to (records/GAME-ID.jsonl) if --out is not given. Default: chefshat in the user's data directory.
     #[arg(long, env = "CHEFSHAT_DATA_DIR")]
     data_dir: Option<PathBuf>,
     /// Print one JSON object.
@@ -56,7 +56,7 @@ impl Import {
         let path = self.path_for(&header.game_id)?;
         if path.exists() {
             return Err(format!(
-                "{}: game {} is there already; nothing was changed",
+                "{}: game {} exists already; nothing was changed",
                 path.display(),
                 header.game_id
             )
@@ -67,7 +67,7 @@ impl Import {
         Ok(ExitCode::SUCCESS)
     }
 
-    /// The record that the file is or tells of, verified.
+    /// Reads and verifies the record or transcript.
     fn read(&self) -> Result<(Vec<v1::RecordLine>, Replayed), CommandError> {
         let name = self.file.display();
         let lines = if self

@@ -1,4 +1,4 @@
-//! `chefshat leaderboard`: the ratings of all who have played rated games on a server. How they come about is said in docs/ratings.md.
+//! `chefshat leaderboard`: shows the ratings of a server's participants. docs/ratings.md explains them.
 
 use std::io::Write as _;
 use std::process::ExitCode;
@@ -12,7 +12,7 @@ use super::numbers::counted;
 use super::output::heading;
 use super::{CommandError, board};
 
-/// Show the ratings of all who have played rated games on a server.
+/// Show the ratings of a server's participants, best first.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  chefshat leaderboard --min-games 20\n  chefshat leaderboard --kind human --csv > people.csv\n\n\
@@ -21,19 +21,19 @@ use super::{CommandError, board};
 pub(super) struct Leaderboard {
     #[command(flatten)]
     server: ServerArg,
-    /// Show participants of this kind alone, rated by all their games.
+    /// Only participants of this kind, rated by all their games.
     #[arg(long, value_enum)]
     kind: Option<KindArg>,
-    /// Leave out those who have played fewer rated games.
+    /// Only participants with at least this many rated games.
     #[arg(long, value_name = "N", default_value_t = 0)]
     min_games: u32,
-    /// At most so many, best first.
+    /// Maximum number of participants, best first.
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=1000))]
     limit: u32,
     /// Print one JSON object.
     #[arg(long, conflicts_with = "csv")]
     json: bool,
-    /// Print CSV, a line for each participant.
+    /// Print CSV, one line per participant.
     #[arg(long)]
     csv: bool,
 }

@@ -1,4 +1,4 @@
-//! The command line of `chefshat`: what it understands, and one module for each command. What the commands do is elsewhere.
+//! The command line of `chefshat`: its arguments and one module per command.
 
 mod agent;
 mod board;
@@ -40,7 +40,7 @@ use clap::builder::FalseyValueParser;
 use clap::{Parser, Subcommand};
 use tracing_subscriber::EnvFilter;
 
-/// Why a command failed, in words for the person who ran it.
+/// Why a command failed, as a message for the user.
 type CommandError = Box<dyn std::error::Error + Send + Sync>;
 
 /// Chef's Hat: a game server for agents, robots and people.
@@ -49,7 +49,7 @@ type CommandError = Box<dyn std::error::Error + Send + Sync>;
 struct Cli {
     #[command(subcommand)]
     command: Command,
-    /// What is logged to standard error, for instance `debug` or `chefshat_server=debug`.
+    /// Log filter for standard error, for example `debug` or `chefshat_server=debug`.
     #[arg(long, env = "CHEFSHAT_LOG", default_value = "warn", global = true)]
     log: String,
     /// Log lines as JSON.
@@ -59,49 +59,49 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Host rooms.
+    /// Run a server that hosts rooms.
     Serve(serve::Serve),
-    /// Play a game between agents over real connections and watch it.
+    /// Run a server and agents over real connections, and watch their game.
     Demo(demo::Demo),
-    /// Play as a built-in agent on a server.
+    /// Play on a server as a built-in agent.
     Agent(agent::AgentCommand),
-    /// Examine an agent: play cases with it and say what it got wrong.
+    /// Test whether an agent, in any language, plays correctly.
     CheckAgent(check_agent::CheckAgent),
-    /// Play as a person at this terminal.
+    /// Play in this terminal.
     Play(tui::play::Play),
-    /// Watch a room or a recorded game at this terminal.
+    /// Watch a room or a recorded game in this terminal.
     Watch(tui::watch::Watch),
-    /// Make, list, watch and close rooms of a server.
+    /// Create, list, watch and close rooms of a server.
     Room(room::RoomCommand),
-    /// Hold tournaments: make, join, follow them, and see their results.
+    /// Create, join and follow tournaments, and show their results.
     Tournament(tournament::TournamentCommand),
-    /// Show the ratings of all who have played rated games on a server.
+    /// Show the ratings of a server's participants.
     Leaderboard(leaderboard::Leaderboard),
-    /// List, fetch and add records of games that have ended.
+    /// List, download and import records of finished games.
     Records(records::RecordsCommand),
-    /// Make a dataset of records: Parquet, CSV or JSON Lines, with a dataset card.
+    /// Export records as a dataset: Parquet, CSV or JSON Lines, with a dataset card.
     Export(export::Export),
-    /// Draw a record: a picture of a moment, a film of a game, the look-up table of a decision.
+    /// Draw a record: a picture, an animation, or the action table of a decision.
     Render(render::Render),
-    /// Play many games offline and print what they add up to.
+    /// Play many games offline and print statistics.
     Simulate(simulate::Simulate),
     /// Compare two agents on duplicate deals: the same deals for both, in all seats.
     Compare(compare::Compare),
-    /// Recompute a leaderboard from records.
+    /// Recompute the leaderboard from records.
     Ratings(ratings::RatingsCommand),
     /// Run an experiment of the paper
     Experiment(experiment::ExperimentCommand),
     /// Check the rule engine against test vectors.
     Conformance(conformance::Conformance),
-    /// Replay records and name the first line that does not fit.
+    /// Verify records by replaying them; report the first wrong line.
     Verify(verify::Verify),
-    /// Add the record of a game played elsewhere, at a real table too.
+    /// Import a record from elsewhere, including games at a physical table.
     Import(import::Import),
-    /// Give out or delete what is known of a participant.
+    /// Export or delete a participant's data.
     Participant(participant::ParticipantCommand),
 }
 
-/// Runs what the command line asks for.
+/// Runs the command.
 fn main() -> ExitCode {
     let cli = Cli::parse();
     let result = start_logging(&cli).and_then(|()| match cli.command {
@@ -128,7 +128,7 @@ fn main() -> ExitCode {
     });
     match result {
         Ok(code) => code,
-        // Whoever reads the output has had enough of it, as `head` does.
+        // The reader of the output has closed the pipe, as `head` does.
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
             anstream::eprintln!("chefshat: {error}");
@@ -159,9 +159,9 @@ fn in_runtime(
 
 fn start_logging(cli: &Cli) -> Result<(), CommandError> {
     let filter = EnvFilter::try_new(&cli.log)
-        .map_err(|error| format!("--log {:?}: {error}; write for instance info", cli.log))?;
+        .map_err(|error| format!("--log {:?}: {error}; use for example info", cli.log))?;
     let terminal = io::stderr().is_terminal();
-    // What is logged there would stand in the middle of the picture; a file takes it.
+    // Log lines would corrupt the screen; redirect them to a file.
     let draws = matches!(cli.command, Command::Play(_) | Command::Watch(_));
     let filter = if terminal && draws {
         EnvFilter::new("off")

@@ -1,6 +1,6 @@
-//! Numbers in words for people: with their thousands apart, with what is counted, and as places.
+//! Numbers in words: grouped digits, counts with their noun, places.
 
-/// A number with its thousands apart: `1,234,567`.
+/// A number with grouped thousands: `1,234,567`.
 pub(super) fn grouped(number: u64) -> String {
     let digits = number.to_string();
     let mut text = String::new();
@@ -36,7 +36,7 @@ mod tests {
     use crate::numbers::*;
 
     #[test]
-    fn places_have_the_ends_that_people_say() {
+    fn ordinals_have_english_suffixes() {
         let table = [
             (1, "1st"),
             (2, "2nd"),

@@ -1,5 +1,4 @@
-//! The flags that describe the policy of rooms, shared by the commands that make them: times, limits, rewards. What makes sense is decided by
-//! the server.
+//! Flags for the policy of rooms: times, limits, rewards. The server validates them.
 
 use chefshat_client::v1;
 use chefshat_engine::RewardScheme;
@@ -9,53 +8,53 @@ use clap::{Args, ValueEnum};
 
 use crate::kind::KindArg;
 
-/// Names of the reward schemes, in the order of the protocol's numbers from 1.
+/// Names of the reward schemes, in the order of their numbers in the protocol, from 1.
 const REWARDS: [&str; 5] = ["validity", "paper", "paper_intended", "winning", "points"];
 
 /// Times and limits of a room.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Times and limits")]
 pub(super) struct PolicyArgs {
-    /// Milliseconds for a decision; standard 10000, for people 60000.
+    /// Milliseconds for each decision. Default: 10000, for people 60000.
     #[arg(long, value_name = "MS")]
     decision_time_ms: Option<u32>,
-    /// Milliseconds each seat may use beyond that over the whole game; standard 60000, for people 300000.
+    /// Time bank of each seat for the whole game, in milliseconds. Default: 60000, for people 300000.
     #[arg(long, value_name = "MS")]
     bank_ms: Option<u32>,
-    /// Other times for participants of a kind: milliseconds for a decision and, after another colon, beyond that, for instance human:60000
-    /// or robot:30000:120000. Repeatable. People have their standard times unless --decision-time-ms or --bank-ms is given.
+    /// Times for one kind of participant: milliseconds per decision and, after another colon, the time bank, for example human:60000
+    /// or robot:30000:120000. Repeatable. People have their default times unless --decision-time-ms or --bank-ms is given.
     #[arg(long = "clock", value_name = "KIND:MS[:MS]", value_parser = clock)]
     clocks: Vec<v1::KindClock>,
-    /// Invalid attempts at one decision before the default is taken, 0 for no limit; standard 10.
+    /// Invalid attempts at one decision before the default action is taken, 0 for no limit. Default: 10.
     #[arg(long, value_name = "N")]
     max_invalid_attempts: Option<u32>,
-    /// Decisions in a row lost to the clock before a seat is substituted; standard 3.
+    /// Consecutive timeouts before a seat is substituted. Default: 3.
     #[arg(long, value_name = "N")]
     max_timeouts: Option<u32>,
-    /// Milliseconds that the server's own agents wait before they decide; standard 1000 where a person plays, else 0.
+    /// Milliseconds that built-in agents wait before a decision. Default: 1000 if a person plays, else 0.
     #[arg(long, value_name = "MS")]
     pace_ms: Option<u32>,
-    /// Rewards told to the seats.
+    /// Reward scheme for the seats.
     #[arg(long, value_name = "SCHEME", value_parser = PossibleValuesParser::new(REWARDS))]
     reward: Option<String>,
-    /// Decisions by which spectators are behind; standard 0.
+    /// Number of decisions by which spectators are delayed. Default: 0.
     #[arg(long, value_name = "N")]
     spectator_delay: Option<u32>,
-    /// What the game outlives; standard durable.
+    /// What the game survives. Default: durable.
     #[arg(long)]
     durability: Option<DurabilityArg>,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum DurabilityArg {
-    /// The death of the server: it goes on where it stood.
+    /// The game survives the death of the server and resumes.
     Durable,
-    /// Nothing; takes less time, and its record is kept when it ends.
+    /// The game is lost with the server. Faster; its record is stored when it ends.
     Ephemeral,
 }
 
 impl PolicyArgs {
-    /// The policy as a server is asked for it: what was not said is left to the server's standard.
+    /// The policy for the server; flags that are not given are left to its defaults.
     pub(super) fn message(&self) -> v1::RoomPolicy {
         let scheme = self.reward.as_deref().and_then(RewardScheme::from_name);
         v1::RoomPolicy {
@@ -92,7 +91,7 @@ fn clock(words: &str) -> Result<v1::KindClock, String> {
                 bank_ms: bank_ms.flatten(),
             })
         }
-        _ => Err("give agent, human or robot, :, and milliseconds for a decision".to_owned()),
+        _ => Err("use agent, human or robot, a colon, and milliseconds per decision".to_owned()),
     }
 }
 
@@ -124,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn a_game_outlives_the_server_or_not() {
+    fn durability_is_a_choice() {
         for (flags, expected) in [
             ("", v1::Durability::Unspecified),
             ("--durability durable", v1::Durability::Durable),
@@ -135,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn kinds_have_clocks_of_their_own() {
+    fn kinds_have_their_own_clocks() {
         let clock_of = |kind: v1::ParticipantKind, decision_time_ms, bank_ms| v1::KindClock {
             kind: kind.into(),
             decision_time_ms: Some(decision_time_ms),

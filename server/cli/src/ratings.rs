@@ -1,5 +1,5 @@
-//! `chefshat ratings`: a leaderboard recomputed from record files. Which games count is decided in `chefshat-records`, how ratings come about
-//! in `chefshat-arena`.
+//! `chefshat ratings`: recomputes the leaderboard from record files. `chefshat-record` decides which games count, `chefshat-tournament`
+//! updates the ratings.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write as _;
@@ -34,39 +34,39 @@ Examples:
   chefshat ratings ./chefshat-data/records --min-games 20
   chefshat ratings records/ --kind human --csv > people.csv";
 
-/// Recompute a leaderboard from records.
+/// Recompute the leaderboard from records.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(super) struct RatingsCommand {
-    /// Records, or folders of records (*.jsonl). Standard: the records of the data folder.
+    /// Records, or directories of records (*.jsonl). Default: the records of the data directory.
     #[arg(value_name = "PATH")]
     paths: Vec<PathBuf>,
-    /// Data folder whose records are taken when no PATH is named. Standard: chefshat in the user's data folder.
+    /// Data directory to read records from if no PATH is given. Default: chefshat in the user's data directory.
     #[arg(long, env = "CHEFSHAT_DATA_DIR")]
     data_dir: Option<PathBuf>,
-    /// Show participants of this kind alone, rated by all their games.
+    /// Only participants of this kind, rated by all their games.
     #[arg(long, value_enum)]
     kind: Option<KindArg>,
-    /// Leave out those who have played fewer rated games.
+    /// Only participants with at least this many rated games.
     #[arg(long, value_name = "N", default_value_t = 0)]
     min_games: u32,
-    /// Leave out damaged records, and say which.
+    /// Skip damaged records and report them.
     #[arg(long)]
     skip_damaged: bool,
     /// Print one JSON object.
     #[arg(long, conflicts_with = "csv")]
     json: bool,
-    /// Print CSV, a line for each participant.
+    /// Print CSV, one line per participant.
     #[arg(long)]
     csv: bool,
 }
 
-/// What the records came to.
+/// The result of reading the records.
 #[derive(Default)]
 struct Gathered {
     records: u64,
     damaged: u64,
-    /// Games that are not rated, by reason: in a word, and in words.
+    /// Games that are not rated, by reason (code and words).
     not_rated: BTreeMap<(&'static str, String), u64>,
     ratings: Ratings<Identity>,
 }
@@ -93,7 +93,7 @@ impl RatingsCommand {
         Ok(ExitCode::SUCCESS)
     }
 
-    /// Reads all records on all cores, then rates the games in their order.
+    /// Reads all records on all cores, then rates the games in order.
     fn gather(&self, files: &[RecordFile]) -> Result<Gathered, CommandError> {
         let bytes = files.iter().map(|file| file.bytes).sum();
         let bar = ProgressBar::new(bytes).with_style(ProgressStyle::with_template(
@@ -120,7 +120,7 @@ impl RatingsCommand {
                 }
                 Err(problem) => {
                     return Err(format!(
-                        "{}: {problem}; leave out what is damaged with --skip-damaged",
+                        "{}: {problem}; use --skip-damaged to leave out damaged records",
                         path.display()
                     )
                     .into());
@@ -140,21 +140,21 @@ impl RatingsCommand {
             key(left).cmp(&key(right))
         });
         for game in games {
-            // A game of one seat or of seven would be no game of these rules, and the record did not replay.
+            // The record would not have replayed with another number of seats.
             gathered.ratings.fold(&game.places())?;
         }
         Ok(gathered)
     }
 }
 
-/// What a record says of ratings.
+/// What a record contributes to ratings.
 struct Told {
     game_id: String,
-    /// Or why the game counts for none.
+    /// Why the game is not rated.
     outcome: Result<Outcome, (&'static str, String)>,
 }
 
-/// Reads and checks a record.
+/// Reads and verifies a record.
 fn tell(path: &Path) -> Result<Told, String> {
     let lines = jsonl::read(path).map_err(|error| match error {
         jsonl::RecordFileError::Io { source, .. } => source.to_string(),

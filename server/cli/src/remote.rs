@@ -1,5 +1,5 @@
-//! A built-in agent at the other end of a connection: what a decision request says is read back into the engine's observation, and the
-//! agent decides as it would inside the server.
+//! A built-in agent as a remote client: converts a decision request to the engine's observation, so that the agent decides as it would
+//! inside the server.
 
 use std::time::Duration;
 
@@ -13,10 +13,10 @@ use tracing::warn;
 use chefshat_record::convert::observation_from_proto;
 use chefshat_room::ids::random_bytes;
 
-/// Longest time a remote agent may be told to wait before it decides, milliseconds: well within the standard time for a decision.
+/// Maximum wait of a remote agent before a decision, in milliseconds: well within the default time.
 pub(super) const MAX_PACE_MS: u64 = 5_000;
 
-/// A built-in agent that plays a seat of a server. Goes on with the same generator from one game to the next.
+/// A built-in agent that plays a seat of a server. Keeps its random generator from game to game.
 #[derive(Debug)]
 pub(super) struct RemoteAgent {
     agent: BuiltInAgent,
@@ -36,21 +36,21 @@ impl RemoteAgent {
         }
     }
 
-    /// What the agent would do; an error when the request does not fit the rules that the server told.
+    /// The agent's action; an error if the request does not fit the rules.
     fn consider(&mut self, request: &v1::DecisionRequest) -> Result<ActionId, String> {
         let (Some(rules), Some(seat)) = (self.rules, self.seat) else {
-            return Err("the server asked before it said what is played".into());
+            return Err("the server sent a decision before the rules".into());
         };
         let seat = usize::try_from(seat)
             .ok()
             .filter(|seat| *seat < rules.players())
             .map(Seat::new)
-            .ok_or("the server told a seat that the game does not have")?;
+            .ok_or("the server assigned a seat that the game does not have")?;
         let observation = observation_from_proto(request, seat, &rules)
-            .map_err(|problem| format!("the observation cannot be read: {problem}"))?;
+            .map_err(|problem| format!("invalid observation: {problem}"))?;
         let legal = Mask::from_bytes(&request.action_mask)
             .filter(|mask| !mask.is_empty())
-            .ok_or("the mask of legal actions cannot be read")?;
+            .ok_or("invalid mask of legal actions")?;
         let action = self.agent.decide(&observation, &legal);
         Ok(ActionId(action.index().into()))
     }
@@ -86,7 +86,7 @@ impl Agent for RemoteAgent {
     }
 }
 
-/// The seed for one use of a number that a person chose: SHA-256(use ‖ number, 8 bytes, low byte first); random without a number.
+/// Derives a seed for one purpose from the user's number: SHA-256(purpose ‖ number, 8 bytes little-endian); random without a number.
 pub(super) fn seed_for(purpose: &str, number: Option<u64>) -> [u8; 32] {
     match number {
         Some(number) => Sha256::new()
@@ -98,7 +98,7 @@ pub(super) fn seed_for(purpose: &str, number: Option<u64>) -> [u8; 32] {
     }
 }
 
-/// Reads the name of a built-in agent on the command line.
+/// Parses the name of a built-in agent.
 pub(super) fn agent_kind(name: &str) -> Result<AgentKind, String> {
     AgentKind::from_name(name).ok_or_else(|| {
         let known = AgentKind::ALL.map(AgentKind::name).join(", ");
@@ -118,7 +118,7 @@ mod tests {
     use crate::remote::*;
     use chefshat_record::convert::observation_to_proto;
 
-    /// A request as a server would put the open decision of a game.
+    /// The open decision of a game as a server requests it.
     fn request(game: &Game) -> v1::DecisionRequest {
         let decision = game.decision().expect("a decision is open");
         let observation = game.observe(Viewer::Seat(decision.seat));
@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn a_recorded_player_sees_remotely_what_it_saw() {
+    fn a_recorded_player_recognises_its_observations() {
         let rules = RuleSetSpec::default().validate().expect("the standard");
         let mut chance = BuiltInAgent::new(AgentKind::Random, [4; 32]);
         let mut game = Game::new(rules, Seed([5; 32]), |_| {});
@@ -195,7 +195,7 @@ mod tests {
                 observation,
                 legal,
                 action,
-                // No model elsewhere: only what looks exactly the same finds its action again.
+                // No model: only identical observations have an action.
                 own: false,
             });
             game.apply(action, |_| {}).expect("the action is legal");
@@ -213,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_read_is_answered_all_the_same() {
+    fn malformed_requests_are_answered() {
         let rules = RuleSetSpec::default().validate().expect("the standard");
         let game = Game::new(rules, Seed([5; 32]), |_| {});
         let mut remote = RemoteAgent::new(

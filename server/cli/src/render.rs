@@ -1,5 +1,5 @@
-//! `chefshat render`: a record as a picture or a film. What is drawn, and how, is decided in `chefshat-records`; how frames become a file,
-//! in the modules below.
+//! `chefshat render`: draws a record as a picture or an animation. `chefshat-render` draws the frames; the module below writes them to
+//! a file.
 
 mod reel;
 
@@ -31,16 +31,16 @@ Examples:
 
 docs/pictures.md shows what comes of it.";
 
-/// Pixels that a picture is wide if nothing else is said.
+/// Default width of a picture, in pixels.
 const PICTURE_WIDTH: u32 = 1280;
-/// Pixels that a film is wide if nothing else is said.
+/// Default width of an animation, in pixels.
 const FILM_WIDTH: u32 = 960;
-/// How much longer than a decision the end of a Shift or of the game is shown.
+/// Duration of the end of a Shift or game, in decisions.
 const END_DECISIONS: f64 = 3.0;
-/// The shortest time that a decision is shown in real time, in seconds: built-in agents take none.
+/// Minimum duration of a decision in real time, in seconds: built-in agents take none.
 const SHORTEST_SECONDS: f64 = 0.2;
 
-/// Draw a record: a picture of a moment, a film of a game, the look-up table of a decision.
+/// Draw a record: a picture of a moment, an animation of a game, or the action table of a decision.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(super) struct Render {
@@ -49,40 +49,40 @@ pub(super) struct Render {
     /// The file to write: .png, .svg, .gif or .mp4.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// What is drawn.
+    /// What to draw.
     #[arg(long, value_enum, default_value_t = Drawn::Table)]
     figure: Drawn,
-    /// Picture: the decision that is open, or `end`. Standard: the end of the game, or of the Shift named by --shift.
+    /// Picture: the open decision, or `end`. Default: the end of the game, or of the Shift given by --shift.
     #[arg(long, value_name = "DECISION", value_parser = moment, conflicts_with_all = ["from", "to"])]
     at: Option<At>,
-    /// Film: the first decision that is shown. Standard: the game's first.
+    /// Animation: first decision. Default: the first of the game.
     #[arg(long, value_name = "DECISION")]
     from: Option<u64>,
-    /// Film: the last decision that is shown. Standard: the game's last.
+    /// Animation: last decision. Default: the last of the game.
     #[arg(long, value_name = "DECISION")]
     to: Option<u64>,
-    /// Film: only this Shift. Picture: its end.
+    /// Animation: only this Shift. Picture: its end.
     #[arg(long, value_name = "SHIFT", conflicts_with_all = ["from", "to", "at"])]
     shift: Option<u32>,
-    /// Only what this seat saw; the cards of others show their backs.
+    /// Show only what this seat saw; other hands are face down.
     #[arg(long, value_name = "SEAT", conflicts_with = "spectator")]
     seat: Option<u32>,
-    /// Only what everybody saw: all cards in hands show their backs.
+    /// Show only what spectators saw: all hands are face down.
     #[arg(long)]
     spectator: bool,
-    /// Film: how long each decision is shown.
+    /// Animation: duration of each decision.
     #[arg(long, value_name = "SECONDS", default_value_t = 1.0, value_parser = seconds)]
     seconds_per_decision: f64,
-    /// Film: show each decision for as long as it took, so many times faster.
+    /// Animation: show each decision for the time it took, divided by this factor.
     #[arg(long, value_name = "FACTOR", num_args = 0..=1, default_missing_value = "1", value_parser = factor, conflicts_with = "seconds_per_decision")]
     real_time: Option<f64>,
-    /// Film in real time: the longest that a decision is shown.
+    /// Animation in real time: maximum duration of a decision.
     #[arg(long, value_name = "SECONDS", default_value_t = 5.0, value_parser = seconds)]
     longest: f64,
-    /// Pixels from left to right. Standard: 1280 for a picture, 960 for a film.
+    /// Width in pixels. Default: 1280 for a picture, 960 for an animation.
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(width_range()))]
     width: Option<u32>,
-    /// The program that makes .mp4 files.
+    /// Program that encodes .mp4 files.
     #[arg(long, value_name = "PROGRAM", default_value = "ffmpeg")]
     ffmpeg: PathBuf,
     /// Print one JSON object.
@@ -90,12 +90,12 @@ pub(super) struct Render {
     json: bool,
 }
 
-/// What is drawn.
+/// What to draw.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Drawn {
-    /// The table with everybody around it.
+    /// The table and its players.
     Table,
-    /// The look-up table of the open decision: which actions are allowed, and which this hand could take.
+    /// The action table of the open decision: legal actions, and those this hand could take.
     Actions,
 }
 
@@ -106,7 +106,7 @@ enum At {
     End,
 }
 
-/// The kinds of file that can be written.
+/// The kinds of file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Png,
@@ -126,16 +126,16 @@ fn moment(text: &str) -> Result<At, String> {
         number => number
             .parse()
             .map(At::Decision)
-            .map_err(|_| "write the number of a decision, from 1, or end".to_owned()),
+            .map_err(|_| "use the number of a decision, from 1, or end".to_owned()),
     }
 }
 
 fn seconds(text: &str) -> Result<f64, String> {
-    positive(text, 600.0).ok_or_else(|| "write seconds above 0, at most 600".to_owned())
+    positive(text, 600.0).ok_or_else(|| "use seconds above 0, at most 600".to_owned())
 }
 
 fn factor(text: &str) -> Result<f64, String> {
-    positive(text, 1000.0).ok_or_else(|| "write a number above 0, at most 1000".to_owned())
+    positive(text, 1000.0).ok_or_else(|| "use a number above 0, at most 1000".to_owned())
 }
 
 fn positive(text: &str, most: f64) -> Option<f64> {
@@ -152,7 +152,7 @@ impl Kind {
             Some("gif") => Ok(Kind::Gif),
             Some("mp4") => Ok(Kind::Mp4),
             _ => Err(format!(
-                "--out {}: what is to be made? Choose a name that ends in .png, .svg, .gif or .mp4",
+                "--out {}: unknown kind of file; choose a name that ends in .png, .svg, .gif or .mp4",
                 path.display()
             )
             .into()),
@@ -173,7 +173,7 @@ impl Kind {
     }
 }
 
-/// What has been written.
+/// What was written.
 struct Written {
     width: u32,
     height: u32,
@@ -195,11 +195,11 @@ impl Render {
         Ok(ExitCode::SUCCESS)
     }
 
-    /// What fits no file of this kind.
+    /// Refuses flags that do not fit the kind of file.
     fn check(&self, kind: Kind) -> Result<(), CommandError> {
         let name = self.out.display();
         if kind.is_film() && self.at.is_some() {
-            return Err(format!("--at names one moment, but {name} is to show a row of them: use --from and --to, or --shift").into());
+            return Err(format!("--at selects one moment, but {name} is an animation: use --from and --to, or --shift").into());
         }
         if kind.is_film() && self.figure == Drawn::Actions {
             return Err(
@@ -208,12 +208,12 @@ impl Render {
         }
         if !kind.is_film() && (self.from.is_some() || self.to.is_some()) {
             return Err(format!(
-                "--from and --to name a row of moments, but {name} is to show one: use --at"
+                "--from and --to select several moments, but {name} is a picture: use --at"
             )
             .into());
         }
         if self.figure == Drawn::Actions && !matches!(self.at, Some(At::Decision(_))) {
-            return Err("--figure actions shows an open decision: name it with --at".into());
+            return Err("--figure actions shows an open decision: select it with --at".into());
         }
         Ok(())
     }
@@ -226,7 +226,7 @@ impl Render {
         }
     }
 
-    /// An error that names the record.
+    /// An error with the name of the record.
     fn of_record(&self, error: impl std::fmt::Display) -> CommandError {
         format!("{}: {error}", self.record.display()).into()
     }
@@ -296,7 +296,7 @@ impl Render {
         })
     }
 
-    /// How long a frame is shown.
+    /// The duration of a frame.
     fn shown_for(&self, frame: &Frame) -> Duration {
         let is_end = !matches!(frame.when, When::Decision(_));
         let seconds = match self.real_time {

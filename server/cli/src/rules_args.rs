@@ -1,5 +1,4 @@
-//! The flags that describe a rule set, shared by the commands that play games: a preset, and one flag for each field that may be set
-//! in its place. What makes sense is not decided here but by the engine.
+//! Flags for a rule set: a preset and one flag per field that overrides it. The engine validates the result.
 
 use chefshat_engine::{RuleSet, RuleSetSpec};
 use chefshat_proto::v1;
@@ -9,45 +8,45 @@ use clap::{Args, ValueEnum};
 
 use super::CommandError;
 
-/// A rule set as the command line describes it.
+/// A rule set on the command line.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Rules")]
 pub(super) struct RulesArgs {
-    /// Where the rules start from; every other flag overrides one field. paper: to 15 points, 5,3,1,0 by place, the Golden 11 opens.
+    /// Preset; every other flag overrides one field. paper: to 15 points, 5,3,1,0 by place, the Golden 11 opens.
     /// rulebook: the same with 3,2,1,0. original2020: as paper, but any 11 opens, the opener may pass and a pass binds for one turn.
     #[arg(long, default_value = "paper", value_parser = PossibleValuesParser::new(RuleSetSpec::PRESETS))]
     preset: String,
-    /// Seats, 2 to 6; standard 4.
+    /// Seats, 2 to 6. Default: 4.
     #[arg(long, value_name = "N")]
     players: Option<u32>,
-    /// Faces, 4 to 15; face f is in the deck f times; standard 11.
+    /// Faces, 4 to 15; the deck has f cards of face f. Default: 11.
     #[arg(long, value_name = "F")]
     faces: Option<u32>,
-    /// Jokers, 0 to 2; standard 2.
+    /// Jokers, 0 to 2. Default: 2.
     #[arg(long, value_name = "J")]
     jokers: Option<u32>,
-    /// End after the Shift in which somebody reaches this many points; standard 15.
+    /// End the game after the Shift in which a player reaches this many points. Default: 15.
     #[arg(long, value_name = "POINTS", conflicts_with = "target_shifts")]
     target_points: Option<u32>,
-    /// End after this many Shifts.
+    /// End the game after this many Shifts.
     #[arg(long, value_name = "SHIFTS")]
     target_shifts: Option<u32>,
-    /// Points by place, from the first on, for instance 5,3,1,0.
+    /// Points by place, from the first, for example 5,3,1,0.
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     points: Vec<u32>,
     /// Whether cards are exchanged from the second Shift on.
     #[arg(long, value_name = "ON|OFF")]
     exchange: Option<Switch>,
-    /// Short for --exchange off.
+    /// Same as --exchange off.
     #[arg(long, conflicts_with = "exchange")]
     no_exchange: bool,
     /// Whether special actions are offered from the second Shift on.
     #[arg(long, value_name = "ON|OFF")]
     special_actions: Option<Switch>,
-    /// Short for --special-actions off.
+    /// Same as --special-actions off.
     #[arg(long, conflicts_with = "special_actions")]
     no_special_actions: bool,
-    /// Who opens a Shift.
+    /// Which seat opens a Shift.
     #[arg(long)]
     opening: Option<OpeningFlag>,
     /// Whether the seat that opens a Shift may pass on that turn.
@@ -56,7 +55,7 @@ pub(super) struct RulesArgs {
     /// How long a pass binds.
     #[arg(long)]
     pass_scope: Option<PassScopeFlag>,
-    /// Consecutive pizzas without a play after which somebody must play.
+    /// Consecutive pizzas without a play after which the leader has to play.
     #[arg(long, value_name = "PIZZAS")]
     max_idle_pizzas: Option<u32>,
     /// Turns after which a Shift is adjudicated.
@@ -73,9 +72,9 @@ enum Switch {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 #[value(rename_all = "snake_case")]
 enum OpeningFlag {
-    /// The holder of the Golden card, who must play it.
+    /// The holder of the Golden card, which must be played.
     Golden,
-    /// The first seat from a drawn one that holds the top face, which must play that face.
+    /// The first seat from a random one that holds the highest face, which must be played.
     AnyTopFace,
 }
 
@@ -94,7 +93,7 @@ enum PassScopeFlag {
 }
 
 impl RulesArgs {
-    /// Whether no flag was given that changes the standard.
+    /// Whether no flag changes the default.
     pub(super) fn are_standard(&self) -> bool {
         let standard = v1::RuleSet {
             preset: RuleSetSpec::PRESETS[0].to_owned(),
@@ -103,7 +102,7 @@ impl RulesArgs {
         self.message() == standard
     }
 
-    /// The rule set as a server is asked for it: what was not said is left to the preset.
+    /// The rule set for the server; fields that are not given are left to the preset.
     pub(super) fn message(&self) -> v1::RuleSet {
         use v1::rule_set::Stop;
         let on = |switch: Switch| switch == Switch::On;
@@ -136,24 +135,24 @@ impl RulesArgs {
         }
     }
 
-    /// The rule set.
+    /// The validated rule set.
     ///
     /// # Errors
-    /// The first flag that makes no sense.
+    /// The first invalid flag.
     pub(super) fn rules(&self) -> Result<RuleSet, CommandError> {
         rules_of(&self.message())
     }
 }
 
-/// The rule set of a message that was made from flags.
+/// Validates the rule set of a message made from flags.
 ///
 /// # Errors
-/// The first flag that makes no sense.
+/// The first invalid flag.
 pub(super) fn rules_of(message: &v1::RuleSet) -> Result<RuleSet, CommandError> {
     rules_from_proto(message).map_err(|problem| by_flag(problem.field, &problem.message).into())
 }
 
-/// What is wrong with a field of the protocol, for somebody who typed a flag.
+/// The problem with a field, with the flag instead of the field.
 pub(super) fn by_flag(field: &str, message: &str) -> String {
     let flag = match field {
         "reward_scheme" => "reward".to_owned(),
@@ -222,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn nonsense_names_its_field() {
+    fn errors_name_the_flag() {
         let only = Only::try_parse_from(["test", "--faces", "3"]).expect("a number");
         let problem = only.rules.rules().expect_err("three faces are too few");
         assert!(problem.to_string().starts_with("--faces: "), "{problem}");

@@ -1,5 +1,4 @@
-//! Leaving a secret in a file, for programs that are started beside the one that was told it: the join code of a room or a tournament, or
-//! what its owner needs.
+//! Writes a secret to a file for another program: the join code of a room or tournament, or its owner token.
 
 use std::fs::File;
 use std::io::{self, Write as _};

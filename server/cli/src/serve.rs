@@ -1,4 +1,4 @@
-//! `chefshat serve`: host rooms until told to stop.
+//! `chefshat serve`: runs a server until it is stopped.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -18,35 +18,35 @@ use chefshat_server::serve::Server;
 use chefshat_server::store::{MemoryStore, SqliteStore, Store};
 use chefshat_server::web;
 
-/// Host rooms: one port for gRPC, gRPC-web, health checks, reflection, and the page on which people play.
+/// Run a server that hosts rooms. One port serves gRPC, gRPC-web, health checks, reflection and the web page.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example:\n  chefshat serve --listen 127.0.0.1:50051 --data-dir ./chefshat-data"
 )]
 pub(super) struct Serve {
-    /// Address and port to listen on, such as 0.0.0.0:50051 or localhost:50051; port 0 takes a free one.
+    /// Address and port to listen on, such as 0.0.0.0:50051 or localhost:50051; port 0 selects a free port.
     #[arg(long, env = "CHEFSHAT_LISTEN", value_name = "HOST:PORT", default_value = "127.0.0.1:50051", value_parser = host_and_port)]
     listen: String,
-    /// Folder in which games are kept: a database (games.sqlite3) and the records of finished games (records/GAME-ID.jsonl). Standard:
-    /// chefshat in the user's data folder.
+    /// Data directory: the database (games.sqlite3) and the records of finished games (records/GAME-ID.jsonl). Default:
+    /// chefshat in the user's data directory.
     #[arg(long, env = "CHEFSHAT_DATA_DIR")]
     data_dir: Option<PathBuf>,
-    /// Keep games in memory alone: no database, no records.
+    /// Keep games only in memory: no database, no records.
     #[arg(long, env = "CHEFSHAT_NO_RECORDS", value_parser = FalseyValueParser::new())]
     no_records: bool,
-    /// Let anybody add records of games played elsewhere.
+    /// Let any client import records of games played elsewhere.
     #[arg(long, env = "CHEFSHAT_ALLOW_IMPORT", value_parser = FalseyValueParser::new())]
     allow_import: bool,
-    /// Most rooms at a time.
+    /// Maximum number of rooms at a time.
     #[arg(long, env = "CHEFSHAT_MAX_ROOMS", default_value_t = 10_000, value_parser = RangedU64ValueParser::<usize>::new().range(1..))]
     max_rooms: usize,
-    /// Threads that step the games of learning agents; 0: one for each core. Rooms have threads of their own.
+    /// Threads for the games of learning agents; 0 means one per core. Rooms have separate threads.
     #[arg(long, env = "CHEFSHAT_VECTOR_THREADS", default_value_t = 0, value_parser = RangedU64ValueParser::<usize>::new().range(..=256))]
     vector_threads: usize,
-    /// Seconds that running games may go on after the server was told to stop.
+    /// Seconds that games in progress may continue after the server is asked to stop.
     #[arg(long, env = "CHEFSHAT_GRACE", default_value_t = 30)]
     grace: u64,
-    /// Web origin whose pages may call the server, such as https://example.org (repeatable); * is all.
+    /// Web origin whose pages may call the server, such as https://example.org; * allows all. Repeatable.
     #[arg(
         long = "allow-origin",
         env = "CHEFSHAT_ALLOW_ORIGIN",
@@ -55,17 +55,17 @@ pub(super) struct Serve {
         value_parser = origin
     )]
     allowed_origins: Vec<String>,
-    /// Stop when standard input ends: for a program that starts a server of its own and may itself end in any way.
+    /// Stop when standard input ends: for a program that starts its own server and may die at any time.
     #[arg(long)]
     until_stdin_closes: bool,
-    /// Say where the server listens as a JSON line on standard output.
+    /// Print the server's address as a JSON line on standard output.
     #[arg(long)]
     json: bool,
 }
 
 impl Serve {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
-        // Not left to clap, for which a variable that says no is there as much as one that says yes.
+        // Not a clap conflict: clap would treat a variable that is set to false as present.
         let data_dir = match (self.no_records, self.data_dir) {
             (true, None) => None,
             (true, Some(_)) => {
@@ -84,7 +84,7 @@ impl Serve {
             None => Arc::new(MemoryStore::default()),
         };
         let address = listener.local_addr()?;
-        // Before anybody is told where to connect, so that a stop that comes at once is heard.
+        // Before the address is printed, so that an immediate signal is handled.
         let mut terminate = signal(SignalKind::terminate())?;
         let mut interrupt = signal(SignalKind::interrupt())?;
         let kept_in = data_dir.clone();
@@ -146,27 +146,27 @@ impl Serve {
     }
 }
 
-/// Resolves when standard input has ended. Read in a thread of its own, which nobody waits for: tokio would wait for one of its threads.
+/// Resolves when standard input ends. Uses a detached thread: tokio would wait for one of its own at shutdown.
 fn end_of_input() -> oneshot::Receiver<()> {
     let (tell, told) = oneshot::channel();
     std::thread::spawn(move || {
-        // An input that cannot be read has ended, too.
+        // A read error ends the input, too.
         let _ = std::io::copy(&mut std::io::stdin().lock(), &mut std::io::sink());
         let _ = tell.send(());
     });
     told
 }
 
-/// Checks the form of an address; whether there is such a host is found out when it is used.
+/// Checks the form of an address; the host is resolved later.
 fn host_and_port(text: &str) -> Result<String, String> {
     let whole = |(host, port): (&str, &str)| !host.is_empty() && port.parse::<u16>().is_ok();
     match text.rsplit_once(':').is_some_and(whole) {
         true => Ok(text.to_owned()),
-        false => Err("give IP:PORT or HOST:PORT, for instance 127.0.0.1:50051".to_owned()),
+        false => Err("use IP:PORT or HOST:PORT, for example 127.0.0.1:50051".to_owned()),
     }
 }
 
-/// Checks a web origin as browsers send it: a scheme and a host, without a path. A variable that is empty names none.
+/// Checks a web origin as browsers send it: scheme and host without a path. An empty variable means none.
 fn origin(text: &str) -> Result<String, String> {
     if text.is_empty() || text == "*" {
         return Ok(text.to_owned());
@@ -177,7 +177,7 @@ fn origin(text: &str) -> Result<String, String> {
     match host.is_some_and(|host| !host.is_empty() && host.chars().all(plain)) {
         true => Ok(text.to_owned()),
         false => Err(
-            "give http://HOST or https://HOST with a port if it has one and no path, for instance https://example.org, or *"
+            "use http://HOST or https://HOST with an optional port and no path, for example https://example.org, or *"
                 .to_owned(),
         ),
     }

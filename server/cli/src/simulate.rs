@@ -1,5 +1,5 @@
-//! `chefshat simulate`: a batch of offline games on all cores, and what it adds up to. How the result is written is in `report`, how its games are
-//! written down in `records`; the games are played by `chefshat-arena`.
+//! `chefshat simulate`: plays a batch of games offline on all cores and prints statistics. `chefshat-simulation` plays, `report` prints,
+//! `records` writes records.
 
 mod records;
 mod report;
@@ -32,29 +32,29 @@ Examples:
 
 The same seed gives the same output, on any number of threads.";
 
-/// Play many games offline, on all cores, and print what they add up to.
+/// Play many games offline on all cores and print statistics.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct Simulate {
-    /// Games to play.
+    /// Number of games.
     #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..))]
     games: u64,
-    /// The number that all chance is drawn from.
+    /// Seed of all random choices.
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// The agent on each seat, from seat 0, separated by commas. Standard: greedy on seat 0, random on the others.
+    /// The agents by seat, separated by commas. Default: greedy on seat 0, random on the others.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = agents())]
     agents: Vec<AgentKind>,
-    /// Reward the turns by this scheme and print each seat's mean reward.
+    /// Reward turns by this scheme and print each seat's mean reward.
     #[arg(long, value_name = "SCHEME", value_parser = schemes())]
     reward: Option<RewardScheme>,
-    /// Take the default decision after so many invalid answers to one decision. Standard: ask again without end.
+    /// Take the default action after this many invalid answers to one decision. Default: no limit.
     #[arg(long, value_name = "N")]
     max_invalid_attempts: Option<NonZeroU32>,
-    /// Threads to play on, at most 256 and one for each game; 0 is one for each core.
+    /// Number of threads, at most 256 and one per game; 0 means one per core.
     #[arg(long, value_name = "N", default_value_t = 0)]
     threads: usize,
-    /// Write the record of every game into this folder, as the server writes those of hosted games.
+    /// Write the record of every game to this directory, in the form of hosted games.
     #[arg(long, value_name = "DIR")]
     records: Option<PathBuf>,
     /// Print one JSON object.
@@ -99,7 +99,7 @@ impl Simulate {
         Ok(ExitCode::SUCCESS)
     }
 
-    /// What is to be played.
+    /// The batch to play.
     fn batch(&self) -> Result<Batch, CommandError> {
         let rules = self.rules.rules()?;
         let players = rules.players();
@@ -112,7 +112,7 @@ impl Simulate {
         };
         let mut batch = Batch::new(rules, &agents, self.games, self.seed).map_err(|error| {
             let example = vec!["random"; players].join(",");
-            format!("--agents: {error}, for instance --agents {example}, or change --players")
+            format!("--agents: {error}, for example --agents {example}, or change --players")
         })?;
         if let Some(scheme) = self.reward {
             batch = batch.with_rewards(scheme);
@@ -131,7 +131,7 @@ impl Simulate {
     }
 }
 
-/// Writes the records of all games, on the threads of the pool it is called in.
+/// Writes the records of all games on the current thread pool.
 fn write_records(batch: &Batch, folder: &Path) -> Result<(), CommandError> {
     let bar = ProgressBar::new(batch.games()).with_style(ProgressStyle::with_template(
         "{bar:40} {human_pos} of {human_len} records, {eta} left",
@@ -143,7 +143,7 @@ fn write_records(batch: &Batch, folder: &Path) -> Result<(), CommandError> {
     Ok(())
 }
 
-/// For people who watch: to standard error, because it is never the same twice.
+/// Prints the speed to standard error, because it differs from run to run.
 fn say_speed(table: &BatchTable, seconds: f64) {
     let answers = table.decisions + table.seats.values().map(|seat| seat.wrong).sum::<u64>();
     eprintln!(

@@ -1,5 +1,5 @@
-//! `chefshat verify`: replays records and names the first line that does not fit. What is checked is decided in `chefshat-records`; here
-//! files are found, checked on all cores, and told of.
+//! `chefshat verify`: verifies records by replaying them and reports the first wrong line. `chefshat-record` checks a record; this module
+//! finds the files, checks them on all cores and prints the results.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -29,33 +29,33 @@ Examples:
   chefshat verify ./chefshat-data/records game.jsonl
   chefshat verify --data-dir ./chefshat-data --json";
 
-/// Records checked before they are told of: as many at a time keep all cores busy, and whoever watches sees them come.
+/// Records checked per batch: enough for all cores, with results printed as they come.
 const AT_A_TIME: usize = 64;
 
-/// Replay records and name the first line that does not fit.
+/// Verify records by replaying them; report the first wrong line.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(super) struct Verify {
-    /// Records, or folders of records (*.jsonl). Standard: the records of the data folder.
+    /// Records, or directories of records (*.jsonl). Default: the records of the data directory.
     #[arg(value_name = "PATH")]
     paths: Vec<PathBuf>,
-    /// Data folder whose records are checked when no PATH is named. Standard: chefshat in the user's data folder.
+    /// Data directory to read records from if no PATH is given. Default: chefshat in the user's data directory.
     #[arg(long, env = "CHEFSHAT_DATA_DIR")]
     data_dir: Option<PathBuf>,
-    /// Print one JSON object a record.
+    /// Print one JSON object per record.
     #[arg(long)]
     json: bool,
 }
 
-/// What a record says that fits.
+/// A correct record.
 struct Fits {
     header: v1::RecordHeader,
     replayed: Replayed,
 }
 
-/// Why a file is no record that fits.
+/// Why a record is wrong.
 struct Problem {
-    /// The first line that does not fit, from 1; none where the file could not be read.
+    /// The first wrong line, from 1; none if the file is unreadable.
     line: Option<usize>,
     problem: String,
 }
@@ -139,7 +139,7 @@ fn check(file: &Path) -> Result<Fits, Problem> {
     }
 }
 
-/// How the deals of a record were checked, in words.
+/// How the deals of a record were verified, in words.
 pub(super) fn deals(header: &v1::RecordHeader) -> &'static str {
     use v1::GameOrigin::{Branched, Imported, Scripted};
     let committed = !header.seed_commitment.is_empty();

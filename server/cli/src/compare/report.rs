@@ -1,5 +1,4 @@
-//! The result of `chefshat compare` as a text for people and as JSON for programs. Both depend on what is compared alone: no times, no number
-//! of threads.
+//! The result of `chefshat compare` as text and as JSON. Both depend only on what is compared, not on time or the number of threads.
 
 use chefshat_simulation::{Comparison, Contender, Duplicate, Figure, RulesForm};
 use serde_json::{Value, json};
@@ -8,10 +7,10 @@ use super::super::numbers::counted;
 use super::super::output::{self, heading, line, table};
 use super::{Compare, Entrant, SeatsFlag};
 
-/// Longest name of an agent in a table.
+/// Maximum length of an agent's name in a table.
 const MAX_LABEL: usize = 14;
 
-/// A comparison that has been played.
+/// A finished comparison.
 pub(super) struct Played<'c> {
     pub(super) compare: &'c Compare,
     pub(super) entrants: &'c [Entrant; 2],
@@ -120,19 +119,19 @@ impl Played<'_> {
         text
     }
 
-    /// What duplication was good for, in words.
+    /// How many independent deals would have been needed, in words.
     fn gain(&self) -> String {
         let shifts = self.comparison.shifts;
         match self.comparison.points.gain() {
-            None => "Every deal came out the same, so chance has no part in it.".to_owned(),
+            None => "All deals had the same result: chance had no influence.".to_owned(),
             Some(gain) => format!(
-                "The points are as sure as {} of independent deals would make them ({gain:.1} times as many).",
+                "This is as precise as {} of independent deals ({gain:.1} times as many).",
                 counted((gain * shifts as f64).round() as u64, "Shift")
             ),
         }
     }
 
-    /// What stands above the columns of the two: short names where they tell them apart.
+    /// Column headings of the two agents: their names, or A and B if these are equal.
     fn columns(&self) -> [String; 2] {
         let [a, b] = self
             .entrants
@@ -155,7 +154,7 @@ fn shortened(label: &str) -> String {
 }
 
 fn signed(number: f64) -> String {
-    // Nothing is neither more nor less.
+    // Avoids a signed zero.
     let number = if number == 0.0 { 0.0 } else { number };
     format!("{number:+.3}").replace('-', "−")
 }

@@ -1,6 +1,5 @@
-//! `chefshat demo`: a server, agents that reach it over real connections, a spectator that tells the game, and at the end the
-//! standings, whether the deals check out, and where the record is. The game is played as any other: the demo has no way around the
-//! protocol.
+//! `chefshat demo`: runs a server, agents that connect to it, and a spectator that narrates the game; at the end prints the standings,
+//! whether the deals are verified, and where the record is. The game goes through the protocol like any other.
 
 mod table;
 mod verify;
@@ -23,12 +22,12 @@ use crate::narration::{Narrator, abort_reason, clean, heading, legend, row};
 use chefshat_server::host::Host;
 use table::Table;
 
-/// Most agents that can be named: the engine's limit of seats.
+/// Maximum number of agents: the engine's limit of seats.
 const MAX_PLAYERS: usize = 6;
-/// The agents that take turns in taking seats when none are named.
+/// The default agents, seated in turn.
 const STANDARD_AGENTS: [AgentKind; 2] = [AgentKind::Greedy, AgentKind::Random];
 
-/// Play a game between agents over real connections and watch it.
+/// Run a server and agents over real connections, and watch their game.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  chefshat demo\n  chefshat demo --seed 7 --agents greedy,random,random_unmasked\n  \
@@ -36,19 +35,19 @@ const STANDARD_AGENTS: [AgentKind; 2] = [AgentKind::Greedy, AgentKind::Random];
                   Exit code: 0 when the game finished and its deals check out."
 )]
 pub(super) struct Demo {
-    /// Makes the game repeatable: fixes its deals and the agents' choices.
+    /// Seed of the deals and the agents' choices, for a repeatable game.
     #[arg(long)]
     seed: Option<u64>,
-    /// Who plays, seat by seat: random, random_unmasked, greedy, trained. Standard: greedy and random in turn.
+    /// The agents, seat by seat: random, random_unmasked, greedy, trained. Default: greedy and random in turn.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = agent_kind)]
     agents: Vec<AgentKind>,
-    /// Milliseconds that each agent waits before it decides.
+    /// Milliseconds that each agent waits before a decision.
     #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u64).range(0..=MAX_PACE_MS))]
     pace_ms: u64,
-    /// Folder for the record (records/GAME-ID.jsonl). Standard: chefshat in the user's data folder.
+    /// Data directory for the record (records/GAME-ID.jsonl). Default: chefshat in the user's data directory.
     #[arg(long, env = "CHEFSHAT_DATA_DIR")]
     data_dir: Option<PathBuf>,
-    /// Print JSON lines: where the server listens, every event, the result.
+    /// Print JSON lines: the server's address, every event, the result.
     #[arg(long)]
     json: bool,
     #[command(flatten)]
@@ -74,7 +73,7 @@ impl Demo {
         let end = self.watch(&mut out, &table).await?;
         let Table { agents, room, .. } = table;
         let outcomes = table::outcomes(agents.players).await;
-        // The record is written when the server has ended: it waits for that.
+        // The record is complete when the server has stopped.
         host.stop().await?;
         let end = match end {
             Ending::Finished(end) => end,
@@ -95,7 +94,7 @@ impl Demo {
         Ok(ExitCode::SUCCESS)
     }
 
-    /// Who plays by which rules: as many seats as agents are named, unless the flags say how many.
+    /// Agents and rules: as many seats as agents are given, unless the flags set the number.
     fn agents_and_rules(&self) -> Result<(Vec<AgentKind>, v1::RuleSet), CommandError> {
         let mut message = self.rules.message();
         if !self.agents.is_empty() && message.players.is_none() {
@@ -135,7 +134,7 @@ impl Demo {
             Some(seed) => format!("from the seed {seed}"),
             None => {
                 let commitment = hex::encode(&table.room.seed_commitment);
-                format!("committed to as {commitment}")
+                format!("commitment {commitment}")
             }
         };
         write!(out, "{}", row("the deals", &deals))?;
@@ -143,20 +142,20 @@ impl Demo {
         Ok(())
     }
 
-    /// Shows every event as it comes, to the end of the game.
+    /// Shows each event as it arrives, until the game ends.
     async fn watch(&self, out: &mut impl Write, table: &Table) -> Result<Ending, CommandError> {
         let labels = table.agents.kinds.iter().map(|kind| kind.name().to_owned());
         let mut narrator = Narrator::default().with_labels(labels);
         let mut spectator: Spectator = table.client.spectate(table.room.room_id.as_str(), 1);
-        let mut end = Ending::Aborted("the spectator was not told why");
+        let mut end = Ending::Aborted("the server gave no reason");
         while let Some(event) = spectator.next().await? {
             if self.json {
-                // What came over the wire may be more than JSON can say; that is an error, not a panic.
+                // A message may have values that JSON has not, such as NaN: an error, not a panic.
                 let game_event = serde_json::to_value(&event)?;
                 let line = serde_json::json!({"event": "game", "game_event": game_event});
                 writeln!(out, "{line}")?;
             } else if !matches!(event.kind, Some(Kind::Seated(_))) {
-                // Who sits where is said when the game begins.
+                // The start of the game lists the seats.
                 write!(out, "{}", narrator.tell(&event))?;
                 out.flush()?;
             }
@@ -172,13 +171,13 @@ impl Demo {
     }
 }
 
-/// How the game ended for the spectator.
+/// The end of the game as the spectator saw it.
 enum Ending {
     Finished(v1::GameEnded),
     Aborted(&'static str),
 }
 
-/// The last line for programs.
+/// The last line with --json.
 fn result(
     end: &v1::GameEnded,
     room: &v1::Room,

@@ -1,4 +1,4 @@
-//! The table of a demo: a room made over one connection, and agents that sit down at it over a connection each.
+//! The room of a demo and its agents, each with a connection of its own.
 
 use std::net::SocketAddr;
 use std::time::Duration;
@@ -10,20 +10,20 @@ use tokio::task::JoinHandle;
 use super::super::CommandError;
 use super::super::remote::{RemoteAgent, seed_for};
 
-/// An agent at play.
+/// An agent while it plays.
 pub(super) type Player = JoinHandle<Result<Outcome, PlayError>>;
 
-/// A room whose agents are at play.
+/// A room with its agents.
 pub(super) struct Table {
-    /// The connection of the host, which is the spectator's too.
+    /// Connection of the room's creator and spectator.
     pub(super) client: Client,
-    /// The room as it was made.
+    /// The room as created.
     pub(super) room: v1::Room,
-    /// Who plays.
+    /// The agents.
     pub(super) agents: Agents,
 }
 
-/// The agents of a table; each list's index is the seat.
+/// The agents of a room; the index of each list is the seat.
 pub(super) struct Agents {
     pub(super) kinds: Vec<AgentKind>,
     pub(super) names: Vec<String>,
@@ -31,7 +31,7 @@ pub(super) struct Agents {
 }
 
 impl Table {
-    /// Makes the room, seats the agents in the order of the seats and lets them play.
+    /// Creates the room, seats the agents in order and starts them.
     pub(super) async fn set(
         address: SocketAddr,
         kinds: Vec<AgentKind>,
@@ -51,9 +51,9 @@ impl Table {
             .await?;
         let room = made
             .room
-            .ok_or("the server did not say which room it made")?;
+            .ok_or("the server did not return the created room")?;
         let names = names(&kinds);
-        // Everybody sits before anybody plays, so that the seats do not depend on who is faster.
+        // All take their seats before the first plays, so that seats do not depend on timing.
         let mut seated = Vec::with_capacity(kinds.len());
         for name in &names {
             let own = Client::connect(&server).await?;
@@ -84,7 +84,7 @@ impl Table {
     }
 }
 
-/// What the agents have at the end of the game, index = seat.
+/// The agents' results at the end of the game, by seat.
 pub(super) async fn outcomes(players: Vec<Player>) -> Result<Vec<Outcome>, CommandError> {
     let mut outcomes = Vec::with_capacity(players.len());
     for player in players {
@@ -93,12 +93,12 @@ pub(super) async fn outcomes(players: Vec<Player>) -> Result<Vec<Outcome>, Comma
     Ok(outcomes)
 }
 
-/// The game seed of a number that a person chose.
+/// The game seed for the user's seed.
 pub(super) fn game_seed(seed: u64) -> [u8; 32] {
     seed_for("chefshat demo game", Some(seed))
 }
 
-/// A name for each agent, no two alike, whose first letter says what it is.
+/// Unique names for the agents; the first letter shows the kind of agent.
 fn names(kinds: &[AgentKind]) -> Vec<String> {
     let mut used = [0; AgentKind::ALL.len()];
     kinds

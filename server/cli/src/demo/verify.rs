@@ -1,6 +1,5 @@
-//! Whether the deals of a finished game are those that were promised: the seed the server revealed is the one it committed to before
-//! anybody was asked for anything (or the one that was asked for), the agents' own bytes are in it, and every hand of the record
-//! follows from it.
+//! Verifies the deals of a finished game: the revealed seed matches the commitment made before the game (or the requested seed), it
+//! contains the agents' entropy, and each recorded hand follows from it.
 
 use chefshat_client::{Outcome, v1};
 use chefshat_engine::{Deal, RuleSet, Seed};
@@ -9,17 +8,17 @@ use chefshat_record::convert::{rules_from_proto, seat_cards};
 use v1::game_event::Kind;
 use v1::record_line::Line;
 
-/// What was found to be right.
+/// A successful verification.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Checked {
-    /// Deals that follow from the seed.
+    /// Number of deals that follow from the seed.
     pub(super) deals: usize,
     /// Whether the server had committed to its part of the seed.
     pub(super) committed: bool,
 }
 
 impl Checked {
-    /// For people.
+    /// The result in words.
     pub(super) fn in_words(&self) -> String {
         let deals = match self.deals {
             1 => "the deal follows".to_owned(),
@@ -34,12 +33,12 @@ impl Checked {
     }
 }
 
-/// Why the deals are not to be trusted.
+/// Why the verification failed.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the deals do not check out: {0}")]
+#[error("the deals cannot be verified: {0}")]
 pub(super) struct Unproven(&'static str);
 
-/// Checks a record against what was known before the game: the commitment, the seed asked for if any, and what each agent added.
+/// Verifies a record against the commitment, the requested seed if any, and each agent's entropy.
 pub(super) fn check(
     record: &[v1::RecordLine],
     commitment: &[u8],
@@ -122,7 +121,7 @@ fn check_commitment(
     Ok(())
 }
 
-/// Whether the hands of a Shift are those that the seed deals.
+/// Whether the hands of a Shift are those the seed deals.
 fn check_deal(rules: &RuleSet, seed: Seed, start: &v1::ShiftStarted) -> Result<(), Unproven> {
     let deal = Deal::new(rules, seed, start.shift);
     let hands: Vec<v1::SeatCards> = deal
@@ -149,7 +148,7 @@ mod tests {
 
     use crate::demo::verify::*;
 
-    /// A game as it was promised and as it was played.
+    /// A game with what was promised and what was recorded.
     #[derive(Clone)]
     struct Game {
         commitment: Vec<u8>,
@@ -238,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_promised_checks_out() {
+    fn honest_games_are_verified() {
         for (game, committed) in [(committed(), true), (fixed(), false)] {
             assert_eq!(
                 checked(&game),
@@ -251,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn every_change_is_noticed() {
+    fn every_change_is_detected() {
         type Change = fn(&mut Game);
         let changes: [(&str, Change); 8] = [
             ("commitment", |game| game.commitment[0] ^= 1),

@@ -1,4 +1,4 @@
-//! `chefshat participant delete`: the database first, then the files of records. A run that was interrupted is made good by another.
+//! `chefshat participant delete`: changes the database first, then the record files. Running it again completes an interrupted run.
 
 use std::io::{self, BufRead as _, IsTerminal as _, Write as _};
 use std::path::Path;
@@ -28,18 +28,18 @@ Examples:
   chefshat participant delete P07 --data-dir ./chefshat-data
   chefshat participant delete \"Rosa L.\" --yes --json";
 
-/// What a pseudonym begins with.
+/// Prefix of a pseudonym.
 const PSEUDONYM: &str = "deleted participant ";
 /// Random bytes of a pseudonym.
 const PSEUDONYM_BYTES: usize = 3;
 
-/// Take a participant out of everything that is kept: the name gives way to a pseudonym.
+/// Delete a participant's data: a pseudonym replaces the name.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(super) struct Delete {
     #[command(flatten)]
     who: Who,
-    /// Do not ask.
+    /// Do not ask for confirmation.
     #[arg(long)]
     yes: bool,
     /// Print one JSON object.
@@ -47,12 +47,12 @@ pub(super) struct Delete {
     json: bool,
 }
 
-/// What came of the files.
+/// The result for the files.
 #[derive(Default)]
 struct Files {
     changed: u64,
     taken_out: TakenOut,
-    /// The pseudonym that a run before this one, which did not come to its end, had put into the database.
+    /// The pseudonym that an interrupted run stored in the database.
     earlier: Option<String>,
     left: Left,
 }
@@ -110,7 +110,7 @@ impl Delete {
         }
         files.left.check(&who.name)?;
         if !found && !self.json {
-            anstream::eprintln!("nothing is kept of {:?}", who.name);
+            anstream::eprintln!("nothing is stored about {:?}", who.name);
         }
         Ok(if found {
             ExitCode::SUCCESS
@@ -119,19 +119,19 @@ impl Delete {
         })
     }
 
-    /// Asks whether this is meant.
+    /// Asks for confirmation.
     fn ask(&self) -> Result<(), CommandError> {
         if self.yes {
             return Ok(());
         }
         if !io::stdin().is_terminal() {
-            return Err("nothing was changed: say --yes if this is meant".into());
+            return Err("nothing was changed: confirm with --yes".into());
         }
         let name = &self.who.name;
         let mut out = anstream::stderr();
         write!(
             out,
-            "This takes {name:?} out of everything kept here and cannot be undone. Type the name to go on: "
+            "This removes {name:?} from all data here and cannot be undone. Type the name to confirm: "
         )?;
         out.flush()?;
         let mut answer = String::new();
@@ -144,7 +144,7 @@ impl Delete {
     }
 }
 
-/// Rewrites the files of the records in which the name stands, each whole or not at all.
+/// Rewrites the record files that contain the name, each atomically.
 async fn rewrite(
     database: &mut Forgetting,
     data_dir: &Path,
@@ -176,7 +176,7 @@ async fn rewrite(
     Ok(files)
 }
 
-/// The pseudonym that the database has in the place of a name in a record, so that the file says what the database says.
+/// The pseudonym the database has for a name in a record, so that file and database agree.
 async fn held(
     database: &mut Forgetting,
     lines: &[v1::RecordLine],
@@ -198,7 +198,7 @@ async fn held(
             return Ok(Some(held));
         }
     }
-    // Who left before the game has no seat in it, but sat down.
+    // A participant who left before the game has no seat in the header but a Seated event.
     let names = sat_down(lines);
     if !names.contains(&name) {
         return Ok(None);
@@ -207,7 +207,7 @@ async fn held(
     Ok(pseudonym_of(name, &names, &kept).cloned())
 }
 
-/// The names of those who sat down in the game of a record, in order.
+/// The names of the participants seated in a record, in order.
 fn sat_down(lines: &[v1::RecordLine]) -> Vec<&str> {
     let events = lines.iter().filter_map(|line| match &line.line {
         Some(Line::Event(event)) => event.kind.as_ref(),
@@ -220,7 +220,7 @@ fn sat_down(lines: &[v1::RecordLine]) -> Vec<&str> {
     names.collect()
 }
 
-/// The pseudonym that is kept where a record has a name, of those who sat down in the same game.
+/// The pseudonym stored for a name, by the participants seated in the same game.
 fn pseudonym_of<'k>(name: &str, recorded: &[&str], kept: &'k [String]) -> Option<&'k String> {
     let mut both = recorded.iter().zip(kept);
     let found = both.find(|(recorded, kept)| **recorded == name && kept.starts_with(PSEUDONYM));
@@ -232,7 +232,7 @@ mod tests {
     use crate::participant::delete::*;
 
     #[test]
-    fn who_left_before_the_game_is_found_among_those_who_sat_down() {
+    fn participants_who_left_before_the_game_are_found() {
         let seated = |name: &str| v1::RecordLine {
             line: Some(Line::Event(v1::GameEvent {
                 kind: Some(Kind::Seated(Box::new(v1::Seated {

@@ -1,4 +1,4 @@
-//! `chefshat participant export`: what is kept of a participant, as JSON Lines. What others did in the same games is left out.
+//! `chefshat participant export`: writes a participant's data as JSON Lines, without what others did in the same games.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -30,19 +30,19 @@ Examples:
   chefshat participant export P07 --out p07.jsonl --data-dir ./chefshat-data
   chefshat participant export \"Rosa L.\" --out rosa.jsonl --json";
 
-/// Records that are asked for at a time.
+/// Page size of the list of records.
 const AT_A_TIME: usize = 100;
 
-/// Write everything that is kept of a participant into a file, JSON Lines.
+/// Export everything stored about a participant as JSON Lines.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(super) struct Export {
     #[command(flatten)]
     who: Who,
-    /// The file to write; it appears whole or not at all.
+    /// File to write; it is written atomically.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Replace the file if it is there.
+    /// Replace an existing file.
     #[arg(long)]
     force: bool,
     /// Print one JSON object.
@@ -50,7 +50,7 @@ pub(super) struct Export {
     json: bool,
 }
 
-/// The lines to write, and what they are.
+/// The lines to write, and their counts.
 #[derive(Default)]
 struct Sheet {
     lines: Vec<Value>,
@@ -66,7 +66,7 @@ impl Export {
         let data_dir = self.who.data_dir()?;
         if self.out.exists() && !self.force {
             let out = self.out.display();
-            return Err(format!("{out} is there already; --force replaces it").into());
+            return Err(format!("{out} exists already; --force replaces it").into());
         }
         let store = SqliteStore::open(&data_dir).await?;
         let gathered = gather(&store, &data_dir, &self.who.name).await;
@@ -76,7 +76,7 @@ impl Export {
             sheet.left.check(&self.who.name)?;
             let name = &self.who.name;
             return Err(format!(
-                "nothing is kept of {name:?} in {}: write the name exactly as it was played under",
+                "nothing is stored about {name:?} in {}: give the exact name the participant played under",
                 data_dir.display()
             )
             .into());
@@ -111,7 +111,7 @@ impl Export {
     }
 }
 
-/// Everything that is kept of a name.
+/// Everything stored about a name.
 async fn gather(store: &SqliteStore, data_dir: &Path, name: &str) -> Result<Sheet, CommandError> {
     let mut sheet = Sheet::default();
     let mut known = BTreeSet::new();
@@ -133,7 +133,7 @@ async fn gather(store: &SqliteStore, data_dir: &Path, name: &str) -> Result<Shee
             known.insert(summary.game_id);
         }
     }
-    // Records of other servers, and of real tables, may lie there as files alone.
+    // Imported records may exist as files only.
     for candidate in records_with(data_dir, name)? {
         let Some(lines) = sheet.left.read(&candidate) else {
             continue;
@@ -172,7 +172,7 @@ async fn gather(store: &SqliteStore, data_dir: &Path, name: &str) -> Result<Shee
 }
 
 impl Sheet {
-    /// Adds what a participant did in a game, if it took part in it.
+    /// Adds what the participant did in a game, if it took part.
     fn add_game(&mut self, summary: &v1::RecordSummary, lines: &[v1::RecordLine], name: &str) {
         let game_id = &summary.game_id;
         let mut own = OwnSeats::at_start(lines, name);

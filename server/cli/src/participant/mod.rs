@@ -1,5 +1,5 @@
-//! `chefshat participant`: what a data folder knows of one participant, given out or taken out. Both need the folder for themselves: the
-//! server is stopped first. What is changed in a record is decided in `chefshat-records`, in the database in [`chefshat_server::store`].
+//! `chefshat participant`: exports or deletes a participant's data in a data directory. The server must be stopped. `chefshat-record`
+//! changes the records, [`chefshat_server::store`] the database.
 
 mod delete;
 mod export;
@@ -14,7 +14,7 @@ use clap::{Args, Subcommand};
 
 use super::{CommandError, data_dir};
 
-/// Give out or delete what is known of a participant.
+/// Export or delete a participant's data.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  chefshat participant export P07 --out p07.jsonl --data-dir ./chefshat-data\n  \
@@ -27,19 +27,19 @@ pub(super) struct ParticipantCommand {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Write everything that is kept of a participant into a file, JSON Lines.
+    /// Export everything stored about a participant as JSON Lines.
     Export(export::Export),
-    /// Take a participant out of everything that is kept: the name gives way to a pseudonym.
+    /// Delete a participant's data: a pseudonym replaces the name.
     Delete(delete::Delete),
 }
 
-/// The participant, and where it is looked for.
+/// The participant and the data directory.
 #[derive(Debug, Args)]
 struct Who {
-    /// The name that the participant played under, exactly.
+    /// The exact name the participant played under.
     #[arg(value_name = "NAME", value_parser = NonEmptyStringValueParser::new())]
     name: String,
-    /// Data folder of the server, which must be stopped. Standard: chefshat in the user's data folder.
+    /// Data directory of the server, which must be stopped. Default: chefshat in the user's data directory.
     #[arg(long, env = "CHEFSHAT_DATA_DIR")]
     data_dir: Option<PathBuf>,
 }
@@ -54,30 +54,33 @@ impl ParticipantCommand {
 }
 
 impl Who {
-    /// The data folder; a folder that is not there is not made.
+    /// The data directory, which must exist.
     fn data_dir(&self) -> Result<PathBuf, CommandError> {
         let folder = data_dir::name(self.data_dir.clone())?;
         if folder.is_dir() {
             Ok(folder)
         } else {
             let folder = folder.display();
-            Err(format!("there is no data folder {folder}; name another with --data-dir").into())
+            Err(
+                format!("there is no data directory {folder}; choose another with --data-dir")
+                    .into(),
+            )
         }
     }
 }
 
-/// A file in which the name may stand.
+/// A file that may contain the name.
 struct Candidate {
     path: PathBuf,
-    /// It does, or the file cannot even be looked into; otherwise it may be written by the numbers of its letters.
+    /// The name occurs, or the file is unreadable; otherwise the name may be escaped.
     named: bool,
 }
 
-/// Why files with the name were left as they are. The others are done first: the command fails when it has.
+/// Why files with the name were left unchanged; the command fails after the others are done.
 #[derive(Default)]
 struct Left(Vec<String>);
 
-/// The records in a data folder in which a name may stand, by the letters in the file: reading each as a record would take long.
+/// The records in which a name may occur, by a search of their bytes: parsing each record would take long.
 fn records_with(data_dir: &Path, name: &str) -> Result<Vec<Candidate>, CommandError> {
     let folder = data_dir.join("records");
     if !folder.is_dir() {
@@ -93,7 +96,7 @@ fn records_with(data_dir: &Path, name: &str) -> Result<Vec<Candidate>, CommandEr
         }
         let text = std::fs::read(&path);
         let named = (text.as_ref()).map_or(true, |text| contains(text, quoted.as_bytes()));
-        // Other programs write some letters by their numbers.
+        // Other programs may escape letters.
         if named || text.is_ok_and(|text| contains(&text, b"\\u")) {
             found.push(Candidate { path, named });
         }
@@ -107,7 +110,7 @@ fn contains(text: &[u8], wanted: &[u8]) -> bool {
 }
 
 impl Left {
-    /// The record of a candidate; one that cannot be read is left, and need not be this participant's.
+    /// Reads a candidate; an unreadable one is skipped and need not concern this participant.
     fn read(&mut self, candidate: &Candidate) -> Option<Vec<v1::RecordLine>> {
         let lines = jsonl::read(&candidate.path);
         lines
@@ -115,7 +118,7 @@ impl Left {
             .ok()
     }
 
-    /// Notes why a candidate is left as it is.
+    /// Notes why a candidate is left unchanged.
     fn note(&mut self, candidate: &Candidate, why: String) {
         if candidate.named {
             self.0.push(why);
@@ -124,7 +127,7 @@ impl Left {
         }
     }
 
-    /// Fails if the name stands in what was left.
+    /// Fails if the name occurs in a skipped file.
     fn check(&self, name: &str) -> Result<(), CommandError> {
         if self.0.is_empty() {
             return Ok(());

@@ -1,18 +1,18 @@
-//! The flags that say which records are wanted.
+//! Flags that filter records.
 
 use chefshat_client::v1;
 use clap::{Args, ValueEnum};
 
 use crate::kind::{KindArg, kind_filter};
 
-/// Which records: all conditions that are given must hold.
+/// Filter of records; all given conditions must hold.
 #[derive(Debug, Default, Args)]
 #[command(next_help_heading = "Which")]
 pub(super) struct FilterArgs {
-    /// Games that ended so.
+    /// Games with this end.
     #[arg(long)]
     state: Option<EndArg>,
-    /// Games in which a participant had this name, or the built-in agent of a seat is this.
+    /// Games with a participant of this name or a built-in agent of this kind.
     #[arg(
         long,
         value_name = "NAME",
@@ -31,10 +31,10 @@ pub(super) struct FilterArgs {
         hide_default_value = true
     )]
     room_name: String,
-    /// Games that came about so.
+    /// Games with this origin.
     #[arg(long)]
     origin: Option<OriginArg>,
-    /// Games whose room was created at this time or later, milliseconds since the Unix epoch.
+    /// Games whose room was created at or after this time, in milliseconds since the Unix epoch.
     #[arg(
         long,
         value_name = "MS",
@@ -42,7 +42,7 @@ pub(super) struct FilterArgs {
         hide_default_value = true
     )]
     created_from_ms: u64,
-    /// Games whose room was created before this time, milliseconds since the Unix epoch.
+    /// Games whose room was created before this time, in milliseconds since the Unix epoch.
     #[arg(
         long,
         value_name = "MS",
@@ -50,35 +50,35 @@ pub(super) struct FilterArgs {
         hide_default_value = true
     )]
     created_before_ms: u64,
-    /// Games that this server hosted: none that were added from elsewhere.
+    /// Games hosted by this server, not imported ones.
     #[arg(long)]
     hosted_here: bool,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum EndArg {
-    /// With a result.
+    /// The game has a result.
     Finished,
-    /// Without one.
+    /// The game was aborted.
     Aborted,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum OriginArg {
-    /// Dealt from a seed that the server committed to.
+    /// Dealt from a seed the server committed to.
     Dealt,
-    /// Dealt from a seed that the room's creator fixed.
+    /// Dealt from a seed fixed by the room's creator.
     FixedSeed,
-    /// Begun with given hands.
+    /// Started with given hands.
     Scripted,
     /// Branched from another record.
     Branched,
-    /// Played elsewhere with real cards.
+    /// Played with physical cards and imported.
     Imported,
 }
 
 impl FilterArgs {
-    /// The filter as a server is asked for it.
+    /// The filter for the server.
     pub(super) fn message(&self) -> v1::RecordFilter {
         let state = match self.state {
             None => v1::RoomState::Unspecified,

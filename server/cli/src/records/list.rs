@@ -1,4 +1,4 @@
-//! `chefshat records list`: a line for each record.
+//! `chefshat records list`: lists records, one per line.
 
 use std::process::ExitCode;
 
@@ -11,10 +11,10 @@ use super::filter::FilterArgs;
 use super::service;
 use crate::narration::{abort_reason, clean};
 
-/// Records asked for at a time.
+/// Page size.
 const PAGE: u32 = 100;
 
-/// List the records of a server, oldest first unless asked otherwise.
+/// List the records of a server, oldest first.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  chefshat records list --state finished\n  \
                   chefshat records list --newest-first --participant Greta\n  \
@@ -24,7 +24,7 @@ pub(super) struct List {
     server: ServerArg,
     #[command(flatten)]
     filter: FilterArgs,
-    /// Begin with the newest, not with the oldest.
+    /// List the newest record first.
     #[arg(long)]
     newest_first: bool,
     /// Print each record's summary as a JSON line.
@@ -71,7 +71,7 @@ impl List {
     }
 }
 
-/// A record in a line: which game, how it ended, how long it was, who played.
+/// A record in one line: game, end, length, players.
 pub(super) fn in_a_line(summary: &v1::RecordSummary) -> String {
     let state = match summary.state() {
         v1::RoomState::Finished => "finished",

@@ -1,5 +1,5 @@
-//! `chefshat records`: the records a server holds, listed, fetched and added from the command line. What a record says is checked by
-//! `chefshat verify` and by the server that takes one in.
+//! `chefshat records`: lists, downloads and imports records of a server. `chefshat verify` checks a downloaded record; a server verifies an
+//! imported one.
 
 mod filter;
 mod list;
@@ -14,10 +14,10 @@ use tonic::transport::Channel;
 
 use super::CommandError;
 
-/// Longest message taken from a server, bytes: a page of a hundred summaries, or a part of a record.
+/// Maximum size of a response in bytes: a page of a hundred summaries, or a part of a record.
 const MAX_RESPONSE_BYTES: usize = 16 * 1024 * 1024;
 
-/// List, fetch and add records of games that have ended.
+/// List, download and import records of finished games.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  chefshat records list --participant Greta --json\n  \
@@ -32,13 +32,13 @@ pub(super) struct RecordsCommand {
 
 #[derive(Debug, Subcommand)]
 enum RecordsAction {
-    /// List the records of a server, oldest or newest first.
+    /// List the records of a server.
     List(list::List),
-    /// Fetch the record of one game.
+    /// Download the record of one game.
     Get(transfer::Get),
-    /// Fetch many records.
+    /// Download many records.
     Stream(transfer::Stream),
-    /// Add records of games played elsewhere.
+    /// Import records of games played elsewhere.
     Import(transfer::Import),
 }
 

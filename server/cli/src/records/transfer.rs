@@ -1,4 +1,4 @@
-//! `chefshat records get`, `stream` and `import`: whole records between a server and files. A file appears whole or not at all.
+//! `chefshat records get`, `stream` and `import`: transfers records between a server and files, which are written atomically.
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -17,26 +17,26 @@ use super::filter::FilterArgs;
 use super::list::in_a_line;
 use super::service;
 
-/// Bytes of lines that are sent in one message: half of what a server takes.
+/// Bytes of lines per message: half of the server's limit.
 const PART_BYTES: usize = 32 * 1024;
 
-/// Fetch the record of one game.
+/// Download the record of one game.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example:\n  chefshat records get 5f0c6a4de2b14b7f8a3d9c1e7b60425d --out game.jsonl"
 )]
 pub(super) struct Get {
-    /// Which game.
+    /// ID of the game.
     #[arg(value_name = "GAME-ID")]
     game_id: String,
     #[command(flatten)]
     server: ServerArg,
-    /// File to write; standard output if none is named.
+    /// File to write. Default: standard output.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
 
-/// Fetch many records, oldest first.
+/// Download many records, oldest first.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  chefshat records stream --state finished --out-dir ./games\n  \
@@ -47,17 +47,17 @@ pub(super) struct Stream {
     server: ServerArg,
     #[command(flatten)]
     filter: FilterArgs,
-    /// Folder to write into, a file GAME-ID.jsonl for each; standard output, one after the other, if none is named.
+    /// Directory to write to, one file GAME-ID.jsonl per record. Default: standard output, one record after the other.
     #[arg(long, value_name = "FOLDER")]
     out_dir: Option<PathBuf>,
 }
 
-/// Add records of games played elsewhere: on another server, or at a real table. The server verifies them first, and its host must have
-/// allowed it.
+/// Import records of games played elsewhere: on another server or at a physical table. The server verifies them first and must have been
+/// started with --allow-import.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  chefshat records import ./game.jsonl ./games/*.jsonl")]
 pub(super) struct Import {
-    /// The records.
+    /// The records to import.
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
     #[command(flatten)]
@@ -106,7 +106,7 @@ impl Stream {
         }
         bar.finish_and_clear();
         if !record.is_empty() {
-            return Err("the server ended in the middle of a record".into());
+            return Err("the server ended the stream in the middle of a record".into());
         }
         if let Some(folder) = &self.out_dir {
             say(format_args!("{count} records in {}", folder.display()))?;
@@ -121,7 +121,7 @@ impl Stream {
         let Some(Line::Header(header)) = record.first().and_then(|line| line.line.as_ref()) else {
             return Err("the server sent a record without a header".into());
         };
-        // It becomes a file's name, and the server may be anybody's.
+        // The ID becomes a file name: do not trust the server.
         if header.game_id.len() != 32
             || !header.game_id.bytes().all(|byte| byte.is_ascii_hexdigit())
         {
@@ -144,7 +144,7 @@ impl Import {
             let added = (service.import_record(tokio_stream::iter(requests)).await)
                 .map_err(|status| refused(file, &Error::from(status)))?;
             let summary = (added.into_inner().record)
-                .ok_or("the server did not say which record it added")?;
+                .ok_or("the server did not return the imported record")?;
             let line = if self.json {
                 serde_json::to_string(&summary)?
             } else {
@@ -161,15 +161,15 @@ impl Import {
 fn refused(file: &Path, error: &Error) -> CommandError {
     let (name, message) = (file.display(), error.message());
     match error.reason() {
-        Some("IMPORT_OFF") => {
-            format!("{name}: {message}; its host can allow it with `chefshat serve --allow-import`")
-                .into()
-        }
+        Some("IMPORT_OFF") => format!(
+            "{name}: {message}; its host can allow imports with `chefshat serve --allow-import`"
+        )
+        .into(),
         _ => format!("{name}: {message}").into(),
     }
 }
 
-/// The lines of a record in messages of a size that a server takes.
+/// The lines of a record in messages within the server's limit.
 fn in_parts(lines: Vec<RecordLine>) -> Vec<v1::ImportRecordRequest> {
     let mut parts: Vec<v1::ImportRecordRequest> = Vec::new();
     let mut room = 0;

@@ -1,4 +1,4 @@
-//! Frames as a film: painted on all cores, in order into an animated GIF or into ffmpeg for an MP4.
+//! Writes frames as an animation: painted on all cores, encoded in order as an animated GIF or, by ffmpeg, as an MP4.
 
 use std::io::{self, Read as _, Write};
 use std::path::Path;
@@ -13,16 +13,16 @@ use rayon::prelude::*;
 
 use super::CommandError;
 
-/// Frames painted before they are written: as many at a time keep all cores busy without filling the memory.
+/// Frames painted per batch: enough for all cores within bounded memory.
 const AT_A_TIME: usize = 32;
-/// Frames that a GIF's palette is made from.
+/// Frames sampled for a GIF's palette.
 const PALETTE_FRAMES: usize = 12;
-/// Pictures a second of an MP4; a decision is shown for a whole number of them.
+/// Frames per second of an MP4; a decision lasts a whole number of them.
 const PICTURES_A_SECOND: u32 = 10;
-/// Most of what ffmpeg says that is told on.
+/// Maximum length of ffmpeg's error output in a message.
 const MAX_COMPLAINT: u64 = 2000;
 
-/// The frames of a film with the time each is shown.
+/// The frames of an animation with their durations.
 pub(super) struct Reel<'a> {
     frames: Vec<(&'a Frame, Duration)>,
     width: u32,
@@ -44,12 +44,12 @@ impl<'a> Reel<'a> {
         self.frames.len()
     }
 
-    /// How long the film is.
+    /// Total duration.
     pub(super) fn time(&self) -> Duration {
         self.frames.iter().map(|(_, shown_for)| *shown_for).sum()
     }
 
-    /// Writes the film as a GIF; says its size.
+    /// Writes a GIF; returns its size.
     pub(super) fn gif(&self, path: &Path) -> Result<(u32, u32), CommandError> {
         let mut file = AtomicFile::create(path)?;
         let sample = self.sample()?;
@@ -69,7 +69,7 @@ impl<'a> Reel<'a> {
         Ok(size)
     }
 
-    /// Writes the film as an MP4 by the program ffmpeg; says its size.
+    /// Writes an MP4 with ffmpeg; returns its size.
     pub(super) fn mp4(&self, path: &Path, program: &Path) -> Result<(u32, u32), CommandError> {
         let (first, _) = self.frames.first().ok_or("there is nothing to show")?;
         let first = self.paint(first)?;
@@ -83,7 +83,7 @@ impl<'a> Reel<'a> {
             }
             Ok(())
         });
-        // When ffmpeg stops early, what it says about it is worth more than that nobody reads any more.
+        // When ffmpeg stops early, its own message explains more than the broken pipe.
         ffmpeg.finish()?;
         shown?;
         file.finish()?;
@@ -95,7 +95,7 @@ impl<'a> Reel<'a> {
         Ok(self.painter.pixels(&svg, self.width)?)
     }
 
-    /// Some pictures, spread over the film.
+    /// Some frames, spread over the animation.
     fn sample(&self) -> Result<Vec<Pixels>, CommandError> {
         let step = self.frames.len().div_ceil(PALETTE_FRAMES).max(1);
         let frames: Vec<_> = self.frames.iter().step_by(step).collect();
@@ -105,7 +105,7 @@ impl<'a> Reel<'a> {
             .collect()
     }
 
-    /// Paints all frames and hands them over in order.
+    /// Paints all frames and passes them on in order.
     fn show(
         &self,
         mut take: impl FnMut(&Pixels, Duration) -> Result<(), CommandError>,
@@ -129,7 +129,7 @@ impl<'a> Reel<'a> {
     }
 }
 
-/// ffmpeg, being given pictures.
+/// A running ffmpeg that reads frames.
 struct Ffmpeg {
     child: Child,
     input: ChildStdin,
@@ -148,7 +148,7 @@ impl Ffmpeg {
             .args(["-f", "rawvideo", "-pixel_format", "rgba"])
             .args(["-video_size", &format!("{width}x{height}")])
             .args(["-framerate", &rate, "-i", "-"])
-            // The usual players know no other form, and it has no odd sides.
+            // Common players support no other form, and it requires even sides.
             .args(["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2"])
             .args(["-c:v", "libx264", "-pix_fmt", "yuv420p"])
             .args(["-movflags", "+faststart", "-f", "mp4"])
@@ -169,7 +169,7 @@ impl Ffmpeg {
         let complaints = std::thread::spawn(move || {
             let (mut text, mut rest) = (Vec::new(), errors);
             rest.by_ref().take(MAX_COMPLAINT).read_to_end(&mut text)?;
-            // The rest is read so that ffmpeg does not wait for a reader.
+            // The rest is drained so that ffmpeg does not block.
             io::copy(&mut rest, &mut io::sink())?;
             Ok(String::from_utf8_lossy(&text).trim().to_owned())
         });

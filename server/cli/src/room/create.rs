@@ -1,4 +1,4 @@
-//! `chefshat room create`: a room as the flags describe it, and the secrets it comes with. How its game begins is in `start`.
+//! `chefshat room create`: creates a room and prints its secrets. `start` has the flags for the beginning of its game.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -15,7 +15,7 @@ use super::super::secret_file::SecretFile;
 use super::super::{CommandError, say};
 use super::start::{StartArgs, players_of};
 
-/// Make a room and say how to join it.
+/// Create a room and print how to join it.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  chefshat room create --name friday --seat greedy --seat random=Rolf\n  \
@@ -25,20 +25,20 @@ use super::start::{StartArgs, players_of};
                   chefshat room create --hands ./hands.json --durability ephemeral"
 )]
 pub(super) struct Create {
-    /// Name to show.
+    /// Display name.
     #[arg(long, default_value = "")]
     name: String,
     #[command(flatten)]
     server: ServerArg,
-    /// How the next seat is filled: random, random_unmasked, greedy or trained (played by the server), replay:GAME-ID:SEAT (played by the server
-    /// as the player of that seat of a recorded game played), each with =NAME to go by another name, or open, agent, human or robot (for whom it
-    /// is free). Repeatable; seats not named are open.
+    /// How to fill the next seat: random, random_unmasked, greedy or trained (played by the server), replay:GAME-ID:SEAT (imitates the player
+    /// who had that seat in a recorded game), each optionally with =NAME for another name; or open, agent, human or robot (who may join).
+    /// Repeatable; seats not listed are open.
     #[arg(long = "seat", value_name = "SEAT", value_parser = seat)]
     seats: Vec<v1::SeatConfig>,
-    /// The game seed, 64 hexadecimal digits, for experiments; such a game has no seed commitment.
+    /// Game seed, 64 hexadecimal digits, for experiments; such a game has no seed commitment.
     #[arg(long, value_name = "HEX", value_parser = game_seed)]
     game_seed: Option<[u8; 32]>,
-    /// Leave the join code in this file, readable to its owner alone; waits for the server if it is not there yet.
+    /// Write the join code to this file, readable only by its owner; waits for the server to start.
     #[arg(long, value_name = "FILE")]
     code_file: Option<PathBuf>,
     /// Print the room with its secrets as a JSON line.
@@ -50,7 +50,7 @@ pub(super) struct Create {
     rules: RulesArgs,
     #[command(flatten)]
     policy: PolicyArgs,
-    /// Milliseconds to wait for the seats to be filled; standard 3600000.
+    /// Milliseconds to wait for all seats to be taken. Default: 3600000.
     #[arg(long, value_name = "MS", help_heading = "Times and limits")]
     waiting_time_ms: Option<u32>,
 }
@@ -65,21 +65,21 @@ impl Create {
         };
         let players = match (rules, self.start.branch()) {
             (Some(rules), _) => rules.players(),
-            // Who plays is asked for seat by seat; if no seat is named, all are open and it need not be known how many there are.
+            // Without --seat all seats are open, and their number may be left to the preset.
             (None, Some(point)) if !self.seats.is_empty() => {
                 players_of(&client, &point.game_id).await?
             }
             (None, _) => 0,
         };
         let request = self.request(start, players)?;
-        // Before there is a room: whoever cannot be told its code has no use for it.
+        // Before the room is created: without a file for its code it would be useless.
         let code_file = (self.code_file.as_deref())
             .map(|file| SecretFile::prepare(file, "--code-file", "a join code"))
             .transpose()?;
         let made = client.create_room(request).await.map_err(refused)?;
         let room = made
             .room
-            .ok_or("the server did not say which room it made")?;
+            .ok_or("the server did not return the created room")?;
         let left = code_file.map_or(Ok(()), |file| file.leave(&made.join_code));
         let (code, owner) = (made.join_code, made.owner_token);
         if self.json {
@@ -96,19 +96,19 @@ impl Create {
                 say(words)?;
             }
         }
-        // Only now, so that the secrets are told all the same.
+        // Last, so that the secrets are printed even if this fails.
         left?;
         Ok(ExitCode::SUCCESS)
     }
 
-    /// The rule set, unless it is that of a recorded game.
+    /// The rule set, unless a recorded game sets it.
     fn rules(&self) -> Result<Option<RuleSet>, CommandError> {
         if self.start.branch().is_none() {
             return Ok(Some(self.rules.rules()?));
         }
         if !self.rules.are_standard() {
             return Err(
-                "--branch: the recorded game's rules are played; leave out the flags for rules"
+                "--branch: the rules of the recorded game apply; leave out the flags for rules"
                     .into(),
             );
         }
@@ -147,12 +147,14 @@ impl Create {
 
 fn seat(word: &str) -> Result<v1::SeatConfig, String> {
     let (filled_by, name) = match word.split_once('=') {
-        Some((_, "")) => return Err("there is no name after the =".into()),
+        Some((_, "")) => return Err("the name after the = is empty".into()),
         Some((agent, name)) => (filled_by(agent)?, name),
         None => (filled_by(word)?, ""),
     };
     if !name.is_empty() && matches!(filled_by, FilledBy::ReservedFor(_)) {
-        return Err("a name is for a built-in agent; whoever joins brings their own".into());
+        return Err(
+            "only a built-in agent can be named; participants bring their own names".into(),
+        );
     }
     Ok(v1::SeatConfig {
         filled_by: Some(filled_by),
@@ -188,7 +190,7 @@ fn recorded_player(words: &str) -> Result<v1::RecordedPlayer, String> {
             seat: seat.parse().ok()?,
         })
     });
-    player.ok_or_else(|| "give replay:, the id of a recorded game, :, and a seat of it".to_owned())
+    player.ok_or_else(|| "use replay:, the ID of a recorded game, a colon, and a seat".to_owned())
 }
 
 fn game_seed(digits: &str) -> Result<[u8; 32], String> {
@@ -198,7 +200,7 @@ fn game_seed(digits: &str) -> Result<[u8; 32], String> {
         .map_err(|_| "a game seed is 64 hexadecimal digits".to_owned())
 }
 
-/// A refusal of the server in the words of the command line.
+/// A refusal of the server, with flags instead of fields.
 fn refused(error: chefshat_client::Error) -> CommandError {
     match (error.reason(), error.metadata().get("field")) {
         (Some("RULE_SET_REFUSED" | "POLICY_REFUSED" | "NAME_REFUSED"), Some(field)) => {
@@ -212,7 +214,7 @@ fn refused(error: chefshat_client::Error) -> CommandError {
     }
 }
 
-/// How the seats that are free can be filled.
+/// How to fill the free seats.
 fn next_step(room: &v1::Room, server: &str, code: &str) -> Option<String> {
     let free = free_seats(room);
     let first = room.seats.iter().find(|seat| seat.name.is_empty())?;
@@ -256,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn seats_not_named_are_open() {
+    fn seats_not_listed_are_open() {
         let request = request("--seat greedy --seat human").expect("a room");
         let seats: Vec<FilledBy> = request
             .seats
@@ -277,7 +279,7 @@ mod tests {
     }
 
     #[test]
-    fn a_seat_can_be_a_recorded_players() {
+    fn a_seat_can_imitate_a_recorded_player() {
         let request = request("--seat replay:5f0c6a4d:3").expect("a room");
         let replay = FilledBy::Replay(v1::RecordedPlayer {
             game_id: "5f0c6a4d".into(),
@@ -297,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn a_built_in_agent_may_go_by_another_name() {
+    fn a_built_in_agent_may_have_another_name() {
         let request = request("--seat greedy=Greta --seat random").expect("a room");
         let names: Vec<&str> = request.seats.iter().map(|seat| &*seat.name).collect();
         assert_eq!(names, ["Greta", "", "", ""]);
@@ -306,7 +308,7 @@ mod tests {
     }
 
     #[test]
-    fn a_branch_leaves_the_rules_to_the_record() {
+    fn a_branch_takes_its_rules_from_the_record() {
         let branch = request("--branch 5f0c6a4d@7 --seat greedy").expect("a room");
         assert_eq!(branch.rules, None);
         assert_eq!(branch.seats.len(), 4);
@@ -325,7 +327,7 @@ mod tests {
     }
 
     #[test]
-    fn free_seats_come_with_the_line_that_fills_them() {
+    fn free_seats_come_with_the_command_that_fills_them() {
         let seat = |name: &str, kind: v1::ParticipantKind| v1::Participant {
             name: name.into(),
             reserved_for: kind.into(),

@@ -1,4 +1,4 @@
-//! `chefshat room`: rooms of a server, made, listed, shown, watched and closed from the command line.
+//! `chefshat room`: creates, lists, shows, follows and closes rooms of a server.
 
 mod create;
 mod show;
@@ -12,7 +12,7 @@ use clap::{Args, Subcommand};
 use super::connect::ServerArg;
 use super::{CommandError, say};
 
-/// Make, list, watch and close rooms of a server.
+/// Create, list, watch and close rooms of a server.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  chefshat room create --name friday --seat greedy --seat random\n  \
@@ -25,7 +25,7 @@ pub(super) struct RoomCommand {
 
 #[derive(Debug, Subcommand)]
 enum RoomAction {
-    /// Make a room and say how to join it.
+    /// Create a room and print how to join it.
     Create(Box<create::Create>),
     /// List the rooms of a server.
     List(show::List),
@@ -33,20 +33,20 @@ enum RoomAction {
     Show(show::Show),
     /// Follow the game of a room.
     Watch(watch::Watch),
-    /// Close a room; a running game is aborted.
+    /// Close a room; a game in progress is aborted.
     Close(Close),
 }
 
-/// Close a room; a running game is aborted.
+/// Close a room; a game in progress is aborted.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example:\n  chefshat room close 5f0c6a4de2b14b7f8a3d9c1e7b60425d --owner-token TOKEN"
 )]
 struct Close {
-    /// Which room.
+    /// ID of the room.
     #[arg(value_name = "ROOM-ID")]
     room_id: String,
-    /// The secret that `room create` gave.
+    /// The secret printed by `room create`.
     #[arg(long, env = "CHEFSHAT_OWNER_TOKEN", hide_env_values = true)]
     owner_token: String,
     #[command(flatten)]

@@ -10,7 +10,7 @@ use super::super::{CommandError, say};
 use crate::kind::kind_name;
 use crate::narration::{abort_reason, clean};
 
-/// Rooms asked for at a time.
+/// Page size.
 const PAGE: u32 = 100;
 
 /// List the rooms of a server, newest first.
@@ -19,7 +19,7 @@ const PAGE: u32 = 100;
 pub(super) struct List {
     #[command(flatten)]
     server: ServerArg,
-    /// Rooms in this state alone.
+    /// Only rooms in this state.
     #[arg(long)]
     state: Option<StateArg>,
     /// Print each room as a JSON line.
@@ -31,7 +31,7 @@ pub(super) struct List {
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  chefshat room show 5f0c6a4de2b14b7f8a3d9c1e7b60425d")]
 pub(super) struct Show {
-    /// Which room.
+    /// ID of the room.
     #[arg(value_name = "ROOM-ID")]
     room_id: String,
     #[command(flatten)]
@@ -100,7 +100,7 @@ impl Show {
     }
 }
 
-/// Where a room stands, in a word.
+/// Name of a room's state.
 pub(super) fn state(state: v1::RoomState) -> &'static str {
     match state {
         v1::RoomState::Unspecified => "in a state this program does not know",
@@ -163,7 +163,7 @@ fn in_full(room: &v1::Room) -> String {
     out
 }
 
-/// How the game of a room begins, where it is not simply dealt.
+/// How the game of a room begins, if it is not dealt as usual.
 pub(super) fn beginning(room: &v1::Room) -> Option<String> {
     if let Some(point) = &room.branched_from {
         let (game, decisions) = (clean(&point.game_id, 40), point.decisions);

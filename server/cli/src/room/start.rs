@@ -1,4 +1,4 @@
-//! How the game of a new room begins, where it is not simply dealt: from given hands, or from a point of a recorded game.
+//! Flags for games that begin with given hands, or at a point of a recorded game.
 
 use std::path::{Path, PathBuf};
 
@@ -13,28 +13,28 @@ use super::super::CommandError;
 #[derive(Debug, Default, Args)]
 #[command(next_help_heading = "Beginning")]
 pub(super) struct StartArgs {
-    /// Go on with a recorded game of the server after so many of its decisions, by its rules; 0: with its first deal.
+    /// Continue a recorded game of the server after this many of its decisions, with its rules; 0 keeps only its first deal.
     #[arg(long, value_name = "GAME-ID@DECISIONS", value_parser = branch_point, conflicts_with = "hands")]
     branch: Option<v1::BranchPoint>,
-    /// With --branch: deal later Shifts as in the recorded game. Whoever knows its record then knows hidden cards.
+    /// With --branch: deal later Shifts as in the recorded game. Anyone who knows its record then knows hidden cards.
     #[arg(long, requires = "branch")]
     same_deals: bool,
-    /// Begin with the hands in this file: a ScriptedShift in canonical JSON, for instance {"hands": [{"seat": 0, "cards": [1, 4, 12],
+    /// Start with the hands in this file: a ScriptedShift in canonical JSON, for example {"hands": [{"seat": 0, "cards": [1, 4, 12],
     /// "golden": true}, ...]} with every seat's cards (a joker is the number of faces plus 1).
     #[arg(long, value_name = "FILE")]
     hands: Option<PathBuf>,
 }
 
 impl StartArgs {
-    /// The recorded game that is gone on with.
+    /// The recorded game to continue.
     pub(super) fn branch(&self) -> Option<&v1::BranchPoint> {
         self.branch.as_ref()
     }
 
-    /// The beginning as a server is asked for it.
+    /// The beginning for the server.
     ///
     /// # Errors
-    /// The file of hands cannot be read.
+    /// The file of hands is unreadable.
     pub(super) fn message(&self) -> Result<Option<Start>, CommandError> {
         if let Some(point) = &self.branch {
             return Ok(Some(Start::Branch(v1::BranchPoint {
@@ -55,7 +55,7 @@ fn branch_point(words: &str) -> Result<v1::BranchPoint, String> {
             same_deals: false,
         })
     });
-    point.ok_or_else(|| "give the id of a recorded game, @, and a number of decisions".to_owned())
+    point.ok_or_else(|| "use the ID of a recorded game, @, and a number of decisions".to_owned())
 }
 
 fn read_hands(file: &Path) -> Result<v1::ScriptedShift, CommandError> {
@@ -66,7 +66,7 @@ fn read_hands(file: &Path) -> Result<v1::ScriptedShift, CommandError> {
         .map_err(|error| format!("--hands: {name} is no ScriptedShift: {error}").into())
 }
 
-/// How many players a recorded game has, from the first line of its record.
+/// Number of players of a recorded game, from the header of its record.
 ///
 /// # Errors
 /// `GAME_UNKNOWN`, `GAME_RUNNING`.

@@ -1,4 +1,4 @@
-//! `chefshat room watch`: the public events of a room as they happen, told or as JSON lines.
+//! `chefshat room watch`: follows the public events of a room, as text or as JSON lines.
 
 use std::io::Write as _;
 use std::process::ExitCode;
@@ -12,14 +12,14 @@ use super::super::connect::{PATIENCE, ServerArg};
 use super::show::beginning;
 use crate::narration::{Narrator, clean, heading};
 
-/// Follow the game of a room.
+/// Follow the game of a room as text.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example:\n  chefshat room watch 5f0c6a4de2b14b7f8a3d9c1e7b60425d\n\n\
                   Exit code: 0 when the game finished, 1 when it was aborted or the room was lost."
 )]
 pub(super) struct Watch {
-    /// Which room.
+    /// ID of the room.
     #[arg(value_name = "ROOM-ID")]
     room_id: String,
     #[command(flatten)]
@@ -72,7 +72,7 @@ impl Watch {
                 _ => {}
             }
             if self.json {
-                // What came over the wire may be more than JSON can say; that is an error, not a panic.
+                // A message may have values that JSON has not, such as NaN: an error, not a panic.
                 let game_event = serde_json::to_value(&event)?;
                 let line = serde_json::json!({"event": "game", "game_event": game_event});
                 writeln!(out, "{line}")?;
@@ -85,15 +85,15 @@ impl Watch {
     }
 }
 
-/// Why there is nothing more to watch although the game has not ended.
+/// Why the stream ended before the game.
 fn lost(error: Option<Error>) -> CommandError {
     match error {
-        // The server said why.
+        // The server gave a reason.
         Some(error) if error.reason().is_some() => error.into(),
         Some(error) => {
             let patience = PATIENCE.as_secs();
-            format!("the connection was lost before the game ended, and not made again in {patience} seconds: {error}").into()
+            format!("the connection was lost before the game ended and not restored within {patience} seconds: {error}").into()
         }
-        None => "the server has nothing more to show, but the game has not ended".into(),
+        None => "the server ended the stream before the game ended".into(),
     }
 }

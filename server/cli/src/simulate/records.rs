@@ -1,5 +1,5 @@
-//! Records of simulated games: the games of a batch are played again, their decisions noted and written down. The form of such a record is
-//! decided in `convert::played`.
+//! Records of simulated games: replays each game of a batch, notes its decisions and writes its record. `chefshat-record` decides the
+//! form.
 
 use std::path::Path;
 
@@ -13,10 +13,10 @@ use chefshat_simulation::Batch;
 use chefshat_record::convert::Played;
 use chefshat_server::convert::simulation_policy;
 
-/// Plays a game of a batch, by its index from 0, and writes its record into a folder.
+/// Plays a game of a batch, by its index from 0, and writes its record to a directory.
 ///
 /// # Errors
-/// Whatever the file system has against it.
+/// The file cannot be written.
 pub(super) fn write(batch: &Batch, index: u64, folder: &Path) -> Result<(), RecordFileError> {
     let limit = batch
         .max_invalid_attempts()
@@ -42,7 +42,7 @@ pub(super) fn write(batch: &Batch, index: u64, folder: &Path) -> Result<(), Reco
     jsonl::write(&path, &played.record())
 }
 
-/// The decisions of a game, each after the attempts that were refused.
+/// The decisions of a game, each after its invalid attempts.
 #[derive(Default)]
 struct Notes {
     limit: Option<usize>,

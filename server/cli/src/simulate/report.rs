@@ -1,5 +1,4 @@
-//! The result of `chefshat simulate` as a text for people and as JSON for programs. Both depend on the batch alone: no times, no
-//! number of threads.
+//! The result of `chefshat simulate` as text and as JSON. Both depend only on the batch, not on time or the number of threads.
 
 use chefshat_engine::RewardScheme;
 use chefshat_simulation::{Batch, BatchTable, RulesForm};
@@ -8,10 +7,10 @@ use serde_json::{Value, json};
 use super::super::numbers::{counted, grouped};
 use super::super::output::{self, heading, line, percent};
 
-/// The column that holds the agents; the others hold numbers.
+/// The column of agents; the others have numbers.
 const AGENT_COLUMN: usize = 1;
 
-/// The result as one JSON object: what was played, sums and means over all, the same for each seat.
+/// The result as JSON: parameters, sums and means over all, and the same for each seat.
 pub(super) fn json(batch: &Batch, table: &BatchTable) -> Value {
     let seats: Vec<Value> = table
         .seats
@@ -54,7 +53,7 @@ pub(super) fn json(batch: &Batch, table: &BatchTable) -> Value {
     })
 }
 
-/// The result as lines of at most 100 columns, headings emphasised by escape codes (which the stream strips where they are unwanted).
+/// The result as lines of at most 100 columns, with headings in bold.
 pub(super) fn text(batch: &Batch, table: &BatchTable) -> String {
     let mut text = String::new();
     heading(
@@ -81,7 +80,7 @@ pub(super) fn text(batch: &Batch, table: &BatchTable) -> String {
     text
 }
 
-/// The rule set: its size and end, then what differs from the standard.
+/// The rule set: its size and end, then its variations.
 fn rules_lines(batch: &Batch) -> Vec<String> {
     let mut variations = output::variations(batch.rules());
     if let Some(attempts) = batch.max_invalid_attempts() {

@@ -1,4 +1,4 @@
-//! `chefshat tournament create`: a tournament as the flags describe it, and the secrets it comes with.
+//! `chefshat tournament create`: creates a tournament and prints its secrets.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -15,10 +15,10 @@ use super::super::secret_file::SecretFile;
 use super::super::{CommandError, say};
 use super::words::{DealsArg, FormatArg};
 
-/// Most participants of a tournament.
+/// Maximum number of participants.
 const MAX_BUILT_IN: usize = 1024;
 
-/// Make a tournament and say how to take part.
+/// Create a tournament and print how to take part.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  chefshat tournament create --name cup --format knockout --built-in greedy*4 --start-when 16\n  \
@@ -28,59 +28,59 @@ const MAX_BUILT_IN: usize = 1024;
                   docs/tournaments.md says what the formats and deals are, and what happens to those who do not come."
 )]
 pub(super) struct Create {
-    /// Name to show, 1 to 64 characters.
+    /// Display name, 1 to 64 characters.
     #[arg(long)]
     name: String,
-    /// Who plays whom.
+    /// Format of the tournament.
     #[arg(long, value_enum)]
     format: FormatArg,
     #[command(flatten)]
     server: ServerArg,
-    /// Built-in agents that take part: random, random_unmasked, greedy or trained, or so many of one, separated by commas, for instance
+    /// Built-in participants: random, random_unmasked, greedy or trained, or several as in greedy*4, separated by commas, for example
     /// greedy*4,trained. Repeatable.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = built_in)]
     built_in: Vec<BuiltIn>,
-    /// Begin by itself when so many have joined, built-in agents included. Standard: `chefshat tournament start` begins it.
+    /// Start when this many have joined, built-in agents included. Default: `chefshat tournament start` starts it.
     #[arg(long, value_name = "N")]
     start_when: Option<u32>,
-    /// Rounds of round_robin and swiss. Standard: one less than there are participants; for swiss, enough to find a winner.
+    /// Rounds of round_robin and swiss. Default: one less than participants; for swiss, enough to find a winner.
     #[arg(long, value_name = "N")]
     rounds: Option<u32>,
-    /// Games of each table of a round, its seats rotated from game to game; with rotated deals: deals. Standard 1.
+    /// Games of each table of a round, with seats rotated between games; with rotated deals: deals. Default: 1.
     #[arg(long, value_name = "N")]
     games_per_pairing: Option<u32>,
     /// How games are dealt.
     #[arg(long, value_enum, default_value_t = DealsArg::Independent)]
     deals: DealsArg,
-    /// What may take part. Repeatable; standard: all.
+    /// Kinds of participants that may join. Repeatable. Default: all.
     #[arg(long = "kind", value_enum, value_name = "KIND")]
     kinds: Vec<KindArg>,
-    /// Most participants, built-in agents included, 2 to 1024; standard 64.
+    /// Maximum number of participants, built-in agents included, 2 to 1024. Default: 64.
     #[arg(long, value_name = "N")]
     max_participants: Option<u32>,
-    /// Milliseconds that a game waits for participants who are not connected; standard 60000.
+    /// Milliseconds that a game waits for participants who are not connected. Default: 60000.
     #[arg(long, value_name = "MS")]
     no_show_time_ms: Option<u32>,
-    /// How often a game is called before those who do not come forfeit it, 1 to 10; standard 2.
+    /// How often a game is called before absent participants forfeit it, 1 to 10. Default: 2.
     #[arg(long, value_name = "N")]
     max_calls: Option<u32>,
-    /// Most games at a time, 1 to 256; standard 64.
+    /// Maximum number of games at a time, 1 to 256. Default: 64.
     #[arg(long, value_name = "N")]
     max_parallel_games: Option<u32>,
-    /// What every draw of seats and tables is made from, 64 hexadecimal digits, so that it can be drawn again alike. The deals do not depend
+    /// Seed of pairings and seats, 64 hexadecimal digits, to repeat a draw. The deals do not depend
     /// on it.
     #[arg(long, value_name = "HEX", value_parser = seed)]
     draw_seed: Option<[u8; 32]>,
-    /// 64 hexadecimal digits from which all deals follow, for an experiment: whoever knows them knows the cards, and games are not rated.
+    /// Seed of all deals, 64 hexadecimal digits, for experiments: anyone who knows it knows the cards, and games are not rated.
     #[arg(long, value_name = "HEX", value_parser = seed)]
     deal_seed: Option<[u8; 32]>,
-    /// Built-in agent that fills up a knockout and plays for those who forfeit; standard random.
+    /// Built-in agent that fills up a knockout and plays for participants who forfeit. Default: random.
     #[arg(long, value_name = "AGENT", value_parser = agent_name)]
     filler: Option<String>,
-    /// Leave the join code in this file, readable to its owner alone; waits for the server if it is not there yet.
+    /// Write the join code to this file, readable only by its owner; waits for the server to start.
     #[arg(long, value_name = "FILE")]
     code_file: Option<PathBuf>,
-    /// Leave the owner token in this file, readable to its owner alone; `start` and `close` take it from there.
+    /// Write the owner token to this file, readable only by its owner; `start` and `close` read it.
     #[arg(long, value_name = "FILE")]
     owner_file: Option<PathBuf>,
     /// Print the tournament with its secrets as a JSON line.
@@ -92,7 +92,7 @@ pub(super) struct Create {
     policy: PolicyArgs,
 }
 
-/// Some built-in agents alike.
+/// A number of equal built-in agents.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct BuiltIn {
     pub(super) name: String,
@@ -106,7 +106,7 @@ impl Create {
             Some(_) => self.server.connect_patiently().await?,
             None => self.server.connect().await?,
         };
-        // Before there is a tournament: whoever cannot be told its secrets has no use for it.
+        // Before the tournament is created: without a file for its secrets it would be useless.
         let code_file = (self.code_file.as_deref())
             .map(|file| SecretFile::prepare(file, "--code-file", "a join code"))
             .transpose()?;
@@ -116,7 +116,7 @@ impl Create {
         let made = client.create_tournament(settings).await.map_err(refused)?;
         let tournament = made
             .tournament
-            .ok_or("the server did not say which tournament it made")?;
+            .ok_or("the server did not return the created tournament")?;
         let (code, owner) = (made.join_code, made.owner_token);
         let left = [(code_file, &code), (owner_file, &owner)].map(|(file, secret)| match file {
             Some(file) => file.leave(secret),
@@ -133,14 +133,14 @@ impl Create {
             say(format_args!("owner token  {owner}"))?;
             say(self.next_steps(&tournament, &code))?;
         }
-        // Only now, so that the secrets are told all the same.
+        // Last, so that the secrets are printed even if this fails.
         left.into_iter().collect::<Result<Vec<()>, _>>()?;
         Ok(ExitCode::SUCCESS)
     }
 
-    /// What the server is asked for: what was not said is left to its standard.
+    /// The request; flags that are not given are left to the server's defaults.
     fn settings(&self) -> Result<v1::TournamentSettings, CommandError> {
-        // Nonsense is said by flag, before anybody is asked.
+        // Errors name the flag and come before any request.
         self.rules.rules()?;
         let built_in: usize = self.built_in.iter().map(|some| some.count).sum();
         if built_in > MAX_BUILT_IN {
@@ -172,7 +172,7 @@ impl Create {
         })
     }
 
-    /// How others take part, and how it begins.
+    /// How others take part, and how the tournament starts.
     fn next_steps(&self, tournament: &v1::Tournament, code: &str) -> String {
         let (id, server) = (&tournament.tournament_id, self.server.url());
         if tournament.state() != v1::TournamentState::Open {
@@ -196,15 +196,15 @@ impl Create {
     }
 }
 
-/// A number as the protocol has it, where 0 stands for what was not said.
+/// A number for the protocol, where 0 means not set.
 fn asked(flag: &str, number: Option<u32>) -> Result<u32, CommandError> {
     match number {
-        Some(0) => Err(format!("{flag}: 0 is too few; leave the flag out for the standard").into()),
+        Some(0) => Err(format!("{flag}: 0 is too few; leave out the flag for the default").into()),
         number => Ok(number.unwrap_or(0)),
     }
 }
 
-/// Reads `greedy` or `greedy*4`.
+/// Parses `greedy` or `greedy*4`.
 pub(super) fn built_in(words: &str) -> Result<BuiltIn, String> {
     let (name, count) = match words.split_once('*') {
         None => (words, Some(1)),
@@ -230,7 +230,7 @@ fn seed(digits: &str) -> Result<[u8; 32], String> {
         .map_err(|_| "a seed is 64 hexadecimal digits".to_owned())
 }
 
-/// A refusal of the server in the words of the command line.
+/// A refusal of the server, with flags instead of fields.
 fn refused(error: Error) -> CommandError {
     let known = [
         "RULE_SET_REFUSED",
@@ -245,12 +245,12 @@ fn refused(error: Error) -> CommandError {
     }
 }
 
-/// What is wrong with a field of the settings, for somebody who typed a flag.
+/// The problem with a field of the settings, with the flag instead of the field.
 fn flagged(field: &str, message: &str) -> CommandError {
     let said = format!("{field}: ");
     let message = message.strip_prefix(&said).unwrap_or(message);
     match field {
-        // The field within is what was typed.
+        // The inner field is a flag.
         "rules" | "policy" => match message.split_once(": ") {
             Some((inner, rest)) => by_flag(inner, rest),
             None => message.to_owned(),
@@ -332,7 +332,7 @@ mod tests {
     }
 
     #[test]
-    fn nonsense_is_said_by_flag() {
+    fn errors_name_the_flag() {
         for (flags, words) in [
             ("--faces 3", "--faces: "),
             ("--rounds 0", "--rounds: 0 is too few"),

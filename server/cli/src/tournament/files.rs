@@ -1,4 +1,4 @@
-//! The results of a tournament as CSV: all there is to know of the standings, and the columns of the reference implementation.
+//! The results of a tournament as CSV: complete standings, and the columns of the reference implementation.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -11,7 +11,7 @@ use super::super::CommandError;
 use super::tables::Field;
 use crate::kind::kind_name;
 
-/// What the reference implementation (chefshatgym 2.4.0.4, `ChefsHatRoomTournament`) writes above its FinalResultsComp.csv.
+/// Header of FinalResultsComp.csv in the reference implementation (chefshatgym 2.4.0.4, `ChefsHatRoomTournament`).
 const FINAL_RESULTS: [&str; 4] = [
     "Position",
     "Player Name",
@@ -19,7 +19,7 @@ const FINAL_RESULTS: [&str; 4] = [
     "Games Played",
 ];
 
-/// Writes a line for each participant, best first.
+/// Writes one line per participant, best first.
 ///
 /// # Errors
 /// The file cannot be written.
@@ -31,7 +31,7 @@ pub(super) fn write_standings(
     write(path, Terminator::Any(b'\n'), &header, rows)
 }
 
-/// Writes the columns of the reference implementation, in its form.
+/// Writes the columns of the reference implementation.
 ///
 /// # Errors
 /// The file cannot be written.
@@ -41,7 +41,7 @@ pub(super) fn write_final_results(
     games: &[v1::TournamentGame],
 ) -> Result<(), CommandError> {
     let header = FINAL_RESULTS.map(str::to_owned);
-    // Python's csv module ends lines so.
+    // Line ends of Python's csv module.
     write(
         path,
         Terminator::CRLF,
@@ -50,10 +50,10 @@ pub(super) fn write_final_results(
     )
 }
 
-/// Writes a header and rows. `terminator` ends each line.
+/// Writes a header and rows; `terminator` ends each line.
 ///
 /// # Errors
-/// The file cannot be written; whatever was in its place is still there.
+/// The file cannot be written; an existing file is unchanged.
 fn write(
     path: &Path,
     terminator: Terminator,
@@ -153,12 +153,12 @@ fn standings(results: &v1::GetTournamentResultsResponse) -> (Vec<String>, Vec<Ve
     (header.collect(), rows.collect())
 }
 
-/// A number, or nothing where there is none.
+/// A number, or an empty cell.
 fn said(number: Option<impl ToString>) -> String {
     number.map_or_else(String::new, |number| number.to_string())
 }
 
-/// Position, name, the performance score of the last game that was played, and how many were.
+/// Position, name, performance score of the last game, and number of games.
 fn final_results(
     results: &v1::GetTournamentResultsResponse,
     games: &[v1::TournamentGame],
@@ -180,7 +180,7 @@ fn final_results(
         let who = field.get(standing.participant);
         let name = who.map_or_else(String::new, |who| who.name.clone());
         let (score, played) = last.get(&standing.participant).copied().unwrap_or_default();
-        // Debug writes a whole number as Python does: 10.0.
+        // Debug formats whole numbers like Python: 10.0.
         let score = format!("{score:?}");
         vec![standing.place.to_string(), name, score, played.to_string()]
     };

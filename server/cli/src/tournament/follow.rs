@@ -1,5 +1,5 @@
-//! `chefshat tournament follow`: how a tournament stands, again whenever that has changed, until it is over. On a terminal a bar and a table
-//! that change in place, else a line for each change.
+//! `chefshat tournament follow`: shows how a tournament stands, after each change, until it is over: a bar and a table on a terminal,
+//! otherwise one line per change.
 
 use std::io::{self, IsTerminal as _, Write as _};
 use std::process::ExitCode;
@@ -15,11 +15,11 @@ use super::tables::{self, Field};
 use super::words::{is_over, state};
 use crate::narration::clean;
 
-/// Lines of the table that is shown while a tournament goes on.
+/// Rows of the table while a tournament is in progress.
 const LIVE_LINES: usize = 12;
-/// Time between two looks at the clock.
+/// Time between two updates of the elapsed time.
 const TICK: Duration = Duration::from_secs(1);
-/// Leaders named in a line.
+/// Leaders listed in a line.
 const LEADERS: usize = 3;
 
 /// Follow a tournament to its end.
@@ -30,7 +30,7 @@ const LEADERS: usize = 3;
                   Exit code: 0 when the tournament finished, 1 when it was closed or could not be followed."
 )]
 pub(super) struct Follow {
-    /// Which tournament.
+    /// ID of the tournament.
     #[arg(value_name = "TOURNAMENT-ID")]
     tournament_id: String,
     #[command(flatten)]
@@ -59,9 +59,7 @@ impl Follow {
         match end {
             Some(v1::TournamentState::Finished) => Ok(ExitCode::SUCCESS),
             Some(_) => Ok(ExitCode::FAILURE),
-            None => {
-                Err("the server has nothing more to show, but the tournament is not over".into())
-            }
+            None => Err("the server ended the stream before the tournament was over".into()),
         }
     }
 }
@@ -69,7 +67,7 @@ impl Follow {
 /// How changes are shown.
 enum Display {
     Json,
-    /// The line that was printed last.
+    /// The last printed line.
     Lines(String),
     Live(ProgressBar),
 }
@@ -84,7 +82,7 @@ impl Display {
         }
         let style = "{prefix}\n{bar:40} {human_pos} of {human_len} games, {elapsed}\n{msg}";
         let bar = ProgressBar::new(0).with_style(ProgressStyle::with_template(style)?);
-        // So that time is seen to pass while nothing happens.
+        // Shows that time passes while nothing changes.
         bar.enable_steady_tick(TICK);
         Ok(Self::Live(bar))
     }
@@ -150,7 +148,7 @@ fn print_standings(
     Ok(out.flush()?)
 }
 
-/// Which tournament, and what it is at.
+/// Name and progress of a tournament.
 fn title(tournament: &v1::Tournament) -> String {
     let settings = tournament.settings.clone().unwrap_or_default();
     let name = clean(&settings.name, 40);

@@ -1,5 +1,4 @@
-//! `chefshat tournament join`: a built-in agent takes part as a remote client, over the Rust SDK like anybody's agent, until the tournament
-//! is over.
+//! `chefshat tournament join`: takes part with a built-in agent, through the Rust SDK, until the tournament is over.
 
 use std::process::ExitCode;
 use std::time::Duration;
@@ -25,34 +24,34 @@ use super::words::state;
                   Exit code: 0 when the tournament finished, 1 when it was closed or the place in it was lost."
 )]
 pub(super) struct Join {
-    /// Which agent: random, random_unmasked, greedy or trained.
+    /// The agent: random, random_unmasked, greedy or trained.
     #[arg(long, value_parser = agent_kind, value_name = "KIND")]
     agent: AgentKind,
     #[command(flatten)]
     server: ServerArg,
     #[command(flatten)]
     way_in: WayIn,
-    /// Name to show, which no other participant has; standard: the agent's.
+    /// Display name, unique in the tournament. Default: the agent's.
     #[arg(long)]
     name: Option<String>,
-    /// What to take part as.
+    /// Kind of participant.
     #[arg(long, value_enum, default_value_t = KindArg::Agent)]
     kind_of: KindArg,
-    /// Games to play at a time.
+    /// Maximum number of games at a time.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=64))]
     games: u32,
-    /// Makes the agent's choices repeatable.
+    /// Seed of the agent's choices, for repeatable games.
     #[arg(long)]
     seed: Option<u64>,
-    /// Milliseconds to wait before each decision, so that people can follow.
+    /// Milliseconds to wait before each decision, so that people can follow the game.
     #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u64).range(0..=MAX_PACE_MS))]
     pace_ms: u64,
-    /// Print one JSON line a game, and one at the end.
+    /// Print one JSON line per game, and one at the end.
     #[arg(long)]
     json: bool,
 }
 
-/// A place in a tournament that was taken just now.
+/// A new place in a tournament.
 struct Place {
     tournament_id: String,
     participant: u32,
@@ -102,7 +101,7 @@ impl Join {
                 name: name.to_owned(),
                 kind: v1::ParticipantKind::from(self.kind_of).into(),
                 max_games: self.games,
-                // Each game has an agent of its own.
+                // Each game has its own agent.
                 stateless: true,
                 ..v1::JoinTournamentRequest::default()
             })
@@ -110,9 +109,9 @@ impl Join {
         let tournament = joined.tournament.unwrap_or_default();
         let (participant, id) = (joined.participant, tournament.tournament_id);
         anstream::eprintln!("{name} takes part in tournament {id} as participant {participant}");
-        // Whoever has it has the place: it is told to the one who started the agent alone.
+        // The ticket grants the place: it is shown only here, to the person who started the agent.
         anstream::eprintln!(
-            "should this agent end before the tournament, another goes on in its place with --ticket {}",
+            "if this agent stops before the tournament ends, resume its place with --ticket {}",
             joined.ticket
         );
         let place = Place {
@@ -146,7 +145,7 @@ impl Join {
     }
 }
 
-/// An agent whose games are told as they end.
+/// An agent that reports the ends of its games.
 struct Teller {
     agent: RemoteAgent,
     json: bool,
@@ -171,7 +170,7 @@ impl Agent for Teller {
             false => say(outcome_in_words(outcome)),
         };
         if let Err(error) = told {
-            // The tournament is played to its end all the same.
+            // The agent plays on even if nobody listens.
             tracing::debug!(%error, "a game was told to nobody");
         }
     }

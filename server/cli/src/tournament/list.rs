@@ -1,4 +1,4 @@
-//! `chefshat tournament list` and `chefshat tournament games`: a line for each tournament of a server, and for each game of a tournament.
+//! `chefshat tournament list` and `chefshat tournament games`: list tournaments and games, one per line.
 
 use std::process::ExitCode;
 
@@ -12,7 +12,7 @@ use super::all_games;
 use super::words::{StateArg, format_name, state};
 use crate::narration::clean;
 
-/// Tournaments asked for at a time.
+/// Page size.
 const PAGE: u32 = 100;
 
 /// List the tournaments of a server, newest first.
@@ -21,7 +21,7 @@ const PAGE: u32 = 100;
 pub(super) struct List {
     #[command(flatten)]
     server: ServerArg,
-    /// Tournaments in this state alone.
+    /// Only tournaments in this state.
     #[arg(long)]
     state: Option<StateArg>,
     /// Print each tournament as a JSON line.
@@ -29,7 +29,7 @@ pub(super) struct List {
     json: bool,
 }
 
-/// List the games of a tournament, in order, with what came of them and where their records are.
+/// List the games of a tournament, with their results and records.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  chefshat tournament games 5f0c6a4de2b14b7f8a3d9c1e7b60425d --round 2\n  \
@@ -37,12 +37,12 @@ pub(super) struct List {
                   A record lies in the server's data directory as records/GAME-ID.jsonl; `chefshat records get GAME-ID` fetches it."
 )]
 pub(super) struct Games {
-    /// Which tournament.
+    /// ID of the tournament.
     #[arg(value_name = "TOURNAMENT-ID")]
     tournament_id: String,
     #[command(flatten)]
     server: ServerArg,
-    /// Games of this round alone, from 1.
+    /// Only games of this round, from 1.
     #[arg(long, value_name = "ROUND")]
     round: Option<u32>,
     /// Print each game as a JSON line.
@@ -111,7 +111,7 @@ impl Games {
     }
 }
 
-/// Where the record of a game lies under the server's data directory, once it has one.
+/// Path of a game's record under the server's data directory, once it exists.
 fn record_of(game: &v1::TournamentGame) -> Option<String> {
     let counted = game.state() == v1::TournamentGameState::Counted;
     counted.then(|| format!("records/{}.jsonl", clean(&game.game_id, 40)))
@@ -130,7 +130,7 @@ fn in_a_line(tournament: &v1::Tournament) -> String {
     )
 }
 
-/// Which game, where it stands, who played as what, and its record.
+/// A game in one line: number, state, players with results, record.
 fn game_in_a_line(game: &v1::TournamentGame, participants: &[v1::TournamentParticipant]) -> String {
     let name = |seat: &v1::TournamentGameSeat| {
         let who = usize::try_from(seat.participant)

@@ -1,5 +1,5 @@
-//! `chefshat tournament`: tournaments of a server, made, joined, begun, followed and closed from the command line, and their results. Who
-//! plays whom and what counts is decided in `chefshat_tournament`, by the server.
+//! `chefshat tournament`: creates, joins, starts, follows and closes tournaments of a server, and shows results. Pairings and standings are
+//! those of `chefshat_tournament`, computed by the server.
 
 mod create;
 mod files;
@@ -19,10 +19,10 @@ use clap::{Args, Subcommand};
 
 use super::CommandError;
 
-/// Games asked for at a time.
+/// Page size of the list of games.
 const GAMES_PAGE: u32 = 500;
 
-/// Hold tournaments: make, join, follow them, and see their results.
+/// Create, join and follow tournaments, and show their results.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  chefshat tournament create --name cup --format swiss --built-in greedy*4 --start-when 12\n  \
@@ -36,17 +36,17 @@ pub(super) struct TournamentCommand {
 
 #[derive(Debug, Subcommand)]
 enum TournamentAction {
-    /// Make a tournament and say how to take part.
+    /// Create a tournament and print how to take part.
     Create(Box<create::Create>),
     /// Take part with a built-in agent, until the tournament is over.
     Join(join::Join),
-    /// Begin a tournament with those who have joined.
+    /// Start a tournament with the participants who have joined.
     Start(owner::Start),
-    /// Close a tournament before its end.
+    /// Close a tournament early.
     Close(owner::Close),
     /// Follow a tournament to its end.
     Follow(follow::Follow),
-    /// Show the standings of a tournament, and how sure they are.
+    /// Show the standings of a tournament and their confidence.
     Results(results::Results),
     /// Play a tournament of built-in agents offline.
     Simulate(simulate::Simulate),
@@ -72,7 +72,7 @@ impl TournamentCommand {
     }
 }
 
-/// All games of a tournament that have been drawn, in order.
+/// All games that have been drawn, in order.
 ///
 /// # Errors
 /// `TOURNAMENT_UNKNOWN`.

@@ -1,4 +1,4 @@
-//! What only the owner of a tournament may do: `chefshat tournament start` and `close`.
+//! Commands for the owner of a tournament: `chefshat tournament start` and `close`.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -10,7 +10,7 @@ use super::super::connect::ServerArg;
 use super::super::{CommandError, say};
 use super::words::state;
 
-/// Begin a tournament with those who have joined.
+/// Start a tournament with the participants who have joined.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example:\n  chefshat tournament start 5f0c6a4de2b14b7f8a3d9c1e7b60425d --owner-file ./owner"
@@ -20,7 +20,7 @@ pub(super) struct Start {
     owned: Owned,
 }
 
-/// Close a tournament before its end: games that are being played are aborted, what has been counted stays.
+/// Close a tournament early: games in progress are aborted, counted games keep their results.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example:\n  chefshat tournament close 5f0c6a4de2b14b7f8a3d9c1e7b60425d --owner-file ./owner"
@@ -30,13 +30,13 @@ pub(super) struct Close {
     owned: Owned,
 }
 
-/// Which tournament, and what shows that one is its owner.
+/// The tournament and the proof of ownership.
 #[derive(Debug, Args)]
 struct Owned {
-    /// Which tournament.
+    /// ID of the tournament.
     #[arg(value_name = "TOURNAMENT-ID")]
     tournament_id: String,
-    /// The secret that `tournament create` gave.
+    /// The secret printed by `tournament create`.
     #[arg(
         long,
         env = "CHEFSHAT_OWNER_TOKEN",
@@ -44,7 +44,7 @@ struct Owned {
         required_unless_present = "owner_file"
     )]
     owner_token: Option<String>,
-    /// The file in which `tournament create` left it.
+    /// File with the secret, written by `tournament create`.
     #[arg(long, value_name = "FILE")]
     owner_file: Option<PathBuf>,
     #[command(flatten)]
@@ -75,7 +75,7 @@ impl Close {
 }
 
 impl Owned {
-    /// The owner's token; one in a file that is named goes before one of the environment.
+    /// The owner token; the file has priority over the environment.
     fn token(&self) -> Result<String, CommandError> {
         match (&self.owner_file, &self.owner_token) {
             (Some(file), _) => std::fs::read_to_string(file)

@@ -1,4 +1,4 @@
-//! `chefshat tournament results`: the standings, how sure their order is, how all played; for people, for programs, as files.
+//! `chefshat tournament results`: the standings, their confidence and statistics of play, as text, JSON or files.
 
 use std::io::Write as _;
 use std::path::PathBuf;
@@ -16,7 +16,7 @@ use super::words::{format_name, is_over, state};
 use super::{all_games, files};
 use crate::narration::clean;
 
-/// Show the standings of a tournament, how sure their order is, and how all played; final once it is over.
+/// Show the standings of a tournament, their confidence, and statistics of play; final once it is over.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  chefshat tournament results 5f0c6a4de2b14b7f8a3d9c1e7b60425d\n  \
@@ -24,7 +24,7 @@ use crate::narration::clean;
                   docs/tournaments.md and docs/ratings.md say what the numbers mean."
 )]
 pub(super) struct Results {
-    /// Which tournament.
+    /// ID of the tournament.
     #[arg(value_name = "TOURNAMENT-ID")]
     tournament_id: String,
     #[command(flatten)]
@@ -32,10 +32,10 @@ pub(super) struct Results {
     /// Print the results as a JSON line.
     #[arg(long)]
     json: bool,
-    /// Write a line for each participant into this file, with all there is to know.
+    /// Write complete standings to this CSV file, one line per participant.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
-    /// Write the columns of the reference implementation's FinalResultsComp.csv into this file. The score is that of the last game played.
+    /// Write the columns of the reference implementation's FinalResultsComp.csv to this file. The score is that of the last game played.
     #[arg(long, value_name = "FILE")]
     final_results: Option<PathBuf>,
 }
@@ -107,7 +107,7 @@ fn text(results: &v1::GetTournamentResultsResponse) -> String {
     text
 }
 
-/// What has to be known about the deals.
+/// Remarks about the deals.
 pub(super) fn of_deals(deals: v1::TournamentDeals) -> Option<&'static str> {
     match deals {
         v1::TournamentDeals::Unspecified | v1::TournamentDeals::Independent => None,

@@ -1,5 +1,4 @@
-//! `chefshat tournament simulate`: a tournament of built-in agents, played offline on all cores. Who plays whom and what counts is decided by
-//! the same core as on a server; the games are played by `chefshat-arena`.
+//! `chefshat tournament simulate`: plays a tournament of built-in agents offline on all cores, with the pairings and standings of a server.
 
 use std::io::Write as _;
 use std::path::PathBuf;
@@ -30,10 +29,10 @@ use super::tables::{self, Field};
 use super::words::{DealsArg, FormatArg};
 use chefshat_server::convert;
 
-/// Most games at a time. Only by this many at a time games are handed to the threads.
+/// Maximum number of games at a time, which are played in parallel.
 const MAX_PARALLEL: usize = 256;
 
-/// Play a tournament of built-in agents offline, on all cores, and print how they stand and how sure that is.
+/// Play a tournament of built-in agents offline on all cores; print the standings and their confidence.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  chefshat tournament simulate --format round_robin --agents greedy*4,trained*4,random*4 --games-per-pairing 100\n  \
@@ -42,32 +41,32 @@ const MAX_PARALLEL: usize = 256;
                   The same seed gives the same output, on any number of threads. What it took is said on standard error."
 )]
 pub(super) struct Simulate {
-    /// Who plays whom.
+    /// Format of the tournament.
     #[arg(long, value_enum)]
     format: FormatArg,
-    /// Built-in agents that take part: random, random_unmasked, greedy or trained, or so many of one, separated by commas, for instance
+    /// Participants: random, random_unmasked, greedy or trained, or several as in greedy*4, separated by commas, for example
     /// greedy*4,trained.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = built_in, required = true)]
     agents: Vec<BuiltIn>,
-    /// Participants, 2 to 1024: the agents of the list in turn, over and over. Standard: each once.
+    /// Number of participants, 2 to 1024: the list of agents is repeated. Default: each once.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=MAX_PARTICIPANTS as i64))]
     participants: Option<u32>,
-    /// Rounds of round_robin and swiss. Standard: one less than there are participants; for swiss, enough to find a winner.
+    /// Rounds of round_robin and swiss. Default: one less than participants; for swiss, enough to find a winner.
     #[arg(long, value_name = "N")]
     rounds: Option<u32>,
-    /// Games of each table of a round, its seats rotated from game to game; with rotated deals: deals.
+    /// Games of each table of a round, with seats rotated between games; with rotated deals: deals.
     #[arg(long, value_name = "N", default_value_t = 1)]
     games_per_pairing: u32,
     /// How games are dealt.
     #[arg(long, value_enum, default_value_t = DealsArg::Independent)]
     deals: DealsArg,
-    /// The number that all chance is drawn from.
+    /// Seed of all random choices.
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Threads to play on, at most 256; 0 is one for each core.
+    /// Number of threads, at most 256; 0 means one per core.
     #[arg(long, value_name = "N", default_value_t = 0)]
     threads: usize,
-    /// Write a line for each participant into this file, with all there is to know.
+    /// Write complete standings to this CSV file, one line per participant.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
     /// Print one JSON object.
@@ -111,7 +110,7 @@ impl Simulate {
         Ok(ExitCode::SUCCESS)
     }
 
-    /// The tournament with all its participants, not yet begun.
+    /// The tournament with all participants, before its start.
     fn tournament(&self, rules: &RuleSet) -> Result<Tournament, CommandError> {
         let entrants = self.entrants()?;
         let settings = Settings {
@@ -137,7 +136,7 @@ impl Simulate {
         Ok(tournament)
     }
 
-    /// Who takes part: `greedy 1`, `greedy 2`, …, or `greedy` if there is but one.
+    /// The participants: `greedy 1`, `greedy 2`, …, or `greedy` if there is only one.
     fn entrants(&self) -> Result<Vec<Entrant>, CommandError> {
         let kinds = |some: &BuiltIn| {
             let kind =
@@ -168,7 +167,7 @@ impl Simulate {
         Ok(entrants.collect())
     }
 
-    /// What the draws are made from: the seed, 8 bytes, lowest first.
+    /// The seed of pairings: the seed, 8 bytes little-endian.
     fn draw_seed(&self) -> [u8; 32] {
         let mut seed = [0; 32];
         seed[..8].copy_from_slice(&self.seed.to_le_bytes());
@@ -190,7 +189,7 @@ impl Simulate {
         }
     }
 
-    /// The result for people: lines of at most 100 columns.
+    /// The result for people, in lines of at most 100 columns.
     fn text(
         &self,
         rules: &RuleSet,
@@ -231,7 +230,7 @@ impl Simulate {
         text
     }
 
-    /// The result as one JSON object: what was played, how all stand, how sure that is.
+    /// The result as JSON: parameters, standings and confidence.
     fn json(
         &self,
         rules: &RuleSet,
@@ -282,7 +281,7 @@ impl DealsArg {
     }
 }
 
-/// What is wrong with the settings, for somebody who typed flags.
+/// The problem with the settings, with flags instead of fields.
 fn refused(problem: SettingsProblem) -> CommandError {
     let field = match problem.field {
         "max_participants" => "participants",

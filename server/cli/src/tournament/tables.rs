@@ -1,4 +1,4 @@
-//! Tables of a tournament for people: who stands where, how sure that is, how all played. Each is at most 100 columns wide.
+//! Tables of a tournament for people: standings, confidence, statistics of play. Each is at most 100 columns wide.
 
 use chefshat_client::v1;
 
@@ -11,12 +11,12 @@ use crate::narration::clean;
 /// What is said of the standings before a game has counted.
 pub(crate) const NO_GAME_COUNTED: &str = "no game was counted";
 
-/// Longest name in a table.
+/// Maximum columns of a name.
 const MAX_NAME: usize = 20;
-/// Confidence from which an order counts as sure.
+/// Confidence above which an order is significant.
 const SURE: f64 = 0.95;
 
-/// Who takes part, and what in tables depends on the format.
+/// The participants, and the columns that depend on the format.
 pub(crate) struct Field<'t> {
     participants: &'t [v1::TournamentParticipant],
     knockout: bool,
@@ -32,7 +32,7 @@ impl<'t> Field<'t> {
         }
     }
 
-    /// The participant of a number.
+    /// The participant with a number.
     pub(crate) fn get(&self, participant: u32) -> Option<&v1::TournamentParticipant> {
         usize::try_from(participant)
             .ok()
@@ -47,7 +47,7 @@ impl<'t> Field<'t> {
         }
     }
 
-    /// What a participant is.
+    /// Kind of a participant, or its built-in agent.
     fn what(&self, participant: u32) -> String {
         match self.get(participant) {
             Some(who) if who.filler => "filler".to_owned(),
@@ -58,12 +58,12 @@ impl<'t> Field<'t> {
     }
 }
 
-/// Mean score of a game; 0 if there was none.
+/// Mean score per game; 0 without games.
 pub(crate) fn mean_score(standing: &v1::TournamentStanding) -> f64 {
     a_game(standing.score, standing)
 }
 
-/// Where a participant stands among so many; `None` before a game has counted, when nobody has a place.
+/// The place of a participant in words; `None` before a game has counted, when there are no places.
 pub(crate) fn place_in_words(
     standing: &v1::TournamentStanding,
     participants: usize,
@@ -80,7 +80,7 @@ fn a_game(sum: u64, standing: &v1::TournamentStanding) -> f64 {
     sum as f64 / f64::from(standing.games.max(1))
 }
 
-/// Mean place in a game.
+/// Mean place per game.
 fn mean_place(standing: &v1::TournamentStanding) -> String {
     let games: u64 = standing.places.iter().copied().map(u64::from).sum();
     if games == 0 {
@@ -91,12 +91,12 @@ fn mean_place(standing: &v1::TournamentStanding) -> String {
     format!("{:.2}", sum as f64 / games as f64)
 }
 
-/// Whether a game has counted: before, nobody has a place.
+/// Whether a game has counted; before, there are no places.
 pub(super) fn has_counted(standings: &[v1::TournamentStanding]) -> bool {
     standings.iter().any(|standing| standing.place > 0)
 }
 
-/// Adds the table of who stands where; before a game has counted, of who takes part.
+/// Adds the standings; before a game has counted, the participants.
 pub(super) fn standings(
     text: &mut String,
     field: &Field<'_>,
@@ -148,7 +148,7 @@ pub(super) fn standings(
     table(text, &header, &[1, 2], rows);
 }
 
-/// Adds the table of how sure it is that of two neighbours the first is the better one.
+/// Adds the confidence that of two neighbours the first is better.
 pub(super) fn order(text: &mut String, field: &Field<'_>, pairs: &[v1::OrderConfidence]) {
     heading(text, "How sure is the order?");
     let header = [
@@ -179,7 +179,7 @@ pub(super) fn order(text: &mut String, field: &Field<'_>, pairs: &[v1::OrderConf
     table(text, &header, &[0, 1], rows);
 }
 
-/// Adds the table of how all played, and their ratings.
+/// Adds statistics of play and ratings.
 pub(super) fn play(text: &mut String, field: &Field<'_>, standings: &[v1::TournamentStanding]) {
     heading(text, "How they played");
     let header = [
@@ -211,7 +211,7 @@ pub(super) fn play(text: &mut String, field: &Field<'_>, standings: &[v1::Tourna
     table(text, &header, &[0], rows);
 }
 
-/// A rating with its uncertainty, and the games it is of.
+/// A rating with its uncertainty and number of games.
 fn rating(rating: Option<&v1::Rating>) -> (String, String) {
     match rating {
         Some(rating) => (rating_in_words(rating).join(" "), rating.games.to_string()),
@@ -224,7 +224,7 @@ mod tests {
     use crate::tournament::tables::*;
 
     #[test]
-    fn before_a_game_has_counted_it_is_told_who_takes_part() {
+    fn participants_are_listed_before_a_game_has_counted() {
         let tournament = v1::Tournament {
             participants: vec![v1::TournamentParticipant {
                 name: "Ada".into(),
@@ -245,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn nobody_has_a_place_before_a_game_has_counted() {
+    fn no_places_before_a_game_has_counted() {
         let standing = |place, games| v1::TournamentStanding {
             place,
             games,

@@ -1,17 +1,17 @@
-//! What the protocol's numbers for tournaments are called on the command line.
+//! Arguments and names for values of the protocol about tournaments.
 
 use chefshat_client::v1;
 use clap::ValueEnum;
 
-/// Who plays whom.
+/// Format: who plays whom.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 #[value(rename_all = "snake_case")]
 pub(super) enum FormatArg {
-    /// Tables of four, of each of which the first two advance, in two halves that meet in a final.
+    /// Tables of four; the first two of each advance, in two halves that meet in a final.
     Knockout,
-    /// All meet, and have each seat, as evenly as their number allows.
+    /// All participants meet and take each seat as evenly as possible.
     RoundRobin,
-    /// Those who score alike meet.
+    /// Participants with similar scores meet.
     Swiss,
 }
 
@@ -28,11 +28,11 @@ impl FormatArg {
 /// How games are dealt.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum DealsArg {
-    /// Every game anew.
+    /// New deals in every game.
     Independent,
-    /// All tables of a round alike.
+    /// The same deals at all tables of a round.
     Same,
-    /// Every pairing plays each deal once for each seat; for built-in and stateless agents alone.
+    /// Each pairing plays each deal once per seat; only for built-in and stateless agents.
     Rotated,
 }
 
@@ -46,16 +46,16 @@ impl DealsArg {
     }
 }
 
-/// Where a tournament stands.
+/// State of a tournament.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum StateArg {
     /// Participants may join.
     Open,
-    /// It is being played.
+    /// Games are being played.
     Playing,
-    /// It has been played to its end.
+    /// All games are over.
     Finished,
-    /// It was closed before its end.
+    /// The owner closed it early.
     Closed,
 }
 
@@ -91,7 +91,7 @@ pub(super) fn state(state: v1::TournamentState) -> &'static str {
     }
 }
 
-/// Whether nothing more happens in a tournament.
+/// Whether a tournament has ended.
 pub(crate) fn is_over(tournament: &v1::Tournament) -> bool {
     use v1::TournamentState::{Closed, Finished};
     [Finished, Closed].contains(&tournament.state())
