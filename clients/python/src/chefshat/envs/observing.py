@@ -47,18 +47,17 @@ class Form:
             sizes: the numbers that determine shapes.
             sample: some situations, to determine the space of a function.
         """
-        self._sizes = sizes
         self._function: ObservationFunction | None = None
         self.has_parts = observation == "columns"
         if callable(observation):
             self._function = observation
             self.space = _space_of(np.asarray(observation(sample)), len(sample))
         elif observation == "classic":
-            self._function = self._classic
+            self._function = features.classic_of
             width = features.classic_width(sizes.faces, sizes.hand_size)
             self.space = spaces.Box(0.0, 1.0, (width,), np.float32)
         elif observation == "table":
-            self._function = self._table
+            self._function = features.table_of
             # A play of all F cards of face F with both jokers exceeds 1.
             self.space = spaces.Box(0.0, 2.0, (features.table_width(sizes.players, sizes.faces),), np.float32)
         elif observation == "columns":
@@ -83,22 +82,6 @@ class Form:
         if isinstance(observed, dict):
             return {name: array[row].copy() for name, array in observed.items()}
         return observed[row].copy()
-
-    def _classic(self, situations: Situations) -> NDArray[Any]:
-        sizes = self._sizes
-        return features.classic(situations.observations, situations.mask_bits, faces=sizes.faces, hand_size=sizes.hand_size)
-
-    def _table(self, situations: Situations) -> NDArray[Any]:
-        sizes = self._sizes
-        return features.table(
-            situations.observations,
-            situations.seats,
-            situations.kinds,
-            situations.mask_bits,
-            players=sizes.players,
-            faces=sizes.faces,
-            hand_size=sizes.hand_size,
-        )
 
 
 def mask_space(sizes: Sizes) -> spaces.Box:

@@ -10,10 +10,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from chefshat.errors import failed
 from chefshat.experiments import plots
 from chefshat.experiments.results import Figure, Line, Panel
-from chefshat.files import check_readable, write_atomically
 
 EXAMPLE = """\
 example:
@@ -76,15 +74,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, required=True, metavar="PNG", help="the picture to write")
     parser.add_argument("--json", action="store_true", help="print one object of JSON")
     options = parser.parse_args(arguments)
-    try:
-        check_readable(options.report, "report", f"{PRINTED}")
-        write_atomically(options.out, plots.png(figure(options.report.read_text(encoding="utf-8"))))
-    except OSError as error:
-        return failed(error, as_json=options.json)
-    except ValueError as error:
-        return failed(ValueError(f"{options.report}: {error}"), as_json=options.json)
-    print(json.dumps({"out": str(options.out)}) if options.json else f"wrote {options.out}")
-    return 0
+    return plots.draw_file(options.report, "report", PRINTED, figure, options.out, as_json=options.json)
 
 
 if __name__ == "__main__":

@@ -1,8 +1,10 @@
 """Draws a `Figure` as PNG, in one style with a colour-blind-safe palette, without a display."""
 
 import io
-from collections.abc import Sequence
+import json
+from collections.abc import Callable, Sequence
 from math import ceil
+from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
@@ -11,7 +13,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as Canvas
 from matplotlib.transforms import ScaledTranslation
 
+from chefshat.errors import failed
 from chefshat.experiments.results import Figure, Panel
+from chefshat.files import check_readable, write_atomically
 
 # The palette of Okabe and Ito, strongest contrasts first, without yellow, which is too pale on white.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -59,6 +63,28 @@ def png(figure: Figure) -> bytes:
         # Omits the version of matplotlib, for reproducible bytes.
         drawn(figure).savefig(out, format="png", dpi=DOTS_PER_INCH, metadata={"Software": None})
     return out.getvalue()
+
+
+def draw_file(source: Path, what: str, origin: str, figure: Callable[[str], Figure], out: Path, *, as_json: bool) -> int:
+    """Draws a figure of a text file, for a command. Returns the exit code.
+
+    Args:
+        source: the file.
+        what: the kind of file, and `origin`, what writes it; see `check_readable`.
+        origin: see `what`.
+        figure: creates the figure from the text. Raises ValueError if the text is wrong.
+        out: the picture to write.
+        as_json: whether to print JSON.
+    """
+    try:
+        check_readable(source, what, origin)
+        write_atomically(out, png(figure(source.read_text(encoding="utf-8"))))
+    except OSError as error:
+        return failed(error, as_json=as_json)
+    except ValueError as error:
+        return failed(ValueError(f"{source}: {error}"), as_json=as_json)
+    print(json.dumps({"out": str(out)}) if as_json else f"wrote {out}")
+    return 0
 
 
 def drawn(figure: Figure) -> Canvas:

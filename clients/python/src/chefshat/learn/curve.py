@@ -3,10 +3,8 @@
 import argparse
 import json
 
-from chefshat.errors import failed
 from chefshat.experiments import plots
 from chefshat.experiments.results import Figure, Level, Line, Panel
-from chefshat.files import check_readable, write_atomically
 
 # Half the width of a 95% interval, in standard errors.
 WIDTH_95 = 1.96
@@ -55,13 +53,5 @@ def figure(log: str) -> Figure:
 
 def run(options: argparse.Namespace) -> int:
     """Runs the command. Returns the exit code."""
-    try:
-        check_readable(options.log, "log", "`python -m chefshat.learn ppo` writes next to its network, as .jsonl")
-        drawn = figure(options.log.read_text(encoding="utf-8"))
-        write_atomically(options.out, plots.png(drawn))
-    except OSError as error:
-        return failed(error, as_json=options.json)
-    except ValueError as error:
-        return failed(ValueError(f"{options.log}: {error}"), as_json=options.json)
-    print(json.dumps({"out": str(options.out)}) if options.json else f"wrote {options.out}")
-    return 0
+    origin = "`python -m chefshat.learn ppo` writes next to its network, as .jsonl"
+    return plots.draw_file(options.log, "log", origin, figure, options.out, as_json=options.json)

@@ -180,7 +180,7 @@ def play(
         if batch.done:
             return stack.agents, log.played()
         on_decision(stack.agents)
-        states = features.classic(batch.observations, batch.mask_bits, faces=env.faces, hand_size=env.hand_size)
+        states = features.classic_of(batch)
         masks = states[:, -config.outputs :] != 0
         if idle_pass_is_wrong:
             masks = _without_idle_passes(masks)

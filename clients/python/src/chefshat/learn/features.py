@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
-from chefshat.columns import Observations
+from chefshat.columns import Observations, Situations
 
 # Maximum number of jokers in a deck; counts of jokers are divided by it.
 MAX_JOKERS = 2
@@ -163,6 +163,19 @@ def table(
     actions = num_actions(faces)
     block(actions)[:] = np.unpackbits(mask_bits, axis=1, count=actions, bitorder="little")
     return out
+
+
+def classic_of(situations: Situations) -> Floats:
+    """Computes `classic` for the rows of a batch."""
+    sizes = situations.sizes
+    return classic(situations.observations, situations.mask_bits, faces=sizes.faces, hand_size=sizes.hand_size)
+
+
+def table_of(situations: Situations, out: Floats | None = None) -> Floats:
+    """Computes `table` for the rows of a batch."""
+    seen, sizes = situations, situations.sizes
+    shape = {"players": sizes.players, "faces": sizes.faces, "hand_size": sizes.hand_size}
+    return table(seen.observations, seen.seats, seen.kinds, seen.mask_bits, **shape, out=out)
 
 
 @cache

@@ -101,7 +101,7 @@ class Collector:
             batch = self._batch
             rows = batch.games
             inputs = rollout.inputs[step]
-            inputs[rows] = self._features(batch, self._rows[: len(batch)])
+            inputs[rows] = features.table_of(batch, self._rows[: len(batch)])
             actions, rollout.log_probabilities[step], rollout.values[step] = act(inputs)
             rollout.actions[step] = actions
             rollout.present[step] = False
@@ -111,19 +111,6 @@ class Collector:
             self.decisions += len(rows)
             rollout.ends.append(self._ends(self._batch))
         return rollout
-
-    def _features(self, batch: Batch, out: Floats) -> Floats:
-        env = self._env
-        return features.table(
-            batch.observations,
-            batch.seats,
-            batch.kinds,
-            batch.mask_bits,
-            players=env.players,
-            faces=env.faces,
-            hand_size=env.hand_size,
-            out=out,
-        )
 
     def _ends(self, batch: Batch) -> Ends:
         endings = batch.endings
