@@ -5,6 +5,7 @@ mod beginnings;
 mod branches;
 mod connections;
 mod cup;
+mod database;
 mod doors;
 mod examiner;
 mod faults;
