@@ -240,8 +240,12 @@ fn routes(
             .max_decoding_message_size(MAX_MESSAGE_BYTES),
     )
     .add_service(
-        RecordServiceServer::new(grpc::Records::new(recorded, config.allow_import))
-            .max_decoding_message_size(MAX_MESSAGE_BYTES),
+        RecordServiceServer::new(grpc::Records::new(
+            recorded,
+            Arc::clone(tournaments),
+            config.allow_import,
+        ))
+        .max_decoding_message_size(MAX_MESSAGE_BYTES),
     )
     .add_service(
         VectorServiceServer::new(vectors).max_decoding_message_size(MAX_VECTOR_MESSAGE_BYTES),

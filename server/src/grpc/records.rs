@@ -24,6 +24,7 @@ use crate::config::{
     RECORD_SEND_TIMEOUT,
 };
 use crate::store::Part;
+use crate::tournaments::Tournaments;
 use chefshat_room::ids::Id;
 
 /// Lines in one message, and bytes, but for a single line of more: well below what gRPC clients accept.
@@ -36,6 +37,7 @@ const STREAM_PAGE: usize = 100;
 #[derive(Debug, Clone)]
 pub struct Records {
     recorded: Recorded,
+    tournaments: Arc<Tournaments>,
     /// Records that are on their way to clients stay in memory until these have taken them.
     sending: Arc<Semaphore>,
     receiving: Arc<Semaphore>,
@@ -44,9 +46,10 @@ pub struct Records {
 
 impl Records {
     /// The service for these games.
-    pub fn new(recorded: Recorded, allow_import: bool) -> Self {
+    pub fn new(recorded: Recorded, tournaments: Arc<Tournaments>, allow_import: bool) -> Self {
         Self {
             recorded,
+            tournaments,
             sending: Arc::new(Semaphore::new(MAX_RECORDS_SENT)),
             receiving: Arc::new(Semaphore::new(MAX_IMPORTS)),
             allow_import,
@@ -175,22 +178,19 @@ impl RecordService for Records {
             .await
             .map_err(|_| import_too_slow())??;
         let replaying = move || {
-            let replayed = replay::replay(&lines);
-            (lines, replayed)
+            let summary = replay::replay(&lines).map(|replayed| summary(&lines, &replayed));
+            (Arc::<[v1::RecordLine]>::from(lines), summary)
         };
-        let (lines, replayed) = self.recorded.in_turn(replaying).await?;
-        let replayed = replayed.map_err(|error| refused(error.line, &error.problem))?;
-        let summary = summary(&lines, &replayed)
+        let (lines, summary) = self.recorded.in_turn(replaying).await?;
+        let summary = summary
+            .map_err(|error| refused(error.line, &error.problem))?
             .ok_or_else(|| refused(1, "nothing was dealt in this game"))?;
         let game = Id::parse(&summary.game_id)
             .ok_or_else(|| refused(1, "the game id has not 32 hexadecimal digits"))?;
         let rooms = self.recorded.rooms();
-        let new = !rooms.is_running(game)
-            && (rooms
-                .store()
-                .import(game, summary.clone(), lines.into())
-                .await)
-                .map_err(not_kept)?;
+        let is_ours = rooms.is_running(game) || self.tournaments.has_announced(game);
+        let new = !is_ours
+            && (rooms.store().import(game, summary.clone(), lines).await).map_err(not_kept)?;
         if !new {
             return Err(status(
                 Code::AlreadyExists,

@@ -140,7 +140,7 @@ impl Rooms {
         let making = self.context.tracker.spawn(place.make(new));
         making
             .await
-            .map_err(|error| StoreError(format!("a room was not made: {error}")))?
+            .map_err(|error| StoreError::Failed(format!("a room was not made: {error}")))?
     }
 
     /// A room by its id.

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use chefshat_proto::v1;
 use futures::FutureExt as _;
 use futures::future::{BoxFuture, ready};
-use tokio::sync::watch;
+use tokio::sync::{Semaphore, watch};
 
 use super::tournaments::{KeptTournament, TournamentEntry, TournamentHeader};
 use super::{Journal, KeptGame, LeftGame, MemoryStore, Part, Store, StoreError};
@@ -19,6 +19,8 @@ pub struct FailingStore {
     inner: MemoryStore,
     appends_left: Arc<AtomicU64>,
     has_failed: watch::Sender<bool>,
+    /// Permits for commits of tournaments, each of which uses one.
+    pub tournament_commits: Arc<Semaphore>,
 }
 
 impl FailingStore {
@@ -28,12 +30,13 @@ impl FailingStore {
             inner: MemoryStore::default(),
             appends_left: Arc::new(AtomicU64::new(appends)),
             has_failed: watch::Sender::new(false),
+            tournament_commits: Arc::new(Semaphore::new(Semaphore::MAX_PERMITS)),
         }
     }
 }
 
 fn told_to() -> StoreError {
-    StoreError("the store was told to fail".into())
+    StoreError::Failed("the store was told to fail".into())
 }
 
 impl Store for FailingStore {
@@ -108,7 +111,13 @@ impl Store for FailingStore {
         row: u64,
         entries: Vec<TournamentEntry>,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
-        self.inner.append_tournament(tournament, row, entries)
+        async move {
+            let permit = self.tournament_commits.acquire().await;
+            permit.expect("nothing closes it").forget();
+            let appended = self.inner.append_tournament(tournament, row, entries);
+            appended.await
+        }
+        .boxed()
     }
 
     fn tournaments(

@@ -80,6 +80,9 @@ impl Store for MemoryStore {
         header: Arc<GameHeader>,
         entries: Vec<Entry>,
     ) -> BoxFuture<'_, Result<Box<dyn Journal>, StoreError>> {
+        if lock(&self.finished).get(header.game_id).is_some() {
+            return ready(Err(StoreError::Taken(header.game_id))).boxed();
+        }
         let journal = MemoryJournal {
             header,
             entries,

@@ -4,6 +4,8 @@
 mod failing;
 mod memory;
 mod sqlite;
+#[cfg(test)]
+mod tests;
 pub mod tournaments;
 
 use std::sync::Arc;
@@ -21,8 +23,14 @@ use tournaments::{KeptTournament, TournamentEntry, TournamentHeader};
 
 /// Why a store could not do what it was asked, and what to do about it.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{0}")]
-pub struct StoreError(pub String);
+pub enum StoreError {
+    /// The store failed; a commit that was under way may or may not have been made.
+    #[error("{0}")]
+    Failed(String),
+    /// There is a game or a tournament with this id. Nothing was changed, and the store has not failed.
+    #[error("the id {0} is taken")]
+    Taken(Id),
+}
 
 /// A finished game as it was kept.
 #[derive(Debug, Clone)]

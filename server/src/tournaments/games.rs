@@ -11,13 +11,13 @@ use futures::future::join_all;
 use tokio::time::Instant;
 use tracing::warn;
 
-use super::hosted::Call;
+use super::handle::Call;
 use super::task::Task;
 use crate::config::{MAX_NAME_CHARS, TOURNAMENT_RETRY};
 use crate::convert;
 use crate::rooms::{CreateError, NewRoom, Seating};
-use crate::store::StoreError;
 use crate::store::tournaments::TournamentEntry;
+use crate::store::{KeptGame, StoreError};
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Fill, GameStart, SeatedParticipant, TournamentGame};
 
@@ -25,14 +25,12 @@ impl Task {
     /// Gives a game a room, which is made when that is kept.
     pub(super) fn place(&mut self, game: usize) {
         let (room_id, game_id) = (Id::random(), Id::random());
-        let mut moving = self.hosted.moving();
-        moving.placed.insert(game, (room_id, game_id));
-        if let Some(deal) = moving.core.games()[game].deal {
+        if let Some(deal) = self.state.core.games()[game].deal {
             self.rooms.withhold(self.hosted.series(deal), true);
         }
         self.unmade.insert(game);
         self.seen.remove(&game);
-        self.unkept.push(TournamentEntry::Placed {
+        self.push(TournamentEntry::Placed {
             game,
             room_id,
             game_id,
@@ -41,12 +39,12 @@ impl Task {
 
     /// Takes in what came of games that have ended.
     pub(super) async fn look_at_games(&mut self) -> Result<(), StoreError> {
-        let playing: Vec<usize> = self.hosted.look(|core| core.playing().collect());
+        let playing: Vec<usize> = self.state.core.playing().collect();
         for game in playing {
             if self.unmade.contains(&game) {
                 continue;
             }
-            let placed = self.hosted.moving().placed.get(&game).copied();
+            let placed = self.state.placed.get(&game).copied();
             let Some((room, game_id)) = placed else {
                 self.place(game);
                 continue;
@@ -57,7 +55,7 @@ impl Task {
             }
             match self.ended(game, room, game_id).await? {
                 Some(ended) => {
-                    let change = self.hosted.look(|core| core.ended(game, ended));
+                    let change = self.state.core.ended(game, ended);
                     self.fold_all(change.into_iter().collect());
                 }
                 // The server ended before the room was made, or with it: nothing was played that could count.
@@ -70,14 +68,18 @@ impl Task {
 
     /// What came of a game whose room is over or gone; `None` if nothing did, and that was nobody's fault.
     async fn ended(&self, game: usize, room: Id, game_id: Id) -> Result<Option<Ended>, StoreError> {
-        if let Some(kept) = self.rooms.store().finished(game_id).await? {
+        // A record with this id that was imported is not the tournament's game.
+        let is_ours = |game: &KeptGame| {
+            (game.tournament()).is_some_and(|game| game.tournament == self.hosted.id())
+        };
+        if let Some(kept) = self.rooms.store().finished(game_id).await?.filter(is_ours) {
             let told = tokio::task::spawn_blocking(move || {
                 let lines = convert::lines_of(&kept);
                 (outcome::outcome(&lines), abort_reason(&lines))
             });
             let (outcome, reason) = told
                 .await
-                .map_err(|error| StoreError(format!("a record was not read: {error}")))?;
+                .map_err(|error| StoreError::Failed(format!("a record was not read: {error}")))?;
             return Ok(match (outcome, reason) {
                 (Ok(outcome), _) => Some(Ended::Played {
                     shifts: outcome.shifts,
@@ -101,7 +103,7 @@ impl Task {
             // Who was there when it was given up is not known any more.
             _ if !self.seen.contains(&game) => None,
             _ => {
-                let seats = self.hosted.look(|core| core.games()[game].seats.clone());
+                let seats = self.state.core.games()[game].seats.clone();
                 let away = described.seats.iter().zip(seats);
                 let missing = away
                     .filter(|(seat, _)| !seat.connected)
@@ -132,6 +134,11 @@ impl Task {
                     self.has_changed = true;
                     self.call(game);
                 }
+                // It gets other ids.
+                Err(CreateError::Store(StoreError::Taken(id))) => {
+                    warn!(tournament = %self.hosted.id(), %id, "the id of a game is taken");
+                    self.place(game);
+                }
                 Err(CreateError::Store(error)) => return Err(error),
                 // When the server is back, the game is given a room anew.
                 Err(CreateError::ShuttingDown) => self.retry = Some(retry()),
@@ -147,12 +154,10 @@ impl Task {
 
     /// Tells the participants of a game that are connected where it is played.
     fn call(&mut self, game: usize) {
-        let moving = self.hosted.moving();
-        let Some((room, _)) = moving.placed.get(&game).copied() else {
+        let Some((room, _)) = self.state.placed.get(&game).copied() else {
             return;
         };
-        let called = moving.core.games()[game].clone();
-        drop(moving);
+        let called = self.state.core.games()[game].clone();
         for participant in &called.seats {
             if !plays_itself(&called, *participant) {
                 continue;
@@ -166,10 +171,10 @@ impl Task {
 
     /// The room of a game.
     fn new_room(&self, number: usize) -> NewRoom {
-        let moving = self.hosted.moving();
-        let game = &moving.core.games()[number];
+        let state = &self.state;
+        let game = &state.core.games()[number];
         let plan = &self.hosted.plan;
-        let entrants = moving.core.participants();
+        let entrants = state.core.participants();
         let (mut participants, mut called) = (BTreeMap::new(), BTreeMap::new());
         let fills = game.seats.iter().enumerate();
         let fills = fills
@@ -183,7 +188,7 @@ impl Task {
                     return Fill::BuiltIn(kind);
                 }
                 let kind = convert::participant_kind(entrant.kind);
-                if let Some(ticket) = moving.tickets.get(participant) {
+                if let Some(ticket) = state.tickets.get(participant) {
                     let (name, ticket) = (entrant.name.clone(), *ticket);
                     participants.insert(seat, SeatedParticipant { name, kind, ticket });
                 }
@@ -192,7 +197,7 @@ impl Task {
                 }
             })
             .collect();
-        let (room_id, game_id) = moving.placed[&number];
+        let (room_id, game_id) = state.placed[&number];
         let place = format!(
             " · round {}, table {}, game {}",
             game.round, game.table, game.number

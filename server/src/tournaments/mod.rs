@@ -2,7 +2,7 @@
 //! decided in `chefshat_tournament`; a tournament is moved by its `task`.
 
 mod games;
-mod hosted;
+mod handle;
 mod leaderboard;
 mod shared;
 mod shown;
@@ -11,7 +11,6 @@ mod task;
 #[cfg(test)]
 mod tests;
 
-use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard};
 
 use chefshat_record::convert::FieldProblem;
@@ -21,7 +20,7 @@ use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 use tracing::{error, info};
 
-pub use hosted::{Call, Connection, Entry, Hosted, Stopped};
+pub use handle::{Call, Connection, Entry, Hosted, Stopped};
 pub use leaderboard::Leaderboard;
 pub use shared::NotWorkedOut;
 
@@ -32,7 +31,7 @@ use crate::rooms::Rooms;
 use crate::store::StoreError;
 use crate::store::tournaments::{KeptTournament, TournamentEntry, TournamentHeader};
 use chefshat_room::ids::{Id, Token, join_code, normal_code, random_bytes};
-use hosted::Moving;
+use handle::TournamentState;
 use shown::Shown;
 use table::Table;
 use task::Task;
@@ -107,7 +106,7 @@ impl Tournaments {
         let making = self.tracker.spawn(place.make(name.to_owned(), plan, core));
         making
             .await
-            .map_err(|error| StoreError(format!("a tournament was not made: {error}")))?
+            .map_err(|error| StoreError::Failed(format!("a tournament was not made: {error}")))?
     }
 
     /// Goes on with the tournaments of the store, and says how many were not over. The rooms must be there already.
@@ -119,9 +118,9 @@ impl Tournaments {
         for kept in self.rooms.store().tournaments(MAX_TOURNAMENTS).await? {
             let id = kept.header.id;
             match folded(&kept) {
-                Ok((plan, core)) => {
-                    going_on += usize::from(core.state() == State::Playing);
-                    self.take_up(kept, plan, core);
+                Ok((plan, state)) => {
+                    going_on += usize::from(state.core.state() == State::Playing);
+                    self.take_up(kept.header, kept.rows, plan, state);
                 }
                 Err(problem) => {
                     // What it would withhold is not known.
@@ -156,6 +155,17 @@ impl Tournaments {
         self.lock().by_code(&normal_code(code)).cloned()
     }
 
+    /// Whether a tournament has announced a game of this id.
+    pub fn has_announced(&self, game: Id) -> bool {
+        let all: Vec<_> = (self.lock().earlier(None))
+            .map(|(_, hosted)| Arc::clone(hosted))
+            .collect();
+        let announces = |hosted: &Arc<Hosted>| {
+            (hosted.committed().placed.values()).any(|(_, announced)| *announced == game)
+        };
+        all.iter().any(announces)
+    }
+
     /// The newest `count` tournaments in this state, or in any; or of those made before the one numbered `before`. With their numbers, newest
     /// first.
     pub fn newest(
@@ -175,44 +185,31 @@ impl Tournaments {
     }
 
     /// Enters a tournament into the table and lets it move.
-    fn take_up(&self, kept: KeptTournament, plan: TournamentPlan, core: Tournament) -> Arc<Hosted> {
+    fn take_up(
+        &self,
+        header: TournamentHeader,
+        rows: u64,
+        plan: TournamentPlan,
+        state: TournamentState,
+    ) -> Arc<Hosted> {
         let (mailbox, inbox) = mpsc::channel(TOURNAMENT_MAILBOX);
-        let mut moving = Moving {
-            core,
-            tickets: BTreeMap::new(),
-            placed: BTreeMap::new(),
-            connected: BTreeMap::new(),
-        };
-        for entry in kept.entries {
-            match entry {
-                TournamentEntry::Change(_) => {}
-                TournamentEntry::Ticket {
-                    participant,
-                    ticket,
-                } => drop(moving.tickets.insert(participant, ticket)),
-                TournamentEntry::Placed {
-                    game,
-                    room_id,
-                    game_id,
-                } => drop(moving.placed.insert(game, (room_id, game_id))),
-            }
-        }
         let hosted = Arc::new(Hosted {
-            header: kept.header,
+            header,
             plan,
-            moving: Mutex::new(moving),
+            committed: Mutex::new(state),
             mailbox,
             changes: watch::Sender::new(0),
             shown: Shown::default(),
         });
         self.lock().enter(Arc::clone(&hosted));
         // Before anybody can ask for a record.
-        hosted.withhold(&hosted.deals(), &self.rooms);
+        let deals = hosted.committed().deals();
+        hosted.withhold(&deals, &self.rooms);
         if hosted.is_over() {
             hosted.close_rooms(&self.rooms);
             return hosted;
         }
-        let task = Task::new(Arc::clone(&hosted), Arc::clone(&self.rooms), kept.rows);
+        let task = Task::new(Arc::clone(&hosted), Arc::clone(&self.rooms), rows);
         self.tracker.spawn(task.run(inbox, self.stop.clone()));
         hosted
     }
@@ -237,7 +234,7 @@ impl Place {
         self,
         name: String,
         plan: TournamentPlan,
-        mut core: Tournament,
+        core: Tournament,
     ) -> Result<(Arc<Hosted>, Token), CreateProblem> {
         let tournaments = &self.0;
         let id = Id::random();
@@ -250,22 +247,15 @@ impl Place {
             owner: owner.hash(),
             deal_secret: random_bytes(),
         };
-        let mut entries = Vec::new();
-        for entrant in built_in(&plan) {
-            let change = Change::Joined(entrant);
-            core.fold(&change);
-            entries.push(TournamentEntry::Change(change));
-        }
+        let built_in = built_in(&plan).into_iter().map(Change::Joined);
+        let entries: Vec<_> = built_in.map(TournamentEntry::Change).collect();
         let store = tournaments.rooms.store();
         store
             .create_tournament(Arc::new(header.clone()), entries.clone())
             .await?;
-        let kept = KeptTournament {
-            header,
-            rows: 1,
-            entries,
-        };
-        Ok((tournaments.take_up(kept, plan, core), owner))
+        let mut state = TournamentState::new(core);
+        entries.iter().for_each(|entry| state.apply(entry));
+        Ok((tournaments.take_up(header, 1, plan, state), owner))
     }
 }
 
@@ -298,14 +288,11 @@ fn built_in(plan: &TournamentPlan) -> Vec<Entrant> {
 }
 
 /// A tournament as it stood, from what was kept of it.
-fn folded(kept: &KeptTournament) -> Result<(TournamentPlan, Tournament), String> {
+fn folded(kept: &KeptTournament) -> Result<(TournamentPlan, TournamentState), String> {
     let plan = convert::tournament_plan(&kept.header.settings, [0; 32])
         .map_err(|problem: FieldProblem| problem.to_string())?;
-    let mut core = Tournament::new(plan.core.clone()).map_err(|problem| problem.to_string())?;
-    for entry in &kept.entries {
-        if let TournamentEntry::Change(change) = entry {
-            core.fold(change);
-        }
-    }
-    Ok((plan, core))
+    let core = Tournament::new(plan.core.clone()).map_err(|problem| problem.to_string())?;
+    let mut state = TournamentState::new(core);
+    kept.entries.iter().for_each(|entry| state.apply(entry));
+    Ok((plan, state))
 }

@@ -8,7 +8,7 @@ use chefshat_tournament::ratings::Ratings;
 use chefshat_tournament::{Format, Game, GameState, State, Tournament};
 use tokio::sync::Semaphore;
 
-use super::hosted::Hosted;
+use super::handle::Hosted;
 use super::shared::{NotWorkedOut, Shared};
 use crate::config::MAX_GAMES_FOLLOWED;
 use crate::convert;
@@ -101,10 +101,10 @@ impl Hosted {
     fn tell(&self) -> v1::FollowTournamentResponse {
         // Copied and let go of: nobody waits while standings are worked out.
         let (core, games) = {
-            let moving = self.moving();
-            let followed = followed(&moving.core).into_iter();
-            let games = followed.map(|number| self.game(&moving, number)).collect();
-            (moving.core.clone(), games)
+            let state = self.committed();
+            let followed = followed(&state.core).into_iter();
+            let games = followed.map(|number| self.game(&state, number)).collect();
+            (state.core.clone(), games)
         };
         v1::FollowTournamentResponse {
             tournament: Some(self.described(&core)),

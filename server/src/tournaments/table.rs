@@ -4,7 +4,7 @@
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
-use super::hosted::Hosted;
+use super::handle::Hosted;
 use crate::config::MAX_TOURNAMENTS;
 use chefshat_room::ids::Id;
 

@@ -12,7 +12,7 @@ use tracing::{error, info};
 
 use super::Stop;
 use super::games::plays_itself;
-use super::hosted::{Call, Connection, Entry, Hosted, Message};
+use super::handle::{Call, Connection, Entry, Hosted, Message, TournamentState};
 use crate::config::TOURNAMENT_OPEN_TIME;
 use crate::convert;
 use crate::rooms::Rooms;
@@ -27,6 +27,8 @@ const MESSAGES_AT_A_TIME: usize = 64;
 pub(super) struct Task {
     pub(super) hosted: Arc<Hosted>,
     pub(super) rooms: Arc<Rooms>,
+    /// With pending changes; the handle's copy follows when they are committed.
+    pub(super) state: TournamentState,
     /// Rows that have been kept.
     rows: u64,
     /// What is to be kept next.
@@ -53,7 +55,9 @@ pub(super) struct Task {
 impl Task {
     /// The task of a tournament of which so many rows have been kept.
     pub(super) fn new(hosted: Arc<Hosted>, rooms: Arc<Rooms>, rows: u64) -> Self {
+        let state = hosted.committed().clone();
         Self {
+            state,
             hosted,
             rooms,
             rows,
@@ -111,7 +115,7 @@ impl Task {
     }
 
     fn wake_at(&self) -> Option<Instant> {
-        let core = self.hosted.look(|core| core.wake_at());
+        let core = self.state.core.wake_at();
         let core = core.map(|ms| self.began + Duration::from_millis(ms));
         core.into_iter()
             .chain(self.retry)
@@ -121,7 +125,7 @@ impl Task {
 
     /// When a tournament that nobody begins or joins is closed.
     fn open_until(&self) -> Option<Instant> {
-        let is_open = self.hosted.look(|core| core.state() == State::Open);
+        let is_open = self.state.core.state() == State::Open;
         is_open.then(|| self.joined_at + TOURNAMENT_OPEN_TIME)
     }
 
@@ -189,15 +193,13 @@ impl Task {
             stateless: entry.stateless,
             max_games: entry.max_games,
         };
-        let (change, participant) = self
-            .hosted
-            .look(|core| Ok((core.join(entrant)?, core.participants().len())))?;
+        let change = self.state.core.join(entrant)?;
+        let participant = self.state.core.participants().len();
         let token = Token::random(self.hosted.id());
         let ticket = token.hash();
         self.fold(change);
         self.joined_at = Instant::now();
-        self.hosted.moving().tickets.insert(participant, ticket);
-        self.unkept.push(TournamentEntry::Ticket {
+        self.push(TournamentEntry::Ticket {
             participant,
             ticket,
         });
@@ -206,7 +208,7 @@ impl Task {
 
     /// Closes the tournament; the rooms of its games follow when that is kept.
     fn close(&mut self) {
-        if let Some(change) = self.hosted.look(|core| core.close()) {
+        if let Some(change) = self.state.core.close() {
             self.fold(change);
             self.unmade.clear();
         }
@@ -221,16 +223,19 @@ impl Task {
             return;
         }
         // Known before it is called: a stream takes a seat only as long as it is the newest.
-        (self.hosted.moving().connected).insert(participant, number);
+        self.set_connection(participant, Some(number));
         let mut rooms = self.rooms_of(participant).into_iter();
         let reached = rooms.all(|room| connection.call(Call::Seat(room)));
         self.connections.insert(participant, (number, connection));
-        if reached {
-            (self.hosted.moving().core).set_present(participant, true);
-            self.has_changed = true;
-        } else {
+        if !reached {
             self.away(participant);
         }
+    }
+
+    fn set_connection(&mut self, participant: usize, connection: Option<u64>) {
+        self.state.set_connection(participant, connection);
+        (self.hosted.committed()).set_connection(participant, connection);
+        self.has_changed = true;
     }
 
     fn left(&mut self, participant: usize, number: u64) {
@@ -242,22 +247,18 @@ impl Task {
     /// A participant is not to be reached any more.
     pub(super) fn away(&mut self, participant: usize) {
         self.connections.remove(&participant);
-        let mut moving = self.hosted.moving();
-        moving.connected.remove(&participant);
-        moving.core.set_present(participant, false);
-        drop(moving);
-        self.has_changed = true;
+        self.set_connection(participant, None);
     }
 
     /// Rooms in which a participant has a seat now.
     fn rooms_of(&self, participant: usize) -> Vec<Id> {
-        let moving = self.hosted.moving();
-        let games = moving.core.playing().filter(|number| {
-            let game = &moving.core.games()[*number];
+        let state = &self.state;
+        let games = state.core.playing().filter(|number| {
+            let game = &state.core.games()[*number];
             !self.unmade.contains(number) && plays_itself(game, participant)
         });
         games
-            .filter_map(|number| moving.placed.get(&number).map(|(room, _)| *room))
+            .filter_map(|number| state.placed.get(&number).map(|(room, _)| *room))
             .collect()
     }
 
@@ -271,17 +272,21 @@ impl Task {
             Change::Rescheduled { game, .. }
             | Change::Counted { game, .. }
             | Change::Voided { game } => {
-                self.deals
-                    .extend(self.hosted.look(|core| core.games()[*game].deal));
+                self.deals.extend(self.state.core.games()[*game].deal);
             }
-            Change::Finished | Change::Closed => self.deals = self.hosted.deals(),
+            Change::Finished | Change::Closed => self.deals = self.state.deals(),
             _ => {}
         }
-        self.hosted.moving().core.fold(&change);
-        self.unkept.push(TournamentEntry::Change(change));
+        self.push(TournamentEntry::Change(change));
         if let Some(game) = placed {
             self.place(game);
         }
+    }
+
+    /// Applies an entry and keeps it for the next commit.
+    pub(super) fn push(&mut self, entry: TournamentEntry) {
+        self.state.apply(&entry);
+        self.unkept.push(entry);
     }
 
     pub(super) fn fold_all(&mut self, changes: Vec<Change>) {
@@ -301,8 +306,9 @@ impl Task {
             if moved {
                 let entries = std::mem::take(&mut self.unkept);
                 let store = self.rooms.store();
-                (store.append_tournament(self.hosted.id(), self.rows, entries)).await?;
+                (store.append_tournament(self.hosted.id(), self.rows, entries.clone())).await?;
                 self.rows += 1;
+                self.hosted.publish(&entries);
             }
             for reply in self.replies.drain(..) {
                 reply();
@@ -317,7 +323,7 @@ impl Task {
             if std::mem::take(&mut self.has_changed) || moved {
                 self.hosted.changes.send_modify(|count| *count += 1);
             }
-            if !moved {
+            if !moved && self.unkept.is_empty() {
                 return Ok(());
             }
         }
@@ -327,11 +333,12 @@ impl Task {
     async fn follow(&mut self) -> Result<(), StoreError> {
         let now_ms = self.now_ms();
         // With nothing being played a round may be due, which takes a while to draw.
-        let may_draw = self.hosted.look(|core| match core.state() {
+        let core = &self.state.core;
+        let may_draw = match core.state() {
             State::Open => core.settings().start_when_joined.is_some(),
             State::Playing => core.playing().next().is_none(),
             State::Finished | State::Closed => false,
-        });
+        };
         if may_draw {
             let following = move |mut core: Tournament| {
                 let mut changes = Vec::new();
@@ -345,7 +352,7 @@ impl Task {
             self.fold_all(changes);
         }
         loop {
-            let next = self.hosted.moving().core.next(now_ms);
+            let next = self.state.core.next(now_ms);
             let Some(change) = next else { return Ok(()) };
             self.fold(change);
         }
@@ -356,9 +363,9 @@ impl Task {
         &self,
         work: impl FnOnce(Tournament) -> T + Send + 'static,
     ) -> Result<T, StoreError> {
-        let core = self.hosted.look(Tournament::clone);
+        let core = self.state.core.clone();
         let working = tokio::task::spawn_blocking(move || work(core));
-        (working.await).map_err(|error| StoreError(format!("a draw was not made: {error}")))
+        (working.await).map_err(|error| StoreError::Failed(format!("a draw was not made: {error}")))
     }
 }
 

@@ -44,3 +44,118 @@ async fn a_tournament_is_made_to_its_end_though_nobody_waits_for_it() {
     assert!(tournaments.get(Id::random()).is_none());
     assert!(tournaments.by_code("").is_none());
 }
+
+/// Settings of a tournament of built-in agents in games of one Shift.
+fn built_in(name: &str) -> chefshat_proto::v1::TournamentSettings {
+    use chefshat_proto::v1;
+    v1::TournamentSettings {
+        name: name.into(),
+        format: v1::TournamentFormat::Swiss.into(),
+        built_in_agents: vec!["random".into(); 4],
+        rounds: 1,
+        rules: Some(v1::RuleSet {
+            stop: Some(v1::rule_set::Stop::TargetShifts(1)),
+            ..v1::RuleSet::default()
+        }),
+        ..Default::default()
+    }
+}
+
+fn entrant(name: &str) -> Entry {
+    Entry {
+        name: name.into(),
+        kind: chefshat_room::journal::ParticipantKind::Agent,
+        max_games: 1,
+        stateless: true,
+    }
+}
+
+#[tokio::test]
+async fn readers_see_only_committed_changes() {
+    let store = Arc::new(crate::store::FailingStore::after(u64::MAX));
+    let commits = Arc::clone(&store.tournament_commits);
+    let rooms = Rooms::new(&ServerConfig::default(), store, TaskTracker::new());
+    let tournaments = Tournaments::new(rooms, TaskTracker::new());
+    let plan = convert::tournament_plan(&built_in("Coppa"), [7; 32]).expect("it can be held");
+    let (hosted, _) = tournaments.create("Coppa", plan).await.expect("made");
+    commits.forget_permits(usize::MAX >> 3);
+    assert_eq!(commits.available_permits(), 0);
+
+    let joining = tokio::spawn({
+        let hosted = Arc::clone(&hosted);
+        async move { hosted.join(entrant("Ada")).await }
+    });
+    // The task of the tournament has taken the message and waits for the commit.
+    for _ in 0..100 {
+        tokio::task::yield_now().await;
+    }
+    assert!(!joining.is_finished());
+    let shown = hosted.describe().participants.len();
+    assert_eq!(shown, 4, "what is not committed is not shown");
+    commits.add_permits(1);
+    joining
+        .await
+        .expect("no panic")
+        .expect("it runs")
+        .expect("joined");
+    assert_eq!(hosted.describe().participants.len(), 5);
+}
+
+#[tokio::test]
+async fn a_forged_record_of_a_coming_game_is_not_counted() {
+    use chefshat_proto::v1;
+    let folder = tempfile::tempdir().expect("a folder");
+    let store = SqliteStore::open(folder.path()).await.expect("a new one");
+    let store: Arc<dyn Store> = Arc::new(store);
+    let start = |max_rooms| {
+        let config = ServerConfig {
+            max_rooms,
+            ..ServerConfig::default()
+        };
+        let rooms = Rooms::new(&config, Arc::clone(&store), TaskTracker::new());
+        Tournaments::new(rooms, TaskTracker::new())
+    };
+    // There is no space for a room: the game has its id, and waits.
+    let tournaments = start(0);
+    let plan = convert::tournament_plan(&built_in("Coppa"), [7; 32]).expect("it can be held");
+    let (hosted, _) = tournaments.create("Coppa", plan).await.expect("made");
+    let mut changes = hosted.changes();
+    hosted.begin().await.expect("it runs").expect("it begins");
+    let forged = loop {
+        match hosted.games(0, 1).pop().map(|game| game.game_id) {
+            Some(game_id) if !game_id.is_empty() => break game_id,
+            _ => changes.changed().await.expect("the tournament is there"),
+        }
+    };
+    let game = Id::parse(&forged).expect("an id");
+    let summary = v1::RecordSummary {
+        game_id: forged.clone(),
+        state: v1::RoomState::Finished.into(),
+        ..Default::default()
+    };
+    let lines = chefshat_record::jsonl::read(std::path::Path::new(concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../tests/fixtures/records/committed.jsonl"
+    )));
+    let lines: Arc<[_]> = lines.expect("the fixture").into();
+    let imported = store.import(game, summary, lines).await;
+    assert_eq!(imported, Ok(true));
+    assert!(tournaments.has_announced(game), "imports of it are refused");
+    let id = hosted.id();
+    tournaments.end();
+
+    let tournaments = start(9);
+    tournaments.restore().await.expect("readable");
+    let hosted = tournaments.get(id).expect("restored");
+    let mut changes = hosted.changes();
+    while !hosted.is_over() {
+        changes.changed().await.expect("the tournament is there");
+    }
+    let games = hosted.games(0, 9);
+    assert!(store.failed().now_or_never().is_none(), "the store goes on");
+    assert!(!games.is_empty());
+    for game in games {
+        assert_eq!(game.state(), v1::TournamentGameState::Counted);
+        assert_ne!(game.game_id, forged);
+    }
+}

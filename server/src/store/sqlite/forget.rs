@@ -63,7 +63,7 @@ pub enum ForgetError {
 
 impl From<sqlx::Error> for ForgetError {
     fn from(error: sqlx::Error) -> Self {
-        Self::Store(StoreError(explain(&error)))
+        Self::Store(StoreError::Failed(explain(&error)))
     }
 }
 

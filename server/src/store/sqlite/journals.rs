@@ -7,7 +7,9 @@ use chefshat_proto::v1;
 use futures::FutureExt as _;
 use futures::future::{BoxFuture, ready};
 use tokio::sync::{mpsc, oneshot};
+use tracing::error;
 
+use super::codec::Codec;
 use super::form;
 use super::writer::{Order, Pending, Row};
 use crate::store::{Journal, StoreError};
@@ -34,7 +36,7 @@ impl Orders {
 
     /// Gives an order and waits until it is kept.
     pub(super) async fn give(&self, order: Order) -> Result<(), StoreError> {
-        let gone = || StoreError("the database is closed".into());
+        let gone = || StoreError::Failed("the database is closed".into());
         let (reply, kept) = oneshot::channel();
         let order = self.queue.send((order, reply));
         order.await.map_err(|_| gone())?;
@@ -117,6 +119,7 @@ pub(super) struct EphemeralJournal {
     pub(super) header: Arc<GameHeader>,
     pub(super) entries: Vec<Entry>,
     pub(super) orders: Orders,
+    pub(super) codec: Codec,
 }
 
 impl Journal for EphemeralJournal {
@@ -135,16 +138,31 @@ impl Journal for EphemeralJournal {
         let Some(summary) = summary else {
             return ready(Ok(())).boxed();
         };
-        self.orders
-            .give(Order::Whole {
+        let mut entries = std::mem::take(&mut self.entries);
+        let header = Arc::clone(&self.header);
+        let count = entries.len();
+        let encoding = move || (form::header_to_bytes(&header), encode(&mut entries));
+        async move {
+            let (header, entries) = self.codec.run(count, encoding).await?;
+            let game_id = self.header.game_id;
+            let game = Order::Whole {
                 number: self.number,
-                game_id: self.header.game_id,
-                header: form::header_to_bytes(&self.header),
+                game_id,
+                header,
                 row: self.orders.new_row(),
-                entries: encode(&mut self.entries),
+                entries,
                 summary,
-            })
-            .boxed()
+            };
+            match self.orders.give(game).await {
+                // The game has been played all the same; the record that was there first stays.
+                Err(StoreError::Taken(_)) => {
+                    error!(game = %game_id, "another record has the id of this game; the game is not stored");
+                    Ok(())
+                }
+                stored => stored,
+            }
+        }
+        .boxed()
     }
 }
 

@@ -1,6 +1,7 @@
 //! Games in an SQLite database, which outlives the server. Opening is in `open`, reading in `reader`, writing in `journals` and `writer`, the
 //! form of what is kept in `form`; here is the store that they make up.
 
+mod codec;
 mod errors;
 mod forget;
 mod form;
@@ -31,6 +32,7 @@ use super::{Journal, KeptGame, LeftGame, Part, Store, StoreError};
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Entry, GameHeader};
 use chefshat_room::policy::Durability;
+use codec::Codec;
 use errors::explain;
 use journals::{DurableJournal, EphemeralJournal, Orders};
 use reader::Reader;
@@ -44,6 +46,7 @@ const RESERVE_SHARE: u64 = 50;
 pub struct SqliteStore {
     data_dir: PathBuf,
     reader: Reader,
+    codec: Codec,
     orders: Orders,
     failed: watch::Receiver<Option<StoreError>>,
     numbers: Arc<AtomicI64>,
@@ -60,18 +63,25 @@ impl SqliteStore {
     /// The directory cannot be used; nothing was changed in it.
     pub async fn open(data_dir: &Path) -> Result<Self, OpenError> {
         let opened = open::open(data_dir).await?;
-        let (last, last_row): (i64, i64) = sqlx::query_as(
-            "SELECT (SELECT coalesce(max(number), 0) FROM games), (SELECT coalesce(max(row), 0) FROM journal)",
+        let (last, last_row, last_listed): (i64, i64, i64) = sqlx::query_as(
+            "SELECT (SELECT coalesce(max(number), 0) FROM games),
+                    (SELECT coalesce(max(row), 0) FROM journal),
+                    (SELECT coalesce(max(listed), 0) FROM games)",
         )
         .fetch_one(&opened.readers)
         .await
         .map_err(|error| OpenError::Other(data_dir.join(open::FILE), explain(&error)))?;
         let (orders, queue) = mpsc::channel(writer::QUEUE);
         let (has_failed, failed) = watch::channel(None);
-        let writing = tokio::spawn(writer::run(opened.writer, queue, has_failed));
+        let codec = Codec::new();
+        let writing = tokio::spawn(writer::run(opened.writer, last_listed, queue, has_failed));
         Ok(Self {
             data_dir: data_dir.to_path_buf(),
-            reader: Reader(opened.readers),
+            reader: Reader {
+                pool: opened.readers,
+                codec: codec.clone(),
+            },
+            codec,
             orders: Orders {
                 queue: orders,
                 next_row: Arc::new(AtomicI64::new(last_row + 1)),
@@ -114,6 +124,7 @@ impl Store for SqliteStore {
                 header,
                 entries,
                 orders,
+                codec: self.codec.clone(),
             };
             return ready(Ok(Box::new(journal) as Box<dyn Journal>)).boxed();
         }
@@ -156,16 +167,20 @@ impl Store for SqliteStore {
         summary.added = true;
         async move {
             let number = self.numbers.fetch_add(1, Ordering::Relaxed);
-            self.orders
-                .give(Order::Import {
-                    number,
-                    game_id: game,
-                    record: form::lines_to_bytes(&lines),
-                    summary: Box::new(summary),
-                })
-                .await?;
-            // It has this number, unless a game of this id was there before.
-            Ok(self.reader.number(game).await? == Some(number))
+            let count = lines.len();
+            let encoding = self.codec.run(count, move || form::lines_to_bytes(&lines));
+            let record = encoding.await?;
+            let import = Order::Import {
+                number,
+                game_id: game,
+                record,
+                summary: Box::new(summary),
+            };
+            match self.orders.give(import).await {
+                Ok(()) => Ok(true),
+                Err(StoreError::Taken(_)) => Ok(false),
+                Err(error) => Err(error),
+            }
         }
         .boxed()
     }
@@ -214,7 +229,7 @@ impl Store for SqliteStore {
             let failure = match failed.wait_for(Option::is_some).await {
                 Ok(failure) => failure.clone(),
                 Err(_) if closed.load(Ordering::Acquire) => None,
-                Err(_) => Some(StoreError(
+                Err(_) => Some(StoreError::Failed(
                     "the writer of the database has ended unexpectedly".into(),
                 )),
             };
@@ -229,7 +244,7 @@ impl Store for SqliteStore {
     fn close(&self) -> BoxFuture<'_, ()> {
         async move {
             self.closed.store(true, Ordering::Release);
-            self.reader.0.close().await;
+            self.reader.pool.close().await;
             // A writer that has failed says so elsewhere; here it is only waited for.
             let _ = self.orders.give(Order::Close).await;
             let writing = self

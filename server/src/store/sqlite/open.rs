@@ -29,13 +29,14 @@ const READERS: u32 = 4;
 /// Statements that a connection keeps prepared.
 const STATEMENTS: usize = 64;
 /// The migrations, oldest first. Once released, one is never changed.
-const MIGRATIONS: [(i64, &str, &str); 2] = [
+const MIGRATIONS: [(i64, &str, &str); 3] = [
     (1, "games", include_str!("migrations/0001_games.sql")),
     (
         2,
         "tournaments",
         include_str!("migrations/0002_tournaments.sql"),
     ),
+    (3, "listed", include_str!("migrations/0003_listed.sql")),
 ];
 /// SQLite's codes for a file that is no database, and for one that is damaged.
 const NOT_A_DATABASE: i32 = 26;
@@ -245,6 +246,6 @@ fn make_private(path: &Path) -> Result<(), OpenError> {
 
 impl From<OpenError> for StoreError {
     fn from(error: OpenError) -> Self {
-        Self(error.to_string())
+        Self::Failed(error.to_string())
     }
 }

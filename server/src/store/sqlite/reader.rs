@@ -10,6 +10,7 @@ use sqlx::Row as _;
 use sqlx::sqlite::{SqlitePool, SqliteRow};
 use tracing::error;
 
+use super::codec::Codec;
 use super::errors::explain;
 use super::form::{self, FORM, Unreadable};
 use super::journals::{DurableJournal, Orders};
@@ -25,7 +26,7 @@ const MOST_ENDED: i64 = 256;
 macro_rules! list_query {
     ($part:literal, $order:literal) => {
         concat!(
-            "SELECT number, summary FROM games
+            "SELECT listed, summary FROM games
              WHERE summary IS NOT NULL AND ",
             $part,
             " AND ($2 = 0 OR state = $2) AND ($3 = 0 OR origin = $3) AND ($4 = '' OR room_name = $4)
@@ -41,7 +42,10 @@ macro_rules! list_query {
 }
 
 /// Reads what is kept.
-pub(super) struct Reader(pub(super) SqlitePool);
+pub(super) struct Reader {
+    pub(super) pool: SqlitePool,
+    pub(super) codec: Codec,
+}
 
 impl Reader {
     /// See `Store::left`.
@@ -61,7 +65,7 @@ impl Reader {
         )
         .bind(i64::try_from(ended_since_ms).unwrap_or(i64::MAX))
         .bind(MOST_ENDED)
-        .fetch_all(&self.0)
+        .fetch_all(&self.pool)
         .await
         .map_err(failure)?;
         let mut going_on = self.going_on().await?;
@@ -102,16 +106,20 @@ impl Reader {
              WHERE game_id = $1 AND summary IS NOT NULL",
         )
         .bind(game.0.as_slice())
-        .fetch_optional(&self.0)
+        .fetch_optional(&self.pool)
         .await
         .map_err(failure)?;
         let Some(row) = row else { return Ok(None) };
-        let unreadable =
-            |problem: Unreadable| StoreError(format!("game {game} cannot be read: {problem}"));
+        let unreadable = |problem: Unreadable| {
+            StoreError::Failed(format!("game {game} cannot be read: {problem}"))
+        };
         check_form(row.get(1)).map_err(unreadable)?;
         let record: Option<Vec<u8>> = row.get(3);
         if let Some(record) = record {
-            let lines = form::lines_from_bytes(&record).map_err(unreadable)?;
+            let decoding = self
+                .codec
+                .run(record.len() / 64, move || form::lines_from_bytes(&record));
+            let lines = decoding.await?.map_err(unreadable)?;
             return Ok(Some(KeptGame::Imported(lines.into())));
         }
         let header = header_of(&row).map_err(unreadable)?;
@@ -138,7 +146,7 @@ impl Reader {
              ORDER BY number",
         )
         .bind(i64::try_from(newest_over).unwrap_or(i64::MAX))
-        .fetch_all(&self.0)
+        .fetch_all(&self.pool)
         .await
         .map_err(failure)?;
         let mut kept = Vec::with_capacity(tournaments.len());
@@ -148,7 +156,7 @@ impl Reader {
                 "SELECT entries FROM tournament_entries WHERE tournament = $1 ORDER BY position",
             )
             .bind(number)
-            .fetch_all(&self.0)
+            .fetch_all(&self.pool)
             .await
             .map_err(failure)?;
             let header = check_form(row.get(1)).and_then(|()| {
@@ -185,7 +193,7 @@ impl Reader {
                AND game IN (SELECT number FROM games WHERE state = 0)
              ORDER BY row",
         )
-        .fetch(&self.0);
+        .fetch(&self.pool);
         let mut journals = HashMap::new();
         while let Some(row) = rows.try_next().await.map_err(failure)? {
             let journal = journals.entry(row.get(3)).or_insert(Ok(Read::default()));
@@ -215,14 +223,17 @@ impl Reader {
         )
         .bind(last_row)
         .bind(number)
-        .fetch_all(&self.0)
+        .fetch_all(&self.pool)
         .await
         .map_err(failure)?;
-        let mut read = Read::default();
         if rows.is_empty() && last_row.is_some() {
             return Ok(Err(Unreadable("its journal is missing".into())));
         }
-        Ok(rows.iter().try_for_each(|row| read.add(row)).map(|()| read))
+        let decoding = self.codec.run(rows.len(), move || {
+            let mut read = Read::default();
+            rows.iter().try_for_each(|row| read.add(row)).map(|()| read)
+        });
+        decoding.await
     }
 
     /// See `Store::list`.
@@ -233,8 +244,8 @@ impl Reader {
         count: usize,
     ) -> Result<Vec<(u64, v1::RecordSummary)>, StoreError> {
         let (query, number) = match part {
-            Part::After(number) => (list_query!("number > $1", "number"), number),
-            Part::Before(number) => (list_query!("number < $1", "number DESC"), number),
+            Part::After(number) => (list_query!("listed > $1", "listed"), number),
+            Part::Before(number) => (list_query!("listed < $1", "listed DESC"), number),
         };
         let rows = sqlx::query(query)
             .bind(i64::try_from(number).unwrap_or(i64::MAX))
@@ -247,14 +258,16 @@ impl Reader {
             .bind(filter.participant.as_str())
             .bind(filter.hosted_here)
             .bind(i64::try_from(count).unwrap_or(i64::MAX))
-            .fetch_all(&self.0)
+            .fetch_all(&self.pool)
             .await
             .map_err(failure)?;
         rows.iter()
             .map(|row| {
                 let number: i64 = row.get(0);
-                let summary = v1::RecordSummary::decode(row.get::<&[u8], _>(1))
-                    .map_err(|error| StoreError(format!("game number {number}: {error}")))?;
+                let summary =
+                    v1::RecordSummary::decode(row.get::<&[u8], _>(1)).map_err(|error| {
+                        StoreError::Failed(format!("game number {number}: {error}"))
+                    })?;
                 Ok((u64::try_from(number).unwrap_or_default(), summary))
             })
             .collect()
@@ -265,20 +278,11 @@ impl Reader {
         let ids: Vec<Vec<u8>> = sqlx::query_scalar(
             "SELECT game_id FROM games WHERE filed = 0 AND summary IS NOT NULL ORDER BY number",
         )
-        .fetch_all(&self.0)
+        .fetch_all(&self.pool)
         .await
         .map_err(failure)?;
         let id = |bytes: Vec<u8>| bytes.try_into().ok().map(Id);
         Ok(ids.into_iter().filter_map(id).collect())
-    }
-
-    /// The number under which a game is kept.
-    pub(super) async fn number(&self, game: Id) -> Result<Option<i64>, StoreError> {
-        sqlx::query_scalar("SELECT number FROM games WHERE game_id = $1")
-            .bind(game.0.as_slice())
-            .fetch_optional(&self.0)
-            .await
-            .map_err(failure)
     }
 }
 
@@ -311,7 +315,7 @@ fn header_of(row: &SqliteRow) -> Result<GameHeader, Unreadable> {
 }
 
 fn failure(error: sqlx::Error) -> StoreError {
-    StoreError(explain(&error))
+    StoreError::Failed(explain(&error))
 }
 
 fn check_form(form: i64) -> Result<(), Unreadable> {

@@ -3,6 +3,8 @@
 //! come. A transaction is mostly rows of the journal and nothing else; those are written by one call, because every call goes to the
 //! database's own thread and back.
 
+use std::collections::BTreeMap;
+
 use chefshat_proto::v1;
 use prost::Message as _;
 use sqlx::sqlite::SqliteConnection;
@@ -112,8 +114,11 @@ pub(super) type Pending = (Order, oneshot::Sender<Result<(), StoreError>>);
 
 /// Keeps what is ordered until nobody can order any more. After the first failure it keeps nothing: what became of the transaction that
 /// failed is not known.
+///
+/// `last_listed` is the highest number in the list of finished games.
 pub(super) async fn run(
     mut connection: SqliteConnection,
+    mut last_listed: i64,
     mut orders: mpsc::Receiver<Pending>,
     failed: watch::Sender<Option<StoreError>>,
 ) {
@@ -126,16 +131,24 @@ pub(super) async fn run(
         let failure = failed.borrow().clone();
         let kept = match failure {
             Some(failure) => Err(failure),
-            None => keep(&mut connection, &mut pending).await.map_err(|cause| {
-                let failure = StoreError(explain(&cause));
-                error!(%failure, "the store fails");
-                failed.send_replace(Some(failure.clone()));
-                failure
-            }),
+            None => keep(&mut connection, &mut pending, &mut last_listed)
+                .await
+                .map_err(|cause| {
+                    let failure = StoreError::Failed(explain(&cause));
+                    error!(%failure, "the store fails");
+                    failed.send_replace(Some(failure.clone()));
+                    failure
+                }),
         };
-        for (_, reply) in pending.drain(..) {
-            // A room that has gone does not want to know.
-            let _ = reply.send(kept.clone());
+        for (index, (_, reply)) in pending.drain(..).enumerate() {
+            let answer = match &kept {
+                Ok(taken) => taken
+                    .get(&index)
+                    .map_or(Ok(()), |id| Err(StoreError::Taken(*id))),
+                Err(failure) => Err(failure.clone()),
+            };
+            // The room may be gone.
+            let _ = reply.send(answer);
         }
     }
     // What is in the write-ahead log is as safe as what is in the database: closing only tidies up.
@@ -144,8 +157,13 @@ pub(super) async fn run(
     }
 }
 
-async fn keep(connection: &mut SqliteConnection, pending: &mut [Pending]) -> sqlx::Result<()> {
-    let written = write(connection, pending).await;
+/// Commits commands; returns those that were refused because their id is taken, by their index.
+async fn keep(
+    connection: &mut SqliteConnection,
+    pending: &mut [Pending],
+    last_listed: &mut i64,
+) -> sqlx::Result<BTreeMap<usize, Id>> {
+    let written = write(connection, pending, last_listed).await;
     if written.is_err() {
         // The transaction is given up in any case, at the latest when the file is opened again.
         let _ = connection.execute("ROLLBACK").await;
@@ -154,14 +172,19 @@ async fn keep(connection: &mut SqliteConnection, pending: &mut [Pending]) -> sql
 }
 
 /// Writes orders in one transaction.
-async fn write(connection: &mut SqliteConnection, pending: &mut [Pending]) -> sqlx::Result<()> {
+async fn write(
+    connection: &mut SqliteConnection,
+    pending: &mut [Pending],
+    last_listed: &mut i64,
+) -> sqlx::Result<BTreeMap<usize, Id>> {
+    let mut taken = BTreeMap::new();
     let mut rows = Vec::with_capacity(pending.len());
     let rows_alone = (pending.iter()).all(|(order, _)| matches!(order, Order::Append(_)));
     if !rows_alone {
         connection.execute("BEGIN IMMEDIATE").await?;
     }
     // A game has one order at a time, so that those of different kinds may go in any order.
-    for (order, _) in pending {
+    for (index, (order, _)) in pending.iter_mut().enumerate() {
         match order {
             Order::Append(row) => rows.push(row),
             Order::Close => {}
@@ -172,8 +195,11 @@ async fn write(connection: &mut SqliteConnection, pending: &mut [Pending]) -> sq
                 first_row,
                 first,
             } => {
-                create(connection, *number, *game_id, header, *first_row).await?;
-                rows.extend(first);
+                if create(connection, *number, *game_id, header, *first_row).await? {
+                    rows.extend(first);
+                } else {
+                    taken.insert(index, *game_id);
+                }
             }
             Order::Finish {
                 number,
@@ -191,7 +217,7 @@ async fn write(connection: &mut SqliteConnection, pending: &mut [Pending]) -> sq
                 .execute(&mut *connection)
                 .await?;
                 if let Some(summary) = summary {
-                    summarise(connection, *number, summary).await?;
+                    summarise(connection, *number, last_listed, summary).await?;
                 }
             }
             Order::Whole {
@@ -202,7 +228,10 @@ async fn write(connection: &mut SqliteConnection, pending: &mut [Pending]) -> sq
                 entries,
                 summary,
             } => {
-                create(connection, *number, *game_id, header, *row).await?;
+                if !create(connection, *number, *game_id, header, *row).await? {
+                    taken.insert(index, *game_id);
+                    continue;
+                }
                 sqlx::query("UPDATE games SET last_row = $2 WHERE number = $1")
                     .bind(*number)
                     .bind(*row)
@@ -216,7 +245,7 @@ async fn write(connection: &mut SqliteConnection, pending: &mut [Pending]) -> sq
                 .bind(entries.as_slice())
                 .execute(&mut *connection)
                 .await?;
-                summarise(connection, *number, summary).await?;
+                summarise(connection, *number, last_listed, summary).await?;
             }
             Order::Import {
                 number,
@@ -224,7 +253,6 @@ async fn write(connection: &mut SqliteConnection, pending: &mut [Pending]) -> sq
                 record,
                 summary,
             } => {
-                // Its id comes from outside: that it is there already is no failure of the store.
                 let added = sqlx::query(
                     "INSERT INTO games (number, game_id, form, state, added) VALUES ($1, $2, $3, 0, 1)
                      ON CONFLICT (game_id) DO NOTHING",
@@ -240,19 +268,26 @@ async fn write(connection: &mut SqliteConnection, pending: &mut [Pending]) -> sq
                         .bind(record.as_slice())
                         .execute(&mut *connection)
                         .await?;
-                    summarise(connection, *number, summary).await?;
+                    summarise(connection, *number, last_listed, summary).await?;
+                } else {
+                    taken.insert(index, *game_id);
                 }
             }
             Order::Tournament { header, first } => {
-                sqlx::query(
-                    "INSERT INTO tournaments (tournament_id, form, header) VALUES ($1, $2, $3)",
+                let added = sqlx::query(
+                    "INSERT INTO tournaments (tournament_id, form, header) VALUES ($1, $2, $3)
+                     ON CONFLICT (tournament_id) DO NOTHING",
                 )
                 .bind(first.id.0.as_slice())
                 .bind(FORM)
                 .bind(header.as_slice())
                 .execute(&mut *connection)
                 .await?;
-                move_tournament(connection, first).await?;
+                if added.rows_affected() > 0 {
+                    move_tournament(connection, first).await?;
+                } else {
+                    taken.insert(index, first.id);
+                }
             }
             Order::TournamentEntries(row) => move_tournament(connection, row).await?,
             Order::Filed { game_id } => {
@@ -276,7 +311,8 @@ async fn write(connection: &mut SqliteConnection, pending: &mut [Pending]) -> sq
             .bind(row.previous)
             .bind(row.entries.as_slice());
     }
-    query.execute(connection).await.map(drop)
+    query.execute(connection).await?;
+    Ok(taken)
 }
 
 /// Statements that put so many rows into the journal. Places of the last one for which there is no row are left empty, which SQLite reads
@@ -297,16 +333,18 @@ fn insert(mut rows: usize) -> String {
     text
 }
 
+/// Inserts a game; `false` if its id is taken.
 async fn create(
     connection: &mut SqliteConnection,
     number: i64,
     game_id: Id,
     header: &[u8],
     first_row: i64,
-) -> sqlx::Result<()> {
+) -> sqlx::Result<bool> {
     sqlx::query(
         "INSERT INTO games (number, game_id, form, header, first_row, state)
-         VALUES ($1, $2, $3, $4, $5, 0)",
+         VALUES ($1, $2, $3, $4, $5, 0)
+         ON CONFLICT (game_id) DO NOTHING",
     )
     .bind(number)
     .bind(game_id.0.as_slice())
@@ -315,7 +353,7 @@ async fn create(
     .bind(first_row)
     .execute(connection)
     .await
-    .map(drop)
+    .map(|created| created.rows_affected() > 0)
 }
 
 async fn move_tournament(
@@ -340,14 +378,17 @@ async fn move_tournament(
     Ok(())
 }
 
-/// Notes how a game ended, and by what it is to be found.
+/// Writes how a game ended and by what it is found, and enters it into the list of finished games.
 async fn summarise(
     connection: &mut SqliteConnection,
     number: i64,
+    last_listed: &mut i64,
     summary: &v1::RecordSummary,
 ) -> sqlx::Result<()> {
+    *last_listed += 1;
     sqlx::query(
-        "UPDATE games SET state = $2, summary = $3, origin = $4, room_name = $5, created_at_ms = $6, ended_at_ms = $7
+        "UPDATE games SET state = $2, summary = $3, origin = $4, room_name = $5, created_at_ms = $6, ended_at_ms = $7,
+                          listed = $8
          WHERE number = $1",
     )
     .bind(number)
@@ -357,6 +398,7 @@ async fn summarise(
     .bind(summary.room_name.as_str())
     .bind(i64::try_from(summary.created_at_ms).unwrap_or(i64::MAX))
     .bind(i64::try_from(summary.ended_at_ms).unwrap_or(i64::MAX))
+    .bind(*last_listed)
     .execute(&mut *connection)
     .await?;
     for seat in &summary.seats {

@@ -13,7 +13,7 @@ use tokio::sync::{mpsc, watch};
 
 use super::*;
 use crate::config::MAX_NAME_CHARS;
-use crate::tournaments::hosted::Moving;
+use crate::tournaments::handle::TournamentState;
 use chefshat_room::ids::{Id, Token};
 
 /// What standard gRPC clients take, bytes.
@@ -62,7 +62,7 @@ impl Hosted {
                 deal_secret: [2; 32],
             },
             plan,
-            moving: Mutex::new(Moving {
+            committed: Mutex::new(TournamentState {
                 core,
                 tickets: BTreeMap::new(),
                 placed: BTreeMap::new(),
@@ -77,14 +77,14 @@ impl Hosted {
     fn begun(self: Arc<Self>) -> Arc<Self> {
         let begun = self.look(Tournament::begin).expect("there are enough");
         for change in begun {
-            self.moving().core.fold(&change);
+            self.committed().core.fold(&change);
         }
         self
     }
 
     /// Calls all games that can be called.
     fn call_games(&self) {
-        let mut moving = self.moving();
+        let mut moving = self.committed();
         while let Some(change) = moving.core.next(0) {
             if let Change::Called { game, .. } = change {
                 moving.placed.insert(game, (Id::random(), Id::random()));
@@ -95,7 +95,7 @@ impl Hosted {
 
     /// Ends all games that were called.
     fn end_games(&self) {
-        let mut moving = self.moving();
+        let mut moving = self.committed();
         let playing: Vec<usize> = moving.core.playing().collect();
         for game in playing {
             let seats = moving.core.games()[game].seats.len();

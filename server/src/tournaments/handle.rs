@@ -12,7 +12,7 @@ use super::shown::Shown;
 use crate::convert::{self, TournamentPlan};
 use crate::outbox::{Outbox, StreamEnd};
 use crate::rooms::Rooms;
-use crate::store::tournaments::TournamentHeader;
+use crate::store::tournaments::{TournamentEntry, TournamentHeader};
 use chefshat_room::ids::{Id, SecretHash, Token};
 use chefshat_room::journal::ParticipantKind;
 
@@ -74,9 +74,9 @@ pub(super) enum Message {
     Left(usize, u64),
 }
 
-/// What moves, and what everybody may look at. A look may be ahead of the store by one commit; what it shows is promised when it is kept.
-#[derive(Debug)]
-pub(super) struct Moving {
+/// The state of a tournament. Its task has one with pending changes; the handle has one with committed changes alone, for readers.
+#[derive(Debug, Clone)]
+pub(super) struct TournamentState {
     pub(super) core: Tournament,
     /// Tickets of participants, hashed; built-in ones have none.
     pub(super) tickets: BTreeMap<usize, SecretHash>,
@@ -86,12 +86,56 @@ pub(super) struct Moving {
     pub(super) connected: BTreeMap<usize, u64>,
 }
 
+impl TournamentState {
+    /// The state before anybody has joined.
+    pub(super) fn new(core: Tournament) -> Self {
+        Self {
+            core,
+            tickets: BTreeMap::new(),
+            placed: BTreeMap::new(),
+            connected: BTreeMap::new(),
+        }
+    }
+
+    /// Applies an entry of the tournament's journal.
+    pub(super) fn apply(&mut self, entry: &TournamentEntry) {
+        match entry {
+            TournamentEntry::Change(change) => self.core.fold(change),
+            TournamentEntry::Ticket {
+                participant,
+                ticket,
+            } => drop(self.tickets.insert(*participant, *ticket)),
+            TournamentEntry::Placed {
+                game,
+                room_id,
+                game_id,
+            } => drop(self.placed.insert(*game, (*room_id, *game_id))),
+        }
+    }
+
+    /// Notes the connection that a participant has now, if any. Connections are not part of the journal.
+    pub(super) fn set_connection(&mut self, participant: usize, connection: Option<u64>) {
+        match connection {
+            Some(number) => drop(self.connected.insert(participant, number)),
+            None => drop(self.connected.remove(&participant)),
+        }
+        self.core.set_present(participant, connection.is_some());
+    }
+
+    /// All deals that games share.
+    pub(super) fn deals(&self) -> BTreeSet<u32> {
+        let games = self.core.games().iter();
+        games.filter_map(|game| game.deal).collect()
+    }
+}
+
 /// A tournament of this server.
 #[derive(Debug)]
 pub struct Hosted {
     pub(super) header: TournamentHeader,
     pub(super) plan: TournamentPlan,
-    pub(super) moving: Mutex<Moving>,
+    /// With committed changes alone.
+    pub(super) committed: Mutex<TournamentState>,
     pub(super) mailbox: mpsc::Sender<Message>,
     /// Counts what has happened.
     pub(super) changes: watch::Sender<u64>,
@@ -119,8 +163,8 @@ impl Hosted {
     /// The participant with this ticket, in constant time for each.
     pub fn participant_of(&self, secret: &[u8]) -> Option<usize> {
         let hash = SecretHash::of(secret);
-        let moving = self.moving();
-        let mut tickets = moving.tickets.iter();
+        let state = self.committed();
+        let mut tickets = state.tickets.iter();
         tickets
             .find(|(_, ticket)| ticket.is(&hash))
             .map(|(participant, _)| *participant)
@@ -173,7 +217,7 @@ impl Hosted {
 
     /// Whether this connection is the one that has the participant.
     pub fn is_newest(&self, participant: usize, number: u64) -> bool {
-        self.moving().connected.get(&participant) == Some(&number)
+        self.committed().connected.get(&participant) == Some(&number)
     }
 
     /// The stream with this number has left a participant.
@@ -193,17 +237,17 @@ impl Hosted {
 
     /// Whether it has ended, one way or the other.
     pub fn is_over(&self) -> bool {
-        self.moving().core.state().is_over()
+        self.committed().core.state().is_over()
     }
 
     /// The tournament as everybody sees it.
     pub fn describe(&self) -> v1::Tournament {
-        self.described(&self.moving().core)
+        self.described(&self.committed().core)
     }
 
     /// The same without its participants.
     pub fn describe_briefly(&self) -> v1::Tournament {
-        self.outlined(&self.moving().core)
+        self.outlined(&self.committed().core)
     }
 
     /// A tournament that stood so, as everybody sees it.
@@ -238,15 +282,15 @@ impl Hosted {
 
     /// Its games from the one with this number on, with what has come of them; at most `most`.
     pub fn games(&self, from: usize, most: usize) -> Vec<v1::TournamentGame> {
-        let moving = self.moving();
-        let numbers = (from..moving.core.games().len()).take(most);
-        numbers.map(|number| self.game(&moving, number)).collect()
+        let state = self.committed();
+        let numbers = (from..state.core.games().len()).take(most);
+        numbers.map(|number| self.game(&state, number)).collect()
     }
 
     /// One of its games, with what has come of it.
-    pub(super) fn game(&self, moving: &Moving, number: usize) -> v1::TournamentGame {
-        let game = &moving.core.games()[number];
-        let placed = moving.placed.get(&number).copied();
+    pub(super) fn game(&self, state: &TournamentState, number: usize) -> v1::TournamentGame {
+        let game = &state.core.games()[number];
+        let placed = state.placed.get(&number).copied();
         let series = game.deal.map(|deal| self.series(deal));
         convert::tournament_game(number, game, placed, series, &self.plan)
     }
@@ -258,12 +302,12 @@ impl Hosted {
 
     /// What `look` makes of the tournament.
     pub fn look<T>(&self, look: impl FnOnce(&Tournament) -> T) -> T {
-        look(&self.moving().core)
+        look(&self.committed().core)
     }
 
     /// Closes the rooms of games that go on although the tournament is over: it was closed, perhaps just before the server ended.
     pub(super) fn close_rooms(&self, rooms: &Rooms) {
-        let placed: Vec<Id> = (self.moving().placed.values())
+        let placed: Vec<Id> = (self.committed().placed.values())
             .map(|(room, _)| *room)
             .collect();
         for room in placed {
@@ -275,19 +319,20 @@ impl Hosted {
         }
     }
 
-    /// All deals that games share.
-    pub(super) fn deals(&self) -> BTreeSet<u32> {
-        let moving = self.moving();
-        let games = moving.core.games().iter();
-        games.filter_map(|game| game.deal).collect()
+    /// Shows committed entries to readers.
+    pub(super) fn publish(&self, entries: &[TournamentEntry]) {
+        let mut committed = self.committed();
+        for entry in entries {
+            committed.apply(entry);
+        }
     }
 
     /// Of some deals, withholds what could tell those that are still to be played, and gives free the others.
     pub(super) fn withhold(&self, deals: &BTreeSet<u32>, rooms: &Rooms) {
-        let moving = self.moving();
-        let over = moving.core.state().is_over();
+        let state = self.committed();
+        let over = state.core.state().is_over();
         for &deal in deals {
-            let withheld = !over && !moving.core.is_deal_open(deal);
+            let withheld = !over && !state.core.is_deal_open(deal);
             rooms.withhold(self.series(deal), withheld);
         }
     }
@@ -317,8 +362,8 @@ impl Hosted {
         hash(what, &self.header.deal_secret, &deal.to_le_bytes())
     }
 
-    pub(super) fn moving(&self) -> MutexGuard<'_, Moving> {
-        (self.moving.lock()).expect("nothing that holds this lock can panic")
+    pub(super) fn committed(&self) -> MutexGuard<'_, TournamentState> {
+        (self.committed.lock()).expect("nothing that holds this lock can panic")
     }
 
     async fn ask<T>(

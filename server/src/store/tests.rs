@@ -1,0 +1,141 @@
+//! What every store does alike. Each behavior is checked with games in memory and with a database.
+
+use chefshat_engine::{RULES_VERSION, RuleSetSpec, SeedPlan};
+use chefshat_room::ids::SecretHash;
+use chefshat_room::journal::{Change, Fill, GameStart};
+use chefshat_room::policy::{Durability, Policy};
+use futures::FutureExt as _;
+
+use super::*;
+
+/// Runs a check with a new store of each kind.
+async fn with_each_store(check: impl AsyncFn(&dyn Store)) {
+    check(&MemoryStore::default()).await;
+    let folder = tempfile::tempdir().expect("a folder");
+    let store = SqliteStore::open(folder.path()).await.expect("it opens");
+    check(&store).await;
+    store.close().await;
+}
+
+fn header(game: u8, durability: Durability) -> Arc<GameHeader> {
+    Arc::new(GameHeader {
+        room_id: Id([200 + game; 16]),
+        game_id: Id([game; 16]),
+        name: format!("game {game}"),
+        rules: RuleSetSpec::default().validate().expect("the standard"),
+        policy: Policy {
+            durability,
+            ..Policy::default()
+        },
+        rules_version: RULES_VERSION,
+        fills: vec![Fill::Open { reserved_for: None }; 4],
+        called: Default::default(),
+        recorded: Default::default(),
+        start: GameStart::default(),
+        seed: SeedPlan::Fixed {
+            game_seed: [game; 32],
+        },
+        created_at_ms: 1_000,
+        join_code: "ABCDEFGH".into(),
+        owner: SecretHash::of(b"owner"),
+        tournament: None,
+    })
+}
+
+fn summary(header: &GameHeader) -> Box<v1::RecordSummary> {
+    Box::new(v1::RecordSummary {
+        game_id: header.game_id.to_string(),
+        room_name: header.name.clone(),
+        state: v1::RoomState::Finished.into(),
+        created_at_ms: header.created_at_ms,
+        ended_at_ms: 2_000,
+        ..v1::RecordSummary::default()
+    })
+}
+
+fn entry() -> Entry {
+    Entry {
+        at: std::time::Duration::ZERO,
+        change: Change::ServerRestarted,
+    }
+}
+
+async fn created(store: &dyn Store, game: u8, durability: Durability) -> Box<dyn Journal> {
+    let created = store.create(header(game, durability), vec![entry()]).await;
+    created.expect("a new game")
+}
+
+async fn finish(journal: &mut Box<dyn Journal>, game: u8) {
+    let finished = journal.finish(Some(summary(&header(game, Durability::Durable))));
+    finished.await.expect("committed");
+}
+
+/// Names and numbers of the finished games after a number.
+async fn listed(store: &dyn Store, after: u64) -> Vec<(String, u64)> {
+    let all = v1::RecordFilter::default();
+    let listed = store.list(&all, Part::After(after), 9).await;
+    let listed = listed.expect("readable").into_iter();
+    listed
+        .map(|(number, summary)| (summary.room_name, number))
+        .collect()
+}
+
+#[tokio::test]
+async fn a_cursor_reaches_every_game_that_finishes_later() {
+    with_each_store(async |store| {
+        for durability in [Durability::Durable, Durability::Ephemeral] {
+            let base = if durability == Durability::Durable {
+                1
+            } else {
+                4
+            };
+            let before = listed(store, 0)
+                .await
+                .last()
+                .map_or(0, |(_, number)| *number);
+            let mut first = created(store, base, durability).await;
+            let mut second = created(store, base + 1, durability).await;
+            finish(&mut second, base + 1).await;
+            let page = listed(store, before).await;
+            let [(name, cursor)] = page.as_slice() else {
+                panic!("not one: {page:?}");
+            };
+            assert_eq!(*name, format!("game {}", base + 1));
+            finish(&mut first, base).await;
+            let page = listed(store, *cursor).await;
+            let [(name, number)] = page.as_slice() else {
+                panic!("not one: {page:?}");
+            };
+            assert_eq!(*name, format!("game {base}"));
+            assert!(number > cursor);
+        }
+    })
+    .await;
+}
+
+#[tokio::test]
+async fn a_game_id_that_is_taken_is_refused_and_the_store_goes_on() {
+    with_each_store(async |store| {
+        let forged = header(1, Durability::Durable);
+        let import = || store.import(forged.game_id, *summary(&forged), Arc::from([]));
+        assert_eq!(import().await, Ok(true));
+        assert_eq!(import().await, Ok(false));
+        let refused = store.create(header(1, Durability::Durable), vec![entry()]);
+        assert!(refused.await.is_err(), "the id is taken");
+        assert!(store.failed().now_or_never().is_none(), "no failure");
+
+        // What is committed together with the refused game is committed.
+        let others = (2..9).map(|game| created(store, game, Durability::Durable));
+        let refused = store.create(header(1, Durability::Durable), vec![entry()]);
+        let (mut journals, refused) = futures::join!(futures::future::join_all(others), refused);
+        assert!(refused.is_err());
+        finish(&mut journals[0], 2).await;
+        let game = store.finished(Id([2; 16])).await.expect("readable");
+        assert!(game.is_some(), "the store goes on");
+        assert_eq!(import().await, Ok(false));
+        let taken = store.import(Id([2; 16]), *summary(&forged), Arc::from([]));
+        assert_eq!(taken.await, Ok(false));
+        assert!(store.failed().now_or_never().is_none(), "no failure");
+    })
+    .await;
+}
