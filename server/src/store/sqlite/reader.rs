@@ -229,7 +229,8 @@ impl Reader {
         if rows.is_empty() && last_row.is_some() {
             return Ok(Err(Unreadable("its journal is missing".into())));
         }
-        let decoding = self.codec.run(rows.len(), move || {
+        let bytes: usize = rows.iter().map(|row| row.get::<&[u8], _>(2).len()).sum();
+        let decoding = self.codec.run(bytes / 64, move || {
             let mut read = Read::default();
             rows.iter().try_for_each(|row| read.add(row)).map(|()| read)
         });
