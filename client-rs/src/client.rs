@@ -6,6 +6,7 @@ use std::time::Duration;
 use tonic::transport::{Channel, Endpoint};
 
 use crate::error::with_causes;
+use crate::repeat::{identify, repeated};
 use crate::session::Session;
 use crate::v1::act_request::Command;
 use crate::v1::play_service_client::PlayServiceClient;
@@ -98,17 +99,18 @@ impl Client {
         Ok(service.get_action_table(request).await?.into_inner())
     }
 
-    /// Makes a room. The response holds the join code for its participants and the token that closes it.
+    /// Creates a room. A call whose response is lost is repeated and creates no second room. The response holds the join code for its participants and the token that closes it.
     ///
     /// # Errors
     /// `RULE_SET_REFUSED`, `POLICY_REFUSED`, `SEATS_REFUSED`, `SEED_REFUSED` or `NAME_REFUSED`, with the field at fault in the metadata;
     /// `TOO_MANY_ROOMS`; `SHUTTING_DOWN`.
     pub async fn create_room(
         &self,
-        request: v1::CreateRoomRequest,
+        mut request: v1::CreateRoomRequest,
     ) -> Result<v1::CreateRoomResponse, Error> {
-        let mut service = RoomServiceClient::new(self.channel());
-        Ok(service.create_room(request).await?.into_inner())
+        let service = RoomServiceClient::new(self.channel());
+        identify(&mut request.request_id);
+        repeated(async || service.clone().create_room(request.clone()).await).await
     }
 
     /// One room.
@@ -150,13 +152,17 @@ impl Client {
         Ok(service.list_rooms(request).await?.into_inner())
     }
 
-    /// Takes a seat. The response holds the ticket to play on it.
+    /// Takes a seat. A call whose response is lost is repeated and takes no second seat. The response holds the ticket to play on it.
     ///
     /// # Errors
     /// `JOIN_CODE_WRONG`, `ROOM_FULL`, `SEAT_TAKEN`, `KIND_NOT_ADMITTED`, `GAME_STARTED`, `ROOM_UNKNOWN`.
-    pub async fn join(&self, request: v1::JoinRoomRequest) -> Result<v1::JoinRoomResponse, Error> {
-        let mut service = RoomServiceClient::new(self.channel());
-        Ok(service.join_room(request).await?.into_inner())
+    pub async fn join(
+        &self,
+        mut request: v1::JoinRoomRequest,
+    ) -> Result<v1::JoinRoomResponse, Error> {
+        let service = RoomServiceClient::new(self.channel());
+        identify(&mut request.request_id);
+        repeated(async || service.clone().join_room(request.clone()).await).await
     }
 
     /// Takes the first free seat of the room with this join code, as an agent.

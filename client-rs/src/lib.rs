@@ -13,6 +13,7 @@ mod options;
 mod outcome;
 mod participant;
 mod random;
+mod repeat;
 mod run;
 mod seat;
 mod session;

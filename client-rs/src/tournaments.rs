@@ -10,6 +10,7 @@ use crate::backoff::{Backoff, Outage};
 use crate::client::MAX_RESPONSE_BYTES;
 use crate::error::{Error, PlayError, may_retry};
 use crate::participant::Participant;
+use crate::repeat::{identify, repeated};
 use crate::session::Session;
 use crate::v1::tournament_service_client::TournamentServiceClient;
 use crate::{Agent, Client, Outcome, PlayOptions, run, v1};
@@ -24,11 +25,12 @@ impl Client {
         &self,
         settings: v1::TournamentSettings,
     ) -> Result<v1::CreateTournamentResponse, Error> {
-        let request = v1::CreateTournamentRequest {
+        let mut request = v1::CreateTournamentRequest {
             settings: Some(settings),
+            ..Default::default()
         };
-        let response = service(self).create_tournament(request).await?;
-        Ok(response.into_inner())
+        identify(&mut request.request_id);
+        repeated(async || service(self).create_tournament(request.clone()).await).await
     }
 
     /// One tournament.
@@ -59,17 +61,17 @@ impl Client {
         Ok(response.into_inner())
     }
 
-    /// Joins a tournament; its join code is enough to find it. The response holds the ticket for [`play_tournament`](Self::play_tournament).
+    /// Joins a tournament. A call whose response is lost is repeated and adds no second participant. Its join code is enough to find it. The response holds the ticket for [`play_tournament`](Self::play_tournament).
     ///
     /// # Errors
     /// `JOIN_CODE_WRONG`, `TOURNAMENT_FULL`, `TOURNAMENT_STARTED`, `NAME_TAKEN`, `NAME_REFUSED`, `KIND_NOT_ADMITTED`, `KIND_REFUSED`,
     /// `NOT_STATELESS`, `MAX_GAMES_REFUSED`, `TOURNAMENT_UNKNOWN`.
     pub async fn join_tournament(
         &self,
-        request: v1::JoinTournamentRequest,
+        mut request: v1::JoinTournamentRequest,
     ) -> Result<v1::JoinTournamentResponse, Error> {
-        let response = service(self).join_tournament(request).await?;
-        Ok(response.into_inner())
+        identify(&mut request.request_id);
+        repeated(async || service(self).join_tournament(request.clone()).await).await
     }
 
     /// Begins a tournament.

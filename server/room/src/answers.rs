@@ -36,6 +36,9 @@ pub enum JoinError {
     /// The free seats are reserved for other kinds.
     #[error("the free seats of this room are reserved for participants of another kind")]
     KindNotAdmitted,
+    /// The request id was used for another participant.
+    #[error("this request id was used with another name, kind or seat; draw a new one")]
+    RequestIdUsed,
     /// The game has begun.
     #[error("the game of this room has begun; nobody can join any more")]
     GameStarted,

@@ -103,6 +103,16 @@ impl Token {
         }
     }
 
+    /// The ticket of a request with an id chosen by the client: the same whenever the request is repeated. `key` is known to the server
+    /// alone.
+    pub fn of_request(room: Id, key: &SecretHash, request_id: &[u8; 32]) -> Self {
+        let parts = [key.bytes().as_slice(), &room.0, request_id];
+        Self {
+            room,
+            secret: digest(b"chefshat.v1 ticket", &parts),
+        }
+    }
+
     /// Parses a token; `None` if the text is not one.
     pub fn parse(word: &str) -> Option<Self> {
         let mut bytes = [0; 48];
@@ -129,6 +139,49 @@ impl fmt::Debug for Token {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(formatter, "Token({}, secret withheld)", self.room)
     }
+}
+
+/// A request to create something that can be repeated: its id, 32 random bytes chosen by the client, and a digest of its content.
+#[derive(Clone, Copy)]
+pub struct RequestKey {
+    id: [u8; 32],
+    content: [u8; 32],
+}
+
+impl RequestKey {
+    /// The key of a request with this id and encoded content.
+    pub fn new(id: [u8; 32], content: &[u8]) -> Self {
+        let content = digest(b"chefshat.v1 content", &[content]);
+        Self { id, content }
+    }
+
+    /// The id of what it creates, which depends on the request's id alone.
+    pub fn created_id(&self) -> Id {
+        let hash = digest(b"chefshat.v1 created", &[&self.id]);
+        Id(std::array::from_fn(|index| hash[index]))
+    }
+
+    /// The owner token of what it creates, which depends on the content too: a request with other content does not get it.
+    pub fn owner(&self) -> Token {
+        Token {
+            room: self.created_id(),
+            secret: digest(b"chefshat.v1 owner", &[&self.id, &self.content]),
+        }
+    }
+}
+
+impl fmt::Debug for RequestKey {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str("RequestKey(withheld)")
+    }
+}
+
+fn digest(purpose: &[u8], parts: &[&[u8]]) -> [u8; 32] {
+    let mut hash = Sha256::new_with_prefix(purpose);
+    for part in parts {
+        hash.update(part);
+    }
+    hash.finalize().into()
 }
 
 /// A new join code: eight letters, about 38 bits.
@@ -168,6 +221,26 @@ mod tests {
         assert!(token.hash().matches(&token.secret));
         assert!(!token.hash().matches(&Token::random(id).secret));
         assert!(!format!("{token:?}").contains(&token.word()));
+    }
+
+    #[test]
+    fn a_repeated_request_gets_the_same_secrets() {
+        let (room, key) = (Id::random(), SecretHash::of(b"key"));
+        let ticket = Token::of_request(room, &key, &[1; 32]);
+        assert_eq!(ticket, Token::of_request(room, &key, &[1; 32]));
+        assert_ne!(ticket, Token::of_request(room, &key, &[2; 32]));
+        assert_ne!(
+            ticket,
+            Token::of_request(room, &SecretHash::of(b"other"), &[1; 32])
+        );
+        let request = RequestKey::new([1; 32], b"content");
+        assert_eq!(
+            request.owner(),
+            RequestKey::new([1; 32], b"content").owner()
+        );
+        let other = RequestKey::new([1; 32], b"other content");
+        assert_eq!(request.created_id(), other.created_id());
+        assert_ne!(request.owner(), other.owner());
     }
 
     #[test]

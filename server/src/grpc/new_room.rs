@@ -8,14 +8,15 @@ use chefshat_engine::{RuleSet, Stop};
 use chefshat_proto::v1::{self, create_room_request::Start};
 use chefshat_record::branch::{BranchError, branch_of};
 use chefshat_record::convert::{FieldProblem, rules_from_proto, script_from_proto, seat_number};
+use prost::Message as _;
 use tonic::{Code, Status};
 
 use super::recorded::Recorded;
-use super::status::{field, status};
+use super::status::{field, request_id, status};
 use crate::config::MAX_HOSTED_SHIFTS;
 use crate::convert;
 use crate::rooms::NewRoom;
-use chefshat_room::ids::Id;
+use chefshat_room::ids::{Id, RequestKey};
 use chefshat_room::journal::{Branch, Fill, GameStart};
 use chefshat_room::policy::{Durability, Policy};
 
@@ -29,8 +30,10 @@ struct Beginning {
 /// Checks what is asked for.
 pub(super) async fn new_room(
     recorded: &Recorded,
-    request: v1::CreateRoomRequest,
+    mut request: v1::CreateRoomRequest,
 ) -> Result<NewRoom, Status> {
+    let request_id = request_id(&std::mem::take(&mut request.request_id))?;
+    let request_key = request_id.map(|id| RequestKey::new(id, &request.encode_to_vec()));
     let name = convert::name_to_show("name", &request.name, 0)
         .map_err(|problem| field("NAME_REFUSED", &problem))?;
     let policy = kept_policy(recorded, &request.policy.unwrap_or_default())
@@ -71,6 +74,7 @@ pub(super) async fn new_room(
         start: beginning.start,
         game_seed: beginning.game_seed,
         seating: None,
+        request: request_key,
     })
 }
 

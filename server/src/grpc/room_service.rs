@@ -1,15 +1,17 @@
 //! `RoomService`: making, finding, joining and closing rooms.
 
+use std::pin::pin;
 use std::sync::Arc;
 
 use chefshat_proto::v1::{self, room_service_server::RoomService};
 use chefshat_record::convert::{FieldProblem, seat_number};
+use futures::{Stream, StreamExt as _};
 use tonic::{Code, Request, Response, Status};
 
 use super::new_room::new_room;
 use super::pages;
 use super::recorded::Recorded;
-use super::status::{self, Refusal, field, room_unknown, ticket_unknown};
+use super::status::{self, Refusal, field, request_id, room_unknown, ticket_unknown};
 use crate::convert;
 use crate::room::{Handle, JoinRequest};
 use crate::rooms::Rooms;
@@ -18,6 +20,9 @@ use chefshat_room::journal::ParticipantKind;
 
 /// Rooms looked at for one page.
 const ROOMS_LOOKED_AT: usize = 200;
+
+/// Rooms asked at a time to describe themselves.
+const ROOMS_ASKED: usize = 32;
 
 /// The service.
 #[derive(Debug, Clone)]
@@ -47,6 +52,20 @@ impl RoomCalls {
             false => Err(join_code_wrong()),
         }
     }
+}
+
+/// Describes numbered rooms in their order; asks [`ROOMS_ASKED`] of them at a time.
+fn described<H, R, D: Future<Output = R>>(
+    rooms: Vec<(u64, H)>,
+    describe: impl Fn(H) -> D,
+) -> impl Stream<Item = (u64, R)> {
+    let asked = move |(number, handle)| {
+        let described = describe(handle);
+        async move { (number, described.await) }
+    };
+    futures::stream::iter(rooms)
+        .map(asked)
+        .buffered(ROOMS_ASKED)
 }
 
 /// The room of an id as it stands in a message.
@@ -102,18 +121,20 @@ impl RoomService for RoomCalls {
             }
         };
         let mut response = v1::ListRoomsResponse::default();
-        // Rooms in other states are passed over, but only so many for one page.
+        // Rooms in other states are passed over, up to a limit for one page.
         let looked_at = self.rooms.newest(before, over, ROOMS_LOOKED_AT);
         let mut rest = looked_at.len() == ROOMS_LOOKED_AT;
         let mut last = before;
-        for (number, handle) in looked_at {
+        let describe = |handle: Handle| async move { handle.describe().await.ok() };
+        let mut rooms = pin!(described(looked_at, describe));
+        while let Some((number, room)) = rooms.next().await {
             if response.rooms.len() == page_size {
                 rest = true;
                 break;
             }
             last = Some(number);
             // A room that has just gone is no longer listed.
-            if let Ok(room) = handle.describe().await
+            if let Some(room) = room
                 && (request.state == 0 || request.state == room.state)
             {
                 response.rooms.push(room);
@@ -139,11 +160,13 @@ impl RoomService for RoomCalls {
             .unwrap_or(ParticipantKind::Agent);
         let name = convert::name_to_show("name", &request.name, 1)
             .map_err(|problem| field("NAME_REFUSED", &problem))?;
+        let request_id = request_id(&request.request_id)?;
         let joined = handle
             .join(JoinRequest {
                 name,
                 kind,
                 seat: request.seat,
+                request_id,
             })
             .await
             .map_err(Refusal::from)?
@@ -199,4 +222,24 @@ fn join_code_wrong() -> Status {
         "no room here has this join code; ask the room's creator for it, and join a tournament as one if it is a tournament's",
         [("field", "join_code")],
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use tokio::sync::Barrier;
+
+    use super::*;
+
+    #[tokio::test]
+    async fn rooms_of_a_list_are_asked_at_the_same_time() {
+        let rooms: Vec<_> = (0..64).map(|number| (number, ())).collect();
+        // Nobody answers before as many are asked.
+        let barrier = Barrier::new(ROOMS_ASKED);
+        let barrier = &barrier;
+        let describe = |()| async move { drop(barrier.wait().await) };
+        let numbers: Vec<u64> = (described(rooms, describe).map(|(number, ())| number))
+            .collect()
+            .await;
+        assert_eq!(numbers, (0..64).collect::<Vec<_>>());
+    }
 }

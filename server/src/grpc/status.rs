@@ -95,6 +95,30 @@ pub fn ticket_unknown() -> Status {
     )
 }
 
+/// The id of a request, if it has one.
+pub fn request_id(bytes: &[u8]) -> Result<Option<[u8; 32]>, Status> {
+    if bytes.is_empty() {
+        return Ok(None);
+    }
+    bytes.try_into().map(Some).map_err(|_| {
+        let message = format!("{} bytes; give 32 random ones, or none", bytes.len());
+        field(
+            "REQUEST_ID_REFUSED",
+            &FieldProblem::new("request_id", message),
+        )
+    })
+}
+
+/// A request id was used with other content.
+pub fn request_id_used(message: &str) -> Status {
+    status(
+        Code::AlreadyExists,
+        "REQUEST_ID_USED",
+        message,
+        [("field", "request_id")],
+    )
+}
+
 /// There is no space for more games.
 pub fn disk_nearly_full(message: &str) -> Status {
     status(Code::ResourceExhausted, "DISK_NEARLY_FULL", message, [])
@@ -187,6 +211,7 @@ impl From<JoinError> for Refusal {
             JoinError::SeatTaken => (Code::FailedPrecondition, "SEAT_TAKEN"),
             JoinError::NoSuchSeat => (Code::InvalidArgument, "NO_SUCH_SEAT"),
             JoinError::KindNotAdmitted => (Code::FailedPrecondition, "KIND_NOT_ADMITTED"),
+            JoinError::RequestIdUsed => (Code::AlreadyExists, "REQUEST_ID_USED"),
             JoinError::GameStarted => (Code::FailedPrecondition, "GAME_STARTED"),
             JoinError::GameOver => (Code::FailedPrecondition, "GAME_OVER"),
         };
@@ -226,6 +251,7 @@ impl From<CreateError> for Refusal {
                 error.to_string(),
                 [("max_rooms", &limit.to_string())],
             ),
+            CreateError::RequestIdUsed => request_id_used(&error.to_string()),
             CreateError::ShuttingDown => shutting_down(),
             CreateError::DiskNearlyFull => disk_nearly_full(&error.to_string()),
             CreateError::Store(error) => {

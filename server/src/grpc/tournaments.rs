@@ -7,6 +7,7 @@ use chefshat_proto::v1::{self, tournament_service_server::TournamentService};
 use chefshat_record::convert::FieldProblem;
 use chefshat_tournament::{BeginProblem, JoinProblem};
 use futures::Stream;
+use prost::Message as _;
 use tokio::sync::{Semaphore, mpsc};
 use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::sync::CancellationToken;
@@ -16,11 +17,15 @@ use super::follow::{end, follow, not_worked_out};
 use super::new_room::{kept_policy, too_long};
 use super::pages;
 use super::recorded::Recorded;
-use super::status::{disk_nearly_full, field, shutting_down, status, store_failed};
+use super::status::{
+    disk_nearly_full, field, request_id, request_id_used, shutting_down, status, store_failed,
+};
 use crate::config::{MAX_FOLLOWERS, MAX_GAMES_PAGE, MAX_LEADERBOARD_LINES, MAX_RESULTS_IN_HAND};
 use crate::convert;
-use crate::tournaments::{CreateProblem, Entry, Hosted, Leaderboard, Stopped, Tournaments};
-use chefshat_room::ids::{Id, random_bytes};
+use crate::tournaments::{
+    CreateProblem, Entry, Hosted, JoinRefusal, Leaderboard, Stopped, Tournaments,
+};
+use chefshat_room::ids::{Id, RequestKey, random_bytes};
 use chefshat_room::journal::ParticipantKind;
 
 /// Games of a page, and lines of a leaderboard, where a request does not say.
@@ -103,7 +108,10 @@ impl TournamentService for TournamentCalls {
         &self,
         request: Request<v1::CreateTournamentRequest>,
     ) -> Result<Response<v1::CreateTournamentResponse>, Status> {
-        let settings = request.into_inner().settings.unwrap_or_default();
+        let request = request.into_inner();
+        let settings = request.settings.unwrap_or_default();
+        let request_key = request_id(&request.request_id)?
+            .map(|id| RequestKey::new(id, &settings.encode_to_vec()));
         let name = convert::name_to_show("name", &settings.name, 1)
             .map_err(|problem| field("NAME_REFUSED", &problem))?;
         let mut plan = convert::tournament_plan(&settings, random_bytes())
@@ -117,7 +125,7 @@ impl TournamentService for TournamentCalls {
             .durability;
         let (hosted, owner) = self
             .tournaments
-            .create(&name, plan)
+            .create(&name, plan, request_key)
             .await
             .map_err(not_made)?;
         Ok(Response::new(v1::CreateTournamentResponse {
@@ -189,6 +197,7 @@ impl TournamentService for TournamentCalls {
             kind,
             max_games: usize::try_from(request.max_games.max(1)).unwrap_or(usize::MAX),
             stateless: request.stateless,
+            request_id: request_id(&request.request_id)?,
         };
         let (participant, ticket) = hosted
             .join(entry)
@@ -353,6 +362,7 @@ fn not_made(problem: CreateProblem) -> Status {
             problem.to_string(),
             [("max_tournaments", &limit.to_string())],
         ),
+        CreateProblem::RequestIdUsed => request_id_used(&problem.to_string()),
         CreateProblem::ShuttingDown => shutting_down(),
         CreateProblem::DiskNearlyFull => disk_nearly_full(&problem.to_string()),
         CreateProblem::Store(error) => {
@@ -362,7 +372,11 @@ fn not_made(problem: CreateProblem) -> Status {
     }
 }
 
-fn not_joined(problem: JoinProblem) -> Status {
+fn not_joined(refusal: JoinRefusal) -> Status {
+    let problem = match refusal {
+        JoinRefusal::Rules(problem) => problem,
+        JoinRefusal::RequestIdUsed => return request_id_used(&refusal.to_string()),
+    };
     let (code, reason) = match problem {
         JoinProblem::Full => (Code::ResourceExhausted, "TOURNAMENT_FULL"),
         JoinProblem::Started => (Code::FailedPrecondition, "TOURNAMENT_STARTED"),

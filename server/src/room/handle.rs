@@ -28,6 +28,8 @@ pub struct JoinRequest {
     pub kind: ParticipantKind,
     /// The seat wanted; `None` for any.
     pub seat: Option<u32>,
+    /// Identifies the request when it is repeated.
+    pub request_id: Option<[u8; 32]>,
 }
 
 /// A seat that was taken.

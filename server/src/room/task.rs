@@ -282,7 +282,14 @@ impl Task {
     }
 
     fn join(&mut self, request: JoinRequest) -> Result<Joined, JoinError> {
-        let ticket = Token::random(self.core.header().room_id);
+        let header = self.core.header();
+        let ticket = match request.request_id {
+            Some(id) => Token::of_request(header.room_id, &header.owner, &id),
+            None => Token::random(header.room_id),
+        };
+        if let Some(seat) = self.core.seat_of_ticket(&ticket.secret) {
+            return self.join_again(seat, ticket, &request);
+        }
         let seat = self.core.join(
             self.now,
             request.seat,
@@ -297,6 +304,24 @@ impl Task {
             ticket,
             room: Box::new(convert::describe(&self.core)),
         })
+    }
+
+    /// Answers a repeated request for a seat.
+    fn join_again(
+        &self,
+        seat: Seat,
+        ticket: Token,
+        request: &JoinRequest,
+    ) -> Result<Joined, JoinError> {
+        let room = Box::new(convert::describe(&self.core));
+        let seated = &room.seats[seat.index()];
+        let is_same = seated.name == request.name
+            && seated.kind == convert::kind_to_proto(Some(request.kind))
+            && request.seat.is_none_or(|wanted| wanted == seated.seat);
+        match is_same {
+            true => Ok(Joined { seat, ticket, room }),
+            false => Err(JoinError::RequestIdUsed),
+        }
     }
 
     fn attach(

@@ -99,6 +99,7 @@ struct AttachedSeat {
 async fn take_seat(room: &Handle) -> AttachedSeat {
     let joined = room
         .join(JoinRequest {
+            request_id: None,
             name: "somebody".into(),
             kind: ParticipantKind::Agent,
             seat: None,

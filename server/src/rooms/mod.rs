@@ -23,7 +23,7 @@ use crate::filing::Filing;
 use crate::room::{Handle, RoomWatcher, TaskContext, spawn_room};
 use crate::store::{Store, StoreError};
 use chefshat_room::Core;
-use chefshat_room::ids::{Id, Token, join_code, normal_code, random_bytes};
+use chefshat_room::ids::{Id, RequestKey, Token, join_code, normal_code, random_bytes};
 use chefshat_room::journal::{Fill, GameHeader, GameStart, SeatedParticipant, TournamentGame};
 use chefshat_room::policy::{Durability, Policy};
 use table::{Entry, Table};
@@ -49,6 +49,8 @@ pub struct NewRoom {
     pub game_seed: Option<[u8; 32]>,
     /// Who sits there from the beginning, if a tournament makes the room.
     pub seating: Option<Seating>,
+    /// The request for it, if it can be repeated.
+    pub request: Option<RequestKey>,
 }
 
 /// What a tournament decides about a room for one of its games.
@@ -83,6 +85,9 @@ pub enum CreateError {
     /// The limit of rooms is reached.
     #[error("the server holds {0} rooms already; close one or try later")]
     TooMany(usize),
+    /// The request id was used for a room with other content.
+    #[error("this request id was used to create another room; draw a new one")]
+    RequestIdUsed,
     /// The server takes no new rooms.
     #[error("the server is shutting down and takes no new rooms")]
     ShuttingDown,
@@ -101,6 +106,8 @@ pub struct Rooms {
     closed: Mutex<BTreeSet<Id>>,
     /// Notified when a game has ended or a room has gone.
     changed: Notify,
+    /// Notified when the creation of a room has ended.
+    created: Notify,
     /// Games that have ended since the server was started.
     ended: AtomicU64,
     context: TaskContext,
@@ -114,6 +121,7 @@ impl Rooms {
             table: Mutex::default(),
             closed: Mutex::default(),
             changed: Notify::new(),
+            created: Notify::new(),
             ended: AtomicU64::new(0),
             context: TaskContext {
                 filing: Filing::new(Arc::clone(&store), config.data_dir.clone(), tracker.clone()),
@@ -132,12 +140,25 @@ impl Rooms {
     /// # Errors
     /// The limit of rooms, a shutdown, or the store.
     pub async fn create(self: &Arc<Self>, new: NewRoom) -> Result<Created, CreateError> {
-        let place = Place::reserve(self)?;
+        let owner = match (&new.seating, &new.request) {
+            (Some(seating), _) => Token::random(seating.room_id),
+            (None, Some(request)) => request.owner(),
+            (None, None) => Token::random(Id::random()),
+        };
+        let reservation = loop {
+            // A request that is repeated while its room is being created waits for that room.
+            let created = self.created.notified();
+            match Reservation::of(self, owner)? {
+                Claim::Reserved(reservation) => break reservation,
+                Claim::Created(created) => return Ok(created),
+                Claim::InProgress => created.await,
+            }
+        };
         if !self.context.store.has_space() {
             return Err(CreateError::DiskNearlyFull);
         }
         // Made to the end even if whoever asked for it goes away: what is half made would be kept and be nobody's.
-        let making = self.context.tracker.spawn(place.make(new));
+        let making = self.context.tracker.spawn(reservation.make(new));
         making
             .await
             .map_err(|error| StoreError::Failed(format!("a room was not made: {error}")))?
@@ -322,21 +343,51 @@ impl std::fmt::Debug for Rooms {
     }
 }
 
-/// A place in the table for a room that is being made.
-struct Place(Arc<Rooms>);
+/// What becomes of a request for a room.
+enum Claim {
+    /// There is space for it.
+    Reserved(Reservation),
+    /// It was created by this request before.
+    Created(Created),
+    /// It is being created by this request.
+    InProgress,
+}
 
-impl Place {
-    fn reserve(rooms: &Arc<Rooms>) -> Result<Self, CreateError> {
-        rooms.lock().reserve(rooms.max_rooms)?;
-        Ok(Self(Arc::clone(rooms)))
+/// Space in the table for a room that is being created.
+struct Reservation {
+    rooms: Arc<Rooms>,
+    owner: Token,
+}
+
+impl Reservation {
+    /// Reserves space for the room of this owner token.
+    fn of(rooms: &Arc<Rooms>, owner: Token) -> Result<Claim, CreateError> {
+        let mut table = rooms.lock();
+        if let Some(entry) = table.get(owner.room) {
+            return match entry.owner.matches(&owner.secret) {
+                true => Ok(Claim::Created(Created {
+                    handle: entry.handle.clone(),
+                    join_code: entry.join_code.clone(),
+                    owner,
+                })),
+                false => Err(CreateError::RequestIdUsed),
+            };
+        }
+        if table.in_creation.contains(&owner.room) {
+            return Ok(Claim::InProgress);
+        }
+        table.reserve(owner.room, rooms.max_rooms)?;
+        drop(table);
+        let rooms = Arc::clone(rooms);
+        Ok(Claim::Reserved(Self { rooms, owner }))
     }
 
     async fn make(self, new: NewRoom) -> Result<Created, CreateError> {
-        let rooms = &self.0;
+        let rooms = &self.rooms;
         let seating = new.seating.as_ref();
-        let room_id = seating.map_or_else(Id::random, |seating| seating.room_id);
         let server_seed = seating.and_then(|seating| seating.server_seed);
-        let owner = Token::random(room_id);
+        let owner = self.owner;
+        let room_id = owner.room;
         let header = Arc::new(GameHeader {
             room_id,
             game_id: seating.map_or_else(Id::random, |seating| seating.game_id),
@@ -376,6 +427,7 @@ impl Place {
             table.enter(Entry {
                 handle: handle.clone(),
                 game_id: header.game_id,
+                owner: header.owner,
                 join_code: header.join_code.clone(),
                 durable: rooms.is_durable(&header),
                 over: false,
@@ -393,9 +445,10 @@ impl Place {
     }
 }
 
-impl Drop for Place {
+impl Drop for Reservation {
     fn drop(&mut self) {
-        self.0.lock().being_made -= 1;
+        self.rooms.lock().in_creation.remove(&self.owner.room);
+        self.rooms.created.notify_waiters();
     }
 }
 

@@ -74,6 +74,7 @@ impl Rooms {
         table.enter(Entry {
             handle,
             game_id: header.game_id,
+            owner: header.owner,
             join_code: header.join_code.clone(),
             durable: true,
             over: game.concluded,

@@ -1,11 +1,11 @@
 //! The list of the rooms: in the order in which they were made, found by their ids and join codes. What a room is, and when it leaves the list,
 //! is decided elsewhere.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 use super::CreateError;
 use crate::room::Handle;
-use chefshat_room::ids::Id;
+use chefshat_room::ids::{Id, SecretHash};
 
 #[derive(Default)]
 pub(super) struct Table {
@@ -14,14 +14,16 @@ pub(super) struct Table {
     pub(super) by_number: BTreeMap<u64, Entry>,
     pub(super) numbers: HashMap<Id, u64>,
     pub(super) codes: HashMap<String, u64>,
-    /// Places taken for rooms that are being made.
-    pub(super) being_made: usize,
+    /// Rooms that are being created, for which space is reserved.
+    pub(super) in_creation: HashSet<Id>,
     pub(super) shutting_down: bool,
 }
 
 pub(super) struct Entry {
     pub(super) handle: Handle,
     pub(super) game_id: Id,
+    /// The owner's token, hashed.
+    pub(super) owner: SecretHash,
     pub(super) join_code: String,
     /// Whether the game goes on when the server is back.
     pub(super) durable: bool,
@@ -39,19 +41,23 @@ impl Entry {
 }
 
 impl Table {
-    /// Takes a place for a room that is about to be made.
-    pub(super) fn reserve(&mut self, max_rooms: usize) -> Result<(), CreateError> {
+    pub(super) fn get(&self, id: Id) -> Option<&Entry> {
+        self.by_number.get(self.numbers.get(&id)?)
+    }
+
+    /// Reserves space for a room that is about to be created.
+    pub(super) fn reserve(&mut self, id: Id, max_rooms: usize) -> Result<(), CreateError> {
         if self.shutting_down {
             return Err(CreateError::ShuttingDown);
         }
-        let full = self.by_number.len() + self.being_made >= max_rooms;
+        let full = self.by_number.len() + self.in_creation.len() >= max_rooms;
         if full {
             let open = self.by_number.values().filter(|it| it.is_open()).count();
-            if open + self.being_made >= max_rooms {
+            if open + self.in_creation.len() >= max_rooms {
                 return Err(CreateError::TooMany(max_rooms));
             }
         }
-        self.being_made += 1;
+        self.in_creation.insert(id);
         Ok(())
     }
 

@@ -29,6 +29,7 @@ async fn who_is_seated_by_a_tournament_is_kept_with_the_room() {
         recorded: BTreeMap::new(),
         start: GameStart::default(),
         game_seed: None,
+        request: None,
         seating: Some(Seating {
             game: TournamentGame {
                 tournament: Id([1; 16]),

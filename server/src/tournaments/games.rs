@@ -220,6 +220,7 @@ impl Task {
             recorded: BTreeMap::new(),
             start: GameStart::default(),
             game_seed: self.hosted.game_seed(number, game.deal),
+            request: None,
             seating: Some(Seating {
                 game: TournamentGame {
                     tournament: self.hosted.id(),

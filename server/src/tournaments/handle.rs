@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard};
 
 use chefshat_proto::v1;
-use chefshat_tournament::{BeginProblem, JoinProblem, Tournament};
+use chefshat_tournament::{BeginProblem, Entrant, JoinProblem, Tournament};
 use sha2::{Digest as _, Sha256};
 use tokio::sync::{mpsc, oneshot, watch};
 
@@ -60,6 +60,34 @@ pub struct Entry {
     pub max_games: usize,
     /// Declares that it remembers nothing.
     pub stateless: bool,
+    /// Identifies the request when it is repeated.
+    pub request_id: Option<[u8; 32]>,
+}
+
+impl Entry {
+    pub(super) fn entrant(&self) -> Entrant {
+        Entrant {
+            name: self.name.clone(),
+            kind: convert::entrant_kind(self.kind),
+            built_in: None,
+            filler: false,
+            stateless: self.stateless,
+            max_games: self.max_games,
+        }
+    }
+}
+
+/// Why a participant cannot join.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum JoinRefusal {
+    /// By the rules of the tournament.
+    #[error(transparent)]
+    Rules(#[from] JoinProblem),
+    /// The request id was used for another participant.
+    #[error(
+        "this request id was used with another name, kind, number of games or statelessness; draw a new one"
+    )]
+    RequestIdUsed,
 }
 
 /// The tournament moves no more: the server ends.
@@ -67,7 +95,7 @@ pub struct Entry {
 pub struct Stopped;
 
 pub(super) enum Message {
-    Join(Entry, oneshot::Sender<Result<(usize, Token), JoinProblem>>),
+    Join(Entry, oneshot::Sender<Result<(usize, Token), JoinRefusal>>),
     Begin(oneshot::Sender<Result<(), BeginProblem>>),
     Close(oneshot::Sender<()>),
     Enter(usize, u64, Connection),
@@ -95,6 +123,29 @@ impl TournamentState {
             placed: BTreeMap::new(),
             connected: BTreeMap::new(),
         }
+    }
+
+    /// The participant with this ticket, in constant time for each.
+    pub(super) fn participant_of(&self, ticket: &SecretHash) -> Option<usize> {
+        let mut tickets = self.tickets.iter();
+        tickets
+            .find(|(_, known)| known.is(ticket))
+            .map(|(participant, _)| *participant)
+    }
+
+    /// The answer to a request that was answered before; `None` if it is new.
+    pub(super) fn joined_before(
+        &self,
+        entry: &Entry,
+        ticket: Token,
+    ) -> Option<Result<(usize, Token), JoinRefusal>> {
+        let participant = self.participant_of(&ticket.hash())?;
+        Some(
+            match self.core.participants()[participant] == entry.entrant() {
+                true => Ok((participant, ticket)),
+                false => Err(JoinRefusal::RequestIdUsed),
+            },
+        )
     }
 
     /// Applies an entry of the tournament's journal.
@@ -162,21 +213,24 @@ impl Hosted {
 
     /// The participant with this ticket, in constant time for each.
     pub fn participant_of(&self, secret: &[u8]) -> Option<usize> {
-        let hash = SecretHash::of(secret);
-        let state = self.committed();
-        let mut tickets = state.tickets.iter();
-        tickets
-            .find(|(_, ticket)| ticket.is(&hash))
-            .map(|(participant, _)| *participant)
+        self.committed().participant_of(&SecretHash::of(secret))
     }
 
     /// Takes part; gives the participant's number and its ticket.
     ///
     /// # Errors
     /// The server ends, or (inside) why it cannot.
-    pub async fn join(&self, entry: Entry) -> Result<Result<(usize, Token), JoinProblem>, Stopped> {
+    pub async fn join(&self, entry: Entry) -> Result<Result<(usize, Token), JoinRefusal>, Stopped> {
+        // A repeated request is answered in every state of the tournament.
+        let repeated = entry.request_id.and_then(|_| {
+            let ticket = self.ticket_of(&entry);
+            self.committed().joined_before(&entry, ticket)
+        });
+        if let Some(answer) = repeated {
+            return Ok(answer);
+        }
         match self.ask(|reply| Message::Join(entry, reply)).await {
-            Err(Stopped) if self.is_over() => Ok(Err(JoinProblem::Started)),
+            Err(Stopped) if self.is_over() => Ok(Err(JoinProblem::Started.into())),
             joined => joined,
         }
     }
@@ -223,6 +277,14 @@ impl Hosted {
     /// The stream with this number has left a participant.
     pub async fn left(&self, participant: usize, number: u64) {
         let _ = self.mailbox.send(Message::Left(participant, number)).await;
+    }
+
+    /// The ticket for a request to join.
+    pub(super) fn ticket_of(&self, entry: &Entry) -> Token {
+        match &entry.request_id {
+            Some(id) => Token::of_request(self.header.id, &self.header.owner, id),
+            None => Token::random(self.header.id),
+        }
     }
 
     /// Kinds that may join; empty: all.

@@ -15,12 +15,12 @@ use std::sync::{Arc, Mutex, MutexGuard};
 
 use chefshat_record::convert::FieldProblem;
 use chefshat_tournament::{Change, Entrant, EntrantKind, SettingsProblem, State, Tournament};
-use tokio::sync::{mpsc, watch};
+use tokio::sync::{Notify, mpsc, watch};
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 use tracing::{error, info};
 
-pub use handle::{Call, Connection, Entry, Hosted, Stopped};
+pub use handle::{Call, Connection, Entry, Hosted, JoinRefusal, Stopped};
 pub use leaderboard::Leaderboard;
 pub use shared::NotWorkedOut;
 
@@ -30,7 +30,7 @@ use crate::convert::{self, TournamentPlan};
 use crate::rooms::Rooms;
 use crate::store::StoreError;
 use crate::store::tournaments::{KeptTournament, TournamentEntry, TournamentHeader};
-use chefshat_room::ids::{Id, Token, join_code, normal_code, random_bytes};
+use chefshat_room::ids::{Id, RequestKey, Token, join_code, normal_code, random_bytes};
 use handle::TournamentState;
 use shown::Shown;
 use table::Table;
@@ -45,6 +45,9 @@ pub enum CreateProblem {
     /// The limit of tournaments is reached.
     #[error("the server holds {0} tournaments that are not over; close one or try later")]
     TooMany(usize),
+    /// The request id was used for a tournament with other content.
+    #[error("this request id was used to create another tournament; draw a new one")]
+    RequestIdUsed,
     /// The server takes no new tournaments.
     #[error("the server is shutting down and takes no new tournaments")]
     ShuttingDown,
@@ -63,6 +66,8 @@ pub struct Tournaments {
     tracker: TaskTracker,
     stop: Stop,
     table: Mutex<Table>,
+    /// Notified when the creation of a tournament has ended.
+    created: Notify,
 }
 
 /// How the tournaments of a server are stopped.
@@ -82,6 +87,7 @@ impl Tournaments {
             tracker,
             stop: Stop::default(),
             table: Mutex::default(),
+            created: Notify::new(),
         })
     }
 
@@ -93,6 +99,7 @@ impl Tournaments {
         self: &Arc<Self>,
         name: &str,
         plan: TournamentPlan,
+        request: Option<RequestKey>,
     ) -> Result<(Arc<Hosted>, Token), CreateProblem> {
         let core = Tournament::new(plan.core.clone())?;
         if self.stop.no_more_games.is_cancelled() || self.rooms.is_shutting_down() {
@@ -101,9 +108,25 @@ impl Tournaments {
         if !self.rooms.store().has_space() {
             return Err(CreateProblem::DiskNearlyFull);
         }
-        let place = Place::reserve(self)?;
+        let owner = request.map_or_else(|| Token::random(Id::random()), |key| key.owner());
+        let reservation = loop {
+            // A request that is repeated while its tournament is being created waits for that tournament.
+            let created = self.created.notified();
+            if let Some(hosted) = self.get(owner.room) {
+                return match hosted.header.owner.matches(&owner.secret) {
+                    true => Ok((hosted, owner)),
+                    false => Err(CreateProblem::RequestIdUsed),
+                };
+            }
+            match Reservation::of(self, owner)? {
+                Some(reservation) => break reservation,
+                None => created.await,
+            }
+        };
         // Made to the end even if whoever asked for it goes away: what is half made would be kept, and be there when the server is back.
-        let making = self.tracker.spawn(place.make(name.to_owned(), plan, core));
+        let making = self
+            .tracker
+            .spawn(reservation.make(name.to_owned(), plan, core));
         making
             .await
             .map_err(|error| StoreError::Failed(format!("a tournament was not made: {error}")))?
@@ -219,15 +242,25 @@ impl Tournaments {
     }
 }
 
-/// A place in the table for a tournament that is being made.
-struct Place(Arc<Tournaments>);
+/// Space in the table for a tournament that is being created.
+struct Reservation {
+    tournaments: Arc<Tournaments>,
+    owner: Token,
+}
 
-impl Place {
-    fn reserve(tournaments: &Arc<Tournaments>) -> Result<Self, CreateProblem> {
-        if !tournaments.lock().reserve() {
+impl Reservation {
+    /// Reserves space for the tournament of this owner token; `None` if it is being created or has just been.
+    fn of(tournaments: &Arc<Tournaments>, owner: Token) -> Result<Option<Self>, CreateProblem> {
+        let mut table = tournaments.lock();
+        if table.is_in_creation(owner.room) || table.get(owner.room).is_some() {
+            return Ok(None);
+        }
+        if !table.reserve(owner.room) {
             return Err(CreateProblem::TooMany(MAX_TOURNAMENTS));
         }
-        Ok(Self(Arc::clone(tournaments)))
+        drop(table);
+        let tournaments = Arc::clone(tournaments);
+        Ok(Some(Self { tournaments, owner }))
     }
 
     async fn make(
@@ -236,11 +269,10 @@ impl Place {
         plan: TournamentPlan,
         core: Tournament,
     ) -> Result<(Arc<Hosted>, Token), CreateProblem> {
-        let tournaments = &self.0;
-        let id = Id::random();
-        let owner = Token::random(id);
+        let tournaments = &self.tournaments;
+        let owner = self.owner;
         let header = TournamentHeader {
-            id,
+            id: owner.room,
             settings: convert::settings_to_proto(&name, &plan),
             created_at_ms: since_epoch_ms(),
             join_code: join_code(),
@@ -259,9 +291,10 @@ impl Place {
     }
 }
 
-impl Drop for Place {
+impl Drop for Reservation {
     fn drop(&mut self) {
-        self.0.lock().give_back();
+        self.tournaments.lock().give_back(self.owner.room);
+        self.tournaments.created.notify_waiters();
     }
 }
 

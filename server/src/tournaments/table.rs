@@ -1,7 +1,7 @@
 //! The list of the tournaments: in the order in which they were made, found by their ids and join codes. What a tournament is, and how it is
 //! made, is decided elsewhere.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
 
 use super::handle::Hosted;
@@ -15,8 +15,8 @@ pub(super) struct Table {
     by_number: BTreeMap<u64, Arc<Hosted>>,
     numbers: HashMap<Id, u64>,
     codes: HashMap<String, u64>,
-    /// Places taken for tournaments that are being made.
-    being_made: usize,
+    /// Tournaments that are being created, for which space is reserved.
+    in_creation: HashSet<Id>,
 }
 
 impl Table {
@@ -39,17 +39,24 @@ impl Table {
         earlier.map(|(number, hosted)| (*number, hosted))
     }
 
-    /// Takes a place for a tournament that is about to be made; `false` if there is none.
-    pub(super) fn reserve(&mut self) -> bool {
-        let open = self.by_number.values().filter(|hosted| !hosted.is_over());
-        let has_place = open.count() + self.being_made < MAX_TOURNAMENTS;
-        self.being_made += usize::from(has_place);
-        has_place
+    /// Whether the tournament is being created.
+    pub(super) fn is_in_creation(&self, id: Id) -> bool {
+        self.in_creation.contains(&id)
     }
 
-    /// Gives back a place that was taken.
-    pub(super) fn give_back(&mut self) {
-        self.being_made -= 1;
+    /// Reserves space for a tournament that is about to be created; `false` if there is none.
+    pub(super) fn reserve(&mut self, id: Id) -> bool {
+        let open = self.by_number.values().filter(|hosted| !hosted.is_over());
+        let has_space = open.count() + self.in_creation.len() < MAX_TOURNAMENTS;
+        if has_space {
+            self.in_creation.insert(id);
+        }
+        has_space
+    }
+
+    /// Gives back the space reserved for a tournament.
+    pub(super) fn give_back(&mut self, id: Id) {
+        self.in_creation.remove(&id);
     }
 
     /// Adds a tournament. Those that are over are shown only as long as there is space for them.

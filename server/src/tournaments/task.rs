@@ -5,16 +5,15 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_tournament::{Change, Entrant, JoinProblem, State, Tournament};
+use chefshat_tournament::{Change, State, Tournament};
 use tokio::sync::mpsc;
 use tokio::time::{Instant, sleep_until};
 use tracing::{error, info};
 
 use super::Stop;
 use super::games::plays_itself;
-use super::handle::{Call, Connection, Entry, Hosted, Message, TournamentState};
+use super::handle::{Call, Connection, Entry, Hosted, JoinRefusal, Message, TournamentState};
 use crate::config::TOURNAMENT_OPEN_TIME;
-use crate::convert;
 use crate::rooms::Rooms;
 use crate::store::StoreError;
 use crate::store::tournaments::TournamentEntry;
@@ -184,18 +183,13 @@ impl Task {
         Ok(())
     }
 
-    fn join(&mut self, entry: Entry) -> Result<(usize, Token), JoinProblem> {
-        let entrant = Entrant {
-            name: entry.name,
-            kind: convert::entrant_kind(entry.kind),
-            built_in: None,
-            filler: false,
-            stateless: entry.stateless,
-            max_games: entry.max_games,
-        };
-        let change = self.state.core.join(entrant)?;
+    fn join(&mut self, entry: Entry) -> Result<(usize, Token), JoinRefusal> {
+        let token = self.hosted.ticket_of(&entry);
+        if let Some(answer) = self.state.joined_before(&entry, token) {
+            return answer;
+        }
+        let change = self.state.core.join(entry.entrant())?;
         let participant = self.state.core.participants().len();
-        let token = Token::random(self.hosted.id());
         let ticket = token.hash();
         self.fold(change);
         self.joined_at = Instant::now();

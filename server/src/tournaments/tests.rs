@@ -24,7 +24,7 @@ async fn a_tournament_is_made_to_its_end_though_nobody_waits_for_it() {
     };
     let plan = convert::tournament_plan(&settings, [7; 32]).expect("it can be held");
     // Whoever asked goes away while it is being kept.
-    let asked = tournaments.create("Coppa", plan).now_or_never();
+    let asked = tournaments.create("Coppa", plan, None).now_or_never();
     assert!(asked.is_none(), "it takes a while");
     tournaments.end();
     tracker.close();
@@ -67,6 +67,7 @@ fn entrant(name: &str) -> Entry {
         kind: chefshat_room::journal::ParticipantKind::Agent,
         max_games: 1,
         stateless: true,
+        request_id: None,
     }
 }
 
@@ -77,7 +78,7 @@ async fn readers_see_only_committed_changes() {
     let rooms = Rooms::new(&ServerConfig::default(), store, TaskTracker::new());
     let tournaments = Tournaments::new(rooms, TaskTracker::new());
     let plan = convert::tournament_plan(&built_in("Coppa"), [7; 32]).expect("it can be held");
-    let (hosted, _) = tournaments.create("Coppa", plan).await.expect("made");
+    let (hosted, _) = tournaments.create("Coppa", plan, None).await.expect("made");
     commits.forget_permits(usize::MAX >> 3);
     assert_eq!(commits.available_permits(), 0);
 
@@ -118,7 +119,7 @@ async fn a_forged_record_of_a_coming_game_is_not_counted() {
     // There is no space for a room: the game has its id, and waits.
     let tournaments = start(0);
     let plan = convert::tournament_plan(&built_in("Coppa"), [7; 32]).expect("it can be held");
-    let (hosted, _) = tournaments.create("Coppa", plan).await.expect("made");
+    let (hosted, _) = tournaments.create("Coppa", plan, None).await.expect("made");
     let mut changes = hosted.changes();
     hosted.begin().await.expect("it runs").expect("it begins");
     let forged = loop {
@@ -158,4 +159,55 @@ async fn a_forged_record_of_a_coming_game_is_not_counted() {
         assert_eq!(game.state(), v1::TournamentGameState::Counted);
         assert_ne!(game.game_id, forged);
     }
+}
+
+#[tokio::test]
+async fn a_repeated_request_gets_the_same_answer_also_after_a_restart() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let store = SqliteStore::open(folder.path()).await.expect("a new one");
+    let store: Arc<dyn Store> = Arc::new(store);
+    let start = || {
+        let config = ServerConfig::default();
+        let rooms = Rooms::new(&config, Arc::clone(&store), TaskTracker::new());
+        Tournaments::new(rooms, TaskTracker::new())
+    };
+    let plan = || convert::tournament_plan(&built_in("Coppa"), [7; 32]).expect("it can be held");
+    let request = RequestKey::new([1; 32], b"content");
+    let ada = || Entry {
+        request_id: Some([2; 32]),
+        ..entrant("Ada")
+    };
+    let tournaments = start();
+    let create = || tournaments.create("Coppa", plan(), Some(request));
+    let (first, second) = tokio::join!(create(), create());
+    let ((hosted, owner), (other, again)) = (first.expect("made"), second.expect("made"));
+    assert!(Arc::ptr_eq(&hosted, &other) && owner == again);
+    let other = RequestKey::new([1; 32], b"other content");
+    let refused = tournaments.create("Coppa", plan(), Some(other)).await;
+    assert!(matches!(refused, Err(CreateProblem::RequestIdUsed)));
+
+    let (first, second) = tokio::join!(hosted.join(ada()), hosted.join(ada()));
+    let joined = first.expect("it runs").expect("joined");
+    assert_eq!(second.expect("it runs").expect("joined"), joined);
+    hosted.begin().await.expect("it runs").expect("it begins");
+    assert_eq!(hosted.join(ada()).await.expect("it runs"), Ok(joined));
+    tournaments.end();
+
+    let tournaments = start();
+    tournaments.restore().await.expect("readable");
+    let (hosted, again) = tournaments
+        .create("Coppa", plan(), Some(request))
+        .await
+        .expect("there");
+    assert!(again == owner && hosted.is_owner(&owner.word()));
+    assert_eq!(tournaments.newest(None, None, 9).len(), 1);
+    assert_eq!(hosted.join(ada()).await.expect("it runs"), Ok(joined));
+    assert_eq!(hosted.participant_of(&joined.1.secret), Some(joined.0));
+    let bo = Entry {
+        name: "Bo".into(),
+        ..ada()
+    };
+    let refused = hosted.join(bo).await.expect("it runs");
+    assert_eq!(refused, Err(JoinRefusal::RequestIdUsed));
+    assert_eq!(hosted.describe().participants.len(), 5);
 }
