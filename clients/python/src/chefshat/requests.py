@@ -1,5 +1,8 @@
 """What both clients share around a call: addresses, channel options, building requests, paging and errors."""
 
+import asyncio
+import secrets
+import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Iterator, Sequence
 from typing import NamedTuple, Protocol, TypeAlias, TypeVar
 
@@ -21,6 +24,12 @@ class Page(Protocol):
 
     next_page_token: str
 
+
+# Requests that carry an id, by which the server answers a repeated one like the first.
+REPEATABLE = (pb.CreateRoomRequest, pb.JoinRoomRequest, pb.CreateTournamentRequest, pb.JoinTournamentRequest)
+REQUEST_ID_BYTES = 32
+# Seconds before each further attempt of a request whose response was lost.
+PAUSES_S = (0.1, 0.2, 0.4)
 
 Asked = TypeVar("Asked")
 Answered = TypeVar("Answered")
@@ -151,19 +160,44 @@ def attach(
 
 
 def called(method: Callable[[Asked], Answered], request: Asked) -> Answered:
-    """Makes a unary call. Raises a gRPC error as `ChefsHatError`."""
-    try:
-        return method(request)
-    except grpc.RpcError as error:
-        raise from_rpc_error(error) from error
+    """Makes a unary call. Repeats it if it can be repeated and its response was lost. Raises a gRPC error as `ChefsHatError`."""
+    pauses = _pauses(request)
+    while True:
+        try:
+            return method(request)
+        except grpc.RpcError as error:
+            pause = _pause_after(error, pauses)
+        time.sleep(pause)
 
 
 async def awaited(method: Callable[[Asked], Awaitable[Answered]], request: Asked) -> Answered:
-    """Makes a unary call of asyncio. Raises a gRPC error as `ChefsHatError`."""
-    try:
-        return await method(request)
-    except grpc.RpcError as error:
-        raise from_rpc_error(error) from error
+    """Makes a unary call of asyncio, like `called`."""
+    pauses = _pauses(request)
+    while True:
+        try:
+            return await method(request)
+        except grpc.RpcError as error:
+            pause = _pause_after(error, pauses)
+        await asyncio.sleep(pause)
+
+
+def _pauses(request: object) -> Iterator[float]:
+    """Returns the pauses in seconds between the attempts of a call, and gives a request that can be repeated its id."""
+    if not isinstance(request, REPEATABLE):
+        return iter(())
+    if not request.request_id:
+        request.request_id = secrets.token_bytes(REQUEST_ID_BYTES)
+    return iter(PAUSES_S)
+
+
+def _pause_after(error: grpc.RpcError, pauses: Iterator[float]) -> float:
+    """Returns the pause before the next attempt; raises the error if the server answered or no attempt is left."""
+    failure = from_rpc_error(error)
+    pause = next(pauses, None)
+    # With a reason of its own the server has answered.
+    if pause is None or failure.reason != grpc.StatusCode.UNAVAILABLE.name:
+        raise failure from error
+    return pause
 
 
 def pages(

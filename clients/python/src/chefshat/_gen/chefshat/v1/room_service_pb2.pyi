@@ -33,11 +33,18 @@ class CreateRoomRequest(_message.Message):
     GAME_SEED_FIELD_NUMBER: _builtins.int
     SCRIPTED_FIELD_NUMBER: _builtins.int
     BRANCH_FIELD_NUMBER: _builtins.int
+    REQUEST_ID_FIELD_NUMBER: _builtins.int
     name: _builtins.str
     """Display name, at most 64 characters."""
     game_seed: _builtins.bytes
     """The game seed, fixed for an experiment: 32 bytes, or empty. With it the game has no seed
     commitment and is not rated.
+    """
+    request_id: _builtins.bytes
+    """Empty, or 32 bytes drawn at random for this call and kept secret. A call that is repeated with the same id, because its response was
+    lost, creates nothing more and gets the same answer with the same secrets, as long as the server lists what was created; after a restart
+    of the server too, if that outlives the server. With the same id but other content: ALREADY_EXISTS (REQUEST_ID_USED). Another length:
+    INVALID_ARGUMENT (REQUEST_ID_REFUSED).
     """
     @_builtins.property
     def rules(self) -> _rules_pb2.RuleSet:
@@ -71,10 +78,11 @@ class CreateRoomRequest(_message.Message):
         game_seed: _builtins.bytes = ...,
         scripted: _rules_pb2.ScriptedShift | None = ...,
         branch: _room_pb2.BranchPoint | None = ...,
+        request_id: _builtins.bytes = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["branch", b"branch", "policy", b"policy", "rules", b"rules", "scripted", b"scripted", "start", b"start"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["branch", b"branch", "game_seed", b"game_seed", "name", b"name", "policy", b"policy", "rules", b"rules", "scripted", b"scripted", "seats", b"seats", "start", b"start"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["branch", b"branch", "game_seed", b"game_seed", "name", b"name", "policy", b"policy", "request_id", b"request_id", "rules", b"rules", "scripted", b"scripted", "seats", b"seats", "start", b"start"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType_start: _TypeAlias = _typing.Literal["scripted", "branch"]  # noqa: Y015
     _WhichOneofArgType_start: _TypeAlias = _typing.Literal["start", b"start"]  # noqa: Y015
@@ -233,6 +241,7 @@ class JoinRoomRequest(_message.Message):
     NAME_FIELD_NUMBER: _builtins.int
     KIND_FIELD_NUMBER: _builtins.int
     SEAT_FIELD_NUMBER: _builtins.int
+    REQUEST_ID_FIELD_NUMBER: _builtins.int
     room_id: _builtins.str
     """Identifies the room. May be empty: the join code alone identifies it."""
     join_code: _builtins.str
@@ -243,6 +252,12 @@ class JoinRoomRequest(_message.Message):
     """Kind of the participant; UNSPECIFIED means AGENT."""
     seat: _builtins.int
     """The requested seat; unset: the first free one that admits the kind."""
+    request_id: _builtins.bytes
+    """Empty, or 32 bytes drawn at random for this call and kept secret. A call that is repeated with the same id, because its response was
+    lost, gets the same place with the same ticket, also when the game has begun or the server was restarted, as long as the participant
+    has its place. With the same id but another name, kind or seat: ALREADY_EXISTS (REQUEST_ID_USED). Another length: INVALID_ARGUMENT
+    (REQUEST_ID_REFUSED).
+    """
     def __init__(
         self,
         *,
@@ -251,10 +266,11 @@ class JoinRoomRequest(_message.Message):
         name: _builtins.str = ...,
         kind: _room_pb2.ParticipantKind.ValueType = ...,
         seat: _builtins.int | None = ...,
+        request_id: _builtins.bytes = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["_seat", b"_seat", "seat", b"seat"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["_seat", b"_seat", "join_code", b"join_code", "kind", b"kind", "name", b"name", "room_id", b"room_id", "seat", b"seat"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_seat", b"_seat", "join_code", b"join_code", "kind", b"kind", "name", b"name", "request_id", b"request_id", "room_id", b"room_id", "seat", b"seat"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType__seat: _TypeAlias = _typing.Literal["seat"]  # noqa: Y015
     _WhichOneofArgType__seat: _TypeAlias = _typing.Literal["_seat", b"_seat"]  # noqa: Y015

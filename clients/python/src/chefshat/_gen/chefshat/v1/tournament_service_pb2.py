@@ -26,7 +26,7 @@ from chefshat._gen.chefshat.v1 import room_pb2 as chefshat_dot_v1_dot_room__pb2
 from chefshat._gen.chefshat.v1 import tournament_pb2 as chefshat_dot_v1_dot_tournament__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n$chefshat/v1/tournament_service.proto\x12\x0b\x63hefshat.v1\x1a\x16\x63hefshat/v1/room.proto\x1a\x1c\x63hefshat/v1/tournament.proto\"L\n\x17\x43reateTournamentRequest\x12\x31\n\x08settings\x18\x01 \x01(\x0b\x32\x1f.chefshat.v1.TournamentSettings\"o\n\x18\x43reateTournamentResponse\x12+\n\ntournament\x18\x01 \x01(\x0b\x32\x17.chefshat.v1.Tournament\x12\x11\n\tjoin_code\x18\x02 \x01(\t\x12\x13\n\x0bowner_token\x18\x03 \x01(\t\"@\n\x14GetTournamentRequest\x12\x15\n\rtournament_id\x18\x01 \x01(\t\x12\x11\n\tjoin_code\x18\x02 \x01(\t\"D\n\x15GetTournamentResponse\x12+\n\ntournament\x18\x01 \x01(\x0b\x32\x17.chefshat.v1.Tournament\"l\n\x16ListTournamentsRequest\x12\x11\n\tpage_size\x18\x01 \x01(\r\x12\x12\n\npage_token\x18\x02 \x01(\t\x12+\n\x05state\x18\x03 \x01(\x0e\x32\x1c.chefshat.v1.TournamentState\"`\n\x17ListTournamentsResponse\x12,\n\x0btournaments\x18\x01 \x03(\x0b\x32\x17.chefshat.v1.Tournament\x12\x17\n\x0fnext_page_token\x18\x02 \x01(\t\"\xa1\x01\n\x15JoinTournamentRequest\x12\x15\n\rtournament_id\x18\x01 \x01(\t\x12\x11\n\tjoin_code\x18\x02 \x01(\t\x12\x0c\n\x04name\x18\x03 \x01(\t\x12*\n\x04kind\x18\x04 \x01(\x0e\x32\x1c.chefshat.v1.ParticipantKind\x12\x11\n\tmax_games\x18\x05 \x01(\r\x12\x11\n\tstateless\x18\x06 \x01(\x08\"j\n\x16JoinTournamentResponse\x12+\n\ntournament\x18\x01 \x01(\x0b\x32\x17.chefshat.v1.Tournament\x12\x13\n\x0bparticipant\x18\x02 \x01(\r\x12\x0e\n\x06ticket\x18\x03 \x01(\t\"D\n\x16StartTournamentRequest\x12\x15\n\rtournament_id\x18\x01 \x01(\t\x12\x13\n\x0bowner_token\x18\x02 \x01(\t\"F\n\x17StartTournamentResponse\x12+\n\ntournament\x18\x01 \x01(\x0b\x32\x17.chefshat.v1.Tournament\"D\n\x16\x43loseTournamentRequest\x12\x15\n\rtournament_id\x18\x01 \x01(\t\x12\x13\n\x0bowner_token\x18\x02 \x01(\t\"F\n\x17\x43loseTournamentResponse\x12+\n\ntournament\x18\x01 \x01(\x0b\x32\x17.chefshat.v1.Tournament\"0\n\x17\x46ollowTournamentRequest\x12\x15\n\rtournament_id\x18\x01 \x01(\t\"\xa7\x01\n\x18\x46ollowTournamentResponse\x12+\n\ntournament\x18\x01 \x01(\x0b\x32\x17.chefshat.v1.Tournament\x12\x32\n\tstandings\x18\x02 \x03(\x0b\x32\x1f.chefshat.v1.TournamentStanding\x12*\n\x05games\x18\x03 \x03(\x0b\x32\x1b.chefshat.v1.TournamentGame\"4\n\x1bGetTournamentResultsRequest\x12\x15\n\rtournament_id\x18\x01 \x01(\t\"\xb1\x01\n\x1cGetTournamentResultsResponse\x12+\n\ntournament\x18\x01 \x01(\x0b\x32\x17.chefshat.v1.Tournament\x12\x32\n\tstandings\x18\x02 \x03(\x0b\x32\x1f.chefshat.v1.TournamentStanding\x12\x30\n\nconfidence\x18\x03 \x03(\x0b\x32\x1c.chefshat.v1.OrderConfidence\"Z\n\x1aListTournamentGamesRequest\x12\x15\n\rtournament_id\x18\x01 \x01(\t\x12\x11\n\tpage_size\x18\x02 \x01(\r\x12\x12\n\npage_token\x18\x03 \x01(\t\"b\n\x1bListTournamentGamesResponse\x12*\n\x05games\x18\x01 \x03(\x0b\x32\x1b.chefshat.v1.TournamentGame\x12\x17\n\x0fnext_page_token\x18\x02 \x01(\t\"e\n\x15GetLeaderboardRequest\x12*\n\x04kind\x18\x01 \x01(\x0e\x32\x1c.chefshat.v1.ParticipantKind\x12\x11\n\tmin_games\x18\x02 \x01(\r\x12\r\n\x05limit\x18\x03 \x01(\r\"J\n\x16GetLeaderboardResponse\x12!\n\x05rated\x18\x01 \x03(\x0b\x32\x12.chefshat.v1.Rated\x12\r\n\x05games\x18\x02 \x01(\x04\x32\xd6\x07\n\x11TournamentService\x12_\n\x10\x43reateTournament\x12$.chefshat.v1.CreateTournamentRequest\x1a%.chefshat.v1.CreateTournamentResponse\x12V\n\rGetTournament\x12!.chefshat.v1.GetTournamentRequest\x1a\".chefshat.v1.GetTournamentResponse\x12\\\n\x0fListTournaments\x12#.chefshat.v1.ListTournamentsRequest\x1a$.chefshat.v1.ListTournamentsResponse\x12Y\n\x0eJoinTournament\x12\".chefshat.v1.JoinTournamentRequest\x1a#.chefshat.v1.JoinTournamentResponse\x12\\\n\x0fStartTournament\x12#.chefshat.v1.StartTournamentRequest\x1a$.chefshat.v1.StartTournamentResponse\x12\\\n\x0f\x43loseTournament\x12#.chefshat.v1.CloseTournamentRequest\x1a$.chefshat.v1.CloseTournamentResponse\x12\x61\n\x10\x46ollowTournament\x12$.chefshat.v1.FollowTournamentRequest\x1a%.chefshat.v1.FollowTournamentResponse0\x01\x12k\n\x14GetTournamentResults\x12(.chefshat.v1.GetTournamentResultsRequest\x1a).chefshat.v1.GetTournamentResultsResponse\x12h\n\x13ListTournamentGames\x12\'.chefshat.v1.ListTournamentGamesRequest\x1a(.chefshat.v1.ListTournamentGamesResponse\x12Y\n\x0eGetLeaderboard\x12\".chefshat.v1.GetLeaderboardRequest\x1a#.chefshat.v1.GetLeaderboardResponseb\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n$chefshat/v1/tournament_service.proto\x12\x0b\x63hefshat.v1\x1a\x16\x63hefshat/v1/room.proto\x1a\x1c\x63hefshat/v1/tournament.proto\"`\n\x17\x43reateTournamentRequest\x12\x31\n\x08settings\x18\x01 \x01(\x0b\x32\x1f.chefshat.v1.TournamentSettings\x12\x12\n\nrequest_id\x18\x02 \x01(\x0c\"o\n\x18\x43reateTournamentResponse\x12+\n\ntournament\x18\x01 \x01(\x0b\x32\x17.chefshat.v1.Tournament\x12\x11\n\tjoin_code\x18\x02 \x01(\t\x12\x13\n\x0bowner_token\x18\x03 \x01(\t\"@\n\x14GetTournamentRequest\x12\x15\n\rtournament_id\x18\x01 \x01(\t\x12\x11\n\tjoin_code\x18\x02 \x01(\t\"D\n\x15GetTournamentResponse\x12+\n\ntournament\x18\x01 \x01(\x0b\x32\x17.chefshat.v1.Tournament\"l\n\x16ListTournamentsRequest\x12\x11\n\tpage_size\x18\x01 \x01(\r\x12\x12\n\npage_token\x18\x02 \x01(\t\x12+\n\x05state\x18\x03 \x01(\x0e\x32\x1c.chefshat.v1.TournamentState\"`\n\x17ListTournamentsResponse\x12,\n\x0btournaments\x18\x01 \x03(\x0b\x32\x17.chefshat.v1.Tournament\x12\x17\n\x0fnext_page_token\x18\x02 \x01(\t\"\xb5\x01\n\x15JoinTournamentRequest\x12\x15\n\rtournament_id\x18\x01 \x01(\t\x12\x11\n\tjoin_code\x18\x02 \x01(\t\x12\x0c\n\x04name\x18\x03 \x01(\t\x12*\n\x04kind\x18\x04 \x01(\x0e\x32\x1c.chefshat.v1.ParticipantKind\x12\x11\n\tmax_games\x18\x05 \x01(\r\x12\x11\n\tstateless\x18\x06 \x01(\x08\x12\x12\n\nrequest_id\x18\x07 \x01(\x0c\"j\n\x16JoinTournamentResponse\x12+\n\ntournament\x18\x01 \x01(\x0b\x32\x17.chefshat.v1.Tournament\x12\x13\n\x0bparticipant\x18\x02 \x01(\r\x12\x0e\n\x06ticket\x18\x03 \x01(\t\"D\n\x16StartTournamentRequest\x12\x15\n\rtournament_id\x18\x01 \x01(\t\x12\x13\n\x0bowner_token\x18\x02 \x01(\t\"F\n\x17StartTournamentResponse\x12+\n\ntournament\x18\x01 \x01(\x0b\x32\x17.chefshat.v1.Tournament\"D\n\x16\x43loseTournamentRequest\x12\x15\n\rtournament_id\x18\x01 \x01(\t\x12\x13\n\x0bowner_token\x18\x02 \x01(\t\"F\n\x17\x43loseTournamentResponse\x12+\n\ntournament\x18\x01 \x01(\x0b\x32\x17.chefshat.v1.Tournament\"0\n\x17\x46ollowTournamentRequest\x12\x15\n\rtournament_id\x18\x01 \x01(\t\"\xa7\x01\n\x18\x46ollowTournamentResponse\x12+\n\ntournament\x18\x01 \x01(\x0b\x32\x17.chefshat.v1.Tournament\x12\x32\n\tstandings\x18\x02 \x03(\x0b\x32\x1f.chefshat.v1.TournamentStanding\x12*\n\x05games\x18\x03 \x03(\x0b\x32\x1b.chefshat.v1.TournamentGame\"4\n\x1bGetTournamentResultsRequest\x12\x15\n\rtournament_id\x18\x01 \x01(\t\"\xb1\x01\n\x1cGetTournamentResultsResponse\x12+\n\ntournament\x18\x01 \x01(\x0b\x32\x17.chefshat.v1.Tournament\x12\x32\n\tstandings\x18\x02 \x03(\x0b\x32\x1f.chefshat.v1.TournamentStanding\x12\x30\n\nconfidence\x18\x03 \x03(\x0b\x32\x1c.chefshat.v1.OrderConfidence\"Z\n\x1aListTournamentGamesRequest\x12\x15\n\rtournament_id\x18\x01 \x01(\t\x12\x11\n\tpage_size\x18\x02 \x01(\r\x12\x12\n\npage_token\x18\x03 \x01(\t\"b\n\x1bListTournamentGamesResponse\x12*\n\x05games\x18\x01 \x03(\x0b\x32\x1b.chefshat.v1.TournamentGame\x12\x17\n\x0fnext_page_token\x18\x02 \x01(\t\"e\n\x15GetLeaderboardRequest\x12*\n\x04kind\x18\x01 \x01(\x0e\x32\x1c.chefshat.v1.ParticipantKind\x12\x11\n\tmin_games\x18\x02 \x01(\r\x12\r\n\x05limit\x18\x03 \x01(\r\"J\n\x16GetLeaderboardResponse\x12!\n\x05rated\x18\x01 \x03(\x0b\x32\x12.chefshat.v1.Rated\x12\r\n\x05games\x18\x02 \x01(\x04\x32\xd6\x07\n\x11TournamentService\x12_\n\x10\x43reateTournament\x12$.chefshat.v1.CreateTournamentRequest\x1a%.chefshat.v1.CreateTournamentResponse\x12V\n\rGetTournament\x12!.chefshat.v1.GetTournamentRequest\x1a\".chefshat.v1.GetTournamentResponse\x12\\\n\x0fListTournaments\x12#.chefshat.v1.ListTournamentsRequest\x1a$.chefshat.v1.ListTournamentsResponse\x12Y\n\x0eJoinTournament\x12\".chefshat.v1.JoinTournamentRequest\x1a#.chefshat.v1.JoinTournamentResponse\x12\\\n\x0fStartTournament\x12#.chefshat.v1.StartTournamentRequest\x1a$.chefshat.v1.StartTournamentResponse\x12\\\n\x0f\x43loseTournament\x12#.chefshat.v1.CloseTournamentRequest\x1a$.chefshat.v1.CloseTournamentResponse\x12\x61\n\x10\x46ollowTournament\x12$.chefshat.v1.FollowTournamentRequest\x1a%.chefshat.v1.FollowTournamentResponse0\x01\x12k\n\x14GetTournamentResults\x12(.chefshat.v1.GetTournamentResultsRequest\x1a).chefshat.v1.GetTournamentResultsResponse\x12h\n\x13ListTournamentGames\x12\'.chefshat.v1.ListTournamentGamesRequest\x1a(.chefshat.v1.ListTournamentGamesResponse\x12Y\n\x0eGetLeaderboard\x12\".chefshat.v1.GetLeaderboardRequest\x1a#.chefshat.v1.GetLeaderboardResponseb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -34,45 +34,45 @@ _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'chefshat._gen.chefshat.v1.t
 if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
   _globals['_CREATETOURNAMENTREQUEST']._serialized_start=107
-  _globals['_CREATETOURNAMENTREQUEST']._serialized_end=183
-  _globals['_CREATETOURNAMENTRESPONSE']._serialized_start=185
-  _globals['_CREATETOURNAMENTRESPONSE']._serialized_end=296
-  _globals['_GETTOURNAMENTREQUEST']._serialized_start=298
-  _globals['_GETTOURNAMENTREQUEST']._serialized_end=362
-  _globals['_GETTOURNAMENTRESPONSE']._serialized_start=364
-  _globals['_GETTOURNAMENTRESPONSE']._serialized_end=432
-  _globals['_LISTTOURNAMENTSREQUEST']._serialized_start=434
-  _globals['_LISTTOURNAMENTSREQUEST']._serialized_end=542
-  _globals['_LISTTOURNAMENTSRESPONSE']._serialized_start=544
-  _globals['_LISTTOURNAMENTSRESPONSE']._serialized_end=640
-  _globals['_JOINTOURNAMENTREQUEST']._serialized_start=643
-  _globals['_JOINTOURNAMENTREQUEST']._serialized_end=804
-  _globals['_JOINTOURNAMENTRESPONSE']._serialized_start=806
-  _globals['_JOINTOURNAMENTRESPONSE']._serialized_end=912
-  _globals['_STARTTOURNAMENTREQUEST']._serialized_start=914
-  _globals['_STARTTOURNAMENTREQUEST']._serialized_end=982
-  _globals['_STARTTOURNAMENTRESPONSE']._serialized_start=984
-  _globals['_STARTTOURNAMENTRESPONSE']._serialized_end=1054
-  _globals['_CLOSETOURNAMENTREQUEST']._serialized_start=1056
-  _globals['_CLOSETOURNAMENTREQUEST']._serialized_end=1124
-  _globals['_CLOSETOURNAMENTRESPONSE']._serialized_start=1126
-  _globals['_CLOSETOURNAMENTRESPONSE']._serialized_end=1196
-  _globals['_FOLLOWTOURNAMENTREQUEST']._serialized_start=1198
-  _globals['_FOLLOWTOURNAMENTREQUEST']._serialized_end=1246
-  _globals['_FOLLOWTOURNAMENTRESPONSE']._serialized_start=1249
-  _globals['_FOLLOWTOURNAMENTRESPONSE']._serialized_end=1416
-  _globals['_GETTOURNAMENTRESULTSREQUEST']._serialized_start=1418
-  _globals['_GETTOURNAMENTRESULTSREQUEST']._serialized_end=1470
-  _globals['_GETTOURNAMENTRESULTSRESPONSE']._serialized_start=1473
-  _globals['_GETTOURNAMENTRESULTSRESPONSE']._serialized_end=1650
-  _globals['_LISTTOURNAMENTGAMESREQUEST']._serialized_start=1652
-  _globals['_LISTTOURNAMENTGAMESREQUEST']._serialized_end=1742
-  _globals['_LISTTOURNAMENTGAMESRESPONSE']._serialized_start=1744
-  _globals['_LISTTOURNAMENTGAMESRESPONSE']._serialized_end=1842
-  _globals['_GETLEADERBOARDREQUEST']._serialized_start=1844
-  _globals['_GETLEADERBOARDREQUEST']._serialized_end=1945
-  _globals['_GETLEADERBOARDRESPONSE']._serialized_start=1947
-  _globals['_GETLEADERBOARDRESPONSE']._serialized_end=2021
-  _globals['_TOURNAMENTSERVICE']._serialized_start=2024
-  _globals['_TOURNAMENTSERVICE']._serialized_end=3006
+  _globals['_CREATETOURNAMENTREQUEST']._serialized_end=203
+  _globals['_CREATETOURNAMENTRESPONSE']._serialized_start=205
+  _globals['_CREATETOURNAMENTRESPONSE']._serialized_end=316
+  _globals['_GETTOURNAMENTREQUEST']._serialized_start=318
+  _globals['_GETTOURNAMENTREQUEST']._serialized_end=382
+  _globals['_GETTOURNAMENTRESPONSE']._serialized_start=384
+  _globals['_GETTOURNAMENTRESPONSE']._serialized_end=452
+  _globals['_LISTTOURNAMENTSREQUEST']._serialized_start=454
+  _globals['_LISTTOURNAMENTSREQUEST']._serialized_end=562
+  _globals['_LISTTOURNAMENTSRESPONSE']._serialized_start=564
+  _globals['_LISTTOURNAMENTSRESPONSE']._serialized_end=660
+  _globals['_JOINTOURNAMENTREQUEST']._serialized_start=663
+  _globals['_JOINTOURNAMENTREQUEST']._serialized_end=844
+  _globals['_JOINTOURNAMENTRESPONSE']._serialized_start=846
+  _globals['_JOINTOURNAMENTRESPONSE']._serialized_end=952
+  _globals['_STARTTOURNAMENTREQUEST']._serialized_start=954
+  _globals['_STARTTOURNAMENTREQUEST']._serialized_end=1022
+  _globals['_STARTTOURNAMENTRESPONSE']._serialized_start=1024
+  _globals['_STARTTOURNAMENTRESPONSE']._serialized_end=1094
+  _globals['_CLOSETOURNAMENTREQUEST']._serialized_start=1096
+  _globals['_CLOSETOURNAMENTREQUEST']._serialized_end=1164
+  _globals['_CLOSETOURNAMENTRESPONSE']._serialized_start=1166
+  _globals['_CLOSETOURNAMENTRESPONSE']._serialized_end=1236
+  _globals['_FOLLOWTOURNAMENTREQUEST']._serialized_start=1238
+  _globals['_FOLLOWTOURNAMENTREQUEST']._serialized_end=1286
+  _globals['_FOLLOWTOURNAMENTRESPONSE']._serialized_start=1289
+  _globals['_FOLLOWTOURNAMENTRESPONSE']._serialized_end=1456
+  _globals['_GETTOURNAMENTRESULTSREQUEST']._serialized_start=1458
+  _globals['_GETTOURNAMENTRESULTSREQUEST']._serialized_end=1510
+  _globals['_GETTOURNAMENTRESULTSRESPONSE']._serialized_start=1513
+  _globals['_GETTOURNAMENTRESULTSRESPONSE']._serialized_end=1690
+  _globals['_LISTTOURNAMENTGAMESREQUEST']._serialized_start=1692
+  _globals['_LISTTOURNAMENTGAMESREQUEST']._serialized_end=1782
+  _globals['_LISTTOURNAMENTGAMESRESPONSE']._serialized_start=1784
+  _globals['_LISTTOURNAMENTGAMESRESPONSE']._serialized_end=1882
+  _globals['_GETLEADERBOARDREQUEST']._serialized_start=1884
+  _globals['_GETLEADERBOARDREQUEST']._serialized_end=1985
+  _globals['_GETLEADERBOARDRESPONSE']._serialized_start=1987
+  _globals['_GETLEADERBOARDRESPONSE']._serialized_end=2061
+  _globals['_TOURNAMENTSERVICE']._serialized_start=2064
+  _globals['_TOURNAMENTSERVICE']._serialized_end=3046
 # @@protoc_insertion_point(module_scope)

@@ -27,6 +27,13 @@ class CreateTournamentRequest(_message.Message):
     DESCRIPTOR: _descriptor.Descriptor
 
     SETTINGS_FIELD_NUMBER: _builtins.int
+    REQUEST_ID_FIELD_NUMBER: _builtins.int
+    request_id: _builtins.bytes
+    """Empty, or 32 bytes drawn at random for this call and kept secret. A call that is repeated with the same id, because its response was
+    lost, creates nothing more and gets the same answer with the same secrets, as long as the server lists what was created; after a restart
+    of the server too, if that outlives the server. With the same id but other content: ALREADY_EXISTS (REQUEST_ID_USED). Another length:
+    INVALID_ARGUMENT (REQUEST_ID_REFUSED).
+    """
     @_builtins.property
     def settings(self) -> _tournament_pb2.TournamentSettings:
         """Its settings."""
@@ -35,10 +42,11 @@ class CreateTournamentRequest(_message.Message):
         self,
         *,
         settings: _tournament_pb2.TournamentSettings | None = ...,
+        request_id: _builtins.bytes = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["settings", b"settings"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["settings", b"settings"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["request_id", b"request_id", "settings", b"settings"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
@@ -196,6 +204,7 @@ class JoinTournamentRequest(_message.Message):
     KIND_FIELD_NUMBER: _builtins.int
     MAX_GAMES_FIELD_NUMBER: _builtins.int
     STATELESS_FIELD_NUMBER: _builtins.int
+    REQUEST_ID_FIELD_NUMBER: _builtins.int
     tournament_id: _builtins.str
     """Identifies the tournament. May be empty: the join code alone identifies it."""
     join_code: _builtins.str
@@ -208,6 +217,12 @@ class JoinTournamentRequest(_message.Message):
     """Number of games it can play in parallel, 1..=64; 0 means 1."""
     stateless: _builtins.bool
     """Declares it stateless: it remembers nothing from one game to the next."""
+    request_id: _builtins.bytes
+    """Empty, or 32 bytes drawn at random for this call and kept secret. A call that is repeated with the same id, because its response was
+    lost, gets the same place with the same ticket, also when the game has begun or the server was restarted, as long as the participant
+    has its place. With the same id but another name, kind, number of games or `stateless`: ALREADY_EXISTS (REQUEST_ID_USED). Another length: INVALID_ARGUMENT
+    (REQUEST_ID_REFUSED).
+    """
     def __init__(
         self,
         *,
@@ -217,10 +232,11 @@ class JoinTournamentRequest(_message.Message):
         kind: _room_pb2.ParticipantKind.ValueType = ...,
         max_games: _builtins.int = ...,
         stateless: _builtins.bool = ...,
+        request_id: _builtins.bytes = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["join_code", b"join_code", "kind", b"kind", "max_games", b"max_games", "name", b"name", "stateless", b"stateless", "tournament_id", b"tournament_id"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["join_code", b"join_code", "kind", b"kind", "max_games", b"max_games", "name", b"name", "request_id", b"request_id", "stateless", b"stateless", "tournament_id", b"tournament_id"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
