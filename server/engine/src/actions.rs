@@ -1,5 +1,5 @@
-//! Actions, their indices and their texts (`docs/rules.md` §8.1). The numbering depends on the number
-//! of faces alone. `game::legal` decides what is legal.
+//! Actions, their indices and their texts (`docs/rules.md` §8.1). The numbering depends on the
+//! number of faces alone. `game::legal` decides what is legal.
 
 use std::fmt;
 
@@ -188,7 +188,8 @@ impl ActionSpace {
         self.decode(id).map(|action| action.to_string())
     }
 
-    /// The index of the action with this text, or `None` if there is none. Only the exact text counts.
+    /// The index of the action with this text, or `None` if there is none. Only the exact text
+    /// counts.
     pub fn parse(self, text: &str) -> Option<ActionId> {
         let action = parse_action(text)?;
         // Comparing the text refuses spellings such as `C01;Q1;J0`.

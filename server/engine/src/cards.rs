@@ -26,9 +26,9 @@ impl Cards {
     /// No cards.
     pub const EMPTY: Cards = Cards(0);
 
-    /// Creates cards from F+1 counts: faces 1..=F ascending, then jokers. If `golden`, one card of face
-    /// F is the Golden card. `None` if there are not F+1 counts, a count exceeds every deck, or there
-    /// is no card of face F to be golden.
+    /// Creates cards from F+1 counts: faces 1..=F ascending, then jokers. If `golden`, one card of
+    /// face F is the Golden card. `None` if there are not F+1 counts, a count exceeds every deck,
+    /// or there is no card of face F to be golden.
     pub fn from_counts(faces: u8, counts: &[u8], golden: bool) -> Option<Cards> {
         if faces == 0 || faces > MAX_FACES || counts.len() != usize::from(faces) + 1 {
             return None;
@@ -126,8 +126,8 @@ impl Cards {
             .flat_map(|(count, number)| std::iter::repeat_n(number, usize::from(count)))
     }
 
-    /// Both multisets together. `None` if a count would exceed every deck or there would be two Golden
-    /// cards.
+    /// Both multisets together. `None` if a count would exceed every deck or there would be two
+    /// Golden cards.
     pub fn union(self, other: Cards) -> Option<Cards> {
         let mut sum = self;
         for number in 1..=MAX_FACES {
@@ -166,8 +166,8 @@ impl Cards {
         }
     }
 
-    /// These cards without `n` cards of a face; the Golden card is removed last. `None` if there are
-    /// fewer than `n`.
+    /// These cards without `n` cards of a face; the Golden card is removed last. `None` if there
+    /// are fewer than `n`.
     pub fn without_face(self, face: Face, n: u8) -> Option<Cards> {
         let mut left = self;
         (self.count(face) >= n).then(|| {
@@ -214,7 +214,8 @@ impl Cards {
         };
     }
 
-    /// Removes and returns `n` cards of a face, which are known to be present; the Golden card last.
+    /// Removes and returns `n` cards of a face, which are known to be present; the Golden card
+    /// last.
     pub(crate) fn take_face(&mut self, face: Face, n: u8) -> Cards {
         let mut taken = Cards::EMPTY;
         // The Golden card has the top face of the deck, which is the highest face of every hand

@@ -1,6 +1,6 @@
-//! The deal: which cards each seat gets in a Shift, as a function of rule set, seed and Shift number
-//! (`docs/rules.md` §3.1, §8.5). The shuffle is written out here, because records must replay to
-//! the same cards on every machine; no library's shuffle may replace it.
+//! The deal: which cards each seat gets in a Shift, as a function of rule set, seed and Shift
+//! number (`docs/rules.md` §3.1, §8.5). The shuffle is written out here, because records must
+//! replay to the same cards on every machine; no library's shuffle may replace it.
 
 use std::fmt;
 
@@ -128,8 +128,8 @@ pub(crate) fn opening_leader(rules: &RuleSet, hands: &BySeat<Cards>, drawn: Opti
         .expect("the Golden card is always dealt to a seat")
 }
 
-/// The deck before it is shuffled: faces 1..=F ascending, the last card of face F the Golden card, then
-/// the jokers.
+/// The deck before it is shuffled: faces 1..=F ascending, the last card of face F the Golden card,
+/// then the jokers.
 fn ordered_deck(rules: &RuleSet) -> [u8; MAX_DECK] {
     let mut cards = [JOKER; MAX_DECK];
     let faces =

@@ -1,5 +1,5 @@
-//! Newtypes for the numbers of the game: seats, faces and indices of actions. [`crate::ActionSpace`]
-//! says what an index means.
+//! Newtypes for the numbers of the game: seats, faces and indices of actions.
+//! [`crate::ActionSpace`] says what an index means.
 
 use std::fmt;
 

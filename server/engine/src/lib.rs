@@ -62,7 +62,8 @@ pub use rewards::RewardScheme;
 pub use roles::{Role, SpecialAction};
 pub use rules::{Opening, PassScope, RuleSet, RuleSetError, RuleSetSpec, Stop};
 
-/// Version of the rules that this crate implements. Every record names the version it was played by.
+/// Version of the rules that this crate implements. Every record names the version it was played
+/// by.
 pub const RULES_VERSION: u32 = 1;
 /// The most seats a game can have.
 pub const MAX_SEATS: usize = 6;

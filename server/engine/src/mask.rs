@@ -7,8 +7,8 @@ use crate::ActionId;
 /// Words of a set.
 pub(crate) const WORDS: usize = 6;
 
-/// A set of up to 384 action indices, one bit each. It stores its length, so that a uniform choice needs
-/// one look-up.
+/// A set of up to 384 action indices, one bit each. It stores its length, so that a uniform choice
+/// needs one look-up.
 #[derive(Copy, Clone, Eq, PartialEq, Hash, Default)]
 pub struct Mask {
     words: [u64; WORDS],
@@ -163,8 +163,8 @@ const fn byte_sums(word: u64) -> u64 {
     ((fours + (fours >> 4)) & 0x0F0F_0F0F_0F0F_0F0F).wrapping_mul(BYTE_ONES)
 }
 
-/// Index of the set bit with `k` set bits below it; the word has more than `k`. Branchless, because a
-/// random choice would be mispredicted: all bytes are compared at once to find the byte, and a
+/// Index of the set bit with `k` set bits below it; the word has more than `k`. Branchless, because
+/// a random choice would be mispredicted: all bytes are compared at once to find the byte, and a
 /// table gives the bit.
 #[inline]
 fn select(word: u64, sums: u64, k: u32) -> u16 {

@@ -1,5 +1,5 @@
-//! What a seat may know of a game (`docs/rules.md` §8.4) as one value, and the paper's classic vector.
-//! `game::view` fills it in. The mask of legal actions is separate
+//! What a seat may know of a game (`docs/rules.md` §8.4) as one value, and the paper's classic
+//! vector. `game::view` fills it in. The mask of legal actions is separate
 //! ([`crate::Game::legal_actions`]).
 
 use crate::game::default_gift;
@@ -38,7 +38,8 @@ pub struct Observation {
     pub board: Board,
     /// Number of cards in each hand. A card given in the exchange leaves the hand at once.
     pub cards_left: BySeat<u8>,
-    /// Whether each seat has passed in this pizza; with [`crate::PassScope::Turn`], since the last play.
+    /// Whether each seat has passed in this pizza; with [`crate::PassScope::Turn`], since the last
+    /// play.
     pub passed: BySeat<bool>,
     /// Place of each seat that has finished the Shift, from 1; 0 for the others.
     pub places: BySeat<u8>,
@@ -76,9 +77,9 @@ impl Observation {
             + usize::from(ActionSpace::of(self.faces).turn_actions())
     }
 
-    /// The paper's vector of numbers in 0..=1: the board (F slots: the cards ascending, jokers as F+1,
-    /// truncated; F+2 in slot 0 if empty), the hand (H slots: ascending, zeros first), both divided by
-    /// F+2, then the mask of a turn's actions as 0 and 1.
+    /// The paper's vector of numbers in 0..=1: the board (F slots: the cards ascending, jokers as
+    /// F+1, truncated; F+2 in slot 0 if empty), the hand (H slots: ascending, zeros first), both
+    /// divided by F+2, then the mask of a turn's actions as 0 and 1.
     pub fn classic_vector(&self, mask: &Mask) -> Vec<f32> {
         let mut vector = vec![0.0; self.classic_len()];
         self.write_classic_vector(mask, &mut vector);

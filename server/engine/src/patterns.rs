@@ -56,8 +56,8 @@ impl Pattern {
     }
 }
 
-/// The patterns for one number of jokers and one least size of the play, by the number of cards of the
-/// face in the hand.
+/// The patterns for one number of jokers and one least size of the play, by the number of cards of
+/// the face in the hand.
 pub(crate) type Patterns = [Pattern; 16];
 
 /// By jokers in the hand (0..=2) and least size of the play (0..=17).
@@ -95,9 +95,9 @@ const fn pattern(held: usize, size: usize, count: usize) -> Pattern {
     Pattern(bits | (bits.count_ones() as u64) << PATTERN_BITS)
 }
 
-/// The legal actions of a turn: what [`PlayRequirement::allows`] allows to this hand, without asking
-/// it for each of up to 362 actions. The required faces are cut out of the packed hand; then the
-/// number of cards of each face selects the plays of that face from a table.
+/// The legal actions of a turn: what [`PlayRequirement::allows`] allows to this hand, without
+/// asking it for each of up to 362 actions. The required faces are cut out of the packed hand; then
+/// the number of cards of each face selects the plays of that face from a table.
 #[inline]
 pub(crate) fn turn_mask(faces: u8, required: &PlayRequirement, hand: Cards) -> Mask {
     let (jokers, size) = (hand.jokers(), required.fewest_cards);
@@ -167,7 +167,8 @@ impl Filling {
         let pattern = patterns[usize::from(cards.count_of(NUMBER))];
         let (index, shift) = const { place(play_offset(NUMBER)) };
         self.words[index] |= pattern.bits() << shift;
-        // A face has three bits for each of its cards in the deck. They may continue in the next word.
+        // A face has three bits for each of its cards in the deck. They may continue in the next
+        // word.
         if shift + 3 * u32::from(NUMBER) > 64 {
             self.words[index + 1] |= pattern.bits() >> (64 - shift);
         }

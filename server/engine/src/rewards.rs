@@ -3,7 +3,8 @@
 
 use crate::{Event, RuleSet, Seat, ShiftEnd};
 
-/// How turns and invalid attempts at turns are rewarded. No scheme rewards gifts and special actions.
+/// How turns and invalid attempts at turns are rewarded. No scheme rewards gifts and special
+/// actions.
 #[derive(Copy, Clone, Eq, PartialEq, Hash, Debug)]
 pub enum RewardScheme {
     /// +1 for a valid action, -1 for an invalid one (the paper's Experiment 2).
@@ -55,8 +56,8 @@ impl RewardScheme {
         }
     }
 
-    /// Reward of a valid turn after which the seat has `cards_left` cards. `place`, from 1, is set if
-    /// the seat finished with this turn.
+    /// Reward of a valid turn after which the seat has `cards_left` cards. `place`, from 1, is set
+    /// if the seat finished with this turn.
     pub fn turn(self, rules: &RuleSet, cards_left: u8, place: Option<u8>) -> f32 {
         let (left, dealt) = (f64::from(cards_left), f64::from(rules.hand_size()));
         let finishing = place.map_or(0.0, |place| self.finishing(place));
@@ -71,8 +72,8 @@ impl RewardScheme {
         reward as f32
     }
 
-    /// Reward of a seat at the end of a Shift, in addition to its turns: `place` from 1, `points` of
-    /// the Shift, `finished` whether it has no cards left. A seat that finished received its
+    /// Reward of a seat at the end of a Shift, in addition to its turns: `place` from 1, `points`
+    /// of the Shift, `finished` whether it has no cards left. A seat that finished received its
     /// finishing part with its last turn. `None` if there is no reward.
     pub fn shift_end(self, place: u8, points: u32, finished: bool) -> Option<f32> {
         match self {
@@ -86,9 +87,9 @@ impl RewardScheme {
         }
     }
 
-    /// Computes the rewards of the events of ONE call of [`crate::Game::apply`]. Calls `give` with the
-    /// seat, its reward and the index of the event that causes it: a play, a pass or the end of a
-    /// Shift.
+    /// Computes the rewards of the events of ONE call of [`crate::Game::apply`]. Calls `give` with
+    /// the seat, its reward and the index of the event that causes it: a play, a pass or the end of
+    /// a Shift.
     pub fn of_events(
         self,
         rules: &RuleSet,

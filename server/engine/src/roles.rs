@@ -43,7 +43,8 @@ impl Role {
         roles
     }
 
-    /// The roles of a game with this many seats, from the first place of the last Shift to the last.
+    /// The roles of a game with this many seats, from the first place of the last Shift to the
+    /// last.
     pub fn in_order(players: usize) -> impl ExactSizeIterator<Item = Role> {
         (0..players).map(move |rank| Role::of_rank(rank, players))
     }

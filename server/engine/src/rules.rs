@@ -1,5 +1,5 @@
-//! Rule sets (`docs/rules.md` §7): unvalidated ([`RuleSetSpec`]), and validated once ([`RuleSet`]). The
-//! named presets are in `presets`.
+//! Rule sets (`docs/rules.md` §7): unvalidated ([`RuleSetSpec`]), and validated once ([`RuleSet`]).
+//! The named presets are in `presets`.
 
 use std::ops::RangeInclusive;
 
@@ -28,8 +28,8 @@ pub enum Stop {
 pub enum Opening {
     /// The holder of the Golden card, who must play it.
     Golden,
-    /// The first seat from a drawn one that holds the top face, which must play that face. As in the
-    /// reference implementation.
+    /// The first seat from a drawn one that holds the top face, which must play that face. As in
+    /// the reference implementation.
     AnyTopFace,
 }
 

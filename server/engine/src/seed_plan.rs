@@ -1,4 +1,5 @@
-//! A deal that can be checked: what a server commits to before anybody is asked for anything, and what game seed follows from it.
+//! A deal that can be checked: what a server commits to before anybody is asked for anything, and
+//! what game seed follows from it.
 
 use crate::Seed;
 use sha2::{Digest as _, Sha256};
@@ -65,7 +66,8 @@ impl SeedPlan {
         }
     }
 
-    /// The seed of a built-in agent's own generator: SHA-256("chefshat.v1 agent" ‖ server or game seed ‖ seat in one byte).
+    /// The seed of a built-in agent's own generator: SHA-256("chefshat.v1 agent" ‖ server or game
+    /// seed ‖ seat in one byte).
     pub fn agent_seed(&self, seat: usize) -> [u8; 32] {
         let (Self::Committed {
             server_seed: secret,

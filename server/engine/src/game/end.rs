@@ -5,9 +5,9 @@ use super::{Game, Stage};
 use crate::{BySeat, Deal, Event, Seat, SeatOrder, ShiftEnd, Standings, Stop};
 
 impl Game {
-    /// Orders the seats that still hold cards when a Shift reaches its limit of turns (§5.4): fewest
-    /// cards first, ties by distance to the left of the seat that acted last. [`Game::end_shift`]
-    /// gives them their places.
+    /// Orders the seats that still hold cards when a Shift reaches its limit of turns (§5.4):
+    /// fewest cards first, ties by distance to the left of the seat that acted last.
+    /// [`Game::end_shift`] gives them their places.
     pub(super) fn adjudicate(&mut self, acted_last: Seat) {
         let state = &self.state;
         let mut waiting = SeatOrder::EMPTY;

@@ -21,8 +21,8 @@ pub enum Requirement {
     SpecialAction(SpecialAction),
 }
 
-/// What a turn must be (`docs/rules.md` §4.2 to §4.5). A play is legal if it meets this and the hand
-/// holds its cards.
+/// What a turn must be (`docs/rules.md` §4.2 to §4.5). A play is legal if it meets this and the
+/// hand holds its cards.
 #[derive(Copy, Clone, Eq, PartialEq, Hash, Debug)]
 pub struct PlayRequirement {
     /// The lowest face allowed: F on the Shift's first turn, 1 on all others.
@@ -137,8 +137,8 @@ impl Game {
         }
     }
 
-    /// Checks a turn of a seat. Always inlined: each caller checks one variant of the action, and the
-    /// rest is compiled away.
+    /// Checks a turn of a seat. Always inlined: each caller checks one variant of the action, and
+    /// the rest is compiled away.
     #[inline(always)]
     pub(super) fn check_turn(&self, seat: Seat, action: Action) -> Result<(), ActionError> {
         if self.hands[seat].holds(action) && self.play_requirement().allows(action) {

@@ -1,6 +1,7 @@
 //! A game as a value: its open decision, applying an action, and reading its state. The modules:
-//! `start` (deal, special action, exchange), `turn` (plays, passes, pizzas), `end` (places, points),
-//! `legal` (what is legal), `view` (what a seat may know), `script` (games from given hands).
+//! `start` (deal, special action, exchange), `turn` (plays, passes, pizzas), `end` (places,
+//! points), `legal` (what is legal), `view` (what a seat may know), `script` (games from given
+//! hands).
 
 mod end;
 mod error;
@@ -206,14 +207,14 @@ impl Game {
         Ok(())
     }
 
-    /// Deals all later Shifts from this seed, so that a branch can differ from the game it came from.
-    /// The current Shift stays as it was dealt.
+    /// Deals all later Shifts from this seed, so that a branch can differ from the game it came
+    /// from. The current Shift stays as it was dealt.
     pub fn reseed(&mut self, seed: Seed) {
         self.seed = seed;
     }
 
-    /// A copy that ends with this Shift, whatever the rule set says. Its state after the Shift's last
-    /// action is that of the end, which in this game the next deal overwrites.
+    /// A copy that ends with this Shift, whatever the rule set says. Its state after the Shift's
+    /// last action is that of the end, which in this game the next deal overwrites.
     pub fn closing_copy(&self) -> Game {
         Game {
             rules: self.rules.with_stop(Stop::Shifts(self.shift)),
@@ -242,8 +243,8 @@ impl Game {
         self.state.turns
     }
 
-    /// All hands, which are secret. A card given in the exchange is in no hand until the exchange is
-    /// complete.
+    /// All hands, which are secret. A card given in the exchange is in no hand until the exchange
+    /// is complete.
     pub fn hands(&self) -> &BySeat<Cards> {
         &self.hands
     }

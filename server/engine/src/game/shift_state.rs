@@ -1,5 +1,5 @@
-//! The pizzas of one Shift (`docs/rules.md` §4): board, turn order, laps and places. Knows nothing of
-//! hands, points or events.
+//! The pizzas of one Shift (`docs/rules.md` §4): board, turn order, laps and places. Knows nothing
+//! of hands, points or events.
 
 use crate::observation::Board;
 use crate::{BySeat, Seat, SeatOrder};

@@ -1,4 +1,4 @@
-//! What a player is told when an action is not taken.
+//! The messages for refused actions.
 
 use chefshat_engine::{ActionId, Game, Opening, RuleSetSpec, Script, Seat, Seed, Stop};
 
