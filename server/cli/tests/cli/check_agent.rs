@@ -48,7 +48,7 @@ fn commands_that_cannot_be_examined_are_refused() {
         ("-- agent --code {code}", "{address}"),
         ("--many agent -- agent {address} {code}", "{tournament}"),
         ("--only many-seats -- agent {address} {code}", "--many"),
-        ("--only nothing", "there are game, "),
+        ("--only nothing", "use one of game, "),
         ("--patience 0 -- agent {address} {code}", "0.1 to 3600"),
     ] {
         typed(&COMMAND, flags).assert_refused(expected);

@@ -122,7 +122,7 @@ fn mistakes_are_explained() {
             "greedy",
             "random",
             "--target-points 9",
-            "--shifts says how long",
+            "use --shifts to set",
         ),
         ("greedy", "random", "--deals 1", "--deals"),
         ("greedy", "random", "--shifts 0", "--shifts"),

@@ -244,7 +244,7 @@ fn mistakes_are_explained() {
         ("", "is not empty; choose another folder, or replace"),
         ("--format xls", "possible values: parquet, jsonl, csv"),
         ("--layout tensor", "possible values: tables, chefshatgym"),
-        ("--layout chefshatgym --format parquet", "CSV alone"),
+        ("--layout chefshatgym --format parquet", "always CSV"),
         (
             "--with cat",
             "possible values: agent, human, robot, built_in",

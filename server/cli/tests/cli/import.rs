@@ -78,7 +78,7 @@ fn a_transcript_becomes_a_record_that_fits() {
     let ended = import(&file, &flags);
     assert_eq!((ended.code, ended.stdout.as_str()), (Some(1), ""));
     assert!(
-        ended.stderr.contains("is there already"),
+        ended.stderr.contains("exists already"),
         "{}",
         ended.stderr
     );

@@ -172,9 +172,9 @@ fn a_participant_is_given_out_and_deleted_and_every_record_still_fits() {
         (&json!(2), &json!(1), &json!(2))
     );
     check_export(&std::fs::read_to_string(&out).unwrap(), &game_id, &told);
-    participant(&export, &data_dir).assert_refused("is there already");
+    participant(&export, &data_dir).assert_refused("exists already");
 
-    participant(&["delete", NAME], &data_dir).assert_refused("say --yes");
+    participant(&["delete", NAME], &data_dir).assert_refused("confirm with --yes");
     let deleted = participant(&["delete", NAME, "--yes", "--json"], &data_dir);
     let deleted = deleted.well().json();
     let pseudonym = deleted["pseudonym"].as_str().unwrap();
@@ -193,7 +193,7 @@ fn a_participant_is_given_out_and_deleted_and_every_record_still_fits() {
 
     let again = participant(&["delete", NAME, "--yes"], &data_dir);
     assert_eq!(again.code, Some(1));
-    assert!(again.stderr.contains("nothing is kept"), "{}", again.stderr);
+    assert!(again.stderr.contains("nothing is stored"), "{}", again.stderr);
 }
 
 /// What was given out: the participant's own, all of it, and nothing of the other.
@@ -348,7 +348,7 @@ fn a_damaged_file_stops_nothing_and_is_named_where_the_name_stands_in_it() {
     std::fs::remove_file(&damaged).unwrap();
     let again = participant(&delete[..3], &data_dir);
     assert_eq!(again.code, Some(1));
-    assert!(again.stderr.contains("nothing is kept"), "{}", again.stderr);
+    assert!(again.stderr.contains("nothing is stored"), "{}", again.stderr);
 }
 
 #[test]
@@ -393,7 +393,7 @@ fn a_player_of_a_real_table_is_deleted_from_the_file_and_from_a_server_that_was_
 fn a_folder_that_is_not_there_is_not_made() {
     let folder = TempDir::new().unwrap();
     let missing = folder.path().join("missing");
-    participant(&["delete", NAME, "--yes"], &missing).assert_refused("there is no data folder");
+    participant(&["delete", NAME, "--yes"], &missing).assert_refused("there is no data directory");
     assert!(!missing.exists());
     // Seats that nobody has taken have this name.
     participant(&["delete", "", "--yes"], folder.path()).assert_refused("a value is required");

@@ -321,13 +321,13 @@ fn what_cannot_be_drawn_is_said() {
             "a.gif",
             &["--seconds-per-decision", "0"],
             2,
-            "write seconds above 0, at most 600",
+            "use seconds above 0, at most 600",
         ),
         (
             "a.gif",
             &["--real-time", "nan"],
             2,
-            "write a number above 0, at most 1000",
+            "use a number above 0, at most 1000",
         ),
         (
             "a.gif",
@@ -335,7 +335,7 @@ fn what_cannot_be_drawn_is_said() {
             1,
             "choose a name that ends in .png or .svg",
         ),
-        ("a.png", &["--figure", "actions"], 1, "name it with --at"),
+        ("a.png", &["--figure", "actions"], 1, "select it with --at"),
         (
             "a.png",
             &["--figure", "actions", "--at", "3", "--spectator"],

@@ -208,7 +208,7 @@ fn what_a_room_cannot_have_is_said_in_flags_before_there_is_one() {
 #[test]
 fn what_a_server_cannot_be_is_said_at_the_start() {
     for (flags, words) in [
-        (["--listen", "localhost"], "give IP:PORT"),
+        (["--listen", "localhost"], "use IP:PORT"),
         (["--max-rooms", "0"], "--max-rooms"),
         (["--allow-origin", "example.org"], "https://example.org"),
     ] {

@@ -14,7 +14,7 @@ fn without_a_terminal_it_says_so() {
             .unwrap();
         assert_eq!(ended.status.code(), Some(2), "{ended:?}");
         let said = String::from_utf8(ended.stderr).unwrap();
-        assert!(said.contains("draws on a terminal"), "{said}");
+        assert!(said.contains("needs an interactive terminal"), "{said}");
         assert!(ended.stdout.is_empty());
     }
 }
