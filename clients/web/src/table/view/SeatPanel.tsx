@@ -111,39 +111,18 @@ interface ChipProps {
 
 function Chip({ table, seat, state, kind }: ChipProps) {
   const words = t().table.chips;
-  if (state === "placed") {
-    return (
-      <span class={`${css.chip} ${css.chipPlaced}`} data-part="chip">
-        {t().common.place(gamePlace(table, seat) ?? seat.place)}
-      </span>
-    );
-  }
+  const chip = (look: string | undefined, text: string) => (
+    <span class={`${css.chip} ${look}`} data-part="chip">
+      {text}
+    </span>
+  );
+  if (state === "placed") return chip(css.chipPlaced, t().common.place(gamePlace(table, seat) ?? seat.place));
   if (state === "deciding") {
-    const word =
-      kind === DecisionKind.EXCHANGE
-        ? words.toGive
-        : kind === DecisionKind.SPECIAL_ACTION
-          ? words.toDeclare
-          : words.toPlay;
-    return (
-      <span class={`${css.chip} ${css.chipDeciding}`} data-part="chip">
-        {word}
-      </span>
-    );
+    if (kind === DecisionKind.EXCHANGE) return chip(css.chipDeciding, words.toGive);
+    return chip(css.chipDeciding, kind === DecisionKind.SPECIAL_ACTION ? words.toDeclare : words.toPlay);
   }
-  if (seat.lastMove === "pass")
-    return (
-      <span class={`${css.chip} ${css.chipPassed}`} data-part="chip">
-        {words.passed}
-      </span>
-    );
-  if (seat.lastMove)
-    return (
-      <span class={`${css.chip} ${css.chipPlayed}`} data-part="chip">
-        {playWords(seat.lastMove)}
-      </span>
-    );
-  return null;
+  if (seat.lastMove === "pass") return chip(css.chipPassed, words.passed);
+  return seat.lastMove ? chip(css.chipPlayed, playWords(seat.lastMove)) : null;
 }
 
 /** The place in the game, once it is over. */

@@ -45,16 +45,9 @@ export function Tools({ turn, lookup, children }: ToolsProps) {
           aria-label={words.lookup}
           title={words.lookup}
         >
-          <svg
-            viewBox="0 0 24 24"
-            aria-hidden="true"
-            fill="none"
-            stroke="currentColor"
-            stroke-width="2"
-            stroke-linejoin="round"
-          >
+          <Icon>
             <path d="M4 4h16v16H4ZM4 9.3h16M4 14.6h16M9.3 4v16M14.6 4v16" />
-          </svg>
+          </Icon>
         </button>
       )}
       <button
