@@ -4,10 +4,11 @@
 
 use std::sync::Arc;
 
-use chefshat_engine::{Action, ActionId, ActionSpace, DecisionKind, Mask, Observation, Role};
+use chefshat_engine::{ActionId, ActionSpace, DecisionKind, Mask, Observation};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
 
+use crate::greedy::greedy;
 use crate::{Network, RecordedPlayer};
 
 /// Which built-in agent, of those that need nothing but a seed.
@@ -154,33 +155,4 @@ impl Chance {
         let number = (u64::from(self.0.next_u32()) * u64::from(n)) >> 32;
         u16::try_from(number).expect("the number is below n")
     }
-}
-
-/// Prefers, in this order: no jokers, the least rare face, many cards; a pass only when nothing can be played. Gives its least rare
-/// card. Declares where an exchange would cost it cards.
-pub(crate) fn greedy(observation: &Observation, legal: &Mask, space: ActionSpace) -> ActionId {
-    let role = observation.seat.and_then(|seat| observation.roles[seat]);
-    legal
-        .iter()
-        .max_by_key(|action| match space.decode(*action) {
-            Some(Action::Play {
-                face,
-                quantity,
-                jokers,
-            }) => (
-                3,
-                -i16::from(jokers),
-                i16::from(face.get()),
-                i16::from(quantity),
-            ),
-            Some(Action::LoneJoker) => (3, -1, -1, 0),
-            Some(Action::Give(face)) => (3, 0, i16::from(face.get()), 0),
-            Some(Action::GiveJoker) => (2, 0, 0, 0),
-            Some(Action::Declare) if matches!(role, Some(Role::Waiter | Role::Dishwasher)) => {
-                (3, 0, 0, 0)
-            }
-            Some(Action::Decline) => (2, 0, 0, 0),
-            Some(Action::Pass | Action::Declare) | None => (1, 0, 0, 0),
-        })
-        .expect("a decision has a legal action")
 }

@@ -2,6 +2,7 @@
 //! on its seats. Many games, and what they add up to, are in `chefshat-simulation`.
 
 mod built_in;
+mod greedy;
 mod network;
 mod play;
 mod recorded;
@@ -11,6 +12,6 @@ pub use built_in::{AgentKind, BuiltInAgent};
 pub use network::{
     MAX_FILE_BYTES, Network, NetworkError, NetworkInfo, NetworkInput, NetworkOutput, table_features,
 };
-pub use play::{Listener, is_wrong_action, play};
+pub use play::{Answer, Listener, ask, is_wrong_action, play};
 pub use recorded::{MAX_MODELS, RecordedPlayer};
 pub use seeds::{agent_seed, game_seed, seating_agent_seed};

@@ -1,5 +1,4 @@
-//! One offline game from its deal to its end: who is asked, what counts as an answer, and who hears of it. Which games are played,
-//! and what is made of them, is decided in `batch` and `table`.
+//! Plays one game offline, from its deal to its end. Batches of games and their metrics are in `chefshat-simulation`.
 
 use std::num::NonZeroU32;
 
@@ -8,28 +7,28 @@ use chefshat_engine::{
     Standings, Viewer,
 };
 
-/// Somebody who hears everything that happens in a game, private things included. Each method does nothing unless it is written.
+/// Receives everything that happens in a game, private events included. Each method does nothing by default.
 pub trait Listener {
-    /// Something happened.
+    /// Called for every event.
     fn on_event(&mut self, event: &Event) {
         let _ = event;
     }
 
-    /// A decision is about to be taken with this legal action, whose events follow.
+    /// Called with the legal action of a decision, before its events.
     fn on_decision(&mut self, decision: Decision, action: ActionId) {
         let _ = (decision, action);
     }
 
-    /// A seat answered a decision with an action that is not legal.
+    /// Called when a seat answers with an illegal action.
     fn on_invalid(&mut self, decision: Decision, action: ActionId) {
         let _ = (decision, action);
     }
 }
 
-/// Plays a game to its end. `decide` answers for every seat; an illegal answer is reported and the decision asked again, without limit
-/// unless `max_invalid_attempts` says after how many of them the default decision is taken.
+/// Plays a game to its end and returns the final standings. `decide` answers for every seat. An illegal action is reported and the
+/// decision asked again; after `max_invalid_attempts` of them, if there is a limit, the default action is taken.
 ///
-/// Never returns if there is no limit and `decide` never gives a legal action.
+/// Never returns if there is no limit and `decide` never returns a legal action.
 pub fn play(
     rules: RuleSet,
     seed: Seed,
@@ -40,31 +39,68 @@ pub fn play(
     let mut game = Game::new(rules, seed, |event| listener.on_event(&event));
     while let Some(decision) = game.decision() {
         let legal = game.legal_actions();
-        let observation = game.observe(Viewer::Seat(decision.seat));
-        let mut left = max_invalid_attempts.map(NonZeroU32::get);
-        let action = loop {
-            let action = decide(decision.seat, &observation, &legal);
-            if legal.contains(action) {
-                break action;
-            }
-            listener.on_invalid(decision, action);
-            if let Some(left) = &mut left {
-                *left -= 1;
-                if *left == 0 {
-                    break game
-                        .default_action()
-                        .expect("an open decision has a default");
-                }
-            }
-        };
-        listener.on_decision(decision, action);
-        game.apply(action, |event| listener.on_event(&event))
+        let seat = decision.seat;
+        let answer = ask(
+            &game,
+            seat,
+            &legal,
+            max_invalid_attempts,
+            |observation| decide(seat, observation, &legal),
+            |action| listener.on_invalid(decision, action),
+        );
+        listener.on_decision(decision, answer.action);
+        game.apply(answer.action, |event| listener.on_event(&event))
             .expect("an action of the mask is legal");
     }
     game.standings().expect("the game has ended")
 }
 
-/// Whether an invalid attempt at this decision is a wrong action: only those at turns are counted and rewarded.
+/// The action taken at a decision.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Answer {
+    /// A legal action.
+    pub action: ActionId,
+    /// Whether it is the default action, taken after too many invalid attempts.
+    pub by_default: bool,
+}
+
+/// Asks for the open decision of `seat` until the answer is one of the `legal` actions. After `max_invalid_attempts`, if there is a
+/// limit, takes the default action. `on_invalid` receives each illegal action.
+///
+/// # Panics
+/// If no decision is open and the limit is reached.
+pub fn ask(
+    game: &Game,
+    seat: Seat,
+    legal: &Mask,
+    max_invalid_attempts: Option<NonZeroU32>,
+    mut decide: impl FnMut(&Observation) -> ActionId,
+    mut on_invalid: impl FnMut(ActionId),
+) -> Answer {
+    let observation = game.observe(Viewer::Seat(seat));
+    let mut attempts = 0u32;
+    loop {
+        let action = decide(&observation);
+        if legal.contains(action) {
+            return Answer {
+                action,
+                by_default: false,
+            };
+        }
+        on_invalid(action);
+        attempts = attempts.saturating_add(1);
+        if max_invalid_attempts.is_some_and(|limit| attempts >= limit.get()) {
+            return Answer {
+                action: game
+                    .default_action()
+                    .expect("an open decision has a default"),
+                by_default: true,
+            };
+        }
+    }
+}
+
+/// Whether an invalid attempt at this decision counts as a wrong action. Only attempts at turns are counted and rewarded.
 pub fn is_wrong_action(decision: Decision) -> bool {
     decision.kind == DecisionKind::Turn
 }

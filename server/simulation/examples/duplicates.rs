@@ -3,7 +3,7 @@
 
 use chefshat_agents::AgentKind;
 use chefshat_engine::{RuleSet, RuleSetSpec, Stop};
-use chefshat_simulation::{Contender, Measured, Newcomer, SameSeat};
+use chefshat_simulation::{Candidate, Contender, Measured, SameSeat};
 use clap::Parser;
 use serde_json::{Value, json};
 
@@ -69,9 +69,9 @@ fn rows(arguments: &Arguments) -> Vec<Row> {
 }
 
 fn cases(seed: u64) -> Vec<Case> {
-    let agent = |kind, slips_percent| Newcomer {
+    let agent = |kind, percent: u8| Candidate {
         plays: Contender::Kind(kind),
-        slips_percent,
+        epsilon: f64::from(percent) / 100.0,
     };
     let (trained, greedy) = (AgentKind::Trained, AgentKind::Greedy);
     let pairs = [
@@ -90,12 +90,12 @@ fn cases(seed: u64) -> Vec<Case> {
         ("15 points", Stop::Points(15)),
     ];
     let of_length = |(length, stop): (&'static str, Stop)| {
-        pairs.clone().map(|(names, newcomers)| Case {
+        pairs.clone().map(|(names, candidates)| Case {
             names,
             length,
             same_seat: SameSeat {
                 rules: rules(stop),
-                newcomers,
+                candidates,
                 others: Contender::Kind(greedy),
                 seed,
             },

@@ -1,5 +1,6 @@
-//! Batches of offline games on all cores. What comes out depends on the batch alone, never on the number of threads: every game has its own
-//! seed and agents, and results are folded in the order of the games. What is added up is decided in `table`.
+//! Batches of offline games on all cores. The result depends on the batch alone, never on the
+//! number of threads: every game has its own seed and agents, and results are folded in the order
+//! of the games.
 
 use std::num::NonZeroU32;
 
@@ -14,7 +15,8 @@ use crate::fold::fold_in_order;
 use chefshat_agents::is_wrong_action;
 use chefshat_agents::{AgentKind, BuiltInAgent, Listener, agent_seed, game_seed, play};
 
-/// Games that one thread plays at a time. Part of the result: it decides in which groups rewards and scores are summed.
+/// Games played by one thread at a time. Part of the result: it decides how rewards and scores are
+/// grouped for summing.
 const CHUNK: u64 = 32;
 
 /// A number of games of built-in agents under one rule set.
@@ -28,10 +30,10 @@ pub struct Batch {
     max_invalid_attempts: Option<NonZeroU32>,
 }
 
-/// Why a batch cannot be played.
+/// Why a batch is invalid.
 #[derive(Copy, Clone, Eq, PartialEq, Debug, Error)]
 pub enum BatchError {
-    /// Not one agent for each seat.
+    /// The number of agents is not the number of seats.
     #[error("{given} agents for {players} players: name one for each seat")]
     Agents {
         /// Agents given.
@@ -45,11 +47,11 @@ pub enum BatchError {
 }
 
 impl Batch {
-    /// A batch of `games` games, all chance in it drawn from `seed`; `agents` by seat. Without rewards, and without a limit of invalid
-    /// attempts.
+    /// A batch of `games` games with `agents` by seat. `seed` determines all randomness. Without
+    /// rewards and without a limit of invalid attempts.
     ///
     /// # Errors
-    /// If there is not one agent for each seat, or no game to play.
+    /// If there is not one agent for each seat, or `games` is 0.
     pub fn new(
         rules: RuleSet,
         agents: &[AgentKind],
@@ -76,7 +78,7 @@ impl Batch {
         })
     }
 
-    /// The same batch, its turns rewarded by a scheme.
+    /// Rewards turns by a scheme.
     pub fn with_rewards(self, scheme: RewardScheme) -> Batch {
         Batch {
             scheme: Some(scheme),
@@ -84,7 +86,7 @@ impl Batch {
         }
     }
 
-    /// The same batch; after so many invalid attempts at one decision the default is taken.
+    /// Takes the default decision after this many invalid attempts at one decision.
     pub fn with_max_invalid_attempts(self, attempts: NonZeroU32) -> Batch {
         Batch {
             max_invalid_attempts: Some(attempts),
@@ -107,17 +109,17 @@ impl Batch {
         self.games
     }
 
-    /// The number that all chance is drawn from.
+    /// The seed of all randomness.
     pub fn seed(&self) -> u64 {
         self.seed
     }
 
-    /// The scheme of rewards, if there is one.
+    /// The reward scheme, if any.
     pub fn scheme(&self) -> Option<RewardScheme> {
         self.scheme
     }
 
-    /// After how many invalid attempts the default decision is taken; `None` is never.
+    /// Invalid attempts after which the default decision is taken; `None` for no limit.
     pub fn max_invalid_attempts(&self) -> Option<NonZeroU32> {
         self.max_invalid_attempts
     }
@@ -127,10 +129,10 @@ impl Batch {
         game_seed(self.seed, index)
     }
 
-    /// Plays one game, by its index from 0, exactly as it is played within the batch.
+    /// Plays one game, by its index from 0, exactly as within the batch.
     pub fn play_game(&self, index: u64, listener: &mut impl Listener) -> Standings {
         let seed = self.game_seed(index);
-        // An array, because agents with their generators are no values to copy by seat.
+        // An array, because agents with their generators are not `Copy`.
         let mut agents: [BuiltInAgent; MAX_SEATS] = std::array::from_fn(|index| {
             let seat = Seat::new(index);
             let kind = self.agents.get(seat).copied().unwrap_or_default();
@@ -145,8 +147,8 @@ impl Batch {
         )
     }
 
-    /// Plays all games, on the threads of the rayon pool it is called in, and adds them up. `progress` is called from any of those threads,
-    /// with the number of games that have been finished since it was last called.
+    /// Plays all games on the current rayon pool and returns the totals. `progress` is called from
+    /// any thread with the number of games finished since its last call.
     pub fn run(&self, progress: impl Fn(u64) + Sync) -> BatchTable {
         self.fold(
             || BatchTable::empty(self.rules.players()),
@@ -158,9 +160,9 @@ impl Batch {
         )
     }
 
-    /// Folds all games on the threads of the rayon pool it is called in: `add` a game, by its index, to what the games just before it came
-    /// to; `merge` what later games came to. Which games are added to which value, and the order of merging, depend on the number of games
-    /// alone, so that sums of fractions come out the same on any machine.
+    /// Folds all games on the current rayon pool: `add` adds a game, by its index, to a value;
+    /// `merge` merges the value of later games into it. Grouping and order depend on the number of
+    /// games alone, so that sums of fractions are the same on every machine.
     pub fn fold<T: Send>(
         &self,
         empty: impl Fn() -> T + Sync,

@@ -1,14 +1,14 @@
-//! Working through a row of independent items on all cores so that the outcome depends on the items alone. What the items are is known to
-//! the callers.
+//! Folds independent items on all cores with a result that depends on the items alone.
 
 use rayon::prelude::*;
 
-/// Chunks whose results are held at a time.
+/// Chunks whose results are in memory at a time.
 const WAVE: u64 = 1024;
 
-/// Folds the items 0..`count` on the threads of the rayon pool it is called in: `add` an item to what those just before it came to; `merge`
-/// what later items came to. `chunk` items (at least 1) are added to one value by one thread. Which items are added to which value, and
-/// the order of merging, depend on `count` and `chunk` alone, so that sums of fractions come out the same on any machine.
+/// Folds the items 0..`count` on the current rayon pool: `add` adds an item to a value; `merge`
+/// merges the value of later items into it. One thread adds `chunk` items (at least 1) to one
+/// value. Grouping and order depend on `count` and `chunk` alone, so that sums of fractions are the
+/// same on every machine.
 pub(crate) fn fold_in_order<T: Send>(
     count: u64,
     chunk: u64,

@@ -1,5 +1,6 @@
-//! Chef's Hat offline: built-in agents, single games, batches of games on all cores with tables of metrics, comparisons of two
-//! agents on duplicate deals, the paper's experiment on the game's mechanics, agents that play from a network file, and checking an engine
+//! Plays Chef's Hat offline: batches of games on all cores with tables of metrics, comparisons of
+//! two agents on duplicate deals, vector environments, offline tournaments, the paper's experiment
+//! on the mechanics of the game, and checks of the engine
 //! against test vectors. Nothing here knows of rooms, clocks or the protocol.
 //!
 //! ```
@@ -28,7 +29,7 @@ pub mod vector;
 
 pub use batch::{Batch, BatchError};
 pub use duplicate::{
-    Comparison, Contender, Duplicate, DuplicateError, Figure, Measured, Newcomer, SameSeat,
+    Candidate, Comparison, Contender, Duplicate, DuplicateError, Figure, Measured, SameSeat,
     SeatPlan, Seating,
 };
 pub use rules_form::{OpeningName, PassScopeName, RulesForm, RulesFormError};

@@ -1,11 +1,12 @@
-//! The paper's Experiment 1: what the jokers, the exchange and the special actions do to the game. Four random agents play a number of
-//! Shifts with all mechanics and with each of them left out; what is looked at is how often the starter wins the Shift, and how many laps a
-//! Shift has. How the result is printed is not decided here.
+//! The paper's Experiment 1: how jokers, exchange and special actions affect the game. Four random
+//! agents play Shifts with all mechanics and with each of them disabled; measured are the starter's
+//! chance to win the Shift and the laps of a Shift.
 //!
-//! The paper's "games" are Shifts here, its "rounds" laps. Roles, exchange and special actions exist from the second Shift of a game
-//! on, so a condition cannot be so many games of one Shift. Its Shifts are played as the paper's 250 are: in one go, each with the roles that the
-//! one before it brought about, that is as one game of [`SHIFTS_PER_GAME`] Shifts. A larger number is played as more such games, of the
-//! last of which only the first Shifts count; so one Shift in 250 has no roles, whatever the number.
+//! The paper's "games" are Shifts here, its "rounds" laps. Roles, exchange and special actions
+//! exist from the second Shift of a game on, so single-Shift games cannot test them. As in the
+//! paper, a condition is one game of [`SHIFTS_PER_GAME`] Shifts. Larger numbers are played as
+//! several such games, of the last of which only the first Shifts count; so one Shift in 250 has no
+//! roles.
 
 use chefshat_engine::{Event, MetricsRecorder, RuleSet, RuleSetSpec, ShiftMetrics, Stop};
 
@@ -13,7 +14,7 @@ use crate::Batch;
 use chefshat_agents::{AgentKind, Listener};
 use chefshat_tournament::statistics::{Interval, Moments, wilson95};
 
-/// Shifts that are played in one game: those of one condition of the paper.
+/// Shifts of one game, as in one condition of the paper.
 pub const SHIFTS_PER_GAME: u32 = 250;
 
 /// A condition of the experiment.
@@ -21,25 +22,25 @@ pub const SHIFTS_PER_GAME: u32 = 250;
 pub enum Condition {
     /// All mechanics.
     All,
-    /// No jokers in the deck, and so no special actions either.
+    /// No jokers in the deck, hence no special actions.
     WithoutJokers,
-    /// No exchange of cards.
+    /// No exchange.
     WithoutExchange,
     /// No special actions.
     WithoutSpecialActions,
 }
 
-/// What the paper reports for a condition (its table of Experiment 1), over [`SHIFTS_PER_GAME`] Shifts.
+/// The paper's result for a condition (its table of Experiment 1), over [`SHIFTS_PER_GAME`] Shifts.
 #[derive(Copy, Clone, PartialEq, Debug)]
 pub struct PaperFigures {
-    /// Chance that the starter wins the Shift, printed in whole per cent.
+    /// Chance that the starter wins the Shift, rounded to whole per cent.
     pub starter_wins: f64,
-    /// Laps of a Shift, printed as a whole number.
+    /// Laps per Shift, rounded to a whole number.
     pub laps: f64,
 }
 
 impl PaperFigures {
-    /// The interval of the chance that so many Shifts leave open.
+    /// The 95 % interval of the chance, given the paper's number of Shifts.
     pub fn starter_wins_interval(&self) -> Interval {
         let shifts = f64::from(SHIFTS_PER_GAME);
         wilson95(
@@ -50,7 +51,7 @@ impl PaperFigures {
 }
 
 impl Condition {
-    /// All of them, in the paper's order.
+    /// All conditions, in the paper's order.
     pub const ALL: [Condition; 4] = [
         Condition::All,
         Condition::WithoutJokers,
@@ -58,7 +59,7 @@ impl Condition {
         Condition::WithoutSpecialActions,
     ];
 
-    /// The name by which programs call it.
+    /// The name in commands and results.
     pub fn name(self) -> &'static str {
         match self {
             Condition::All => "all",
@@ -68,7 +69,7 @@ impl Condition {
         }
     }
 
-    /// What the paper reports for it.
+    /// The paper's result.
     pub fn paper(self) -> PaperFigures {
         let (starter_wins, laps) = match self {
             Condition::All => (0.28, 35.0),
@@ -79,8 +80,8 @@ impl Condition {
         PaperFigures { starter_wins, laps }
     }
 
-    /// The rules of a preset without what the condition leaves out, for games of [`SHIFTS_PER_GAME`] Shifts. `None` if there is no
-    /// such preset.
+    /// A preset's rules without what the condition disables, for games of [`SHIFTS_PER_GAME`]
+    /// Shifts. `None` if there is no such preset.
     pub fn rules(self, preset: &str) -> Option<RuleSet> {
         let mut spec = RuleSetSpec {
             stop: Stop::Shifts(SHIFTS_PER_GAME),
@@ -97,14 +98,14 @@ impl Condition {
     }
 }
 
-/// What the Shifts of a condition come to.
+/// The result of a condition.
 #[derive(Copy, Clone, PartialEq, Debug, Default)]
 pub struct MechanicsTable {
     /// Shifts that the starter won.
     pub starter_won: u64,
-    /// Laps of the Shifts, the one in progress at the end of each included.
+    /// Laps of the Shifts, including the one in progress at the end of each.
     pub laps: Moments,
-    /// Pizzas of the Shifts, the one in progress at the end of each included.
+    /// Pizzas of the Shifts, including the one in progress at the end of each.
     pub pizzas: Moments,
     /// Turns of the Shifts.
     pub turns: Moments,
@@ -113,10 +114,10 @@ pub struct MechanicsTable {
 }
 
 impl MechanicsTable {
-    /// Plays a condition's `shifts` Shifts (at least 1) of four random agents under rules of [`Condition::rules`], on the threads of the
-    /// rayon pool it is called in. All chance is drawn from `seed`: game i is game i of a [`Batch`] of that seed, so that conditions with
-    /// the same deck play the same deals. `progress` is called from any thread with the number of Shifts that have been played since
-    /// it was last called.
+    /// Plays `shifts` Shifts (at least 1) of four random agents under rules from
+    /// [`Condition::rules`], on the current rayon pool. Game i is game i of a [`Batch`] with this
+    /// seed, so that conditions with the same deck have the same deals. `progress` is called from
+    /// any thread with the number of Shifts finished since its last call.
     pub fn play(rules: RuleSet, shifts: u64, seed: u64, progress: impl Fn(u64) + Sync) -> Self {
         let games = shifts.div_ceil(u64::from(SHIFTS_PER_GAME));
         let agents = vec![AgentKind::Random; rules.players()];
@@ -149,8 +150,9 @@ impl MechanicsTable {
         self.starter_won as f64 / self.shifts().max(1) as f64
     }
 
-    /// Wilson's 95 % interval of that chance. It takes the Shifts as independent of each other, although roles link them: over 400 games of
-    /// every condition, both figures' means by game spread as those of independent Shifts would (variances within 14 % of it, either way).
+    /// Wilson's 95 % interval of that chance. Treats Shifts as independent although roles connect
+    /// them: over 400 games of every condition, the variances of both figures' means by game were
+    /// within 14 % of independent Shifts.
     pub fn starter_wins_interval(&self) -> Interval {
         wilson95(self.starter_won, self.shifts())
     }
@@ -176,7 +178,7 @@ impl MechanicsTable {
 struct Counter<'t> {
     recorder: MetricsRecorder,
     table: &'t mut MechanicsTable,
-    /// How many Shifts are still to be counted.
+    /// Number of Shifts still to count.
     wanted: u64,
 }
 

@@ -47,7 +47,7 @@ pub enum OpeningName {
     AnyTopFace,
 }
 
-/// How long a pass binds, by its name.
+/// The scope of a pass, by its name.
 #[derive(Copy, Clone, Eq, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PassScopeName {
@@ -60,10 +60,10 @@ pub enum PassScopeName {
 /// Why a form is not a rule set.
 #[derive(Clone, Eq, PartialEq, Debug, Error)]
 pub enum RulesFormError {
-    /// None or both of the two.
+    /// Not exactly one stop rule.
     #[error("exactly one of target_points and target_shifts must be set")]
     Stop,
-    /// A value that makes no sense.
+    /// An invalid value.
     #[error("{}: {}", .0.field(), .0)]
     Rules(#[from] RuleSetError),
 }
@@ -103,7 +103,7 @@ impl RulesForm {
     /// The rule set.
     ///
     /// # Errors
-    /// If there is not exactly one rule when to stop, or the engine refuses a value.
+    /// If there is not exactly one stop rule, or the engine refuses a value.
     pub fn rule_set(&self) -> Result<RuleSet, RulesFormError> {
         let stop = match (self.target_points, self.target_shifts) {
             (Some(points), None) => Stop::Points(points),

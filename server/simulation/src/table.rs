@@ -1,20 +1,21 @@
-//! What a batch of games adds up to, over all and for each seat. Counts are kept as whole numbers, means are worked out when asked for.
-//! How a table is printed is not decided here.
+//! Totals of a batch of games, overall and for each seat. Counts are integers; methods compute
+//! means.
 
 use chefshat_engine::{BySeat, Seat, ShiftMetrics, SpecialAction, Standings};
 
-/// Sums over the games of a batch. Per-Shift and per-game means come from the methods.
+/// Totals over the games of a batch.
 #[derive(Copy, Clone, PartialEq, Debug)]
 pub struct BatchTable {
-    /// Games played to their end.
+    /// Finished games.
     pub games: u64,
     /// Shifts.
     pub shifts: u64,
-    /// Decisions taken: turns, gifts of the exchange, special actions declared or declined. Invalid attempts are not among them.
+    /// Decisions: turns, gifts of the exchange, special actions declared or declined. Invalid
+    /// attempts do not count.
     pub decisions: u64,
-    /// Pizzas, those in progress at a Shift's end included.
+    /// Pizzas, including those in progress at the end of a Shift.
     pub pizzas: u64,
-    /// Laps, those in progress at a Shift's end included.
+    /// Laps, including those in progress at the end of a Shift.
     pub laps: u64,
     /// Turns: plays and passes.
     pub turns: u64,
@@ -26,11 +27,11 @@ pub struct BatchTable {
     pub food_fights: u64,
     /// Shifts in which Dinner is Served was declared.
     pub dinners_served: u64,
-    /// The sums of each seat.
+    /// Totals of each seat.
     pub seats: BySeat<SeatTable>,
 }
 
-/// Sums over what one seat did.
+/// Totals of one seat.
 #[derive(Copy, Clone, PartialEq, Debug, Default)]
 pub struct SeatTable {
     /// Games it won.
@@ -58,7 +59,7 @@ pub struct SeatTable {
 }
 
 impl BatchTable {
-    /// The table of no games.
+    /// A table without games.
     pub fn empty(players: usize) -> BatchTable {
         BatchTable {
             games: 0,
@@ -102,7 +103,7 @@ impl BatchTable {
         }
     }
 
-    /// Adds the end of a game whose Shifts have been added, `last` the last of them.
+    /// Adds the end of a game whose Shifts have been added; `last` is its last Shift.
     pub fn add_game_end(&mut self, standings: &Standings, last: &ShiftMetrics) {
         self.games += 1;
         self.seats[standings.winner()].games_won += 1;
@@ -111,8 +112,8 @@ impl BatchTable {
         }
     }
 
-    /// Adds the games of another table of as many seats. Sums of rewards and scores depend on the order in which tables are merged, by
-    /// rounding; always merging in the order of the games keeps them the same.
+    /// Adds another table with as many seats. Rounding of rewards and scores depends on the order
+    /// of merging, so merge in the order of the games.
     pub fn merge(&mut self, other: &BatchTable) {
         self.games += other.games;
         self.shifts += other.shifts;
@@ -140,12 +141,12 @@ impl BatchTable {
         }
     }
 
-    /// A count as a mean per Shift; 0 if there was no Shift.
+    /// A count per Shift; 0 without Shifts.
     pub fn per_shift(&self, count: u64) -> f64 {
         ratio(count, self.shifts)
     }
 
-    /// A count as a mean per game; 0 if there was no game.
+    /// A count per game; 0 without games.
     pub fn per_game(&self, count: u64) -> f64 {
         ratio(count, self.games)
     }
@@ -166,7 +167,8 @@ impl BatchTable {
         (sums.reward_count > 0).then(|| sums.reward_sum / sums.reward_count as f64)
     }
 
-    /// A seat's performance score (10 * points / pizzas, running mean over a game's Shifts) at the end of a game, mean over the games.
+    /// A seat's performance score (10 * points / pizzas, running mean over a game's Shifts) at the
+    /// end of a game, averaged over games.
     pub fn performance(&self, seat: Seat) -> f64 {
         if self.games == 0 {
             return 0.0;

@@ -1,4 +1,4 @@
-//! Playing a tournament of built-in agents offline, on all cores: the one place here that plays games. What comes out depends on the
+//! Plays a tournament of built-in agents offline, on all cores. The result depends on the
 //! tournament and the seed alone, never on the number of threads.
 
 use chefshat_engine::{
@@ -21,19 +21,20 @@ pub enum OfflineProblem {
     Players {
         /// Players of the rule set.
         rules: usize,
-        /// Seats of a table.
+        /// Seats of a game of the tournament.
         seats: usize,
     },
-    /// Somebody is not a built-in agent.
+    /// A participant is not a built-in agent.
     #[error("participant {0} is not a built-in agent")]
     NotBuiltIn(usize),
 }
 
-/// Plays a tournament that has begun from where it stands to its end, on the threads of the rayon pool it is called in. Game n is dealt as
-/// game n of a batch of this seed, or as game d if d is the number of its deal. `progress` is called from any of those threads for every game.
+/// Plays a tournament that has begun to its end, on the current rayon pool. Game n is dealt as game
+/// n of a batch of this seed, or as game d if its deal has the number d. `progress` is called from
+/// any thread after every game.
 ///
 /// # Errors
-/// If somebody takes part who cannot be played here, or the rule set is for another number of players.
+/// If a participant is not a built-in agent, or the rule set is for another number of players.
 pub fn play_offline(
     tournament: &mut Tournament,
     rules: RuleSet,
@@ -51,7 +52,7 @@ pub fn play_offline(
     let kinds = kinds.map(|(who, entrant)| entrant.built_in.ok_or(OfflineProblem::NotBuiltIn(who)));
     let kinds: Vec<AgentKind> = kinds.collect::<Result<_, _>>()?;
     while tournament.state() == State::Playing {
-        // Built-in agents keep nobody waiting, so no time passes.
+        // Built-in agents never wait, so time stands still.
         let Some(change) = tournament.next(0) else {
             play_called(tournament, &kinds, rules, seed, &progress);
             continue;
@@ -120,12 +121,12 @@ fn play_game(game: &Game, index: usize, kinds: &[AgentKind], rules: RuleSet, see
     }
 }
 
-/// Agents draw anew in each game, also where the deal is the same.
+/// Seeds differ from game to game, also with the same deal.
 fn agent_seed(dealt_by: Seed, index: usize, seat: usize) -> [u8; 32] {
     seating_agent_seed(dealt_by, index, Seat::new(seat))
 }
 
-/// Counts what the seats of a game do.
+/// Counts what happens on the seats of a game.
 struct Witness {
     recorder: MetricsRecorder,
     seats: Vec<SeatPlayed>,

@@ -1,60 +1,65 @@
-//! What follows when: which game is called, who is waited for and how long, what comes of a game that ended, when the next round is drawn.
-//! What a change does is in `course`; how a round is drawn in `draw`.
+//! Which change follows: when a game is called, how long it waits for absent participants, and what
+//! follows from its end. `state` applies changes, `pairing` pairs rounds, `scheduler` selects the
+//! games to check.
 //!
-//! A game is called when all its participants are present and have a free place, in the order of the schedule. If nothing but absent ones
-//! hold it up, it waits for them for the no-show time; that counts as a call, and the game waits again, after the others. On the last
-//! call it is played without them. If somebody does not sit down although the last call was heard, the game is called once more without
-//! them; others who are absent then are waited for as before. A game that nobody would come to, or that was aborted on its last call, is
-//! given up. Which games are looked at is in `floor`.
+//! A game is called, in the order of the schedule, when all its participants are present and can
+//! play one more game. If only absent participants block it, it waits for the no-show time. That
+//! counts as a call, and the game is queued again behind the others. The last call starts it
+//! without the absentees. If a participant misses the last call itself, the game is called once
+//! more without it; other absentees are waited for as before. A game that all participants forfeit,
+//! or that is aborted on its last call, is voided.
 
 #[cfg(test)]
 mod tests;
 
 use super::Tournament;
 use super::change::{Change, Ended, Game, GameResult, GameState, SeatPlayed, SeatResult};
-use super::course::{Course, State};
-use super::floor::Floor;
+use super::scheduler::Scheduler;
+use super::state::{State, TournamentState};
 
-/// What is to be done about a game that is due.
+/// Whether a due game can be called.
 enum Readiness {
-    /// This participant plays elsewhere.
+    /// This participant cannot play one more game now.
     Busy(usize),
-    /// These have not come or forfeit it, and nothing else holds it up.
+    /// These participants are absent or forfeit; nothing else blocks the game.
     Missing(Vec<usize>),
-    /// It can be played; these forfeit it.
+    /// The game can be called; these participants forfeit it.
     Ready(Vec<usize>),
 }
 
 impl Tournament {
-    /// Says whether a participant is present: can be seated in games at once. Built-in ones always are. A game's wait
-    /// begins anew when all of its participants were there: whoever comes and goes does not spare those who do not come at all.
+    /// Sets whether a participant is present, that is, can take a seat at once. Built-in agents are
+    /// always present. The wait of a game restarts once all its participants were present together,
+    /// so one participant who comes and goes does not prolong it for the others.
     pub fn set_present(&mut self, participant: usize, present: bool) {
-        let Tournament { course, floor, .. } = self;
-        if participant >= course.participants.len() {
+        let Tournament {
+            state, scheduler, ..
+        } = self;
+        if participant >= state.participants.len() {
             return;
         }
-        floor.set_present(course, participant, present);
+        scheduler.set_present(state, participant, present);
     }
 
     /// Whether a participant is present.
     pub fn is_present(&self, participant: usize) -> bool {
-        participant < self.course.participants.len()
-            && self.floor.is_present(&self.course, participant)
+        participant < self.state.participants.len()
+            && self.scheduler.is_present(&self.state, participant)
     }
 
-    /// The next change that follows at this time, in milliseconds of any steady clock. Whoever asks folds it and asks again, until there is
-    /// none; then again after every other change, and at [`Tournament::wake_at`].
+    /// The next change at this time, in milliseconds of any steady clock. Fold it and call again
+    /// until the result is `None`; repeat after every other change, and at [`Tournament::wake_at`].
     pub fn next(&mut self, now_ms: u64) -> Option<Change> {
-        match self.course.state {
+        match self.state.phase {
             State::Open => {
-                let enough = self.course.settings.start_when_joined?;
+                let enough = self.state.settings.start_when_joined?;
                 (self.joined() >= enough).then(|| self.beginning())?
             }
             State::Playing => {
-                if let Some(change) = self.drawing() {
+                if let Some(change) = self.pairings() {
                     return Some(change);
                 }
-                if self.course.is_round_over() && self.course.drawn >= self.course.rounds {
+                if self.state.is_round_over() && self.state.drawn >= self.state.rounds {
                     return Some(Change::Finished);
                 }
                 self.next_game(now_ms)
@@ -63,32 +68,33 @@ impl Tournament {
         }
     }
 
-    /// When [`Tournament::next`] is to be asked again although nothing has happened, on the same clock.
+    /// When to call [`Tournament::next`] again if nothing happens before, on the same clock.
     pub fn wake_at(&self) -> Option<u64> {
-        self.floor.wake_at(&self.course)
+        self.scheduler.wake_at(&self.state)
     }
 
-    /// What follows from the end of a game that was called; `None` if it is not being played.
+    /// The change that follows from the end of a called game; `None` if the game is not being
+    /// played.
     pub fn ended(&self, game: usize, ended: Ended) -> Option<Change> {
-        let course = &self.course;
-        let played = course.games.get(game)?;
+        let state = &self.state;
+        let played = state.games.get(game)?;
         if played.state != GameState::Playing {
             return None;
         }
-        let is_last_call = played.calls >= course.settings.max_calls;
+        let is_last_call = played.calls >= state.settings.max_calls;
         let missing = match ended {
             Ended::Played { shifts, seats } if seats.len() == played.seats.len() => {
-                let result = result(course, played, shifts, &seats);
+                let result = result(state, played, shifts, &seats);
                 return Some(Change::Counted { game, result });
             }
             Ended::NeverStarted { missing } => missing
                 .into_iter()
                 .filter(|who| played.seats.contains(who) && !played.forfeited.contains(who))
                 .collect(),
-            // A result of other seats is none.
+            // Seats that do not match are not a result.
             Ended::Played { .. } | Ended::Aborted => Vec::new(),
         };
-        // If somebody did not come to the last call, the game is called once more without them.
+        // Participants missed the last call: call once more without them.
         Some(if is_last_call && missing.is_empty() {
             Change::Voided { game }
         } else {
@@ -96,26 +102,28 @@ impl Tournament {
         })
     }
 
-    /// The change that closes it; `None` if it is over.
+    /// The change that closes the tournament; `None` if it is over.
     pub fn close(&self) -> Option<Change> {
-        (!self.course.state.is_over()).then_some(Change::Closed)
+        (!self.state.phase.is_over()).then_some(Change::Closed)
     }
 
-    /// Looks at the games that may have to change, in order, until one of them has to.
+    /// Checks due games in order until one of them changes.
     fn next_game(&mut self, now_ms: u64) -> Option<Change> {
-        let Tournament { course, floor, .. } = self;
-        if !floor.is_open(course, now_ms) {
+        let Tournament {
+            state, scheduler, ..
+        } = self;
+        if !scheduler.is_open(state, now_ms) {
             return None;
         }
-        while let Some(due) = floor.next(course, now_ms) {
+        while let Some(due) = scheduler.next(state, now_ms) {
             let (_, index) = due;
-            let game = &course.games[index];
-            match readiness(course, floor, game) {
-                Readiness::Busy(by) => floor.hold_up(course, due, by),
+            let game = &state.games[index];
+            match readiness(state, scheduler, game) {
+                Readiness::Busy(by) => scheduler.block(state, due, by),
                 Readiness::Ready(forfeited) => return Some(called(index, game, forfeited)),
                 Readiness::Missing(missing) => {
-                    if floor.has_waited(course, due, now_ms) {
-                        return Some(if game.calls + 1 < course.settings.max_calls {
+                    if scheduler.has_waited(state, due, now_ms) {
+                        return Some(if game.calls + 1 < state.settings.max_calls {
                             Change::Rescheduled {
                                 game: index,
                                 missing,
@@ -131,15 +139,15 @@ impl Tournament {
     }
 }
 
-fn readiness(course: &Course, floor: &Floor, game: &Game) -> Readiness {
+fn readiness(state: &TournamentState, scheduler: &Scheduler, game: &Game) -> Readiness {
     let mut out = Vec::new();
     let mut waits = false;
     for &participant in &game.seats {
-        if course.forfeits(game, participant) {
+        if state.forfeits(game, participant) {
             out.push(participant);
-        } else if !course.has_place(participant) {
+        } else if !state.has_capacity(participant) {
             return Readiness::Busy(participant);
-        } else if !floor.is_present(course, participant) {
+        } else if !scheduler.is_present(state, participant) {
             out.push(participant);
             waits = true;
         }
@@ -151,7 +159,7 @@ fn readiness(course: &Course, floor: &Floor, game: &Game) -> Readiness {
     }
 }
 
-/// A game is played without those who forfeit it, if anybody is left.
+/// Calls a game without the participants who forfeit it; voids it if nobody remains.
 fn called(index: usize, game: &Game, forfeited: Vec<usize>) -> Change {
     if game.seats.iter().all(|who| forfeited.contains(who)) {
         return Change::Voided { game: index };
@@ -162,8 +170,8 @@ fn called(index: usize, game: &Game, forfeited: Vec<usize>) -> Change {
     }
 }
 
-/// Places those who forfeited behind the others, in the order of their seats, and says what each place is worth.
-fn result(course: &Course, game: &Game, shifts: u32, played: &[SeatPlayed]) -> GameResult {
+/// Places participants who forfeited behind the others, by seat, and scores each place.
+fn result(state: &TournamentState, game: &Game, shifts: u32, played: &[SeatPlayed]) -> GameResult {
     let has_forfeited = |seat: usize| game.forfeited.contains(&game.seats[seat]);
     let mut order: Vec<usize> = (0..played.len()).collect();
     order.sort_by_key(|&seat| match has_forfeited(seat) {
@@ -180,12 +188,12 @@ fn result(course: &Course, game: &Game, shifts: u32, played: &[SeatPlayed]) -> G
             score: if forfeited {
                 0
             } else {
-                let points = course.settings.points.get(behind);
+                let points = state.settings.points.get(behind);
                 points.copied().unwrap_or_default()
             },
             did: SeatPlayed {
                 place: behind + 1,
-                // What the filler did in its place is nothing of its own.
+                // What the filler did on this seat is not attributed to the participant.
                 ..if forfeited {
                     SeatPlayed::default()
                 } else {

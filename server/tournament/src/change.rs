@@ -1,9 +1,9 @@
-//! What happens to a tournament: who joins, what is drawn, which games are called, what comes of them. What follows from it is decided in
-//! `course`; when it happens in `calls`.
+//! The changes of a tournament and the values in them. `state` applies them; `calls` decides when
+//! they follow.
 
 use chefshat_agents::AgentKind;
 
-/// What a participant is.
+/// The kind of a participant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum EntrantKind {
     /// A program.
@@ -14,75 +14,75 @@ pub enum EntrantKind {
     Robot,
 }
 
-/// Somebody who takes part, or wants to.
+/// A participant, or a candidate for joining.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Entrant {
-    /// Name to show; no two participants have the same.
+    /// Display name, unique in the tournament.
     pub name: String,
-    /// What it is.
+    /// The kind.
     pub kind: EntrantKind,
-    /// The built-in agent it is: always present, and as many games at a time as there are.
+    /// The built-in agent that plays. It is always present and plays any number of games at a time.
     pub built_in: Option<AgentKind>,
-    /// Whether it only fills up tables.
+    /// Whether it only fills tables up.
     pub filler: bool,
-    /// Whether it declared that it remembers nothing from one game to the next.
+    /// Whether it declared that it remembers nothing between games.
     pub stateless: bool,
-    /// Games it can play at a time, 1..=64.
+    /// Maximum number of games at a time, 1..=64.
     pub max_games: usize,
 }
 
-/// A step of a tournament. Whoever keeps these can fold them again and has the tournament as it stood.
+/// A step of a tournament. Folding the same changes again restores the tournament.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Change {
-    /// Somebody joined; its number is how many joined before.
+    /// A participant joined. Its number is the count of those before it.
     Joined(Entrant),
-    /// Nobody joins any more.
+    /// The tournament began; joining is closed.
     Begun {
-        /// Rounds in all.
+        /// Total number of rounds.
         rounds: u32,
     },
-    /// It is known who plays whom in a round. The games of its pairings follow those that were drawn before, table by table.
+    /// A round was paired. Its games are appended to the list of games, table by table.
     Drawn {
         /// The round, from 1.
         round: u32,
-        /// Participants by table, in the order of the seats of the pairing's first game.
+        /// Participants by table, in the seat order of the pairing's first game.
         tables: Vec<Vec<usize>>,
-        /// Participants who do not play in this round.
+        /// Participants with a bye.
         byes: Vec<usize>,
     },
-    /// A game is to be played now.
+    /// A game starts.
     Called {
-        /// Which.
+        /// The game.
         game: usize,
-        /// Its participants who do not play in it: a filler has their seats.
+        /// Participants who forfeit it; a filler takes their seats.
         forfeited: Vec<usize>,
     },
-    /// A game could not begin, or not be played to its end. It waits again, after the others.
+    /// A game could not start, or did not reach its end. It is queued again behind the others.
     Rescheduled {
-        /// Which.
+        /// The game.
         game: usize,
-        /// Those who did not come; empty if that was not the reason.
+        /// Participants who did not come; empty if there was another reason.
         missing: Vec<usize>,
     },
     /// A game has a result.
     Counted {
-        /// Which.
+        /// The game.
         game: usize,
         /// The result.
         result: GameResult,
     },
-    /// A game was given up; it counts for nobody.
+    /// A game was given up and counts for nobody.
     Voided {
-        /// Which.
+        /// The game.
         game: usize,
     },
-    /// All games have been played or given up.
+    /// All games are counted or voided.
     Finished,
-    /// Closed before its end: what has been counted stays, the other games are given up.
+    /// Closed early: counted games stay, all others are voided.
     Closed,
 }
 
-/// What came of a game.
+/// The result of a game.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GameResult {
     /// Shifts played.
@@ -91,71 +91,71 @@ pub struct GameResult {
     pub seats: Vec<SeatResult>,
 }
 
-/// What came of a game for the participant of one seat.
+/// The result of a game for the participant of one seat.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SeatResult {
-    /// Who.
+    /// The participant's number.
     pub participant: usize,
-    /// Did not come.
+    /// Whether it forfeited.
     pub forfeited: bool,
-    /// What the game is worth to it; 0 if it forfeited.
+    /// Tournament score of the game; 0 if it forfeited.
     pub score: u32,
-    /// What it did. Who forfeited did nothing, and has a place behind those who played.
+    /// What it did. After a forfeit all zero, with a place behind those who played.
     pub did: SeatPlayed,
 }
 
-/// What was done on one seat of a game.
+/// What happened on one seat of a game.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SeatPlayed {
     /// Place in the game, from 1.
     pub place: usize,
     /// Points in the game.
     pub points: u64,
-    /// A substitute took decisions.
+    /// Whether a substitute took decisions.
     pub substituted: bool,
-    /// Decisions taken by the participant itself, or lost.
+    /// Decisions taken by the participant itself or lost to the clock.
     pub decisions: u64,
     /// Invalid actions.
     pub wrong_actions: u64,
     /// Decisions lost to the clock.
     pub timeouts: u64,
-    /// Measured time of decisions, microseconds, in all.
+    /// Total measured decision time, in microseconds.
     pub decision_time_us: u64,
-    /// How many decisions were measured.
+    /// Number of measured decisions.
     pub timed_decisions: u64,
     /// Mean over the game's Shifts of 10 * points / pizzas.
     pub performance_score: f64,
 }
 
-/// How the playing of a called game ended.
+/// How a called game ended.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Ended {
     /// With a result.
     Played {
         /// Shifts played.
         shifts: u32,
-        /// By seat, whoever played there.
+        /// What happened, by seat.
         seats: Vec<SeatPlayed>,
     },
-    /// Not a card was dealt.
+    /// The game never started.
     NeverStarted {
-        /// Participants who did not come; empty if that was not the reason.
+        /// Participants who did not come; empty if there was another reason.
         missing: Vec<usize>,
     },
-    /// Cards were dealt, but there is no result.
+    /// The game started but has no result.
     Aborted,
 }
 
-/// Where a game stands.
+/// The state of a game.
 #[derive(Debug, Clone, PartialEq)]
 pub enum GameState {
-    /// It waits to be called.
+    /// Waiting to be called.
     Due,
-    /// It was called.
+    /// Called and not ended.
     Playing,
-    /// It has a result, which counts.
+    /// Counted with this result.
     Counted(GameResult),
-    /// It was given up.
+    /// Given up.
     Void,
 }
 
@@ -168,34 +168,44 @@ pub struct Game {
     pub table: u32,
     /// Number in the pairing, from 1.
     pub number: u32,
-    /// Participant of each seat.
+    /// Participants by seat.
     pub seats: Vec<usize>,
-    /// Games with the same number are dealt alike; `None`: dealt anew. A game of [`Deals::SameAtAllTables`](super::Deals) that was aborted
-    /// is dealt anew, since its participants have seen the deal.
+    /// Games with the same number have the same deal; `None` is a deal of its own. After an abort
+    /// under [`Deals::SameAtAllTables`](super::Deals) a game gets a new deal, because its
+    /// participants have seen the old one.
     pub deal: Option<u32>,
-    /// Where it stands.
+    /// The state.
     pub state: GameState,
-    /// Times it was called, in vain or not.
+    /// Number of calls, including those in vain.
     pub calls: u32,
     /// Participants who forfeited it.
     pub forfeited: Vec<usize>,
-    /// Who did not come when it was last rescheduled.
+    /// Participants who did not come when it was last rescheduled.
     pub missing: Vec<usize>,
-    /// Its turn among the games that are due.
+    /// Position in the queue of due games.
     pub(super) turn: u64,
 }
 
 impl Game {
-    /// Whether it has been counted or given up.
+    /// Whether it is counted or void.
     pub fn is_over(&self) -> bool {
         matches!(self.state, GameState::Counted(_) | GameState::Void)
     }
 
-    /// The result, once it is counted.
+    /// The result, if it is counted.
     pub fn result(&self) -> Option<&GameResult> {
         match &self.state {
             GameState::Counted(result) => Some(result),
             GameState::Due | GameState::Playing | GameState::Void => None,
         }
+    }
+
+    /// Whether it counts for ratings: it has a result, and every participant played it without a
+    /// substitute.
+    pub fn is_rated(&self) -> bool {
+        self.result().is_some_and(|result| {
+            let mut seats = result.seats.iter();
+            seats.all(|seat| !seat.forfeited && !seat.did.substituted)
+        })
     }
 }

@@ -1,11 +1,12 @@
-//! How sure it is that of two participants the one with the higher mean score is the better one, and how many games would settle it. Which
-//! two are asked about, and which games count, is decided by the caller.
+//! How certain it is that, of two participants, the one with the higher mean score is better, and
+//! how many more games would settle it.
 //!
-//! What is independent of each other is not games but *occasions*. Of two who always sat at the same tables these are all games dealt from one
-//! deal, or, where no deal comes twice, the single game. Of two who met others it is the round: in all its games each had the same
-//! opponents, better or worse ones than the other's. On one occasion two participants may have been at the same table, where what one gains the other loses, or at different tables with the
-//! same cards, where luck is shared and cancels out in the difference. Summing up each occasion before anything is said of chance
-//! does right by all of these: if both played once on every occasion it is the paired difference, if they never shared one it is
+//! The independent units are not games but *occasions*. For two participants who always met, an
+//! occasion is all games with one deal, or a single game if deals do not repeat. For others it is a
+//! round, because all games of a round have the same opponents. On one occasion two participants
+//! may share a table, where one gains what the other loses, or a deal at different tables, where
+//! luck cancels out in the difference. Summing each occasion first covers all these cases: if both
+//! played once on every occasion, the result is the paired difference; if they shared none, it is
 //! Welch's.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -13,50 +14,53 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::Tournament;
 use crate::statistics::Moments;
 
-/// What a participant scored in one game.
+/// The score of a participant in one game.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scored {
-    /// The deal, if other games were dealt from it, too; else the game. Any numbers that keep them apart.
+    /// Number of the deal if other games have it too, else of the game.
     pub occasion: u64,
     /// The score.
     pub score: f64,
 }
 
-/// How sure the order of two participants is.
+/// How certain the order of two participants is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OrderConfidence {
-    /// Mean score of the upper minus that of the lower one.
+    /// Mean score of the upper participant minus that of the lower.
     pub difference: f64,
-    /// Standard error of it; 0 with fewer than two occasions each, or if chance decided nothing.
+    /// Standard error of the difference; 0 with fewer than two occasions each, or if all occasions
+    /// agree.
     pub standard_error: f64,
-    /// How likely the difference is the right way round, 0..=1, of Student's distribution: 0.5 if nothing is known, below that if the
-    /// scores speak against the order (in a knockout, whoever got further may have scored less).
+    /// Probability by Student's distribution that the order is right, 0..=1: 0.5 if nothing is
+    /// known, less if the scores contradict the order (in a knockout a participant who got further
+    /// may have scored less).
     pub confidence: f64,
-    /// How many more games of each would bring it to [`SURE`] if the difference and the share of common occasions stay. `None` if it is
-    /// there, or cannot be said.
+    /// Further games each needs to reach [`SURE`], if the difference and the share of common
+    /// occasions stay the same. `None` if it is reached or cannot be estimated.
     pub more_games: Option<u64>,
 }
 
 /// Two neighbours in the standings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Neighbours {
-    /// The upper one, by number.
+    /// Number of the upper participant.
     pub upper: usize,
-    /// The lower one.
+    /// Number of the lower participant.
     pub lower: usize,
-    /// How sure their order is.
+    /// How certain their order is.
     pub order: OrderConfidence,
 }
 
-/// When an order counts as settled.
+/// Confidence from which an order counts as settled.
 pub const SURE: f64 = 0.95;
 /// The normal distribution's 95 % point.
 const Z_SURE: f64 = 1.644_853_626_951_472_2;
 
-/// Scores are whole numbers: a standard error below this is nothing but rounding.
+/// Scores are whole numbers, so a smaller standard error is a rounding error.
 const ROUNDING: f64 = 1e-9;
 
-/// How sure it is that the one with the scores `upper` is better than the one with the scores `lower`.
+/// How certain it is that the participant with the scores `upper` is better than the one with the
+/// scores `lower`.
 pub fn order_confidence(upper: &[Scored], lower: &[Scored]) -> OrderConfidence {
     let (means, games) = ([mean(upper), mean(lower)], [upper.len(), lower.len()]);
     let difference = match means[0] - means[1] {
@@ -76,7 +80,7 @@ pub fn order_confidence(upper: &[Scored], lower: &[Scored]) -> OrderConfidence {
     let confidence = if standard_error > 0.0 {
         below(difference / standard_error, few - 1)
     } else {
-        // All occasions told the same. Had the two been equal, each would have gone either way.
+        // All occasions agree. For two equal participants each would have gone either way.
         let other_way = 0.5f64.powi(i32::try_from(few).unwrap_or(i32::MAX));
         match difference.total_cmp(&0.0) {
             std::cmp::Ordering::Greater => 1.0 - other_way,
@@ -95,16 +99,16 @@ pub fn order_confidence(upper: &[Scored], lower: &[Scored]) -> OrderConfidence {
             } else {
                 (1.0 - SURE).log(0.5) - few as f64
             };
-            // A float becomes the nearest integer that there is.
+            // The cast saturates.
             needed.ceil().max(1.0) as u64
         }),
     }
 }
 
 impl Tournament {
-    /// How sure the order of each two neighbours in the standings is (none before a game has counted), from the top, by the scores of all games
-    /// that counted. Of two who always sat at the same tables, every deal or game tells something. Others met others, who were better or worse, in all games of a
-    /// round: of them it is whole rounds that tell.
+    /// How certain the order of each two neighbours in the standings is, from the top; empty before
+    /// a game has counted. For two participants who always met, each deal or game is an occasion;
+    /// for others, each round.
     pub fn order_confidence(&self) -> Vec<Neighbours> {
         let mut played: Vec<Vec<Played>> = vec![Vec::new(); self.participants().len()];
         for (number, game) in (0u64..).zip(self.games()) {
@@ -118,7 +122,7 @@ impl Tournament {
                 });
             }
         }
-        // Before, they stand in no order that could be right or wrong.
+        // Before a game has counted there is no order to judge.
         let ordered = (self.has_counted()).then(|| self.standings());
         let standings = ordered.unwrap_or_default();
         standings
@@ -169,9 +173,9 @@ fn mean(scores: &[Scored]) -> f64 {
     moments.mean()
 }
 
-/// The standard error of the difference of the means: what each occasion adds to it beyond what was to be expected, squared and summed. Each
-/// participant's part is widened by n / (n - 1) for its n occasions, because its mean was taken from the same games. Both have two
-/// occasions at least.
+/// The standard error of the difference of the means: deviations from the mean, summed by occasion,
+/// squared and summed. Each participant's part is scaled by n / (n - 1) for its n occasions,
+/// because its mean comes from the same games. Both need at least two occasions.
 fn standard_error(upper: &[Scored], lower: &[Scored], means: [f64; 2]) -> f64 {
     let mut by_occasion: BTreeMap<u64, f64> = BTreeMap::new();
     for ((scores, mean), sign) in [upper, lower].into_iter().zip(means).zip([1.0, -1.0]) {
@@ -191,8 +195,9 @@ fn standard_error(upper: &[Scored], lower: &[Scored], means: [f64; 2]) -> f64 {
     if error < ROUNDING { 0.0 } else { error }
 }
 
-/// The share of Student's distribution with so many degrees of freedom, at least one, below so many standard errors: with few occasions
-/// the error itself is not well known. By Wallace's approximation (1959), which is off by at most some thousandths.
+/// Student's cumulative distribution for at least one degree of freedom, by Wallace's approximation
+/// (1959), accurate to a few thousandths. With few occasions the standard error itself is
+/// uncertain.
 fn below(errors: f64, freedom: usize) -> f64 {
     let freedom = freedom as f64;
     let shrunk = (freedom * (errors * errors / freedom).ln_1p())
@@ -251,7 +256,7 @@ mod tests {
 
     #[test]
     fn games_of_one_deal_are_one_occasion() {
-        // Every deal is played twice, with the same outcome: nothing is known that once would not tell.
+        // Every deal is played twice with the same outcome: the second game adds no information.
         let once = order_confidence(&scores(0, &UPPER), &scores(0, &LOWER));
         let twice = |values: &[f64]| [scores(0, values), scores(0, values)].concat();
         let both = order_confidence(&twice(&UPPER), &twice(&LOWER));
@@ -266,7 +271,7 @@ mod tests {
         let now = order_confidence(&scores(0, &upper), &scores(20, &lower));
         let more = now.more_games.expect("it is not sure yet");
         assert!((0.5..SURE).contains(&now.confidence), "{now:?}");
-        // The same games again and again come to the same difference, as sure as was said.
+        // Repeating the same games reaches the stated confidence.
         let repeated = |values: &[f64], times: usize| values.repeat(times);
         let after = |times| {
             let (upper, lower) = (repeated(&upper, times), repeated(&lower, times));

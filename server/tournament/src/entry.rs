@@ -1,29 +1,28 @@
-//! Getting into a tournament: who may join, and what happens when nobody may any more. Join codes, tickets and which kinds are admitted
-//! are the server's affair.
+//! Joining and beginning. Join codes, tickets and admitted kinds belong to the server.
 
 use thiserror::Error;
 
 use super::Tournament;
 use super::change::{Change, Entrant, EntrantKind};
-use super::course::State;
 use super::settings::{Deals, MAX_GAMES_AT_A_TIME, MIN_PARTICIPANTS};
+use super::state::State;
 
-/// Why somebody cannot join.
+/// Why joining fails.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum JoinProblem {
-    /// It has as many participants as it takes.
+    /// The maximum number of participants has joined.
     #[error("the tournament is full")]
     Full,
-    /// It has begun, or is over.
-    #[error("the tournament takes nobody any more: it has begun, or was closed")]
+    /// The tournament has begun or is over.
+    #[error("the tournament no longer accepts participants: it has begun or was closed")]
     Started,
-    /// Another participant has the name.
+    /// Another participant has this name.
     #[error("another participant has this name")]
     NameTaken,
     /// Deals are rotated, and the entrant did not declare itself stateless.
     #[error("each deal is met several times, so only stateless agents may take part")]
     NotStateless,
-    /// Not a number of games at a time.
+    /// The number of games at a time is out of range.
     #[error("games at a time: 1..={MAX_GAMES_AT_A_TIME}")]
     MaxGames,
 }
@@ -34,27 +33,27 @@ pub enum BeginProblem {
     /// Too few participants.
     #[error("{have} of at least {need} participants have joined")]
     TooFew {
-        /// How many there are.
+        /// Participants that joined.
         have: usize,
-        /// How many are needed.
+        /// Participants needed.
         need: usize,
     },
-    /// It has begun, or is over.
+    /// The tournament has begun or is over.
     #[error("the tournament has begun")]
     Started,
 }
 
 impl Tournament {
-    /// The change by which somebody joins; its number will be that of the participants so far.
+    /// The change by which an entrant joins; its number is the current count of participants.
     ///
     /// # Errors
-    /// If it cannot.
+    /// If the entrant cannot join.
     pub fn join(&self, entrant: Entrant) -> Result<Change, JoinProblem> {
-        let course = &self.course;
-        if course.state != State::Open {
+        let state = &self.state;
+        if state.phase != State::Open {
             return Err(JoinProblem::Started);
         }
-        if self.joined() >= course.settings.max_participants {
+        if self.joined() >= state.settings.max_participants {
             return Err(JoinProblem::Full);
         }
         if !(1..=MAX_GAMES_AT_A_TIME).contains(&entrant.max_games) {
@@ -64,19 +63,19 @@ impl Tournament {
             return Err(JoinProblem::NameTaken);
         }
         let forgets = entrant.stateless || entrant.built_in.is_some();
-        if course.settings.deals == Deals::Rotated && !forgets {
+        if state.settings.deals == Deals::Rotated && !forgets {
             return Err(JoinProblem::NotStateless);
         }
         Ok(Change::Joined(entrant))
     }
 
-    /// The changes with which it begins: fillers, the beginning itself, what can be drawn without results (of a round robin every round;
-    /// with hundreds of participants that takes seconds).
+    /// The changes that begin the tournament: fillers, the beginning, and all rounds that can be
+    /// paired without results. For a round robin with hundreds of participants this takes seconds.
     ///
     /// # Errors
-    /// If there are too few participants, or it has begun.
+    /// If there are too few participants, or the tournament has begun.
     pub fn begin(&self) -> Result<Vec<Change>, BeginProblem> {
-        if self.course.state != State::Open {
+        if self.state.phase != State::Open {
             return Err(BeginProblem::Started);
         }
         let (have, need) = (self.joined(), MIN_PARTICIPANTS);
@@ -92,28 +91,28 @@ impl Tournament {
         Ok(changes)
     }
 
-    /// The next of the changes with which it begins, as far as it has come.
+    /// The next change of the beginning.
     pub(super) fn beginning(&mut self) -> Option<Change> {
-        match self.course.state {
+        match self.state.phase {
             State::Open => {
-                let course = &self.course;
-                let present = course.participants.len();
-                let field = course.settings.field_for(self.joined());
+                let state = &self.state;
+                let present = state.participants.len();
+                let field = state.settings.field_for(self.joined());
                 Some(if present < field {
                     Change::Joined(self.filler())
                 } else {
-                    let rounds = course.settings.rounds_for(present);
+                    let rounds = state.settings.rounds_for(present);
                     Change::Begun { rounds }
                 })
             }
-            State::Playing => self.drawing(),
+            State::Playing => self.pairings(),
             State::Finished | State::Closed => None,
         }
     }
 
-    /// Participants, fillers aside.
+    /// Number of participants without fillers.
     pub(super) fn joined(&self) -> usize {
-        let participants = self.course.participants.iter();
+        let participants = self.state.participants.iter();
         participants.filter(|entrant| !entrant.filler).count()
     }
 
@@ -125,7 +124,7 @@ impl Tournament {
         Entrant {
             name,
             kind: EntrantKind::Agent,
-            built_in: Some(self.course.settings.filler),
+            built_in: Some(self.state.settings.filler),
             filler: true,
             stateless: true,
             max_games: MAX_GAMES_AT_A_TIME,
@@ -133,8 +132,8 @@ impl Tournament {
     }
 
     fn is_name_taken(&self, name: &str) -> bool {
-        let mut participants = self.course.participants.iter();
-        // Whoever reads the standings could not tell them apart.
+        let mut participants = self.state.participants.iter();
+        // Equal names would be indistinguishable in the standings.
         let name = name.to_lowercase();
         participants.any(|entrant| entrant.name.to_lowercase() == name)
     }

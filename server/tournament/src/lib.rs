@@ -1,6 +1,7 @@
-//! A tournament as a value: who takes part, who plays whom and when, who is waited for, what counts, how all stand. It moves by changes:
-//! whoever holds a tournament asks it for the next one, keeps it, folds it, and can fold all of them again at any time. There is no clock,
-//! no input or output, no thread here; rooms, connections and storage are the server's affair.
+//! Tournaments as values: entry, pairings, calls of games, results and standings. A tournament
+//! moves by changes: its owner asks for the next change, stores it and folds it. Folding the same
+//! changes again gives the same tournament. There is no clock, IO or thread here; rooms,
+//! connections and storage belong to the server.
 //!
 //! ```
 //! use chefshat_agents::AgentKind;
@@ -49,17 +50,16 @@ mod calls;
 mod chance;
 mod change;
 pub mod confidence;
-mod course;
-mod draw;
 mod entry;
-mod floor;
 mod knockout;
-mod rated;
+mod pairing;
 pub mod ratings;
 mod round_robin;
+mod scheduler;
 mod seats;
 mod settings;
 mod standings;
+mod state;
 pub mod statistics;
 mod swiss;
 
@@ -67,102 +67,104 @@ pub use change::{
     Change, Ended, Entrant, EntrantKind, Game, GameResult, GameState, SeatPlayed, SeatResult,
 };
 pub use confidence::{Neighbours, OrderConfidence, SURE, Scored, order_confidence};
-pub use course::State;
 pub use entry::{BeginProblem, JoinProblem};
 pub use settings::{
     Deals, Format, MAX_GAMES, MAX_GAMES_AT_A_TIME, MAX_GAMES_PER_PAIRING, MAX_PARTICIPANTS,
     MAX_ROUNDS, MIN_PARTICIPANTS, Settings, SettingsProblem,
 };
 pub use standings::Standing;
+pub use state::State;
 
-use course::Course;
-use draw::Drawing;
-use floor::Floor;
+use scheduler::Scheduler;
+use state::{Pairings, TournamentState};
 
-/// A tournament. Two are equal if their changes have led them to the same course, whoever is present.
+/// A tournament. Two are equal if their changes have led to the same state; presence does not
+/// matter.
 #[derive(Debug, Clone)]
 pub struct Tournament {
-    course: Course,
-    floor: Floor,
-    /// The rounds of a round robin, which are found together, until the last of them is drawn.
-    plan: Option<Vec<Drawing>>,
+    state: TournamentState,
+    scheduler: Scheduler,
+    /// All rounds of a round robin, computed together and dropped when the last one is paired.
+    plan: Option<Vec<Pairings>>,
 }
 
 impl PartialEq for Tournament {
     fn eq(&self, other: &Tournament) -> bool {
-        self.course == other.course
+        self.state == other.state
     }
 }
 
 impl Tournament {
-    /// A tournament that nobody has joined yet.
+    /// A tournament without participants.
     ///
     /// # Errors
-    /// If it cannot be held, with the field at fault.
+    /// Returns the first invalid setting.
     pub fn new(settings: Settings) -> Result<Tournament, SettingsProblem> {
         settings.check()?;
         Ok(Tournament {
-            course: Course::new(settings),
-            floor: Floor::default(),
+            state: TournamentState::new(settings),
+            scheduler: Scheduler::default(),
             plan: None,
         })
     }
 
-    /// Lets a change happen. It is not asked whether it follows; one that does not fit does nothing.
+    /// Applies a change. Does not check that the change follows; one that does not fit has no
+    /// effect.
     pub fn fold(&mut self, change: &Change) {
-        self.course.fold(change);
-        self.floor.fold(&self.course, change);
+        self.state.fold(change);
+        self.scheduler.fold(&self.state, change);
     }
 
-    /// Where it stands.
+    /// The phase of the tournament.
     pub fn state(&self) -> State {
-        self.course.state
+        self.state.phase
     }
 
-    /// What it is to be.
+    /// The settings.
     pub fn settings(&self) -> &Settings {
-        &self.course.settings
+        &self.state.settings
     }
 
-    /// Who takes part, by number.
+    /// The participants, by number.
     pub fn participants(&self) -> &[Entrant] {
-        &self.course.participants
+        &self.state.participants
     }
 
-    /// The first round that has games which are not over, else the last that was drawn; from 1, 0 before the first.
+    /// The first round with unfinished games, else the last round that was paired. From 1; 0 before
+    /// the first.
     pub fn round(&self) -> u32 {
-        let waiting = self.course.games.iter().find(|game| !game.is_over());
-        waiting.map_or(self.course.drawn, |game| game.round)
+        let waiting = self.state.games.iter().find(|game| !game.is_over());
+        waiting.map_or(self.state.drawn, |game| game.round)
     }
 
-    /// Rounds in all; 0 before it has begun.
+    /// Total number of rounds; 0 before the tournament begins.
     pub fn rounds(&self) -> u32 {
-        self.course.rounds
+        self.state.rounds
     }
 
-    /// The games that have been drawn, by number.
+    /// All games of the rounds paired so far, by number.
     pub fn games(&self) -> &[Game] {
-        &self.course.games
+        &self.state.games
     }
 
-    /// Numbers of the games that have been called and not yet ended, in order.
+    /// Numbers of the games that have been called and have not ended, ascending.
     pub fn playing(&self) -> impl Iterator<Item = usize> {
-        self.course.playing.iter().copied()
+        self.state.playing.iter().copied()
     }
 
-    /// Games that have been counted or given up.
+    /// Number of games that were counted or voided.
     pub fn games_over(&self) -> usize {
-        self.course.over
+        self.state.over
     }
 
-    /// Games in all; before it has begun, those it would have if it began now.
+    /// Total number of games. Before the tournament begins: the number if it began now.
     pub fn games_expected(&self) -> usize {
         let joined = self.joined().max(MIN_PARTICIPANTS);
-        self.course.settings.games_for(joined)
+        self.state.settings.games_for(joined)
     }
 
-    /// Whether what could tell this deal may be shown: all games that are dealt so are over.
+    /// Whether information about this deal may be published: all games with this deal are over.
     pub fn is_deal_open(&self, deal: u32) -> bool {
-        self.course.deals.get(deal as usize) == Some(&0)
+        self.state.deals.get(deal as usize) == Some(&0)
     }
 }

@@ -1,42 +1,43 @@
-//! What a tournament is to be, and whether it can be held. Rules and clocks of its games, who may join and who owns it are the server's
-//! affair.
+//! Settings of a tournament and their validation. Rules and clocks of its games, admission and ownership belong to the server.
 
 use thiserror::Error;
 
 use chefshat_agents::AgentKind;
 
-/// Most games of a tournament; more would be held in memory for nothing that anybody could follow.
+/// Maximum number of games of a tournament, which bounds its memory.
 pub const MAX_GAMES: usize = 100_000;
-/// Most participants, fillers aside.
+/// Maximum number of participants without fillers.
 pub const MAX_PARTICIPANTS: usize = 1024;
-/// Fewest participants, fillers aside.
+/// Minimum number of participants without fillers.
 pub const MIN_PARTICIPANTS: usize = 2;
-/// Most rounds.
+/// Maximum number of rounds.
 pub const MAX_ROUNDS: u32 = 1000;
-/// Most games of a pairing, or most deals where each is played once for each seat.
+/// Maximum number of games of a pairing; with rotated deals, of deals.
 pub const MAX_GAMES_PER_PAIRING: u32 = 1000;
-/// Most games that a participant may play at a time.
+/// Maximum number of games that a participant may play at a time.
 pub const MAX_GAMES_AT_A_TIME: usize = 64;
 
-/// Seats of a table of a knockout, half of which advance.
+/// Seats of a knockout table, half of which advance.
 pub(super) const KNOCKOUT_SEATS: usize = 4;
 
-/// Who plays whom.
+/// The format of a tournament.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Format {
-    /// Tables of four, of each of which the first two advance, in two halves that meet in a final of four.
+    /// Tables of four. The first two of each advance, in two halves that meet in a final of four.
     Knockout,
-    /// A fixed number of rounds, in which all meet as evenly as their number allows. Its rounds need not wait for each other.
+    /// A fixed number of rounds in which all meet as evenly as possible. Rounds need not wait for
+    /// each other.
     RoundRobin,
-    /// A fixed number of rounds; those who score alike meet, with as few repeated meetings as possible.
+    /// A fixed number of rounds. Participants with similar scores meet, with as few repeated
+    /// meetings as possible.
     Swiss,
 }
 
 impl Format {
-    /// All of them.
+    /// All formats.
     pub const ALL: [Self; 3] = [Self::Knockout, Self::RoundRobin, Self::Swiss];
 
-    /// The name by which people and messages call it.
+    /// The name in messages and commands.
     pub fn name(self) -> &'static str {
         match self {
             Self::Knockout => "knockout",
@@ -45,29 +46,30 @@ impl Format {
         }
     }
 
-    /// The format of a name.
+    /// The format with this name.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|format| format.name() == name)
     }
 }
 
-/// How the games are dealt.
+/// How games are dealt.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub enum Deals {
-    /// Every game anew.
+    /// Every game has its own deal.
     #[default]
     Independent,
-    /// All tables of a round alike, game by game: nobody meets a deal twice.
+    /// All tables of a round have the same deals, game by game. Nobody plays a deal twice.
     SameAtAllTables,
-    /// Every pairing plays each deal once for each seat, its participants rotated. For those who remember nothing.
+    /// Every pairing plays each deal once for each seat, with its participants rotated. For
+    /// stateless agents.
     Rotated,
 }
 
 impl Deals {
-    /// All of them.
+    /// All ways of dealing.
     pub const ALL: [Self; 3] = [Self::Independent, Self::SameAtAllTables, Self::Rotated];
 
-    /// The name by which people and messages call it.
+    /// The name in messages and commands.
     pub fn name(self) -> &'static str {
         match self {
             Self::Independent => "independent",
@@ -76,56 +78,58 @@ impl Deals {
         }
     }
 
-    /// The way of dealing of a name.
+    /// The way of dealing with this name.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|deals| deals.name() == name)
     }
 }
 
-/// What a tournament is to be, not yet checked: [`Tournament::new`](super::Tournament::new) does.
+/// Settings of a tournament, checked by [`Tournament::new`](super::Tournament::new).
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Settings {
-    /// Who plays whom.
+    /// The format.
     pub format: Format,
     /// Seats of a game, 2..=6; 4 in a knockout.
     pub players: usize,
-    /// What a game is worth by place in it, one number for each seat, none larger than the one before.
+    /// Tournament score by place in a game, one for each seat, non-increasing.
     pub points: Vec<u32>,
-    /// Rounds, 1..=1000; `None`: as many as the format suggests. None in a knockout, whose size decides.
+    /// Number of rounds, 1..=1000; `None` for the format's suggestion. Must be `None` in a
+    /// knockout.
     pub rounds: Option<u32>,
-    /// Games of a pairing, 1..=1000, seats rotating by one from game to game. With rotated deals: deals, each of which is played as often
-    /// as there are seats.
+    /// Games of a pairing, 1..=1000, with seats rotating by one from game to game. With rotated
+    /// deals: number of deals, each of which is played once for each seat.
     pub games_per_pairing: u32,
-    /// How the games are dealt.
+    /// How games are dealt.
     pub deals: Deals,
-    /// Most participants, fillers aside, 2..=1024.
+    /// Maximum number of participants without fillers, 2..=1024.
     pub max_participants: usize,
-    /// Begins by itself when so many have joined, 2..=`max_participants`.
+    /// Begin when this many have joined, 2..=`max_participants`.
     pub start_when_joined: Option<usize>,
-    /// Milliseconds that a game waits for participants who are absent, 1000..=86400000.
+    /// No-show time: how long a game waits for absent participants, in milliseconds,
+    /// 1000..=86400000.
     pub no_show_ms: u64,
-    /// How often a game is called before those who do not come forfeit it, 1..=10.
+    /// Calls of a game after which absent participants forfeit it, 1..=10.
     pub max_calls: u32,
-    /// Most games at a time, 1..=256.
+    /// Maximum number of games at a time, 1..=256.
     pub max_parallel: usize,
-    /// What decides every draw: of seats, tables, ties. No deal depends on it.
+    /// Seed of all random choices: seats, tables, tie breaks. No deal depends on it.
     pub draw_seed: [u8; 32],
-    /// The built-in agent that fills up tables.
+    /// The built-in agent that fills tables up.
     pub filler: AgentKind,
 }
 
-/// Why a tournament cannot be held.
+/// An invalid setting.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("{field}: {problem}")]
 pub struct SettingsProblem {
-    /// The field at fault, as the protocol's settings call it.
+    /// The field's name in the protocol.
     pub field: &'static str,
-    /// What is wrong with it, in words.
+    /// What is wrong with it.
     pub problem: String,
 }
 
 impl Settings {
-    /// Finds the first field that cannot be.
+    /// Returns the first invalid field.
     pub(super) fn check(&self) -> Result<(), SettingsProblem> {
         let refuse = |field, problem: String| Err(SettingsProblem { field, problem });
         if !(2..=6).contains(&self.players) || self.points.len() != self.players {
@@ -133,7 +137,7 @@ impl Settings {
             return refuse("rules", format!("{players} players, points for {points}"));
         }
         if self.points.is_sorted_by(|better, worse| better >= worse) {
-            // As it has to be.
+            // Valid.
         } else {
             return refuse("rules", "a better place is worth fewer points".to_owned());
         }
@@ -168,7 +172,7 @@ impl Settings {
         Ok(())
     }
 
-    /// How many take part if so many joined: what it is filled up to.
+    /// Number of participants with fillers, if `joined` have joined.
     pub(super) fn field_for(&self, joined: usize) -> usize {
         match self.format {
             Format::Knockout => joined.next_power_of_two().max(KNOCKOUT_SEATS),
@@ -176,11 +180,11 @@ impl Settings {
         }
     }
 
-    /// Rounds for a field of so many.
+    /// Number of rounds for a field of this size.
     pub(super) fn rounds_for(&self, field: usize) -> u32 {
         let doublings = field.next_power_of_two().trailing_zeros();
         let standard = match self.format {
-            // Four are left for the last round.
+            // The last round has four participants.
             Format::Knockout => doublings - 1,
             Format::RoundRobin => field as u32 - 1,
             Format::Swiss => doublings,
@@ -188,7 +192,7 @@ impl Settings {
         self.rounds.unwrap_or(standard.max(1))
     }
 
-    /// Games of a pairing.
+    /// Number of games of a pairing.
     pub(super) fn games_of_pairing(&self) -> u32 {
         match self.deals {
             Deals::Independent | Deals::SameAtAllTables => self.games_per_pairing,
@@ -196,11 +200,11 @@ impl Settings {
         }
     }
 
-    /// Games in all, if so many joined.
+    /// Total number of games, if `joined` have joined.
     pub(super) fn games_for(&self, joined: usize) -> usize {
         let field = self.field_for(joined);
         let pairings = match self.format {
-            // Half as many tables from round to round, down to one.
+            // The number of tables halves from round to round, down to one.
             Format::Knockout => field / 2 - 1,
             Format::RoundRobin | Format::Swiss => {
                 field / self.players * self.rounds_for(field) as usize

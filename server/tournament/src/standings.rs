@@ -1,37 +1,38 @@
-//! How the participants of a tournament stand, and how those of one pairing do. Ratings, and how sure an order is, are worked out
-//! elsewhere.
+//! Standings of a tournament, and the order within one pairing.
 
 use std::cmp::{Ordering, Reverse};
 
 use super::Tournament;
 use super::chance::Chance;
-use super::course::{Course, Pairing, State, Sums};
 use super::settings::Format;
+use super::state::{Pairing, State, Sums, TournamentState};
+use crate::ratings::Ratings;
 
-/// How a participant stands. Games it forfeited count, with a score of 0.
+/// The standing of a participant. Forfeited games count with a score of 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Standing {
-    /// Place in the tournament, from 1; 0 for all as long as no game has counted: they stand in the order of joining then. The mean score of a
-    /// game decides, then the mean of points, then, among those who are level, who was more often placed better when they met, then the draw.
-    /// In a knockout those who got further come first: in later rounds, then in a better place at their last table, once its round is over.
+    /// Place, from 1; 0 for all before a game has counted, in the order of joining. Sorted by mean
+    /// score of a game, then mean points, then head-to-head results among equals, then a random tie
+    /// break. In a knockout the round reached comes first, then the place at the last table once
+    /// its round is over.
     pub place: u32,
-    /// Who.
+    /// The participant's number.
     pub participant: usize,
-    /// Knockout: the round it was last in, from 1; else 0.
+    /// In a knockout the last round it played, from 1; else 0.
     pub last_round: u32,
-    /// Games that counted for it.
+    /// Number of games that counted.
     pub games: u32,
-    /// Byes it had.
+    /// Number of byes.
     pub byes: u32,
     /// Sum of scores.
     pub score: u64,
     /// Sum of points in the games.
     pub points: u64,
-    /// Games by place; index 0 is the first.
+    /// Number of games by place; index 0 is the first place.
     pub places: Vec<u32>,
-    /// Games it forfeited.
+    /// Number of forfeited games.
     pub forfeited: u32,
-    /// Games in which a substitute took decisions for it.
+    /// Number of games in which a substitute took decisions.
     pub substituted: u32,
     /// Invalid actions.
     pub wrong_actions: u64,
@@ -39,7 +40,7 @@ pub struct Standing {
     pub timeouts: u64,
     /// Mean measured time of a decision, microseconds; 0 if none was measured.
     pub mean_decision_time_us: f64,
-    /// Mean performance score of a game that it played; 0 if it played none.
+    /// Mean performance score of the games it played; 0 without a game.
     pub performance_score: f64,
 }
 
@@ -68,7 +69,7 @@ impl Standing {
         }
     }
 
-    /// Mean score of a game; 0 if none counted.
+    /// Mean score of a game; 0 without a game.
     pub fn mean_score(&self) -> f64 {
         ratio(self.score as f64, u64::from(self.games))
     }
@@ -82,20 +83,43 @@ fn ratio(sum: f64, count: u64) -> f64 {
 }
 
 impl Tournament {
-    /// Whether a game has counted: before, nobody is better than anybody else.
+    /// Whether a game has counted. Before that all are equal.
     pub fn has_counted(&self) -> bool {
-        self.course.sums.iter().any(|sums| sums.games > 0)
+        self.state.sums.iter().any(|sums| sums.games > 0)
     }
 
-    /// How all stand, best first; fillers are among them.
-    pub fn standings(&self) -> Vec<Standing> {
-        let course = &self.course;
-        let format = course.settings.format;
-        let standing = |who: usize| Standing::new(who, &course.sums[who], format);
-        if !self.has_counted() {
-            return (0..course.participants.len()).map(standing).collect();
+    /// Ratings by participant number, from the rated games of this tournament in order.
+    pub fn ratings(&self) -> Ratings<usize> {
+        let mut ratings = Ratings::default();
+        for game in self.games().iter().filter(|game| game.is_rated()) {
+            let Some(result) = game.result() else {
+                continue;
+            };
+            let places: Vec<(usize, u32)> = result
+                .seats
+                .iter()
+                .map(|seat| {
+                    (
+                        seat.participant,
+                        u32::try_from(seat.did.place).unwrap_or(u32::MAX),
+                    )
+                })
+                .collect();
+            // A game that cannot be rated is skipped.
+            let _ = ratings.fold(&places);
         }
-        let ordered = order(course).into_iter().zip(1..);
+        ratings
+    }
+
+    /// The standings, best first, with fillers.
+    pub fn standings(&self) -> Vec<Standing> {
+        let state = &self.state;
+        let format = state.settings.format;
+        let standing = |who: usize| Standing::new(who, &state.sums[who], format);
+        if !self.has_counted() {
+            return (0..state.participants.len()).map(standing).collect();
+        }
+        let ordered = order(state).into_iter().zip(1..);
         let placed = |(who, place)| Standing {
             place,
             ..standing(who)
@@ -105,11 +129,11 @@ impl Tournament {
 }
 
 /// All participants, best first.
-pub(super) fn order(course: &Course) -> Vec<usize> {
-    let tables = last_tables(course);
+pub(super) fn order(state: &TournamentState) -> Vec<usize> {
+    let tables = last_tables(state);
     let level = |&a: &usize, &b: &usize| {
-        let (left, right) = (&course.sums[a], &course.sums[b]);
-        let further = if course.settings.format == Format::Knockout {
+        let (left, right) = (&state.sums[a], &state.sums[b]);
+        let further = if state.settings.format == Format::Knockout {
             (right.last_round, tables[a]).cmp(&(left.last_round, tables[b]))
         } else {
             Ordering::Equal
@@ -118,25 +142,24 @@ pub(super) fn order(course: &Course) -> Vec<usize> {
             .then_with(|| by_mean(left.score, left.games, right.score, right.games))
             .then_with(|| by_mean(left.points, left.games, right.points, right.games))
     };
-    let mut order: Vec<usize> = (0..course.participants.len()).collect();
+    let mut order: Vec<usize> = (0..state.participants.len()).collect();
     order.sort_by(level);
     let mut group = vec![0; order.len()];
     for pair in order.windows(2) {
         let apart = level(&pair[0], &pair[1]) != Ordering::Equal;
         group[pair[1]] = group[pair[0]] + usize::from(apart);
     }
-    let balance = balances(course, &group);
-    let lots = lots(course);
-    order.sort_by_key(|&who| (group[who], Reverse(balance[who]), lots[who]));
+    let balance = balances(state, &group);
+    let tie_breaks = tie_breaks(state);
+    order.sort_by_key(|&who| (group[who], Reverse(balance[who]), tie_breaks[who]));
     order
 }
 
-/// The participants of a pairing, best first: by the sum of their scores in its games, by their points, by their places (which says who was
-/// placed better, as they met in all of them), by the draw.
-pub(super) fn order_of_pairing(course: &Course, pairing: &Pairing) -> Vec<usize> {
+/// The participants of a pairing, best first: by total score, total points, places, tie break.
+pub(super) fn order_of_pairing(state: &TournamentState, pairing: &Pairing) -> Vec<usize> {
     let key = |who: &usize| {
         let (mut score, mut points, mut places) = (0, 0, 0);
-        let results = course.games[pairing.games.clone()]
+        let results = state.games[pairing.games.clone()]
             .iter()
             .filter_map(|game| game.result());
         for seat in results.flat_map(|result| &result.seats) {
@@ -146,41 +169,43 @@ pub(super) fn order_of_pairing(course: &Course, pairing: &Pairing) -> Vec<usize>
                 places += seat.did.place;
             }
         }
-        let lot = Chance::lot(course.settings.draw_seed, *who);
-        (Reverse(score), Reverse(points), places, lot)
+        let tie_break = Chance::tie_break(state.settings.draw_seed, *who);
+        (Reverse(score), Reverse(points), places, tie_break)
     };
     let mut order = pairing.table.clone();
     order.sort_by_cached_key(key);
     order
 }
 
-/// Place of each participant in the pairing of its last round, 0 while the round is being played. Empty but in a knockout.
-fn last_tables(course: &Course) -> Vec<usize> {
-    if course.settings.format != Format::Knockout {
+/// Place of each participant in the pairing of its last round; 0 while that round is being played.
+/// Empty except in a knockout.
+fn last_tables(state: &TournamentState) -> Vec<usize> {
+    if state.settings.format != Format::Knockout {
         return Vec::new();
     }
-    let mut places = vec![0; course.participants.len()];
-    for pairing in &course.pairings {
-        // A tournament that was closed has given games up that nobody lost.
+    let mut places = vec![0; state.participants.len()];
+    for pairing in &state.pairings {
+        // Closing a tournament voids games that nobody lost.
         let is_over =
-            pairing.round < course.drawn || course.is_round_over() && course.state != State::Closed;
-        for (index, who) in order_of_pairing(course, pairing).into_iter().enumerate() {
+            pairing.round < state.drawn || state.is_round_over() && state.phase != State::Closed;
+        for (index, who) in order_of_pairing(state, pairing).into_iter().enumerate() {
             places[who] = if is_over { index + 1 } else { 0 };
         }
     }
     places
 }
 
-/// The larger mean first, without a rounding; nothing of no games is 0.
+/// Orders the larger mean first, without rounding. The mean of no games is 0.
 fn by_mean(left: u64, left_games: u32, right: u64, right_games: u32) -> Ordering {
     let cross = |sum: u64, games: u32| u128::from(sum) * u128::from(games.max(1));
     cross(right, left_games).cmp(&cross(left, right_games))
 }
 
-/// How often each participant was placed better, less how often worse, where it met others of its group.
-fn balances(course: &Course, group: &[usize]) -> Vec<i64> {
+/// For each participant, how often it was placed better minus how often worse in games with others
+/// of its group.
+fn balances(state: &TournamentState, group: &[usize]) -> Vec<i64> {
     let mut balance = vec![0; group.len()];
-    for result in course.games.iter().filter_map(|game| game.result()) {
+    for result in state.games.iter().filter_map(|game| game.result()) {
         for one in &result.seats {
             for other in &result.seats {
                 if group[one.participant] == group[other.participant] {
@@ -196,9 +221,9 @@ fn balances(course: &Course, group: &[usize]) -> Vec<i64> {
     balance
 }
 
-fn lots(course: &Course) -> Vec<u64> {
-    let everybody = 0..course.participants.len();
+fn tie_breaks(state: &TournamentState) -> Vec<u64> {
+    let everybody = 0..state.participants.len();
     everybody
-        .map(|who| Chance::lot(course.settings.draw_seed, who))
+        .map(|who| Chance::tie_break(state.settings.draw_seed, who))
         .collect()
 }

@@ -1,25 +1,26 @@
-//! How sure a figure is: means with their standard errors, shares with their intervals. What is measured is decided elsewhere.
+//! Means with standard errors, and shares with intervals.
 
-/// The normal distribution's 97.5 % point: 95 % lie within so many standard errors of the mean.
+/// The 97.5 % point of the normal distribution.
 const Z95: f64 = 1.959_963_984_540_054;
 
-/// An interval of numbers, both ends included.
+/// A closed interval.
 #[derive(Copy, Clone, PartialEq, Debug)]
 pub struct Interval {
-    /// The lower end.
+    /// Lower end.
     pub low: f64,
-    /// The upper end.
+    /// Upper end.
     pub high: f64,
 }
 
 impl Interval {
-    /// Whether a number lies in it.
+    /// Whether the interval contains a number.
     pub fn contains(&self, number: f64) -> bool {
         (self.low..=self.high).contains(&number)
     }
 }
 
-/// Wilson's 95 % interval of a share: of `trials` independent trials `successes` succeeded. From 0 to 1 if there was no trial.
+/// Wilson's 95 % interval of a share: `successes` of `trials` independent trials. 0 to 1 without a
+/// trial.
 pub fn wilson95(successes: u64, trials: u64) -> Interval {
     if trials == 0 {
         return Interval {
@@ -37,13 +38,13 @@ pub fn wilson95(successes: u64, trials: u64) -> Interval {
     }
 }
 
-/// Number, mean and spread of a sample, gathered in one pass (by Welford's and Chan's formulas, which lose nothing where the mean is
-/// large beside the spread).
+/// Count, mean and variance of a sample, computed in one pass by Welford's and Chan's formulas,
+/// which stay accurate where the mean is large compared to the spread.
 #[derive(Copy, Clone, PartialEq, Debug, Default)]
 pub struct Moments {
     count: u64,
     mean: f64,
-    /// Sum of the squares of the distances from the mean.
+    /// Sum of squared deviations from the mean.
     squares: f64,
 }
 
@@ -56,7 +57,7 @@ impl Moments {
         self.squares += distance * (value - self.mean);
     }
 
-    /// Adds the values of another sample. Up to rounding it does not matter in which order samples are merged.
+    /// Adds the values of another sample. The order of merging affects rounding only.
     pub fn merge(&mut self, other: &Moments) {
         if other.count == 0 {
             return;
@@ -73,12 +74,12 @@ impl Moments {
         self.count
     }
 
-    /// The mean; 0 if there is no value.
+    /// The mean; 0 without values.
     pub fn mean(&self) -> f64 {
         self.mean
     }
 
-    /// The sample's variance, with n - 1 below the line; 0 if there are fewer than two values.
+    /// The sample variance (n - 1 in the denominator); 0 with fewer than two values.
     pub fn variance(&self) -> f64 {
         if self.count < 2 {
             return 0.0;
@@ -86,7 +87,8 @@ impl Moments {
         self.squares / (self.count - 1) as f64
     }
 
-    /// The standard error of the mean, √(variance / n); 0 if there are fewer than two values.
+    /// The standard error of the mean, √(variance / n); infinite with fewer than two values, which
+    /// say nothing about it.
     pub fn standard_error(&self) -> f64 {
         if self.count < 2 {
             return 0.0;
@@ -94,8 +96,9 @@ impl Moments {
         (self.variance() / self.count as f64).sqrt()
     }
 
-    /// The 95 % interval of the mean: 1.96 standard errors to either side. For a few dozen independent values or more; of fewer it
-    /// promises too much (of ten values by a seventh).
+    /// The 95 % interval of the mean: 1.96 standard errors to either side, and all numbers with
+    /// fewer than two values. Meant for a few dozen independent values or more; for ten values it
+    /// is too narrow by a seventh.
     pub fn interval95(&self) -> Interval {
         let half = Z95 * self.standard_error();
         Interval {
@@ -107,7 +110,7 @@ impl Moments {
 
 #[cfg(test)]
 mod tests {
-    use crate::statistics::*;
+    use super::*;
 
     fn close(left: f64, right: f64) -> bool {
         (left - right).abs() < 1e-9
@@ -115,7 +118,7 @@ mod tests {
 
     #[test]
     fn wilson_agrees_with_its_table() {
-        // Worked out by hand: 70 of 250 are 28 %.
+        // Computed by hand: 70 of 250 is 28 %.
         for (successes, trials, low, high) in [
             (70, 250, 0.227_994_4, 0.338_664_3),
             (0, 10, 0.0, 0.277_532_8),
@@ -153,10 +156,18 @@ mod tests {
     }
 
     #[test]
-    fn too_few_values_have_no_spread() {
+    fn fewer_than_two_values_say_nothing_about_the_mean() {
         let mut moments = Moments::default();
-        assert_eq!((moments.mean(), moments.standard_error()), (0.0, 0.0));
-        moments.add(7.0);
-        assert_eq!((moments.mean(), moments.standard_error()), (7.0, 0.0));
+        for value in [7.0, 9.0] {
+            let interval = moments.interval95();
+            assert_eq!(
+                (interval.low, interval.high),
+                (f64::NEG_INFINITY, f64::INFINITY)
+            );
+            assert_eq!(moments.standard_error(), f64::INFINITY);
+            moments.add(value);
+        }
+        assert_eq!((moments.mean(), moments.standard_error()), (8.0, 1.0));
+        assert!(moments.interval95().low > 6.0);
     }
 }

@@ -1,60 +1,59 @@
-//! The tables of a Swiss round: those who stand alike meet, from the top, with as few repeated meetings as possible. Byes go to the lowest
-//! of those who have had the fewest.
+//! Tables of a Swiss round: participants with similar standings meet, from the top, with as few
+//! repeated meetings as possible. Byes go to the lowest of the participants with the fewest byes.
 
 use std::cmp::Reverse;
 
 use super::chance::Chance;
-use super::course::Course;
-use super::draw::Drawing;
 use super::standings;
+use super::state::{Pairings, TournamentState};
 
-/// Exchanges of two participants that are tried for each table.
+/// Swaps of two participants tried for each table.
 const TRIES_PER_TABLE: usize = 10_000;
-/// Exchanges in all that are tried at most.
+/// Maximum number of swaps tried.
 const MAX_TRIES: usize = 500_000;
-/// Steps that an exchange is compared back over: it is kept if it is not worse than what stood so many steps before.
+/// Length of the history of the late-acceptance search.
 const MEMORY: usize = 500;
 
-/// The tables of the next round.
-pub(super) fn draw(course: &Course, chance: &mut Chance) -> Drawing {
-    let seats = course.settings.players;
-    let mut order = standings::order(course);
-    let byes = byes(course, &order, order.len() % seats);
+/// Pairs the next round.
+pub(super) fn draw(state: &TournamentState, chance: &mut Chance) -> Pairings {
+    let seats = state.settings.players;
+    let mut order = standings::order(state);
+    let byes = byes(state, &order, order.len() % seats);
     order.retain(|who| !byes.contains(who));
-    let tables = Tables::new(course, order, seats).improved(chance);
-    Drawing { tables, byes }
+    let tables = Tables::new(state, order, seats).improved(chance);
+    Pairings { tables, byes }
 }
 
-/// So many byes: to those who have had the fewest, of them to the lowest.
-fn byes(course: &Course, order: &[usize], count: usize) -> Vec<usize> {
+/// Selects byes: participants with the fewest so far, the lowest ranks first.
+fn byes(state: &TournamentState, order: &[usize], count: usize) -> Vec<usize> {
     let mut candidates: Vec<(usize, usize)> = order.iter().copied().enumerate().collect();
-    candidates.sort_by_key(|&(rank, who)| (course.sums[who].byes, Reverse(rank)));
+    candidates.sort_by_key(|&(rank, who)| (state.sums[who].byes, Reverse(rank)));
     let chosen = candidates.into_iter().take(count);
     let mut byes: Vec<usize> = chosen.map(|(_, who)| who).collect();
     byes.sort_unstable();
     byes
 }
 
-/// Ranks at tables, one after the other, and what it costs that two of them meet.
+/// Ranks assigned to tables, and the cost of meetings.
 struct Tables {
-    /// Who has each rank.
+    /// Participant by rank.
     order: Vec<usize>,
-    /// Ranks: the first table's seats, then the next one's.
+    /// Ranks by place: the seats of the first table, then the next.
     seated: Vec<usize>,
     seats: usize,
-    /// How often each two ranks have met.
+    /// How often every two ranks have met.
     met: Vec<u16>,
 }
 
 impl Tables {
-    fn new(course: &Course, order: Vec<usize>, seats: usize) -> Tables {
+    fn new(state: &TournamentState, order: Vec<usize>, seats: usize) -> Tables {
         let count = order.len();
-        let mut rank = vec![None; course.participants.len()];
+        let mut rank = vec![None; state.participants.len()];
         for (index, &who) in order.iter().enumerate() {
             rank[who] = Some(index);
         }
         let mut met = vec![0u16; count * count];
-        for pairing in &course.pairings {
+        for pairing in &state.pairings {
             let ranks = pairing.table.iter().filter_map(|&who| rank[who]);
             for a in ranks.clone() {
                 for b in ranks.clone().filter(|&b| b != a) {
@@ -70,7 +69,7 @@ impl Tables {
         }
     }
 
-    /// A repeated meeting costs more than the ranks of all tables could; of meetings alike those of far ranks cost more.
+    /// The cost of a meeting. A repeated one costs more than all distances in rank together.
     fn cost(&self, a: usize, b: usize) -> i64 {
         let count = self.order.len();
         let far = a.abs_diff(b) as i64;
@@ -78,7 +77,7 @@ impl Tables {
         i64::from(self.met[a * count + b]) * dear + far * far
     }
 
-    /// What those at the table of a place would cost the rank that sits there.
+    /// The cost of a rank at a place, with the others of that table.
     fn cost_at(&self, place: usize, rank: usize) -> i64 {
         let first = place / self.seats * self.seats;
         (first..first + self.seats)
@@ -87,8 +86,8 @@ impl Tables {
             .sum()
     }
 
-    /// Exchanges participants of different tables while that makes the tables better, and now and then when it does not (late
-    /// acceptance: the search leaves poor tables behind that no single exchange betters).
+    /// Improves the tables by late acceptance: a swap is kept if the cost is not above the cost
+    /// some steps before. This leaves local optima that no single swap improves.
     fn improved(mut self, chance: &mut Chance) -> Vec<Vec<usize>> {
         let count = self.seated.len();
         let tables = count / self.seats;
@@ -121,7 +120,7 @@ impl Tables {
         self.named()
     }
 
-    /// The tables, those with the best ranks first.
+    /// The tables by participant, best ranks first.
     fn named(self) -> Vec<Vec<usize>> {
         let mut tables: Vec<Vec<usize>> = self
             .seated

@@ -9,7 +9,7 @@ use std::sync::{Arc, LazyLock};
 
 use chefshat_engine::{ActionId, ActionSpace, DecisionKind, Mask, Observation, RuleSet};
 
-use crate::built_in::greedy;
+use crate::greedy::greedy;
 pub use features::table_features;
 use layers::{Hidden, Output};
 

@@ -10,15 +10,15 @@ use thiserror::Error;
 pub struct Disagreement {
     /// What differs, in the words of the vector: for instance `steps[41], legal actions`.
     pub place: String,
-    /// Index, from 0, of the step it showed at; `None` for a deal.
+    /// Index from 0 of the step where it was found; `None` for a deal.
     pub step: Option<usize>,
     /// What the vector says, as JSON or in words.
     pub expected: String,
-    /// What the engine does, as JSON or in words.
+    /// The engine's result, as JSON or in words.
     pub got: String,
 }
 
-/// Compares two values by their JSON. In objects it is the first field that differs which is named, after the place and a dot.
+/// Compares two values by their JSON. For objects, the error names the first field that differs.
 pub(super) fn agree(
     place: &str,
     step: Option<usize>,
@@ -44,4 +44,19 @@ pub(super) fn agree(
 
 fn json(value: impl Serialize) -> Value {
     serde_json::to_value(value).expect("vectors are made of numbers, words and lists")
+}
+
+/// Why a line fails.
+#[derive(Clone, Eq, PartialEq, Debug, Error)]
+pub enum LineError {
+    /// The engine disagrees.
+    #[error(transparent)]
+    Disagrees(#[from] Disagreement),
+    /// The line is no vector.
+    #[error("{0}")]
+    Unreadable(String),
+}
+
+pub(super) fn unreadable(error: impl std::fmt::Display) -> LineError {
+    LineError::Unreadable(error.to_string())
 }

@@ -4,11 +4,10 @@ use chefshat_engine::{Card, Deal, Seat, Seed};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use super::compare::agree;
-use super::{LineError, unreadable};
+use super::compare::{LineError, agree, unreadable};
 use crate::RulesForm;
 
-/// A deal as another engine made it.
+/// A deal made by another engine.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct DealVector {
@@ -16,12 +15,12 @@ pub(super) struct DealVector {
     #[serde(with = "hex")]
     seed: [u8; 32],
     shift: u32,
-    /// Cards in the order dealt: faces, `"G"` the Golden card, F+1 a joker.
+    /// Cards in dealing order: faces, `"G"` for the Golden card, F+1 for a joker.
     hands: Vec<Vec<Value>>,
     leader: usize,
 }
 
-/// Deals it again and compares card by card.
+/// Repeats the deal and compares it card by card.
 pub(super) fn check(vector: &DealVector) -> Result<(), LineError> {
     let rules = vector.rules.rule_set().map_err(unreadable)?;
     let deal = Deal::new(&rules, Seed(vector.seed), vector.shift);

@@ -3,18 +3,17 @@
 use chefshat_engine::{ActionId, Event, Game, Seed, SpecialAction};
 use serde::{Deserialize, Serialize};
 
-use super::compare::{Disagreement, agree};
-use super::{LineError, unreadable};
+use super::compare::{Disagreement, LineError, agree, unreadable};
 use crate::RulesForm;
 
-/// A game as another engine played it.
+/// A game played by another engine.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct GameVector {
     rules: RulesForm,
     #[serde(with = "hex")]
     seed: [u8; 32],
-    /// Seat, action, all legal actions ascending.
+    /// Seat, action, and all legal actions in ascending order.
     steps: Vec<(usize, u16, Vec<u16>)>,
     shifts: Vec<ShiftEnd>,
     scores: Vec<u64>,
@@ -42,7 +41,7 @@ enum Special {
     DinnerIsServed,
 }
 
-/// Plays it again, decision by decision, and compares all the way. Gives the number of steps.
+/// Replays the game decision by decision and compares every step. Returns the number of steps.
 pub(super) fn check(vector: GameVector) -> Result<u64, LineError> {
     let rules = vector.rules.rule_set().map_err(unreadable)?;
     let mut expected_shifts = vector.shifts.iter();
@@ -110,7 +109,7 @@ fn in_words(place: &str, step: usize, expected: String, got: String) -> Disagree
     }
 }
 
-/// What a long list of actions lacks, and has besides the expected ones, in words.
+/// Describes which actions a list lacks and which it has in excess.
 fn difference(expected: &[u16], got: &[u16]) -> String {
     let without = |these: &[u16], those: &[u16]| -> Vec<u16> {
         let rest = these.iter().filter(|action| !those.contains(action));

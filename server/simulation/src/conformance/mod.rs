@@ -10,24 +10,25 @@ use std::io::{BufRead, Read};
 use serde_json::Value;
 use thiserror::Error;
 
-pub use compare::Disagreement;
+use compare::unreadable;
+pub use compare::{Disagreement, LineError};
 
-/// Longest line that is read: far longer than any game of the standard rules, and a bound on memory.
+/// Maximum length of a line. Far longer than any game of the default rules; bounds memory.
 pub const MAX_LINE_BYTES: u64 = 64 << 20;
 
 /// How many vectors agreed.
 #[derive(Copy, Clone, Eq, PartialEq, Debug, Default)]
 pub struct Agreed {
-    /// Deals that came out card for card.
+    /// Deals that agreed card for card.
     pub deals: u64,
     /// Games replayed to the same end.
     pub games: u64,
-    /// Decisions in those games.
+    /// Decisions of those games.
     pub steps: u64,
 }
 
 impl Agreed {
-    /// Vectors of both kinds.
+    /// Total number of vectors.
     pub fn vectors(&self) -> u64 {
         self.deals + self.games
     }
@@ -61,7 +62,7 @@ pub enum Failure {
         /// What is wrong with it.
         reason: String,
     },
-    /// The file cannot be read on.
+    /// The file cannot be read.
     #[error("line {line} cannot be read: {source}")]
     Read {
         /// The line.
@@ -69,24 +70,13 @@ pub enum Failure {
         /// Why.
         source: std::io::Error,
     },
-    /// Nothing to check.
+    /// The file has no vectors.
     #[error("there are no vectors in it: one JSON object a line was expected")]
     Empty,
 }
 
-/// What a single line turned out not to be.
-#[derive(Clone, Eq, PartialEq, Debug, Error)]
-pub enum LineError {
-    /// The engine does something else.
-    #[error(transparent)]
-    Disagrees(#[from] Disagreement),
-    /// The line is no vector.
-    #[error("{0}")]
-    Unreadable(String),
-}
-
-/// Checks all lines, one at a time, until the first that does not agree. `progress` is told the number of bytes of each line read. Empty
-/// lines are passed over.
+/// Checks all lines up to the first failure. `progress` is called with the size of each line in
+/// bytes. Empty lines are skipped.
 pub fn check(mut input: impl BufRead, mut progress: impl FnMut(u64)) -> Report {
     let mut agreed = Agreed::default();
     let mut bytes = Vec::new();
@@ -125,7 +115,7 @@ pub fn check(mut input: impl BufRead, mut progress: impl FnMut(u64)) -> Report {
     unreachable!("a file has fewer than 2^64 lines")
 }
 
-/// Checks one line and counts it if it agrees. Its keys say whether it is a deal or a game.
+/// Checks one line and counts it if it agrees. Its keys tell whether it is a deal or a game.
 ///
 /// # Errors
 /// If it is no vector, or the engine does something else.
@@ -149,8 +139,4 @@ pub fn check_line(line: &[u8], agreed: &mut Agreed) -> Result<(), LineError> {
 
 fn parse<T: serde::de::DeserializeOwned>(value: Value) -> Result<T, LineError> {
     serde_json::from_value(value).map_err(unreadable)
-}
-
-fn unreadable(error: impl std::fmt::Display) -> LineError {
-    LineError::Unreadable(error.to_string())
 }

@@ -1,10 +1,10 @@
-//! What a comparison comes to: each figure's means, their difference, and how sure it is. What is played is decided beside this file.
+//! The results of a comparison: means of each figure, their difference, and its uncertainty.
 
 use std::num::NonZeroU32;
 
 use chefshat_tournament::statistics::{Interval, Moments};
 
-/// What the games of a comparison come to. Means are per seat and Shift: what a seat of A gets in a Shift, and a seat of B.
+/// The result of a comparison. Means are per seat and Shift.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Comparison {
     /// Deals played, each in every seating.
@@ -15,14 +15,14 @@ pub struct Comparison {
     pub shifts: u64,
     /// Points.
     pub points: Figure,
-    /// Places, from 1: lower is better.
+    /// Places, from 1; lower is better.
     pub places: Figure,
     /// Shifts won, as a share from 0 to 1.
     pub wins: Figure,
 }
 
 impl Comparison {
-    /// The comparison of no deals.
+    /// A comparison without deals.
     pub(super) fn empty(seatings: usize) -> Comparison {
         Comparison {
             deals: 0,
@@ -34,8 +34,8 @@ impl Comparison {
         }
     }
 
-    /// Adds the games of a deal, one for each seating, of so many Shifts each; `weights` are the seats and Shifts over which the sums of A
-    /// and B are taken.
+    /// Adds the games of a deal, one for each seating, of `shifts` Shifts each. `weights` are the
+    /// seats times Shifts of A and of B.
     pub(super) fn add_deal(&mut self, games: &[Tally], shifts: NonZeroU32, weights: [f64; 2]) {
         self.deals += 1;
         self.games += games.len() as u64;
@@ -56,17 +56,17 @@ impl Comparison {
     }
 }
 
-/// One figure of a comparison. What is independent of each other is the deals: the games of a deal are summed up before anything is said of
-/// chance.
+/// One figure of a comparison. Deals are the independent units: the games of a deal are summed
+/// first.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Figure {
-    /// Over the deals: mean per seat of A and Shift.
+    /// By deal: mean of A per seat and Shift.
     a: Moments,
-    /// Over the deals: mean per seat of B and Shift.
+    /// By deal: mean of B per seat and Shift.
     b: Moments,
-    /// Over the deals: the difference of the two.
+    /// By deal: the difference of the two.
     difference: Moments,
-    /// By seating, over the deals: what the game adds to the difference.
+    /// By seating and deal: the game's part of the difference.
     by_seating: Vec<Moments>,
 }
 
@@ -105,18 +105,19 @@ impl Figure {
         self.difference.standard_error()
     }
 
-    /// What the standard error of the difference would have been if every game had had a deal of its own: the same games in the same
-    /// seatings, taken as independent of each other.
+    /// The standard error of the difference if every game had its own deal: the same games, taken
+    /// as independent.
     pub fn independent_standard_error(&self) -> f64 {
         let squares = self.by_seating.iter().map(Moments::standard_error);
         squares.map(|error| error * error).sum::<f64>().sqrt()
     }
 
-    /// How many times as many Shifts of independent deals would be needed for the same standard error. `None` if chance decided
-    /// nothing, so that no number is large enough.
+    /// How many times as many Shifts with independent deals would give the same standard error.
+    /// `None` if the standard error is 0 or unknown.
     pub fn gain(&self) -> Option<f64> {
         let error = self.standard_error();
-        (error > 0.0).then(|| (self.independent_standard_error() / error).powi(2))
+        (error > 0.0 && error.is_finite())
+            .then(|| (self.independent_standard_error() / error).powi(2))
     }
 
     fn add_deal(&mut self, games: &[Tally], sums: fn(&Tally) -> [u64; 2], weights: [f64; 2]) {
@@ -128,7 +129,7 @@ impl Figure {
             let [a, b] = share(sums);
             moments.add(a - b);
         }
-        // From whole numbers, so that agents that do the same are exactly as good.
+        // Summed as integers, so that two identical agents have a difference of exactly 0.
         let [a, b] = share(total);
         self.a.add(a);
         self.b.add(b);
@@ -145,7 +146,7 @@ impl Figure {
     }
 }
 
-/// What one game came to: sums over the seats of A and of B and over the Shifts.
+/// Sums of one game over the Shifts, for the seats of A and of B.
 #[derive(Debug, Default)]
 pub(super) struct Tally {
     pub(super) points: [u64; 2],

@@ -1,10 +1,11 @@
-//! Comparing two agents on duplicate deals: every deal is played in all ways of seating the two, so that neither is favoured by the cards.
-//! What is made of the games is in `figures`; how a comparison is printed is not decided here.
+//! Compares two agents on duplicate deals: every deal is played in all ways of seating the two, so
+//! that the cards favour neither.
 //!
-//! What that is worth depends on the two, so every figure says what its standard error would be with a deal of its own for each game. The
-//! more alike two agents play and the less they leave to draws, the more: between agents that do the same nothing is left to chance. Where one
-//! always wins, or draws decide, duplicate deals are worth no more than others; and less where some deals suit one of the two in any
-//! seat, since all games of such a deal tell the same.
+//! The benefit depends on the agents, so every figure also has the standard error that independent
+//! deals would give. The more alike two agents play and the less they randomize, the larger the
+//! benefit; for two identical deterministic agents the error is 0. If one always wins, or
+//! randomness decides, duplicate deals are no better than others. They are worse if some deals suit
+//! one of the two in any seat, because all games of such a deal say the same.
 
 mod figures;
 mod same_seat;
@@ -22,22 +23,23 @@ use chefshat_agents::seating_agent_seed;
 use chefshat_agents::{AgentKind, BuiltInAgent, Listener, Network, game_seed, play};
 use figures::Tally;
 pub use figures::{Comparison, Figure};
-pub use same_seat::{Measured, Newcomer, SameSeat};
+pub use same_seat::{Candidate, Measured, SameSeat};
 
-/// Deals that one thread plays at a time. Part of the result: it decides in which groups figures are summed.
+/// Deals played by one thread at a time. Part of the result: it decides how figures are grouped for
+/// summing.
 const CHUNK: u64 = 4;
 
-/// An agent that takes part in a comparison.
+/// An agent in a comparison.
 #[derive(Debug, Clone)]
 pub enum Contender {
-    /// One of the built-in agents.
+    /// A built-in agent.
     Kind(AgentKind),
-    /// One that plays from a network file.
+    /// A network.
     Network(Arc<Network>),
 }
 
 impl Contender {
-    /// The agent for one game.
+    /// Creates the agent for one game.
     fn agent(&self, seed: [u8; 32]) -> BuiltInAgent {
         match self {
             Contender::Kind(kind) => BuiltInAgent::new(*kind, seed),
@@ -49,11 +51,11 @@ impl Contender {
 /// How the two agents share the seats.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum SeatPlan {
-    /// Half of the seats each, in all ways there are: 6 for four players. With an odd number of players each of them has the seat more
-    /// equally often.
+    /// Half of the seats each, in all ways: 6 for four players. With an odd number of players each
+    /// has the extra seat equally often.
     #[default]
     Half,
-    /// One seat for A, the others for B, in all ways there are: as many as there are players. The paper's tables are of this kind.
+    /// One seat for A and the others for B, in all ways. The paper's tables are of this kind.
     One,
 }
 
@@ -74,7 +76,7 @@ impl Seating {
 }
 
 impl SeatPlan {
-    /// All seatings of so many players.
+    /// All seatings of this number of players.
     pub fn seatings(self, players: usize) -> Vec<Seating> {
         let fits = |seats: usize| match self {
             SeatPlan::Half => seats == players / 2 || seats == players.div_ceil(2),
@@ -87,10 +89,10 @@ impl SeatPlan {
     }
 }
 
-/// A comparison of two agents that is to be played.
+/// A comparison of two agents on duplicate deals.
 ///
-/// Game `d` of a comparison is dealt from the seed of game `d` of a [`crate::Batch`] of the same number, whatever the seating. Only the
-/// deals are duplicated: agents that draw have generators of their own for each seating and seat.
+/// Game `d` has the deal of game `d` of a [`crate::Batch`] with the same seed, in every seating.
+/// Only deals are duplicated: agents have their own generators for each seating and seat.
 #[derive(Debug, Clone)]
 pub struct Duplicate {
     rules: RuleSet,
@@ -101,13 +103,13 @@ pub struct Duplicate {
     seed: u64,
 }
 
-/// Why a comparison cannot be played.
+/// Why a comparison is invalid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum DuplicateError {
-    /// Nothing is known of the spread of a single deal.
+    /// A single deal says nothing about the spread.
     #[error("{0} deals: play at least 2, so that there is a standard error")]
     Deals(u64),
-    /// A network would play as `greedy`.
+    /// A network does not fit the rules, so that it would play as `greedy`.
     #[error(
         "{who} was trained for {players} players, {faces} faces and hands of {hand_size} cards, and does not know games of another size"
     )]
@@ -124,11 +126,11 @@ pub enum DuplicateError {
 }
 
 impl Duplicate {
-    /// A comparison of A and B over `deals` games of `shifts` Shifts each, in every seating of `plan`; when the games of `rules` end is not
-    /// looked at. All chance is drawn from `seed`.
+    /// A comparison of A and B over `deals` games of `shifts` Shifts each, in every seating of
+    /// `plan`. The stop rule of `rules` is ignored. `seed` determines all randomness.
     ///
     /// # Errors
-    /// If there are fewer than two deals, or a network was not trained for games of this size.
+    /// If there are fewer than two deals, or a network does not fit the rules.
     pub fn new(
         rules: RuleSet,
         shifts: NonZeroU32,
@@ -170,7 +172,7 @@ impl Duplicate {
         })
     }
 
-    /// The rule set, its games of the number of Shifts played.
+    /// The rule set, with the number of Shifts played as its stop rule.
     pub fn rules(&self) -> &RuleSet {
         &self.rules
     }
@@ -180,14 +182,14 @@ impl Duplicate {
         &self.seatings
     }
 
-    /// Plays a deal, by its index from 0, in a seating, by its index, exactly as it is played within the comparison.
+    /// Plays one deal in one seating, both by index from 0, exactly as within the comparison.
     ///
     /// # Panics
     /// If there is no such seating.
     pub fn play_game(&self, deal: u64, seating: usize, listener: &mut impl Listener) -> Standings {
         let seed = game_seed(self.seed, deal);
         let seats = self.seatings[seating];
-        // An array, because agents with their generators are no values to copy by seat.
+        // An array, because agents with their generators are not `Copy`.
         let mut agents: [BuiltInAgent; MAX_SEATS] = std::array::from_fn(|index| {
             let seat = Seat::new(index);
             let contender = &self.contenders[usize::from(!seats.is_a(seat))];
@@ -202,8 +204,8 @@ impl Duplicate {
         )
     }
 
-    /// Plays all games, on the threads of the rayon pool it is called in, and adds them up. `progress` is called from any of those threads,
-    /// with the number of deals that have been finished since it was last called.
+    /// Plays all games on the current rayon pool and returns the totals. `progress` is called from
+    /// any thread with the number of deals finished since its last call.
     pub fn run(&self, progress: impl Fn(u64) + Sync) -> Comparison {
         let empty = || Comparison::empty(self.seatings.len());
         fold_in_order(
@@ -230,7 +232,7 @@ impl Duplicate {
                 counter.tally
             })
             .collect();
-        // Over how many seats and Shifts of this deal an agent's sums are taken.
+        // Seats times Shifts of this deal, for each agent.
         let a_seats: usize = self.seatings.iter().map(|seating| seating.a_seats()).sum();
         let seats = self.seatings.len() * self.rules.players();
         let shifts = f64::from(self.shifts.get());

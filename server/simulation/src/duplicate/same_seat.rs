@@ -1,6 +1,6 @@
-//! Two agents that never meet: each sits in the same seats among the same others. How much surer is it which of them is better if they are dealt
-//! the same cards? This is what duplicate deals are to a tournament, where replicas of a deal go to different participants; for two who sit at
-//! one table see the comparison beside this file.
+//! Compares two agents that never meet: each plays the same seats against the same others. Measures
+//! how much duplicate deals reduce the error of the difference, as in a tournament where replicas
+//! of a deal go to different participants. For two agents at one table see [`super::Duplicate`].
 
 use chefshat_engine::{MAX_SEATS, RuleSet, Seat};
 use rand_chacha::ChaCha8Rng;
@@ -12,52 +12,56 @@ use chefshat_agents::seating_agent_seed;
 use chefshat_agents::{BuiltInAgent, Listener, game_seed, play};
 use chefshat_tournament::statistics::Moments;
 
-/// Deals that one thread plays at a time. Part of the result: it decides in which groups figures are summed.
+/// Deals played by one thread at a time. Part of the result: it decides how figures are grouped for
+/// summing.
 const CHUNK: u64 = 4;
 
-/// One of the two.
+/// One of the two compared agents.
 #[derive(Debug, Clone)]
-pub struct Newcomer {
-    /// How it plays.
+pub struct Candidate {
+    /// The agent.
     pub plays: Contender,
-    /// How often, of 100 decisions, it takes any legal action instead: makes two agents alike but not the same. At most 100.
-    pub slips_percent: u8,
+    /// Probability of a random legal action instead, from 0 to 1 and rounded to whole percent.
+    /// Makes two agents similar but not identical.
+    pub epsilon: f64,
 }
 
-/// What is to be measured.
+/// A comparison of two candidates in the same seats.
 #[derive(Debug, Clone)]
 pub struct SameSeat {
     /// The rule set.
     pub rules: RuleSet,
-    /// The two.
-    pub newcomers: [Newcomer; 2],
-    /// Who has all other seats.
+    /// The two candidates.
+    pub candidates: [Candidate; 2],
+    /// The agent on all other seats.
     pub others: Contender,
-    /// What all chance is drawn from.
+    /// The seed of all randomness.
     pub seed: u64,
 }
 
-/// What came of a number of games of each. A game is worth the rule set's points for the place in it.
+/// The result after a number of games of each. A game is worth the rule set's points for the place
+/// in it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measured {
     /// Games of each.
     pub games: u64,
-    /// Mean of the first less that of the second, over the same deals.
+    /// Mean of the first minus that of the second, on the same deals.
     pub difference: f64,
-    /// The standard error of it.
+    /// Its standard error; infinite with fewer than two games.
     pub duplicate_error: f64,
-    /// The standard error with deals of their own for each game, from as many other games of the second.
+    /// The standard error with independent deals, from as many other games of the second.
     pub independent_error: f64,
 }
 
-/// Sums over games: the first's scores, the second's over other deals, the differences over the same.
+/// Sums over games: scores of the first, scores of the second on other deals, differences on the
+/// same deals.
 #[derive(Debug, Clone, Copy, Default)]
 struct Sums([Moments; 3]);
 
 impl SameSeat {
-    /// Plays as many games of each as the last of these numbers, which ascend, and tells what is known after each of them. On the threads of
-    /// the rayon pool it is called in; the result does not depend on them. `progress` is called from any of those threads, with the number
-    /// of games that have been finished since it was last called.
+    /// Plays as many games of each as the last of these ascending numbers, and returns the result
+    /// after each of them. Runs on the current rayon pool, which does not affect the result.
+    /// `progress` is called from any thread with the number of games finished since its last call.
     pub fn measure(&self, games: &[u64], progress: impl Fn(u64) + Sync) -> Vec<Measured> {
         let all = games.last().copied().unwrap_or(0);
         let mut sums = Sums::default();
@@ -83,7 +87,7 @@ impl SameSeat {
             .collect()
     }
 
-    /// Adds a deal, and one that lies `apart` behind it, where the second plays alone.
+    /// Adds a deal, and another one `apart` further on for the second candidate alone.
     fn add(&self, sums: &mut Sums, deal: u64, apart: u64) {
         let first = self.score(0, deal);
         let second = self.score(1, deal);
@@ -92,32 +96,33 @@ impl SameSeat {
         sums.0[2].add(first - second);
     }
 
-    /// What a deal is worth to one of the two, in the seat that the deal's number says.
+    /// The points of a candidate on a deal, in the seat that follows from the deal's number.
     fn score(&self, who: usize, deal: u64) -> f64 {
         let seed = game_seed(self.seed, deal);
         let players = self.rules.players();
         let own = Seat::new((deal % players as u64) as usize);
-        let newcomer = &self.newcomers[who];
+        let candidate = &self.candidates[who];
         let mut agents: [BuiltInAgent; MAX_SEATS] = std::array::from_fn(|index| {
             let seat = Seat::new(index);
             let contender = if seat == own {
-                &newcomer.plays
+                &candidate.plays
             } else {
                 &self.others
             };
             contender.agent(seating_agent_seed(seed, who, seat))
         });
-        // No agent has this seed: there are no more than six seats, and two seatings.
-        let mut slips = ChaCha8Rng::from_seed(seating_agent_seed(seed, 2 + who, own));
+        let percent = (100.0 * candidate.epsilon).round() as u64;
+        // No agent has this seed: agents use the first two seatings.
+        let mut explorer = ChaCha8Rng::from_seed(seating_agent_seed(seed, 2 + who, own));
         let standings = play(
             self.rules,
             seed,
             None,
             |seat, observation, legal| {
                 let action = agents[seat.index()].decide(observation, legal);
-                if seat == own && below(&mut slips, 100) < u64::from(newcomer.slips_percent) {
-                    let any = below(&mut slips, legal.len() as u64);
-                    return legal.nth(any as usize).unwrap_or(action);
+                if seat == own && below(&mut explorer, 100) < percent {
+                    let index = below(&mut explorer, legal.len() as u64);
+                    return legal.nth(index as usize).unwrap_or(action);
                 }
                 action
             },
@@ -149,14 +154,15 @@ impl Sums {
 }
 
 impl Measured {
-    /// How many times as many games with deals of their own would be needed to be as sure. `None` if chance decided nothing.
+    /// How many times as many games with independent deals would give the same standard error.
+    /// `None` if the standard error is 0 or unknown.
     pub fn gain(&self) -> Option<f64> {
-        (self.duplicate_error > 0.0)
+        (self.duplicate_error > 0.0 && self.duplicate_error.is_finite())
             .then(|| (self.independent_error / self.duplicate_error).powi(2))
     }
 }
 
-/// A number below another one, which is small: that some are likelier by 2^-57 does not matter here.
+/// A number below a small `end`. The bias of 2^-57 does not matter here.
 fn below(generator: &mut ChaCha8Rng, end: u64) -> u64 {
     generator.next_u64() % end
 }

@@ -1,24 +1,27 @@
-//! What a step gives: tables whose columns are bytes, one value or a fixed number of values per row, without gaps; numbers are little-endian.
-//! The layout is that of the protocol's vector messages, so that a column is sent as it is. When rows are written is decided in `slot`.
+//! The output of a step as columns of bytes: one value or a fixed number of values per row, packed,
+//! little-endian. The layout is that of the protocol's vector messages, so a column is sent as it
+//! is.
 
 use chefshat_engine::{
-    BySeat, Cards, DecisionKind, Mask, Observation, Seat, SeatOrder, ShiftMetrics, SpecialAction,
-    Standings,
+    BySeat, Cards, DecisionKind, Mask, Observation, PlayedDecision, Seat, SeatOrder, Seed,
+    ShiftMetrics, SpecialAction, Standings,
 };
 
-use super::{Episode, PlayedGame, VectorSetup};
+use super::{Episode, VectorSetup};
 
+/// The end of an episode with a place for every seat.
+const FINISHED: u8 = 1;
 /// Seat in a column where there is none.
 const NO_SEAT: u8 = u8::MAX;
 
-/// One step's tables.
+/// The tables of one step.
 #[derive(Debug, Default)]
 pub struct Batch {
     /// Number of the batch, from 1.
     pub step: u64,
-    /// Decisions that wait.
+    /// Number of open decisions.
     pub rows: u32,
-    /// Whether all games are over for good.
+    /// Whether all games are over and none follows.
     pub done: bool,
     /// u32: game.
     pub games: Vec<u8>,
@@ -30,7 +33,7 @@ pub struct Batch {
     pub attempts: Vec<u8>,
     /// f32: rewards since the seat last decided.
     pub rewards: Vec<u8>,
-    /// What the seats see.
+    /// The observations of the seats.
     pub observations: ObservationColumns,
     /// ceil(A/8) bytes wide: legal actions.
     pub masks: Vec<u8>,
@@ -38,11 +41,11 @@ pub struct Batch {
     pub endings: Endings,
     /// Games that began.
     pub beginnings: Beginnings,
-    /// Shifts that ended, if asked for.
+    /// Shifts that ended, if statistics are enabled.
     pub shifts: Shifts,
-    /// Counts from the beginning.
+    /// Totals since the beginning.
     pub totals: Totals,
-    /// Games that ended, if their decisions are kept.
+    /// Games that ended, if records are enabled.
     pub played: Vec<PlayedGame>,
     /// Bytes of a mask.
     mask_bytes: usize,
@@ -79,7 +82,7 @@ pub struct ObservationColumns {
     pub received: Vec<u8>,
 }
 
-/// Episodes of the owner's seats that ended.
+/// Episodes of the client's seats that ended.
 #[derive(Debug, Default)]
 pub struct Endings {
     /// Number of rows.
@@ -92,13 +95,14 @@ pub struct Endings {
     pub seats: Vec<u8>,
     /// f32: rewards since the seat last decided.
     pub rewards: Vec<u8>,
-    /// u8: 1 finished, 2 cut short.
+    /// u8: always 1, finished. Every episode ends with a place for each seat, also if its last
+    /// Shift was adjudicated.
     pub ends: Vec<u8>,
     /// u8: 0 or 1.
     pub game_over: Vec<u8>,
     /// u8: place in the episode, from 1.
     pub places_taken: Vec<u8>,
-    /// What the seats saw at the end.
+    /// The final observations.
     pub observations: ObservationColumns,
 }
 
@@ -156,14 +160,27 @@ pub struct Shifts {
     pub performance: Vec<u8>,
 }
 
-/// Counts from the beginning.
+/// A game that ended, with all its decisions.
+#[derive(Clone, Eq, PartialEq, Debug)]
+pub struct PlayedGame {
+    /// The game, from 0.
+    pub game: u32,
+    /// Its index.
+    pub index: u64,
+    /// Its seed.
+    pub seed: Seed,
+    /// Its decisions.
+    pub decisions: Vec<PlayedDecision>,
+}
+
+/// Totals since the beginning.
 #[derive(Copy, Clone, Eq, PartialEq, Debug, Default)]
 pub struct Totals {
-    /// Decisions of the owner that were taken.
+    /// Decisions of the client.
     pub client_decisions: u64,
-    /// All decisions that were taken.
+    /// All decisions.
     pub decisions: u64,
-    /// Invalid attempts of the owner.
+    /// Invalid attempts of the client.
     pub invalid_attempts: u64,
     /// Shifts that ended.
     pub shifts: u64,
@@ -171,7 +188,7 @@ pub struct Totals {
     pub games: u64,
 }
 
-/// A decision that waits, as a row.
+/// An open decision, as a row.
 pub(super) struct Row<'a> {
     pub(super) game: u32,
     pub(super) seat: Seat,
@@ -181,20 +198,19 @@ pub(super) struct Row<'a> {
     pub(super) legal: &'a Mask,
 }
 
-/// An episode of a seat that ended, as a row.
+/// An ended episode of a seat, as a row.
 pub(super) struct Ending<'a> {
     pub(super) game: u32,
     pub(super) index: u64,
     pub(super) seat: Seat,
     pub(super) reward: f32,
-    pub(super) cut_short: bool,
     pub(super) game_over: bool,
     pub(super) place: u8,
     pub(super) observation: &'a Observation,
 }
 
 impl Batch {
-    /// No rows, with room for one of every game.
+    /// An empty batch with capacity for one row of every game.
     pub(super) fn new(setup: &VectorSetup) -> Batch {
         let games = setup.games() as usize;
         let rules = setup.rules();
@@ -289,7 +305,7 @@ impl Endings {
         self.indices.extend_from_slice(&row.index.to_le_bytes());
         self.seats.push(row.seat.index() as u8);
         put_f32(&mut self.rewards, row.reward);
-        self.ends.push(if row.cut_short { 2 } else { 1 });
+        self.ends.push(FINISHED);
         self.game_over.push(row.game_over.into());
         self.places_taken.push(row.place);
         self.observations.push(row.observation);
@@ -341,7 +357,8 @@ impl Shifts {
     }
 }
 
-/// The places that seats take in an episode that a Shift ended: those of the Shift, or of the game where that is the episode.
+/// Places by seat at the end of an episode: those of the Shift, or of the game if that is the
+/// episode.
 pub(super) fn places_taken(
     episode: Episode,
     shift: &SeatOrder,

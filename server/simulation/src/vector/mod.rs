@@ -1,6 +1,7 @@
-//! Many games of one owner, stepped together: each step takes a decision in every game that waits for the owner, lets built-in agents go on
-//! in all of them, and gives the decisions that wait then, in columns. How such games are asked for is in `setup`, how one of them goes in
-//! `slot`, what a step gives in `columns`. Pure and without threads: several of these are stepped side by side.
+//! Vector environments: many games of one client, stepped together. A step takes one action for
+//! each open decision of the client, advances all games with built-in agents, and returns the next
+//! open decisions as columns. `setup` has the options, `slot` advances one game, `columns` is the
+//! output. There are no threads here; several environments can be stepped in parallel.
 
 mod columns;
 mod setup;
@@ -9,25 +10,22 @@ mod slot;
 use chefshat_engine::{ActionId, Seat};
 use thiserror::Error;
 
-pub use columns::{Batch, Beginnings, Endings, ObservationColumns, Shifts, Totals};
-pub use setup::{Decisions, Episode, InvalidActions, Seeds, SetupError, Start, VectorSetup};
-pub use slot::PlayedGame;
+pub use columns::{Batch, Beginnings, Endings, ObservationColumns, PlayedGame, Shifts, Totals};
+pub use setup::{
+    Decisions, Episode, InvalidActions, MAX_SEATS_PLAYED, Seeds, SetupError, Start, VectorSetup,
+};
 use slot::Slot;
 
-/// Most seats that an owner plays: games times seats of each.
-pub const MAX_SEATS_PLAYED: u32 = 16_384;
-/// Decisions and invalid attempts of built-in agents within one step, in all games; those that are left have no row and go on with the
-/// next. About a second.
+/// Maximum number of decisions and invalid attempts of built-in agents within one step, over all
+/// games: about a second. Games not advanced have no row and continue with the next step.
 const MAX_WORK_PER_STEP: u64 = 10_000_000;
-/// Shifts that end in one game within one step before it is left for the next, but for one that the owner's answer ends.
-const MAX_SHIFTS_PER_STEP: u64 = 2;
-/// Decisions and invalid attempts that are kept for the records of games that go on: some 64 MB.
+/// Maximum number of decisions and invalid attempts kept for records of running games: about 64 MB.
 pub const MAX_KEPT: u64 = 2_000_000;
 
-/// Why games were not stepped. Nothing has been moved then.
+/// Why a step fails. Except for `Kept`, the games are unchanged.
 #[derive(Copy, Clone, Eq, PartialEq, Debug, Error)]
 pub enum StepError {
-    /// Not one action for each row.
+    /// The number of actions is not the number of rows.
     #[error("{given} actions for a batch of {rows} rows: give one for each row, in the same order")]
     Actions {
         /// Actions given.
@@ -35,7 +33,7 @@ pub enum StepError {
         /// Rows of the batch.
         rows: usize,
     },
-    /// An action that is not legal, where that is an error.
+    /// An illegal action, if that is an error.
     #[error(
         "row {row} (game {game}, seat {seat}): action {} is not legal there; take one of the row's mask, or set invalid actions to be asked again",
         action.index()
@@ -50,40 +48,41 @@ pub enum StepError {
         /// The action.
         action: ActionId,
     },
-    /// A game to begin anew that there is not.
+    /// There is no such game to reset.
     #[error("there is no game {game}: the games are 0 to {last}")]
     NoGame {
-        /// What was named.
+        /// The game named.
         game: u32,
         /// The last game.
         last: u32,
     },
-    /// Games to begin anew in another order, or twice.
+    /// Games to reset are repeated or out of order.
     #[error("game {game} is named twice or out of order: name games ascending, each once")]
     Order {
-        /// What was named.
+        /// The game named.
         game: u32,
     },
-    /// The games that go on have become too long for their records. They have been moved, and are of no use any more.
+    /// Records of running games exceed the limit. The games have advanced and cannot be used any
+    /// more.
     #[error(
         "more than {MAX_KEPT} decisions and invalid attempts are kept of games that go on: play fewer or shorter games at a time, or without records"
     )]
     Kept,
 }
 
-/// Games of one owner.
+/// The games of one client.
 #[derive(Debug)]
 pub struct VectorGames {
     setup: VectorSetup,
     slots: Vec<Slot>,
-    /// The games of the rows of the last batch.
+    /// The games of the last batch's rows.
     open: Vec<u32>,
     totals: Totals,
     step: u64,
 }
 
 impl VectorGames {
-    /// Begins all games; the first batch comes with them.
+    /// Begins all games and returns the first batch.
     pub fn new(setup: VectorSetup) -> (VectorGames, Batch) {
         let mut games = VectorGames {
             slots: Vec::with_capacity(setup.games() as usize),
@@ -96,15 +95,16 @@ impl VectorGames {
         (games, batch)
     }
 
-    /// What the games were asked for with.
+    /// The options.
     pub fn setup(&self) -> &VectorSetup {
         &self.setup
     }
 
-    /// Takes a decision for each row of the last batch, in its order, and gives the next batch.
+    /// Takes one action for each row of the last batch, in order, and returns the next batch.
     ///
     /// # Errors
-    /// If there is not one action for each row, or one is illegal where that is an error.
+    /// If there is not one action for each row, an action is illegal where that is an error, or
+    /// records exceed the limit.
     pub fn step(&mut self, actions: &[ActionId]) -> Result<Batch, StepError> {
         if actions.len() != self.open.len() {
             return Err(StepError::Actions {
@@ -123,8 +123,8 @@ impl VectorGames {
             if let Some((_, action)) = answers.next_if(|(answered, _)| *answered == game) {
                 slot.answer(*action, &self.setup, &mut batch, &mut self.totals);
             }
-            slot.go_on(&self.setup, &mut batch, &mut self.totals, &mut budget);
-            if slot.put_row(&mut batch) {
+            slot.advance(&self.setup, &mut batch, &mut self.totals, &mut budget);
+            if slot.write_row(&mut batch) {
                 open.push(game);
             }
         }
@@ -136,7 +136,7 @@ impl VectorGames {
         Ok(self.finished(batch))
     }
 
-    /// Gives up all games and begins them anew: with other seeds from the first, without each with its next index.
+    /// Restarts all games: with new seeds from index 0, without each with its next index.
     pub fn reset(&mut self, seeds: Option<Seeds>) -> Batch {
         let Some(seeds) = seeds else {
             let all: Vec<u32> = (0..self.setup.games()).collect();
@@ -146,10 +146,11 @@ impl VectorGames {
         self.begin_all()
     }
 
-    /// Gives up some games, named ascending, and begins them anew, each with its next index. The batch lists all that wait.
+    /// Restarts some games, in ascending order, each with its next index. The batch contains all
+    /// open decisions.
     ///
     /// # Errors
-    /// If there is no such game, or the order is another.
+    /// If there is no such game, or the order is not ascending.
     pub fn reset_some(&mut self, games: &[u32]) -> Result<Batch, StepError> {
         let last = self.setup.games() - 1;
         if let Some(&game) = games.iter().find(|game| **game > last) {
@@ -161,7 +162,7 @@ impl VectorGames {
         Ok(self.begin_some(games))
     }
 
-    /// Begins some games, ascending, with their next indices.
+    /// Restarts some games, in ascending order, with their next indices.
     fn begin_some(&mut self, games: &[u32]) -> Batch {
         let mut batch = self.empty_batch();
         let mut budget = MAX_WORK_PER_STEP;
@@ -170,9 +171,9 @@ impl VectorGames {
         for (game, slot) in (0..).zip(&mut self.slots) {
             if anew.next_if_eq(&game).is_some() {
                 slot.begin_next(&self.setup, &mut batch);
-                slot.go_on(&self.setup, &mut batch, &mut self.totals, &mut budget);
+                slot.advance(&self.setup, &mut batch, &mut self.totals, &mut budget);
             }
-            if slot.put_row(&mut batch) {
+            if slot.write_row(&mut batch) {
                 self.open.push(game);
             }
         }
@@ -186,8 +187,8 @@ impl VectorGames {
         self.open.clear();
         for game in 0..self.setup.games() {
             let mut slot = Slot::new(game, &self.setup, &mut batch);
-            slot.go_on(&self.setup, &mut batch, &mut self.totals, &mut budget);
-            if slot.put_row(&mut batch) {
+            slot.advance(&self.setup, &mut batch, &mut self.totals, &mut budget);
+            if slot.write_row(&mut batch) {
                 self.open.push(game);
             }
             self.slots.push(slot);

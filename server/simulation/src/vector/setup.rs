@@ -1,4 +1,4 @@
-//! What games of one owner are asked for with, checked once. Who asks, and in which words, is decided elsewhere.
+//! Validated options of a vector environment.
 
 use std::num::{NonZeroU32, NonZeroU64};
 use std::sync::Arc;
@@ -6,10 +6,12 @@ use std::sync::Arc;
 use chefshat_engine::{BySeat, Game, RewardScheme, RuleSet, Script, ScriptError, Seat, Seed};
 use thiserror::Error;
 
-use super::MAX_SEATS_PLAYED;
 use chefshat_agents::{AgentKind, game_seed};
 
-/// What an episode is.
+/// Maximum number of seats of one client: games times its seats in each.
+pub const MAX_SEATS_PLAYED: u32 = 16_384;
+
+/// The scope of an episode.
 #[derive(Copy, Clone, Eq, PartialEq, Debug, Default)]
 pub enum Episode {
     /// A Shift.
@@ -19,38 +21,39 @@ pub enum Episode {
     Game,
 }
 
-/// Which decisions of its seats the owner takes.
+/// Which decisions of its seats the client takes.
 #[derive(Copy, Clone, Eq, PartialEq, Debug, Default)]
 pub enum Decisions {
     /// All.
     #[default]
     All,
-    /// Turns alone.
+    /// Only turns.
     Turns {
-        /// The agent that takes the others; without one the default decision is taken.
+        /// The agent for other decisions; `None` for the default decision.
         others: Option<AgentKind>,
     },
 }
 
-/// What becomes of an illegal action of the owner. A limit of attempts holds for built-in agents, too.
+/// How illegal actions of the client are handled. The limit of attempts applies to built-in agents
+/// too.
 #[derive(Copy, Clone, Eq, PartialEq, Debug, Default)]
 pub enum InvalidActions {
-    /// The step is refused.
+    /// The step fails.
     #[default]
     Error,
-    /// It is counted and rewarded as an invalid attempt, and asked again.
+    /// The action counts as an invalid attempt, and the decision is asked again.
     AskAgain {
-        /// Attempts after which the default decision is taken; `None`: never.
+        /// Attempts after which the default decision is taken; `None` for no limit.
         limit: Option<NonZeroU32>,
     },
 }
 
-/// Where the seeds of the games come from.
+/// The seeds of the games.
 #[derive(Clone, Eq, PartialEq, Debug)]
 pub enum Seeds {
-    /// Game i has seed i of this number ([`game_seed`]).
+    /// Game i has seed i of this base seed ([`game_seed`]).
     Base(u64),
-    /// Game i has the seed i modulo their number; not empty.
+    /// Game i has seed i modulo the length of the list, which is not empty.
     List(Arc<[Seed]>),
 }
 
@@ -63,24 +66,24 @@ impl Seeds {
     }
 }
 
-/// How each game begins.
+/// The start of each game.
 #[derive(Clone, Debug, Default)]
 pub enum Start {
-    /// With a deal.
+    /// A deal from the seed.
     #[default]
     Deal,
-    /// With these hands.
+    /// A scripted Shift.
     Script(Box<Script>),
-    /// As this game stands.
+    /// A copy of a running game.
     Point {
         /// The game.
         game: Box<Game>,
-        /// Whether the seed it has deals its later Shifts, too, and not each game's own.
+        /// Whether later Shifts are dealt from this game's seed instead of each game's own.
         same_deals: bool,
     },
 }
 
-/// What games of one owner are asked for with. Made by [`VectorSetup::new`] and changed by its `with_` methods.
+/// Options of a vector environment, created by [`VectorSetup::new`].
 #[derive(Clone, Debug)]
 pub struct VectorSetup {
     rules: RuleSet,
@@ -98,49 +101,50 @@ pub struct VectorSetup {
     records: bool,
 }
 
-/// Why games cannot be played.
+/// Why options are invalid.
 #[derive(Clone, Eq, PartialEq, Debug, Error)]
 pub enum SetupError {
-    /// Not one entry for each seat.
+    /// The number of entries is not the number of seats.
     #[error("{given} seats are filled, but {players} play")]
     Seats {
         /// Entries given.
         given: usize,
-        /// Seats there are.
+        /// Seats of the rule set.
         players: usize,
     },
-    /// No seat of the owner.
+    /// The client has no seat.
     #[error("the client plays no seat: give it at least one")]
     NoClient,
-    /// No games, or too many.
+    /// The number of games is 0 or too large.
     #[error(
         "{games} games with {seats} of the client's seats: play at least 1 game, and at most {MAX_SEATS_PLAYED} games times seats"
     )]
     Games {
         /// Games asked for.
         games: u32,
-        /// Seats of the owner.
+        /// Seats of the client in each.
         seats: usize,
     },
-    /// Fewer games in all than at a time.
+    /// The total number of games is below the number of parallel games.
     #[error("{total} games in all are fewer than the {games} that are played side by side")]
     Total {
-        /// Games in all.
+        /// Total number of games.
         total: u64,
-        /// Games at a time.
+        /// Parallel games.
         games: u32,
     },
-    /// No seeds.
+    /// The list of seeds is empty.
     #[error("the list of seeds is empty: give at least one")]
     NoSeeds,
-    /// Hands that do not make a game.
+    /// The script is invalid.
     #[error("{0}")]
     Script(#[from] ScriptError),
 }
 
 impl VectorSetup {
-    /// So many games side by side, `agents` on the seats that the owner does not play. Standard in all else: no rewards, an episode is a
-    /// Shift, the owner takes all decisions, an illegal action is an error, games are followed by others without end.
+    /// Options for `games` parallel games with `agents` on the seats that the client does not play.
+    /// By default there are no rewards, an episode is a Shift, the client takes all decisions, an
+    /// illegal action is an error, and the number of games is unlimited.
     ///
     /// # Errors
     /// If the numbers of games or seats are out of range.
@@ -185,22 +189,22 @@ impl VectorSetup {
         })
     }
 
-    /// The same, turns rewarded by a scheme.
+    /// Rewards turns by a scheme.
     pub fn with_rewards(self, scheme: Option<RewardScheme>) -> VectorSetup {
         VectorSetup { scheme, ..self }
     }
 
-    /// The same with another episode.
+    /// Sets the scope of an episode.
     pub fn with_episode(self, episode: Episode) -> VectorSetup {
         VectorSetup { episode, ..self }
     }
 
-    /// The same; the owner takes these decisions.
+    /// Sets which decisions the client takes.
     pub fn with_decisions(self, decisions: Decisions) -> VectorSetup {
         VectorSetup { decisions, ..self }
     }
 
-    /// The same; whether decisions with one legal action are taken without asking.
+    /// Sets whether decisions with one legal action are taken without asking.
     pub fn with_skip_forced(self, skip_forced: bool) -> VectorSetup {
         VectorSetup {
             skip_forced,
@@ -208,15 +212,15 @@ impl VectorSetup {
         }
     }
 
-    /// The same with another rule for illegal actions.
+    /// Sets how illegal actions are handled.
     pub fn with_invalid_actions(self, invalid: InvalidActions) -> VectorSetup {
         VectorSetup { invalid, ..self }
     }
 
-    /// The same; so many games are played in all.
+    /// Sets the total number of games.
     ///
     /// # Errors
-    /// If they are fewer than are played side by side.
+    /// If it is below the number of parallel games.
     pub fn with_total_games(self, total: Option<NonZeroU64>) -> Result<VectorSetup, SetupError> {
         match total {
             Some(total) if total.get() < u64::from(self.games) => Err(SetupError::Total {
@@ -230,15 +234,15 @@ impl VectorSetup {
         }
     }
 
-    /// The same with other seeds.
+    /// Sets the seeds.
     pub fn with_seeds(self, seeds: Seeds) -> VectorSetup {
         VectorSetup { seeds, ..self }
     }
 
-    /// The same, begun otherwise.
+    /// Sets the start of each game.
     ///
     /// # Errors
-    /// If the hands do not make a game of the rule set.
+    /// If a script is invalid under the rule set.
     pub fn with_start(self, start: Start) -> Result<VectorSetup, SetupError> {
         if let Start::Script(script) = &start {
             Game::scripted(self.rules, Seed([0; 32]), script, |_| {})?;
@@ -246,12 +250,12 @@ impl VectorSetup {
         Ok(VectorSetup { start, ..self })
     }
 
-    /// The same; whether batches tell of the Shifts that ended.
+    /// Sets whether batches contain the Shifts that ended.
     pub fn with_statistics(self, statistics: bool) -> VectorSetup {
         VectorSetup { statistics, ..self }
     }
 
-    /// The same; whether the decisions of games are kept until they end.
+    /// Sets whether decisions are kept for records.
     pub fn with_records(self, records: bool) -> VectorSetup {
         VectorSetup { records, ..self }
     }
@@ -261,17 +265,17 @@ impl VectorSetup {
         &self.rules
     }
 
-    /// Games side by side.
+    /// Number of parallel games.
     pub fn games(&self) -> u32 {
         self.games
     }
 
-    /// The built-in agents by seat; `None` where the owner plays.
+    /// The built-in agents by seat; `None` where the client plays.
     pub fn agents(&self) -> &BySeat<Option<AgentKind>> {
         &self.agents
     }
 
-    /// The seats of the owner, ascending.
+    /// The seats of the client, ascending.
     pub fn client_seats(&self) -> impl Iterator<Item = Seat> + '_ {
         self.agents
             .iter()
@@ -279,17 +283,17 @@ impl VectorSetup {
             .map(|(seat, _)| seat)
     }
 
-    /// The scheme of rewards, if there is one.
+    /// The reward scheme, if any.
     pub fn scheme(&self) -> Option<RewardScheme> {
         self.scheme
     }
 
-    /// What an episode is.
+    /// The scope of an episode.
     pub fn episode(&self) -> Episode {
         self.episode
     }
 
-    /// Which decisions the owner takes.
+    /// Which decisions the client takes.
     pub fn decisions(&self) -> Decisions {
         self.decisions
     }
@@ -299,21 +303,21 @@ impl VectorSetup {
         self.skip_forced
     }
 
-    /// What becomes of an illegal action.
+    /// How illegal actions are handled.
     pub fn invalid_actions(&self) -> InvalidActions {
         self.invalid
     }
 
-    /// Invalid attempts at one decision after which the default is taken, by agents of any kind; the largest number where there is no
-    /// limit.
-    pub(super) fn max_invalid_attempts(&self) -> u32 {
+    /// Invalid attempts at one decision after which the default decision is taken, for agents of
+    /// any kind; `None` for no limit.
+    pub(super) fn max_invalid_attempts(&self) -> Option<NonZeroU32> {
         match self.invalid {
-            InvalidActions::AskAgain { limit: Some(limit) } => limit.get(),
-            InvalidActions::AskAgain { limit: None } | InvalidActions::Error => u32::MAX,
+            InvalidActions::AskAgain { limit } => limit,
+            InvalidActions::Error => None,
         }
     }
 
-    /// Whether batches tell of the Shifts that ended.
+    /// Whether batches contain the Shifts that ended.
     pub fn statistics(&self) -> bool {
         self.statistics
     }
@@ -323,12 +327,12 @@ impl VectorSetup {
         self.records
     }
 
-    /// Where the seeds come from.
+    /// The seeds of the games.
     pub fn seeds(&self) -> &Seeds {
         &self.seeds
     }
 
-    /// Whether there is a game of this index.
+    /// Whether there is a game with this index.
     pub(super) fn has_game(&self, index: u64) -> bool {
         self.total_games.is_none_or(|total| index < total.get())
     }
@@ -338,7 +342,7 @@ impl VectorSetup {
         self.seeds.of(index)
     }
 
-    /// A game of this seed at its beginning.
+    /// A game with this seed at its start.
     pub(super) fn begin(&self, seed: Seed) -> Game {
         match &self.start {
             Start::Deal => Game::new(self.rules, seed, |_| {}),

@@ -1,5 +1,5 @@
-//! One game of an owner: taking the owner's answers, letting built-in agents go on until the owner has to decide, and what that brings in
-//! rewards, ended episodes and counts. Several games together, and the form of what is told, are decided beside this.
+//! One game of a vector environment: takes the client's actions, advances the game with built-in
+//! agents to the client's next decision, and writes rewards, ended episodes and counts.
 
 use chefshat_engine::{
     Action, ActionId, BySeat, Decision, Event, Game, MAX_SEATS, Mask, MetricsRecorder, Seat, Seed,
@@ -7,49 +7,39 @@ use chefshat_engine::{
 };
 
 use super::columns::{Batch, Ending, Row, Totals, places_taken};
-use super::{Decisions, Episode, MAX_SHIFTS_PER_STEP, VectorSetup};
-use chefshat_agents::is_wrong_action;
-use chefshat_agents::{AgentKind, BuiltInAgent, agent_seed};
+use super::{Decisions, Episode, VectorSetup};
+use chefshat_agents::{AgentKind, BuiltInAgent, agent_seed, ask, is_wrong_action};
 use chefshat_engine::PlayedDecision;
 
-/// A game that ended, with all its decisions.
-#[derive(Clone, Eq, PartialEq, Debug)]
-pub struct PlayedGame {
-    /// The game, from 0.
-    pub game: u32,
-    /// Its index.
-    pub index: u64,
-    /// Its seed.
-    pub seed: Seed,
-    /// Its decisions.
-    pub decisions: Vec<PlayedDecision>,
-}
+/// Maximum number of Shifts that end in one game within one step, not counting one that the
+/// client's action ends.
+const MAX_SHIFTS_PER_STEP: u64 = 2;
 
-/// One game and the games that follow it.
+/// A sequence of games with the same number.
 #[derive(Debug)]
 pub(super) struct Slot {
     number: u32,
     index: u64,
-    /// `None` when it is over and none follows.
-    table: Option<Table>,
+    /// `None` once the last game is over.
+    running: Option<RunningGame>,
 }
 
 /// A game being played.
 #[derive(Debug)]
-struct Table {
+struct RunningGame {
     seed: Seed,
     game: Game,
-    /// Those of the owner's seats take the decisions that the owner does not.
+    /// Agents by seat. On the client's seats they take the decisions that the client does not.
     agents: [Option<BuiltInAgent>; MAX_SEATS],
-    /// Counts what Shifts say, if that is asked for.
+    /// Collects statistics of Shifts, if enabled.
     recorder: Option<MetricsRecorder>,
     /// Rewards since each seat last decided.
     rewards: BySeat<f32>,
-    /// The decision that waits for the owner.
+    /// The decision open for the client.
     open: Option<Open>,
-    /// What happened by the last decision.
+    /// The events of the last decision.
     events: Vec<Event>,
-    /// Attempts at the decision being taken, if they are kept.
+    /// Invalid attempts at the current decision, if records are enabled.
     attempts: Vec<ActionId>,
     decisions: Vec<PlayedDecision>,
     /// Number of decisions and attempts in `decisions`.
@@ -61,25 +51,25 @@ struct Open {
     decision: Decision,
     legal: Mask,
     attempts: u32,
-    /// What the row says of rewards, as long as nothing is answered.
+    /// The rewards shown in the row, until the client answers.
     reward: f32,
 }
 
 impl Slot {
-    /// The first game of a number.
+    /// Begins the first game.
     pub(super) fn new(number: u32, setup: &VectorSetup, batch: &mut Batch) -> Slot {
         let mut slot = Slot {
             number,
             index: u64::from(number),
-            table: None,
+            running: None,
         };
         slot.begin(setup, batch);
         slot
     }
 
-    /// Leaves the game, ended or given up, for the next of its indices, if that is among those to be played in all.
+    /// Ends or abandons the game and begins the one with the next index, if there is one.
     pub(super) fn begin_next(&mut self, setup: &VectorSetup, batch: &mut Batch) {
-        self.table = None;
+        self.running = None;
         let next = self.index + u64::from(setup.games());
         if setup.has_game(next) {
             self.index = next;
@@ -88,30 +78,30 @@ impl Slot {
     }
 
     fn begin(&mut self, setup: &VectorSetup, batch: &mut Batch) {
-        let table = Table::new(setup, setup.game_seed(self.index));
+        let running = RunningGame::new(setup, setup.game_seed(self.index));
         batch
             .beginnings
-            .push(self.number, self.index, &table.seed.0);
-        self.table = Some(table);
+            .push(self.number, self.index, &running.seed.0);
+        self.running = Some(running);
     }
 
-    /// Whether the game is over and none follows.
+    /// Whether the last game is over.
     pub(super) fn is_over(&self) -> bool {
-        self.table.is_none()
+        self.running.is_none()
     }
 
-    /// Decisions and attempts that are kept of the game.
+    /// Number of decisions and attempts kept of the game.
     pub(super) fn kept(&self) -> u64 {
-        self.table.as_ref().map_or(0, |table| table.kept)
+        self.running.as_ref().map_or(0, |running| running.kept)
     }
 
-    /// The seat whose open decision does not allow this action.
+    /// The seat of the open decision, if the action is illegal there.
     pub(super) fn refuses(&self, action: ActionId) -> Option<Seat> {
-        let open = self.table.as_ref()?.open.as_ref()?;
+        let open = self.running.as_ref()?.open.as_ref()?;
         (!open.legal.contains(action)).then_some(open.decision.seat)
     }
 
-    /// Takes the owner's answer to the open decision.
+    /// Applies the client's action to the open decision.
     pub(super) fn answer(
         &mut self,
         action: ActionId,
@@ -119,8 +109,12 @@ impl Slot {
         batch: &mut Batch,
         totals: &mut Totals,
     ) {
-        let Some(table) = &mut self.table else { return };
-        let Some(open) = &mut table.open else { return };
+        let Some(running) = &mut self.running else {
+            return;
+        };
+        let Some(open) = &mut running.open else {
+            return;
+        };
         let (decision, legal) = (open.decision, &open.legal);
         let mut taken = action;
         if !legal.contains(action) {
@@ -128,23 +122,24 @@ impl Slot {
             open.reward = 0.0;
             let attempts = open.attempts;
             totals.invalid_attempts += 1;
-            table.refuse(setup, decision, action);
-            if attempts < setup.max_invalid_attempts() {
+            running.refuse(setup, decision, action);
+            let limit = setup.max_invalid_attempts();
+            if limit.is_none_or(|limit| attempts < limit.get()) {
                 return;
             }
-            taken = table
+            taken = running
                 .game
                 .default_action()
                 .expect("an open decision has a default");
         }
-        table.open = None;
+        running.open = None;
         totals.client_decisions += 1;
         self.take(taken, taken != action, setup, batch, totals);
     }
 
-    /// Goes on until the owner has to decide, the game is over and none follows, or the step is long enough. Decisions and attempts of
-    /// built-in agents are taken off `budget`.
-    pub(super) fn go_on(
+    /// Advances until the client has to decide, the last game is over, or the step's limit is
+    /// reached. Decisions and attempts of built-in agents count against `budget`.
+    pub(super) fn advance(
         &mut self,
         setup: &VectorSetup,
         batch: &mut Batch,
@@ -153,15 +148,17 @@ impl Slot {
     ) {
         let shifts_before = totals.shifts;
         while *budget > 0 && totals.shifts - shifts_before < MAX_SHIFTS_PER_STEP {
-            let Some(table) = &mut self.table else { return };
-            if table.open.is_some() {
+            let Some(running) = &mut self.running else {
+                return;
+            };
+            if running.open.is_some() {
                 return;
             }
-            let Some(decision) = table.game.decision() else {
-                self.follow(setup, batch);
+            let Some(decision) = running.game.decision() else {
+                self.finish(setup, batch);
                 continue;
             };
-            if let Some((action, by_default)) = table.built_in_action(setup, decision, budget) {
+            if let Some((action, by_default)) = running.built_in_action(setup, decision, budget) {
                 self.take(action, by_default, setup, batch, totals);
             } else {
                 return;
@@ -169,28 +166,28 @@ impl Slot {
         }
     }
 
-    /// Writes the row of the open decision, if there is one.
-    pub(super) fn put_row(&mut self, batch: &mut Batch) -> bool {
-        let Some(table) = &mut self.table else {
+    /// Writes the row of the open decision. Returns whether there is one.
+    pub(super) fn write_row(&mut self, batch: &mut Batch) -> bool {
+        let Some(running) = &mut self.running else {
             return false;
         };
-        let Some(open) = &mut table.open else {
+        let Some(open) = &mut running.open else {
             return false;
         };
         let seat = open.decision.seat;
-        open.reward += std::mem::take(&mut table.rewards[seat]);
+        open.reward += std::mem::take(&mut running.rewards[seat]);
         batch.push(&Row {
             game: self.number,
             seat,
             attempts: open.attempts,
             reward: open.reward,
-            observation: &table.game.observe(Viewer::Seat(seat)),
+            observation: &running.game.observe(Viewer::Seat(seat)),
             legal: &open.legal,
         });
         true
     }
 
-    /// Takes a legal action and tells what it brought.
+    /// Applies a legal action and records its effects.
     fn take(
         &mut self,
         action: ActionId,
@@ -199,34 +196,35 @@ impl Slot {
         batch: &mut Batch,
         totals: &mut Totals,
     ) {
-        let table = self.table.as_mut().expect("a game is being played");
+        let running = self.running.as_mut().expect("a game is being played");
         totals.decisions += 1;
         if setup.keeps_records() {
-            table.kept += 1 + table.attempts.len() as u64;
-            table.decisions.push(PlayedDecision {
+            running.kept += 1 + running.attempts.len() as u64;
+            running.decisions.push(PlayedDecision {
                 action,
-                attempts: std::mem::take(&mut table.attempts),
+                attempts: std::mem::take(&mut running.attempts),
                 by_default,
             });
         }
-        // Where the Shift may end the seats' last view of it is wanted, which the next deal wipes away.
-        let closing = table
+        // If the Shift may end, keep a copy for the final observations, which the next deal would
+        // overwrite.
+        let closing = running
             .may_end_shift(action)
-            .then(|| table.game.closing_copy());
-        table.events.clear();
-        table
+            .then(|| running.game.closing_copy());
+        running.events.clear();
+        running
             .game
-            .apply(action, |event| table.events.push(event))
+            .apply(action, |event| running.events.push(event))
             .expect("an action of the mask is legal");
         if let Some(scheme) = setup.scheme() {
-            scheme.of_events(setup.rules(), &table.events, |seat, reward, _| {
-                table.rewards[seat] += reward;
+            scheme.of_events(setup.rules(), &running.events, |seat, reward, _| {
+                running.rewards[seat] += reward;
             });
         }
-        let standings = table.game.standings();
-        if let Some(recorder) = &mut table.recorder {
+        let standings = running.game.standings();
+        if let Some(recorder) = &mut running.recorder {
             let winner = standings.as_ref().map(Standings::winner);
-            let shifts = table
+            let shifts = running
                 .events
                 .iter()
                 .filter_map(|event| recorder.on_event(event));
@@ -234,11 +232,11 @@ impl Slot {
                 batch.shifts.push(self.number, self.index, &shift, winner);
             }
         }
-        let end = table.events.iter().find_map(|event| match event {
-            Event::ShiftEnded(end) => Some((end.order, end.adjudicated)),
+        let end = running.events.iter().find_map(|event| match event {
+            Event::ShiftEnded(end) => Some(end.order),
             _ => None,
         });
-        let Some((order, adjudicated)) = end else {
+        let Some(order) = end else {
             return;
         };
         totals.shifts += 1;
@@ -255,8 +253,7 @@ impl Slot {
                     game: self.number,
                     index: self.index,
                     seat,
-                    reward: std::mem::take(&mut table.rewards[seat]),
-                    cut_short: adjudicated,
+                    reward: std::mem::take(&mut running.rewards[seat]),
                     game_over: standings.is_some(),
                     place: places[seat],
                     observation: &closing.observe(Viewer::Seat(seat)),
@@ -265,38 +262,38 @@ impl Slot {
         }
     }
 
-    /// After the end of a game: the next one, if one follows.
-    fn follow(&mut self, setup: &VectorSetup, batch: &mut Batch) {
+    /// Ends a finished game and begins the next one, if there is one.
+    fn finish(&mut self, setup: &VectorSetup, batch: &mut Batch) {
         if setup.keeps_records()
-            && let Some(table) = &mut self.table
+            && let Some(running) = &mut self.running
         {
             batch.played.push(PlayedGame {
                 game: self.number,
                 index: self.index,
-                seed: table.seed,
-                decisions: std::mem::take(&mut table.decisions),
+                seed: running.seed,
+                decisions: std::mem::take(&mut running.decisions),
             });
         }
         self.begin_next(setup, batch);
     }
 }
 
-impl Table {
-    fn new(setup: &VectorSetup, seed: Seed) -> Table {
+impl RunningGame {
+    fn new(setup: &VectorSetup, seed: Seed) -> RunningGame {
         let game = setup.begin(seed);
         let players = setup.rules().players();
         let others = match setup.decisions() {
             Decisions::All | Decisions::Turns { others: None } => None,
             Decisions::Turns { others } => others,
         };
-        // An array, because agents with their generators are no values to copy by seat.
+        // An array, because agents with their generators are not `Copy`.
         let agents = std::array::from_fn(|index| {
             let seat = Seat::new(index);
             let kind: Option<AgentKind> =
                 setup.agents().get(seat).and_then(|agent| agent.or(others));
             kind.map(|kind| BuiltInAgent::new(kind, agent_seed(seed, seat)))
         });
-        Table {
+        RunningGame {
             seed,
             recorder: setup
                 .statistics()
@@ -312,8 +309,8 @@ impl Table {
         }
     }
 
-    /// What is decided here without the owner, and whether it is the default after invalid attempts; `None`, the decision now being open,
-    /// where the owner is to decide.
+    /// Takes a decision without the client: the action, and whether it is the default after invalid
+    /// attempts. Opens the decision and returns `None` if it is the client's.
     fn built_in_action(
         &mut self,
         setup: &VectorSetup,
@@ -343,26 +340,28 @@ impl Table {
             return self.game.default_action().map(|action| (action, false));
         };
         let legal = self.game.legal_actions();
-        let seen = self.game.observe(Viewer::Seat(seat));
-        for _ in 0..setup.max_invalid_attempts() {
-            let action = agent.decide(&seen, &legal);
-            if legal.contains(action) {
-                return Some((action, false));
-            }
-            if let Some(recorder) = &mut self.recorder
-                && is_wrong_action(decision)
-            {
-                recorder.wrong(seat);
-            }
-            *budget = budget.saturating_sub(1);
-            if setup.keeps_records() {
-                self.attempts.push(action);
-            }
-        }
-        self.game.default_action().map(|action| (action, true))
+        let answer = ask(
+            &self.game,
+            seat,
+            &legal,
+            setup.max_invalid_attempts(),
+            |observation| agent.decide(observation, &legal),
+            |action| {
+                if let Some(recorder) = &mut self.recorder
+                    && is_wrong_action(decision)
+                {
+                    recorder.wrong(seat);
+                }
+                *budget = budget.saturating_sub(1);
+                if setup.keeps_records() {
+                    self.attempts.push(action);
+                }
+            },
+        );
+        Some((answer.action, answer.by_default))
     }
 
-    /// An attempt of the owner that is not legal.
+    /// Records an illegal action of the client.
     fn refuse(&mut self, setup: &VectorSetup, decision: Decision, action: ActionId) {
         if is_wrong_action(decision) {
             if let Some(recorder) = &mut self.recorder {
@@ -377,7 +376,8 @@ impl Table {
         }
     }
 
-    /// Whether this action may be the Shift's last: it reaches the limit of turns, or leaves one seat with cards.
+    /// Whether this action may end the Shift: it reaches the limit of turns, or leaves one seat
+    /// with cards.
     fn may_end_shift(&self, action: ActionId) -> bool {
         let rules = self.game.rules();
         if self.game.shift_turns() + 1 >= rules.max_turns() {

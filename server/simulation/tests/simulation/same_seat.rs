@@ -2,20 +2,20 @@
 
 use chefshat_agents::AgentKind;
 use chefshat_engine::{RuleSetSpec, Stop};
-use chefshat_simulation::{Contender, Measured, Newcomer, SameSeat};
+use chefshat_simulation::{Candidate, Contender, Measured, SameSeat};
 
-fn measured(slips: [u8; 2], seed: u64, games: &[u64]) -> Vec<Measured> {
+fn measured(random_percent: [u8; 2], seed: u64, games: &[u64]) -> Vec<Measured> {
     let spec = RuleSetSpec {
         stop: Stop::Shifts(1),
         ..RuleSetSpec::default()
     };
-    let newcomer = |slips_percent| Newcomer {
+    let candidate = |percent: u8| Candidate {
         plays: Contender::Kind(AgentKind::Greedy),
-        slips_percent,
+        epsilon: f64::from(percent) / 100.0,
     };
     let same_seat = SameSeat {
         rules: spec.validate().unwrap(),
-        newcomers: slips.map(newcomer),
+        candidates: random_percent.map(candidate),
         others: Contender::Kind(AgentKind::Greedy),
         seed,
     };

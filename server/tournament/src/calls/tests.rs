@@ -75,21 +75,26 @@ struct Scan {
 }
 
 impl Scan {
-    fn next(&mut self, course: &Course, floor: &Floor, now_ms: u64) -> Option<Change> {
-        let settings = &course.settings;
-        if course.state != State::Playing {
+    fn next(
+        &mut self,
+        state: &TournamentState,
+        scheduler: &Scheduler,
+        now_ms: u64,
+    ) -> Option<Change> {
+        let settings = &state.settings;
+        if state.phase != State::Playing {
             return None;
         }
-        if course.is_round_over() {
+        if state.is_round_over() {
             return Some(Change::Finished);
         }
-        if course.playing.len() >= settings.max_parallel {
+        if state.playing.len() >= settings.max_parallel {
             self.waits.clear();
             return None;
         }
-        for &(_, index) in &course.due {
-            let game = &course.games[index];
-            match readiness(course, floor, game) {
+        for &(_, index) in &state.due {
+            let game = &state.games[index];
+            match readiness(state, scheduler, game) {
                 Readiness::Busy(_) => drop(self.waits.remove(&index)),
                 Readiness::Ready(forfeited) => return Some(called(index, game, forfeited)),
                 Readiness::Missing(missing) => {
@@ -98,10 +103,10 @@ impl Scan {
                         continue;
                     }
                     let game = index;
-                    return Some(if course.games[game].calls + 1 < settings.max_calls {
+                    return Some(if state.games[game].calls + 1 < settings.max_calls {
                         Change::Rescheduled { game, missing }
                     } else {
-                        called(game, &course.games[game], missing)
+                        called(game, &state.games[game], missing)
                     });
                 }
             }
@@ -118,9 +123,9 @@ impl Scan {
         }
     }
 
-    fn wake_at(&self, course: &Course) -> Option<u64> {
+    fn wake_at(&self, state: &TournamentState) -> Option<u64> {
         let since = self.waits.values().min()?;
-        Some(since + course.settings.no_show_ms)
+        Some(since + state.settings.no_show_ms)
     }
 }
 
@@ -145,7 +150,7 @@ fn compare(seed: u8) -> (usize, BTreeMap<&'static str, usize>) {
     let mut happened = BTreeMap::new();
     while tournament.state() == State::Playing {
         loop {
-            let expected = scan.next(&tournament.course, &tournament.floor, now_ms);
+            let expected = scan.next(&tournament.state, &tournament.scheduler, now_ms);
             let next = tournament.next(now_ms);
             assert_eq!(next, expected, "seed {seed}, {now_ms} ms");
             asked += 1;
@@ -162,16 +167,18 @@ fn compare(seed: u8) -> (usize, BTreeMap<&'static str, usize>) {
             scan.fold(&change);
         }
         let wake_at = tournament.wake_at();
-        assert_eq!(wake_at, scan.wake_at(&tournament.course), "seed {seed}");
+        assert_eq!(wake_at, scan.wake_at(&tournament.state), "seed {seed}");
         now_ms += chance.below(700) as u64;
         for _ in 0..chance.below(4) {
             let who = chance.below(participants);
             // Mostly there, but for the first, who comes seldom.
             let present = chance.below(8) >= if who == 0 { 7 } else { 2 };
             tournament.set_present(who, present);
-            let Tournament { course, floor, .. } = &tournament;
-            let is_there = |who: &usize| floor.is_present(course, *who);
-            (scan.waits).retain(|&game, _| !course.games[game].seats.iter().all(is_there));
+            let Tournament {
+                state, scheduler, ..
+            } = &tournament;
+            let is_there = |who: &usize| scheduler.is_present(state, *who);
+            (scan.waits).retain(|&game, _| !state.games[game].seats.iter().all(is_there));
         }
         let playing: Vec<usize> = tournament.playing().collect();
         for game in playing {
@@ -228,7 +235,7 @@ fn few_games_are_looked_at_when_one_has_ended() {
     follow(&mut tournament, 0);
     let games = tournament.games().len() as u64;
     assert_eq!(games, 5000);
-    assert!(tournament.floor.looks < 2 * games);
+    assert!(tournament.scheduler.checks < 2 * games);
     // One after the other, the one that was called first ends first.
     loop {
         let Some(game) = tournament.playing().next() else {
@@ -238,8 +245,8 @@ fn few_games_are_looked_at_when_one_has_ended() {
         follow(&mut tournament, 0);
     }
     assert_eq!(tournament.state(), State::Finished);
-    let looks = tournament.floor.looks;
-    assert!(looks < 40 * games, "{looks}");
+    let checks = tournament.scheduler.checks;
+    assert!(checks < 40 * games, "{checks}");
 }
 
 #[test]
@@ -247,17 +254,17 @@ fn few_games_are_looked_at_while_everybody_is_away() {
     let mut tournament = drawn(400, 50);
     let games = tournament.games().len() as u64;
     assert_eq!(follow(&mut tournament, 0), 0);
-    assert_eq!(tournament.floor.looks, games);
+    assert_eq!(tournament.scheduler.checks, games);
     for now_ms in 1..100 {
         assert_eq!(follow(&mut tournament, now_ms), 0);
     }
-    assert_eq!(tournament.floor.looks, games, "nothing has happened");
+    assert_eq!(tournament.scheduler.checks, games, "nothing has happened");
     tournament.set_present(0, true);
     assert_eq!(follow(&mut tournament, 100), 0);
-    assert_eq!(tournament.floor.looks, games + 50, "only its own");
+    assert_eq!(tournament.scheduler.checks, games + 50, "only its own");
     // Called again, then given up.
     assert_eq!(follow(&mut tournament, 1000) as u64, games);
     assert_eq!(follow(&mut tournament, 2000) as u64, games - 49);
-    let looks = tournament.floor.looks;
-    assert!(looks < 8 * games, "{looks}");
+    let checks = tournament.scheduler.checks;
+    assert!(checks < 8 * games, "{checks}");
 }

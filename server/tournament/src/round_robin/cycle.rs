@@ -1,28 +1,29 @@
-//! A round that becomes a round robin by moving its participants on, one number at a time: whoever is p in one round is p + 1 in the
-//! next, modulo the number of rounds. Two participants then meet as often as their difference occurs at a table of the first round, so the
-//! search is for one round in which every difference occurs equally often. (Whist tournaments have been made so for long.)
+//! A round that generates a round robin by shifting: participant p of one round becomes p + 1 in
+//! the next, modulo the number of rounds. Two participants then meet as often as their difference
+//! occurs at a table of the first round, so the search is for a round in which every difference
+//! occurs equally often. Whist tournaments use the same construction.
 
 use super::super::chance::Chance;
 
-/// Exchanges that are tried at most to find the first round.
+/// Maximum number of swaps tried.
 const MAX_TRIES: usize = 1_500_000;
-/// The same for fields so large that an equal cycle is hardly ever found.
+/// The same for fields too large for a perfectly even cycle.
 const FEW_TRIES: usize = 200_000;
-/// Participants of the largest field for which it is.
+/// Largest field for which a perfectly even cycle is likely.
 const MAX_FIELD: usize = 40;
-/// Steps that an exchange is compared back over.
+/// Length of the history of the late-acceptance search.
 const MEMORY: usize = 300;
 
-/// A first round, by table, those who sit out last.
+/// The first round: participants by table, then those with a bye.
 pub(super) struct Cycle {
     first: Vec<usize>,
-    /// Participants that move on; if everybody has a table the last one stays, which makes their number one less.
+    /// Number of participants that shift. Without byes the last one stays in place.
     modulus: usize,
     is_equal: bool,
 }
 
 impl Cycle {
-    /// Rounds until all is as it was.
+    /// Number of rounds until the cycle repeats.
     pub(super) fn rounds(&self) -> usize {
         self.modulus
     }
@@ -32,7 +33,7 @@ impl Cycle {
         self.is_equal
     }
 
-    /// A round, from 0; after a cycle they begin again.
+    /// A round, from 0; repeats after a cycle.
     pub(super) fn round(&self, round: usize) -> Vec<usize> {
         let moved = |&number: &usize| {
             if number < self.modulus {
@@ -45,7 +46,8 @@ impl Cycle {
     }
 }
 
-/// Searches for the first round (by late acceptance: an exchange is kept if it is not worse than what stood some steps before).
+/// Searches for the first round by late acceptance: a swap is kept if the cost is not above the
+/// cost some steps before.
 pub(super) fn find(participants: usize, seats: usize, chance: &mut Chance) -> Cycle {
     let seated = participants / seats * seats;
     let modulus = participants - usize::from(seated == participants);
@@ -98,28 +100,29 @@ pub(super) fn find(participants: usize, seats: usize, chance: &mut Chance) -> Cy
 struct Differences {
     modulus: usize,
     seats: usize,
-    /// Places at tables; those behind them sit out.
+    /// Number of places at tables; the others are byes.
     seated: usize,
-    /// By difference, the shorter way round.
+    /// By difference, modulo the cycle, in the shorter direction.
     times: Vec<i64>,
-    /// Sum of the squares of how often each two meet in a cycle, for each difference once.
+    /// Sum of the squares of the meetings of two participants, once for each difference.
     cost: i64,
 }
 
 impl Differences {
-    /// The table of a place; all who sit out are of one.
+    /// The table of a place; all byes share one.
     fn table_of(&self, place: usize) -> usize {
         place.min(self.seated) / self.seats
     }
 
-    /// The difference of two, unless one of them stays, who meets all others equally often.
+    /// The difference of two participants; `None` if one of them stays, who meets all others
+    /// equally often.
     fn between(&self, a: usize, b: usize) -> Option<usize> {
         let moving = a < self.modulus && b < self.modulus;
         let difference = a.abs_diff(b);
         moving.then(|| difference.min(self.modulus - difference))
     }
 
-    /// A difference of half the way round belongs to half as many pairs, which meet twice as often for it.
+    /// A difference of half the cycle belongs to half as many pairs, which meet twice as often.
     fn weight(&self, difference: usize) -> i64 {
         1 + i64::from(2 * difference == self.modulus)
     }
@@ -158,14 +161,14 @@ impl Differences {
         }
     }
 
-    /// The other places of a table; none for those who sit out.
+    /// The other places of a table; none for a bye.
     fn neighbours(&self, place: usize) -> impl Iterator<Item = usize> + use<> {
         let table = self.table_of(place);
         let places = table * self.seats..((table + 1) * self.seats).min(self.seated);
         places.filter(move |&other| other != place)
     }
 
-    /// How much more often some two meet in a cycle than some other two.
+    /// Difference between the most and the fewest meetings of two participants in a cycle.
     fn spread(&self) -> i64 {
         let meetings = || (1..self.times.len()).map(|d| self.times[d] * self.weight(d));
         let (least, most) = (meetings().min(), meetings().max());

@@ -220,3 +220,24 @@ fn a_shift_joined_midway_counts_its_seats_from_there() {
         assert!((sum - told).abs() < 1e-4, "{sum} {told}");
     }
 }
+
+#[test]
+fn an_adjudicated_shift_awards_places_so_its_episode_is_finished() {
+    let spec = RuleSetSpec {
+        stop: Stop::Shifts(2),
+        max_turns: 3,
+        ..RuleSetSpec::default()
+    };
+    let setup = VectorSetup::new(spec.validate().unwrap(), 1, &[None; 4], Seeds::Base(3))
+        .unwrap()
+        .with_statistics(true);
+    let (mut games, mut batch) = VectorGames::new(setup);
+    while batch.endings.rows == 0 {
+        batch = games.step(&some_actions(&batch)).unwrap();
+    }
+    assert_eq!(batch.shifts.adjudicated, [1]);
+    assert_eq!(batch.endings.ends, [1; 4]);
+    let mut places = batch.endings.places_taken.clone();
+    places.sort_unstable();
+    assert_eq!(places, [1, 2, 3, 4]);
+}

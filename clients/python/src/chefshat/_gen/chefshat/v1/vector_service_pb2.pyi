@@ -120,9 +120,9 @@ class _EpisodeEndEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_EpisodeEnd
     EPISODE_END_UNSPECIFIED: _EpisodeEnd.ValueType  # 0
     """Not set."""
     EPISODE_END_FINISHED: _EpisodeEnd.ValueType  # 1
-    """By the rules of the game."""
+    """Every seat has a place, also if the last Shift was adjudicated at the limit of turns."""
     EPISODE_END_CUT_SHORT: _EpisodeEnd.ValueType  # 2
-    """Its last Shift reached the limit of turns and was adjudicated."""
+    """The episode was truncated: seats have no places. No episode ends like this at present."""
 
 class EpisodeEnd(_EpisodeEnd, metaclass=_EpisodeEndEnumTypeWrapper):
     """How an episode ended."""
@@ -130,9 +130,9 @@ class EpisodeEnd(_EpisodeEnd, metaclass=_EpisodeEndEnumTypeWrapper):
 EPISODE_END_UNSPECIFIED: EpisodeEnd.ValueType  # 0
 """Not set."""
 EPISODE_END_FINISHED: EpisodeEnd.ValueType  # 1
-"""By the rules of the game."""
+"""Every seat has a place, also if the last Shift was adjudicated at the limit of turns."""
 EPISODE_END_CUT_SHORT: EpisodeEnd.ValueType  # 2
-"""Its last Shift reached the limit of turns and was adjudicated."""
+"""The episode was truncated: seats have no places. No episode ends like this at present."""
 Global___EpisodeEnd: _TypeAlias = EpisodeEnd  # noqa: Y015
 
 @_typing.final

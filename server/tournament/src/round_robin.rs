@@ -1,34 +1,116 @@
-//! How often participants meet over all rounds, and exchanging them until that is as even as a bounded search gets it. Byes stay as they
-//! are given out: whoever gets one leaves one elsewhere.
+//! The rounds of a round robin: participants meet, take each seat and sit out equally often, as far
+//! as the numbers allow.
+//!
+//! With n participants and s seats, n a multiple of s or one more, the rounds follow from a
+//! *cycle*: one round such that shifting all its participants by one, repeatedly, makes every two
+//! meet equally often. It is found by search (`cycle`). Rounds beyond full cycles, and fields of
+//! other sizes, are improved by a search over all rounds ([`Meetings`]). Byes are spread evenly
+//! from the start and stay so. Finally `seats` balances the seats, which always succeeds.
+//!
+//! For tables of four and one round fewer than participants: with 4, 8, …, 32 participants every
+//! two meet three times; with one participant more, two or three times; with other numbers below 16
+//! except 6, numbers of meetings differ by at most one; above, nearly all do, and few differ by
+//! two. Byes and seats differ by at most one.
 
-use super::super::chance::Chance;
+mod cycle;
 
-/// Exchanges tried for each participant of each round, and in all at most.
+use std::cmp::Reverse;
+
+use super::chance::Chance;
+use super::seats;
+use super::state::Pairings;
+
+/// Swaps tried for each participant of each round, and the maximum in total.
 const TRIES_PER_PLACE: usize = 10_000;
 const MAX_TRIES: usize = 2_000_000;
-/// Exchanges without a success after which the search begins again from rounds that are shaken up.
+/// Swaps without an improvement after which the search restarts from perturbed rounds.
 const MAX_IDLE: usize = 100_000;
-/// One place in so many is exchanged to shake the rounds up.
+/// To perturb the rounds, one swap for this many places.
 const SHAKEN: usize = 4;
-/// Steps that an exchange is compared back over.
+/// Length of the history of the late-acceptance search.
 const MEMORY: usize = 100;
 
+/// All rounds, for at least as many participants as seats.
+pub(super) fn plan(
+    participants: usize,
+    seats: usize,
+    rounds: u32,
+    chance: &mut Chance,
+) -> Vec<Pairings> {
+    let rounds = rounds as usize;
+    let mut plan = Vec::with_capacity(rounds);
+    let cycle = cycle::find(participants, seats, chance);
+    let length = cycle.rounds();
+    // A cycle without its last round is as even as possible.
+    let cycles = (rounds + 1) / length;
+    plan.extend((0..rounds.min(cycles * length)).map(|round| cycle.round(round)));
+    let searched = if cycle.is_equal() { plan.len() } else { 0 };
+    add_rounds(&mut plan, participants, seats, rounds, chance);
+    let mut meetings = Meetings::new(participants, seats, plan);
+    meetings.even_out(searched, chance);
+    let rounds = meetings.into_rounds();
+    let mut names: Vec<usize> = (0..participants).collect();
+    chance.shuffle(&mut names);
+    let tables = participants / seats;
+    let mut rounds: Vec<Pairings> = rounds
+        .into_iter()
+        .map(|round| {
+            let named: Vec<usize> = round.into_iter().map(|number| names[number]).collect();
+            let (seated, byes) = named.split_at(tables * seats);
+            let mut byes = byes.to_vec();
+            byes.sort_unstable();
+            Pairings {
+                tables: seated.chunks(seats).map(<[usize]>::to_vec).collect(),
+                byes,
+            }
+        })
+        .collect();
+    let all = rounds.iter_mut().flat_map(|round| &mut round.tables);
+    seats::spread_plan(all.collect(), participants, seats);
+    rounds
+}
+
+/// Adds random rounds up to `rounds`, with byes for the participants that have had the fewest.
+fn add_rounds(
+    plan: &mut Vec<Vec<usize>>,
+    participants: usize,
+    seats: usize,
+    rounds: usize,
+    chance: &mut Chance,
+) {
+    let seated = participants / seats * seats;
+    let mut byes = vec![0; participants];
+    for round in plan.iter() {
+        round[seated..].iter().for_each(|&who| byes[who] += 1);
+    }
+    while plan.len() < rounds {
+        let mut round: Vec<usize> = (0..participants).collect();
+        chance.shuffle(&mut round);
+        // Participants with the fewest byes go last: they sit out.
+        round.sort_by_key(|&who| Reverse(byes[who]));
+        round[seated..].iter().for_each(|&who| byes[who] += 1);
+        chance.shuffle(&mut round[..seated]);
+        plan.push(round);
+    }
+}
+
 /// Rounds, and how often every two participants meet in them.
-pub(super) struct Meetings {
+struct Meetings {
     participants: usize,
     seats: usize,
     seated: usize,
-    /// By round the participants of the first table, then those of the next, those who sit out last.
+    /// By round, the participants of each table in turn, then those with a bye.
     rounds: Vec<Vec<usize>>,
-    /// By round the place of each participant.
+    /// By round, the place of each participant.
     places: Vec<Vec<usize>>,
     met: Vec<i32>,
-    /// Sum of the squares of `met` over all pairs: the smaller the more even, since their sum is always the same.
+    /// Sum of the squares of `met` over all pairs. The sum of `met` is constant, so a lower cost is
+    /// more even.
     cost: i64,
 }
 
 impl Meetings {
-    pub(super) fn new(participants: usize, seats: usize, rounds: Vec<Vec<usize>>) -> Meetings {
+    fn new(participants: usize, seats: usize, rounds: Vec<Vec<usize>>) -> Meetings {
         let mut meetings = Meetings {
             participants,
             seats,
@@ -53,12 +135,12 @@ impl Meetings {
         meetings
     }
 
-    pub(super) fn into_rounds(self) -> Vec<Vec<usize>> {
+    fn into_rounds(self) -> Vec<Vec<usize>> {
         self.rounds
     }
 
-    /// Searches the rounds from this one on, again and again as long as tries are left, and keeps the most even ones.
-    pub(super) fn even_out(&mut self, first: usize, chance: &mut Chance) {
+    /// Improves the rounds from `first` on until no tries are left, and keeps the most even result.
+    fn even_out(&mut self, first: usize, chance: &mut Chance) {
         let free = self.rounds.len() - first;
         if free == 0 || self.seats == self.participants {
             return;
@@ -78,7 +160,8 @@ impl Meetings {
         *self = Meetings::new(self.participants, self.seats, best.1);
     }
 
-    /// One search, by late acceptance: an exchange is kept if it is not worse than what stood some steps before. Gives the tries it took.
+    /// One late-acceptance search: a swap is kept if the cost is not above the cost some steps
+    /// before. Returns the number of tries.
     fn search(&mut self, first: usize, least: i64, tries: usize, chance: &mut Chance) -> usize {
         let mut memory = [self.cost; MEMORY];
         let (mut best, mut best_at) = (self.cost, 0);
@@ -86,7 +169,7 @@ impl Meetings {
             if self.cost < best {
                 (best, best_at) = (self.cost, step);
             }
-            // It ends with the best it has seen, or as good.
+            // Stop at the best cost seen.
             let is_idle = step - best_at > MAX_IDLE || step + MEMORY > tries;
             if self.cost == least || is_idle && self.cost == best {
                 return step + 1;
@@ -103,7 +186,7 @@ impl Meetings {
         tries
     }
 
-    /// Does an exchange at random, if the places drawn allow one.
+    /// Applies a random swap, if the drawn places allow one.
     fn try_exchange(&mut self, first: usize, chance: &mut Chance) -> Option<Exchange> {
         let round = first + chance.below(self.rounds.len() - first);
         let places = [(); 2].map(|()| chance.below(self.participants));
@@ -112,7 +195,7 @@ impl Meetings {
         Some(exchange)
     }
 
-    /// What the sum of squares would be if all met equally often, or nearly so.
+    /// The cost if all meet equally often, or within one of it.
     fn least_cost(&self) -> i64 {
         let pairs = (self.participants * (self.participants - 1) / 2) as i64;
         let meetings = (self.rounds.len() * self.seated * (self.seats - 1) / 2) as i64;
@@ -120,7 +203,8 @@ impl Meetings {
         pairs * each * each + more * (2 * each + 1)
     }
 
-    /// The exchange of the participants of two places of a round; if one of them sits out, another who sits out elsewhere takes its turn.
+    /// The swap of two places of a round. If one of them is a bye, the byes are swapped back in
+    /// another round.
     fn exchange(
         &self,
         round: usize,
@@ -138,7 +222,8 @@ impl Meetings {
                 two: None,
             });
         }
-        // Whoever sits out plays, and sits out in a round in which the other one does, who plays there.
+        // The participant with the bye plays here instead, and gets the bye in a round where the
+        // other has one.
         let (player, sitter) = (self.rounds[round][a], self.rounds[round][b]);
         let other = first + chance.below(self.rounds.len() - first);
         let (plays, sits) = (self.places[other][sitter], self.places[other][player]);
@@ -149,7 +234,7 @@ impl Meetings {
         })
     }
 
-    /// Does an exchange; done once more it is undone.
+    /// Applies a swap; applying it again undoes it.
     fn apply(&mut self, exchange: Exchange) {
         self.swap(exchange.one);
         if let Some(two) = exchange.two {
@@ -169,7 +254,7 @@ impl Meetings {
         }
     }
 
-    /// Counts the meetings of whoever has a place with the others at its table.
+    /// Adds to the meetings of the participant at a place with the others at its table.
     fn meet_table(&mut self, round: usize, place: usize, times: i32) {
         if place >= self.seated {
             return;
@@ -188,7 +273,7 @@ impl Meetings {
     }
 }
 
-/// Two places of a round, and perhaps two of another round, that change their participants.
+/// Two places of a round to swap, and possibly two of another round.
 #[derive(Clone, Copy)]
 struct Exchange {
     one: (usize, usize, usize),

@@ -1,5 +1,6 @@
-//! A tournament as its changes left it, and what each change does to it. Nothing here decides what is to happen, and a change that does
-//! not fit (of a game that is over, say) does nothing, so that the same changes always lead to the same course.
+//! The state of a tournament, and the effect of each change on it. Nothing here decides what
+//! happens next. A change that does not fit (for a finished game, say) has no effect, so the same
+//! changes always lead to the same state.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -7,21 +8,21 @@ use std::ops::Range;
 use super::change::{Change, Entrant, Game, GameResult, GameState};
 use super::settings::{Deals, Settings};
 
-/// Where a tournament stands.
+/// The phase of a tournament.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum State {
     /// Participants may join.
     Open,
-    /// It is being played.
+    /// Games are being played.
     Playing,
-    /// All games have been played or given up; the standings are final.
+    /// All games are counted or voided; the standings are final.
     Finished,
-    /// Closed before its end.
+    /// Closed early.
     Closed,
 }
 
 impl State {
-    /// Whether nothing more happens, one way or the other.
+    /// Whether no further change can follow.
     pub fn is_over(self) -> bool {
         match self {
             State::Open | State::Playing => false,
@@ -30,16 +31,25 @@ impl State {
     }
 }
 
-/// A table of participants of one round and the games they play.
+/// A table of one round and its games.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Pairing {
     pub(super) round: u32,
-    /// Participants in the order of the seats of its first game.
+    /// Participants in the seat order of the first game.
     pub(super) table: Vec<usize>,
     pub(super) games: Range<usize>,
 }
 
-/// What a participant did in the games that counted, in all.
+/// The pairings of a round.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Pairings {
+    /// Participants by table, in the order of their seats.
+    pub(super) tables: Vec<Vec<usize>>,
+    /// Participants with a bye.
+    pub(super) byes: Vec<usize>,
+}
+
+/// Totals of a participant over the games that counted.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Sums {
     pub(super) games: u32,
@@ -57,36 +67,36 @@ pub(super) struct Sums {
     pub(super) performance: f64,
 }
 
-/// A tournament as its changes left it.
+/// The state of a tournament.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Course {
+pub(super) struct TournamentState {
     pub(super) settings: Settings,
-    pub(super) state: State,
+    pub(super) phase: State,
     pub(super) participants: Vec<Entrant>,
     pub(super) sums: Vec<Sums>,
-    /// Rounds in all; 0 before the beginning.
+    /// Total number of rounds; 0 before the beginning.
     pub(super) rounds: u32,
-    /// Rounds that have been drawn.
+    /// Number of rounds that have been paired.
     pub(super) drawn: u32,
     pub(super) pairings: Vec<Pairing>,
     pub(super) games: Vec<Game>,
-    /// Games that wait to be called, by their turns.
+    /// Games waiting to be called, in queue order.
     pub(super) due: BTreeSet<(u64, usize)>,
     pub(super) playing: BTreeSet<usize>,
-    /// Games that each participant is playing.
+    /// By participant: number of games it is playing.
     pub(super) busy: Vec<usize>,
-    /// Games that have been counted or given up.
+    /// Number of games that are counted or void.
     pub(super) over: usize,
-    /// Games of each deal that are not over.
+    /// By deal: number of games that are not over.
     pub(super) deals: Vec<usize>,
     next_turn: u64,
 }
 
-impl Course {
-    pub(super) fn new(settings: Settings) -> Course {
-        Course {
+impl TournamentState {
+    pub(super) fn new(settings: Settings) -> TournamentState {
+        TournamentState {
             settings,
-            state: State::Open,
+            phase: State::Open,
             participants: Vec::new(),
             sums: Vec::new(),
             rounds: 0,
@@ -102,18 +112,19 @@ impl Course {
         }
     }
 
-    /// Whether every game that was drawn is over.
+    /// Whether all games of the rounds paired so far are over.
     pub(super) fn is_round_over(&self) -> bool {
         self.over == self.games.len()
     }
 
     /// Whether a participant can play one more game now.
-    pub(super) fn has_place(&self, participant: usize) -> bool {
+    pub(super) fn has_capacity(&self, participant: usize) -> bool {
         let entrant = &self.participants[participant];
         entrant.built_in.is_some() || self.busy[participant] < entrant.max_games
     }
 
-    /// Whether a participant forfeits a game that is due: it did not come to the last call, and is waited for no more.
+    /// Whether a participant forfeits a due game: it missed the last call and is no longer waited
+    /// for.
     pub(super) fn forfeits(&self, game: &Game, participant: usize) -> bool {
         let is_decided = game.calls >= self.settings.max_calls;
         game.forfeited.contains(&participant) || is_decided && game.missing.contains(&participant)
@@ -130,7 +141,7 @@ impl Course {
                 });
             }
             Change::Begun { rounds } => {
-                self.state = State::Playing;
+                self.phase = State::Playing;
                 self.rounds = *rounds;
             }
             Change::Drawn {
@@ -142,10 +153,10 @@ impl Course {
             Change::Rescheduled { game, missing } => self.reschedule(*game, missing),
             Change::Counted { game, result } => self.count(*game, result),
             Change::Voided { game } => self.void(*game),
-            Change::Finished => self.state = State::Finished,
+            Change::Finished => self.phase = State::Finished,
             Change::Closed => {
                 (0..self.games.len()).for_each(|game| self.void(game));
-                self.state = State::Closed;
+                self.phase = State::Closed;
             }
         }
     }
@@ -213,7 +224,7 @@ impl Course {
         self.queue(index);
     }
 
-    /// Lets a game wait behind those that are due.
+    /// Queues a game behind the others.
     fn queue(&mut self, index: usize) {
         let game = &mut self.games[index];
         game.state = GameState::Due;
@@ -247,7 +258,7 @@ impl Course {
             return;
         };
         match game.state {
-            // Those whom it waited for did not come: that is a call in vain.
+            // The participants it waited for did not come, which counts as a call.
             GameState::Due => game.calls += 1,
             GameState::Playing => {}
             GameState::Counted(_) | GameState::Void => return,
@@ -297,7 +308,7 @@ impl Course {
         }
     }
 
-    /// A game is neither due nor being played any more.
+    /// Removes a game from the queue and from the games being played.
     fn leave(&mut self, index: usize) {
         let game = &self.games[index];
         self.due.remove(&(game.turn, index));
@@ -318,7 +329,7 @@ impl Course {
         self.end_of_deal(deal);
     }
 
-    /// One game less is to be played with this deal.
+    /// Counts down the games of a deal.
     fn end_of_deal(&mut self, deal: Option<u32>) {
         if let Some(left) = deal.and_then(|deal| self.deals.get_mut(deal as usize)) {
             *left -= 1;

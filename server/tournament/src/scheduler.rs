@@ -1,0 +1,223 @@
+//! Selects the due games to check. Holds what is not part of the stored state: who is present,
+//! which games wait for absent participants, and which games need a check. Up to a hundred thousand
+//! games may be due; a game is checked again only after something changed for one of its
+//! participants. `calls` decides what a check results in.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::change::{Change, Game, GameState};
+use super::state::TournamentState;
+
+/// Queue position and number of a due game. Outdated once the game is called or queued again.
+pub(super) type DueGame = (u64, usize);
+
+/// The schedule at this moment. After a restart nobody is present.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Scheduler {
+    /// By participant: whether it is present.
+    present: Vec<bool>,
+    /// Number of games of the state seen so far.
+    known: usize,
+    /// Games to check. A due game that is neither here nor waiting is blocked.
+    to_check: BTreeSet<DueGame>,
+    /// By participant at its limit of games: the games it blocks. When it can play again, the first
+    /// of them is checked; if that one is not called, the next.
+    blocked: Vec<BTreeSet<DueGame>>,
+    /// Games blocked by absent participants only, with the time since when, in milliseconds.
+    waits: BTreeMap<usize, u64>,
+    /// The same games by time, except those whose time was up at the last check.
+    by_time: BTreeSet<(u64, usize)>,
+    /// The same games by participant.
+    waits_by_participant: Vec<BTreeSet<usize>>,
+    /// Whether the maximum number of games is being played. No wait counts meanwhile.
+    full: bool,
+    /// When that last ended, in milliseconds; every wait restarts then.
+    open_since: u64,
+    /// Number of checks so far.
+    #[cfg(test)]
+    pub(super) checks: u64,
+}
+
+impl Scheduler {
+    pub(super) fn is_present(&self, state: &TournamentState, participant: usize) -> bool {
+        state.participants[participant].built_in.is_some()
+            || self.present.get(participant) == Some(&true)
+    }
+
+    /// Sets whether a participant is present. An arrival may complete waiting games; a game whose
+    /// participants are all present restarts its wait.
+    pub(super) fn set_present(
+        &mut self,
+        state: &TournamentState,
+        participant: usize,
+        present: bool,
+    ) {
+        self.seat(state);
+        self.present[participant] = present;
+        if !present {
+            return;
+        }
+        for index in self.waits_by_participant[participant].clone() {
+            let game = &state.games[index];
+            self.to_check.insert((game.turn, index));
+            if game.seats.iter().all(|&who| self.is_present(state, who)) {
+                self.end_wait(state, index);
+            }
+        }
+    }
+
+    /// Updates the schedule for a change that the state has folded.
+    pub(super) fn fold(&mut self, state: &TournamentState, change: &Change) {
+        match change {
+            Change::Joined(_) | Change::Begun { .. } => {}
+            Change::Drawn { .. } => {
+                self.seat(state);
+                let drawn = self.known..state.games.len();
+                (self.to_check).extend(drawn.map(|index| (state.games[index].turn, index)));
+                self.known = state.games.len();
+            }
+            Change::Called { game, .. }
+            | Change::Rescheduled { game, .. }
+            | Change::Counted { game, .. }
+            | Change::Voided { game } => self.on_game_change(state, *game),
+            Change::Finished | Change::Closed => {
+                *self = Scheduler {
+                    present: std::mem::take(&mut self.present),
+                    ..Scheduler::default()
+                };
+                self.known = state.games.len();
+                self.seat(state);
+            }
+        }
+    }
+
+    /// Handles a game that was called, queued again or ended: its participants may have gained or
+    /// lost capacity.
+    fn on_game_change(&mut self, state: &TournamentState, index: usize) {
+        let Some(game) = state.games.get(index) else {
+            return;
+        };
+        self.end_wait(state, index);
+        match game.state {
+            GameState::Due => drop(self.to_check.insert((game.turn, index))),
+            _ => drop(self.to_check.remove(&(game.turn, index))),
+        }
+        for &who in &game.seats {
+            if state.has_capacity(who) {
+                continue;
+            }
+            for waiting in std::mem::take(&mut self.waits_by_participant[who]) {
+                self.end_wait(state, waiting);
+                self.blocked[who].insert((state.games[waiting].turn, waiting));
+            }
+        }
+        self.release(state, game);
+    }
+
+    /// Checks the first game blocked by each of these participants that can play again.
+    fn release(&mut self, state: &TournamentState, game: &Game) {
+        for &who in game.seats.iter().filter(|who| state.has_capacity(**who)) {
+            self.to_check.extend(self.blocked[who].pop_first());
+        }
+    }
+
+    /// Whether games can be called: fewer than the maximum are being played.
+    pub(super) fn is_open(&mut self, state: &TournamentState, now_ms: u64) -> bool {
+        let was_full = self.full;
+        self.full = state.playing.len() >= state.settings.max_parallel;
+        if was_full && !self.full {
+            self.open_since = now_ms;
+        }
+        !self.full
+    }
+
+    /// The next game to check, in queue order. Stays the same until it is called, rescheduled,
+    /// blocked or waiting.
+    pub(super) fn next(&mut self, state: &TournamentState, now_ms: u64) -> Option<DueGame> {
+        while let Some(&(since, index)) = self.by_time.first()
+            && now_ms.saturating_sub(since) >= state.settings.no_show_ms
+        {
+            self.by_time.pop_first();
+            self.to_check.insert((state.games[index].turn, index));
+        }
+        loop {
+            let next = *self.to_check.first()?;
+            if state.due.contains(&next) {
+                #[cfg(test)]
+                {
+                    self.checks += 1;
+                }
+                return Some(next);
+            }
+            self.set_aside(state, next);
+        }
+    }
+
+    /// Removes a checked game that is not called.
+    fn set_aside(&mut self, state: &TournamentState, checked: DueGame) {
+        self.to_check.remove(&checked);
+        self.release(state, &state.games[checked.1]);
+    }
+
+    /// Records that a participant at its limit of games blocks the game.
+    pub(super) fn block(&mut self, state: &TournamentState, checked: DueGame, by: usize) {
+        self.end_wait(state, checked.1);
+        self.blocked[by].insert(checked);
+        self.set_aside(state, checked);
+    }
+
+    /// Makes a game wait for absent participants. Returns `true` if its wait is over instead.
+    pub(super) fn has_waited(
+        &mut self,
+        state: &TournamentState,
+        checked: DueGame,
+        now_ms: u64,
+    ) -> bool {
+        let (_, index) = checked;
+        let before = self.waits.get(&index).copied();
+        let since = before.map_or(now_ms, |since| since.max(self.open_since));
+        if now_ms.saturating_sub(since) >= state.settings.no_show_ms {
+            self.waits.insert(index, since);
+            return true;
+        }
+        if let Some(before) = before {
+            self.by_time.remove(&(before, index));
+        }
+        self.waits.insert(index, since);
+        self.by_time.insert((since, index));
+        let game = &state.games[index];
+        for &who in &game.seats {
+            if !state.forfeits(game, who) {
+                self.waits_by_participant[who].insert(index);
+            }
+        }
+        self.set_aside(state, checked);
+        false
+    }
+
+    /// Ends the wait of a game.
+    fn end_wait(&mut self, state: &TournamentState, index: usize) {
+        if let Some(since) = self.waits.remove(&index) {
+            self.by_time.remove(&(since, index));
+            for &who in &state.games[index].seats {
+                self.waits_by_participant[who].remove(&index);
+            }
+        }
+    }
+
+    /// When the first wait ends, in milliseconds.
+    pub(super) fn wake_at(&self, state: &TournamentState) -> Option<u64> {
+        let &(since, _) = self.by_time.first().filter(|_| !self.full)?;
+        let since = since.max(self.open_since);
+        Some(since.saturating_add(state.settings.no_show_ms))
+    }
+
+    /// Extends the lists to all participants.
+    fn seat(&mut self, state: &TournamentState) {
+        let participants = state.participants.len();
+        self.present.resize(participants, false);
+        self.blocked.resize(participants, BTreeSet::new());
+        self.waits_by_participant
+            .resize(participants, BTreeSet::new());
+    }
+}
