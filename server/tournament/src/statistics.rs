@@ -91,7 +91,7 @@ impl Moments {
     /// say nothing about it.
     pub fn standard_error(&self) -> f64 {
         if self.count < 2 {
-            return 0.0;
+            return f64::INFINITY;
         }
         (self.variance() / self.count as f64).sqrt()
     }
