@@ -1,6 +1,6 @@
-//! The built-in agents. Each is a function of what its seat may know and of its own generator or its own past, and of nothing else. Who asks
-//! them, and what follows from an answer, is decided in `play` (offline) and by the server's rooms; what `replay` does is in `recorded`, how a
-//! network decides in `network`.
+//! The built-in agents. An agent's choice depends only on what its seat may know and on its own
+//! generator. `play` (offline) and the server's rooms ask them; `greedy`, `recorded` and `network`
+//! hold the larger policies.
 
 use std::sync::Arc;
 
@@ -11,22 +11,23 @@ use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
 use crate::greedy::greedy;
 use crate::{Network, RecordedPlayer};
 
-/// Which built-in agent, of those that need nothing but a seed.
+/// The built-in agents that need nothing but a seed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub enum AgentKind {
     /// Uniform over the legal actions.
     #[default]
     Random,
-    /// At a turn uniform over all T actions of a turn, valid or not (the paper's random agent); elsewhere as `Random`.
+    /// At a turn uniform over all T actions of a turn, legal or not (the paper's random agent);
+    /// otherwise like `Random`.
     RandomUnmasked,
-    /// Sheds as many of its least rare cards as it can, keeps jokers, gives away its worst.
+    /// Plays as many of its commonest cards as it can, keeps jokers, gives away its commonest card.
     Greedy,
-    /// Plays by a network that was trained by self-play and is part of the program ([`Network::trained`]).
+    /// Plays by a network trained in self-play that is part of the program ([`Network::trained`]).
     Trained,
 }
 
 impl AgentKind {
-    /// All of them.
+    /// All kinds.
     pub const ALL: [Self; 4] = [
         Self::Random,
         Self::RandomUnmasked,
@@ -34,7 +35,7 @@ impl AgentKind {
         Self::Trained,
     ];
 
-    /// The name by which people and messages call it.
+    /// The name in messages and commands.
     pub fn name(self) -> &'static str {
         match self {
             Self::Random => "random",
@@ -44,13 +45,13 @@ impl AgentKind {
         }
     }
 
-    /// The agent of a name.
+    /// The kind with this name.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| kind.name() == name)
     }
 }
 
-/// A built-in agent, ready to decide.
+/// A built-in agent.
 #[derive(Debug, Clone)]
 pub struct BuiltInAgent {
     mind: Mind,
@@ -62,42 +63,42 @@ pub struct BuiltInAgent {
     reason = "nearly all are of the large variant, and a box would cost offline games an allocation for each agent"
 )]
 enum Mind {
-    /// An agent of a kind, with its generator.
+    /// An agent that needs nothing but a seed, with its generator.
     Kind(AgentKind, Chance),
-    /// One that plays as a recorded player.
+    /// Imitates a recorded player.
     Replay(Arc<RecordedPlayer>),
-    /// One that plays from a network file.
+    /// Plays by a network.
     Network(Arc<Network>),
 }
 
 impl BuiltInAgent {
-    /// Name of the agents that [`BuiltInAgent::replay`] makes.
+    /// Name of agents created by [`BuiltInAgent::replay`].
     pub const REPLAY: &str = "replay";
-    /// Name of the agents that [`BuiltInAgent::network`] makes.
+    /// Name of agents created by [`BuiltInAgent::network`].
     pub const NETWORK: &str = "network";
 
-    /// An agent whose choices follow from `seed` alone.
+    /// An agent of a kind. `seed` determines its random choices.
     pub fn new(kind: AgentKind, seed: [u8; 32]) -> Self {
         Self {
             mind: Mind::Kind(kind, Chance(ChaCha8Rng::from_seed(seed))),
         }
     }
 
-    /// An agent that plays as a recorded player. Its choices follow from what it sees alone.
+    /// An agent that imitates a recorded player. It has no generator.
     pub fn replay(player: Arc<RecordedPlayer>) -> Self {
         Self {
             mind: Mind::Replay(player),
         }
     }
 
-    /// An agent that plays by a network. Its choices follow from what it sees alone.
+    /// An agent that plays by a network. It has no generator.
     pub fn network(network: Arc<Network>) -> Self {
         Self {
             mind: Mind::Network(network),
         }
     }
 
-    /// The name by which people and messages call it.
+    /// The name in messages and commands.
     pub fn name(&self) -> &'static str {
         match &self.mind {
             Mind::Kind(kind, _) => kind.name(),
@@ -106,7 +107,8 @@ impl BuiltInAgent {
         }
     }
 
-    /// Whether its choices depend on how often it was asked before. Otherwise they follow from what it sees alone.
+    /// Whether its choices depend on how often it was asked before. If not, they depend on the
+    /// observation alone.
     pub fn has_generator(&self) -> bool {
         match &self.mind {
             Mind::Kind(kind, _) => matches!(kind, AgentKind::Random | AgentKind::RandomUnmasked),
@@ -114,10 +116,11 @@ impl BuiltInAgent {
         }
     }
 
-    /// Decides. The action is one of `legal`, except that `random_unmasked` may answer a turn with any of its T actions.
+    /// Chooses an action: one of `legal`, except that `random_unmasked` may choose any of the T
+    /// actions at a turn.
     ///
     /// # Panics
-    /// When `legal` is empty: there is no decision to take.
+    /// If `legal` is empty.
     pub fn decide(&mut self, observation: &Observation, legal: &Mask) -> ActionId {
         let space = ActionSpace::new(observation.faces).expect("an observation has 4 to 15 faces");
         let turn = observation.kind == Some(DecisionKind::Turn);
@@ -136,7 +139,7 @@ impl BuiltInAgent {
     }
 }
 
-/// Where the choices of an agent come from.
+/// The random numbers of an agent.
 #[derive(Debug, Clone)]
 struct Chance(ChaCha8Rng);
 
@@ -149,8 +152,8 @@ impl Chance {
             .expect("the index is below the number of actions")
     }
 
-    /// A number below `n`. Spelled out, so that no library's next version changes what a seed brings about. Its bias, that of a
-    /// multiplication with 32 random bits, is below 400 / 2^32.
+    /// A number below `n`. Implemented here so that no library update changes seeded results. The
+    /// bias is below 400 / 2^32.
     fn below(&mut self, n: u16) -> u16 {
         let number = (u64::from(self.0.next_u32()) * u64::from(n)) >> 32;
         u16::try_from(number).expect("the number is below n")

@@ -1,5 +1,5 @@
-//! The built-in agents: random, greedy, trained, replay; the network files that `trained` and others play from; and playing one game with agents
-//! on its seats. Many games, and what they add up to, are in `chefshat-simulation`.
+//! The built-in agents (random, greedy, trained, replay), network files, and playing one game
+//! offline. Batches of games are in `chefshat-simulation`.
 
 mod built_in;
 mod greedy;

@@ -1,5 +1,4 @@
-//! Playing as somebody played before: the decisions one seat took in a recorded game, and what follows from them at a decision of this
-//! game or another. How decisions are read out of a record is not known here.
+//! Imitates a recorded player. Reading decisions from a record happens elsewhere.
 
 use std::collections::HashMap;
 
@@ -7,19 +6,20 @@ use chefshat_engine::{
     ActionId, ActionSpace, Cards, Face, Mask, Observation, RecordedDecision, Seat,
 };
 
-/// A player of a recorded game, as an agent that decides as it did.
+/// A player of a recorded game, as an agent that imitates it.
 ///
-/// - At a decision where it sees exactly what it saw at a recorded one (the same observation, the same legal actions) it does what
-///   it did then. No two decisions of a game look the same to a seat: Shift, pizza, cards played, cards given and hand tell them apart. So in its
-///   own game it repeats itself from beginning to end, from any point on, and again wherever another course of the game leads back to
-///   what it knew.
-/// - At any other decision it does what it did at the most similar of its own decisions of the same kind whose action is legal now; of
-///   equally similar ones at the earliest. The first [`MAX_MODELS`] decisions of its own are compared. Actions are carried over by their meaning, since their numbers depend on the deck.
+/// - Where the seat sees exactly what it saw at a recorded decision (same observation, same legal
+/// actions), it repeats that decision. Shift, pizza, cards played, cards given and hand tell all
+/// decisions of a game apart. So in its own game it repeats itself from any point on, also after
+/// the game has deviated and returned to a known situation.
+/// - Otherwise it repeats the most similar recorded decision of the same kind whose action is legal
+/// now, the earliest of equals, among the first [`MAX_MODELS`] decisions. Actions are translated by
+/// meaning, because their indices depend on the deck.
 /// - If there is none, it takes the default decision.
 ///
-/// How different two decisions are, from 0 (alike) to 14, is the sum of these differences, each from 0 to 1 in millionths rounded down,
-/// times their weights. F and H are the faces and the cards dealt to a hand in each one's own game; seats are counted from the own one to
-/// the left.
+/// The difference of two decisions, from 0 (equal) to 14, is the weighted sum of the following,
+/// each from 0 to 1 in millionths, rounded down. F and H are the faces and the cards dealt to a
+/// hand in each decision's game; seats are counted to the left of the player's own.
 ///
 /// | weight | difference |
 /// |---|---|
@@ -31,22 +31,23 @@ use chefshat_engine::{
 /// | 1 | of the own role: 0 if it is the same, else 1 |
 /// | 1 | of the cards played so far in the Shift, as for the hands |
 ///
-/// Where one game has more seats than the other, those that the other lacks count as seats that hold no cards and have passed.
+/// Where one game has more seats than the other, missing seats count as holding no cards and having
+/// passed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RecordedPlayer {
     decisions: Vec<RecordedDecision>,
-    /// Where in `decisions` those are that look alike at first glance.
+    /// Indices into `decisions` by the most distinctive values.
     by_glance: HashMap<Glance, Vec<usize>>,
 }
 
-/// What tells nearly all decisions of a game apart: Shift, pizza, hand, cards played.
+/// Values that tell nearly all decisions of a game apart: Shift, pizza, hand, cards played.
 type Glance = (u32, u32, Cards, Cards);
 
 fn glance(seen: &Observation) -> Glance {
     (seen.shift, seen.pizza, seen.hand, seen.played)
 }
 
-/// Most decisions that are compared with another to find the most similar one: the first of the recorded game.
+/// Maximum number of decisions searched for the most similar one: the first of the recorded game.
 pub const MAX_MODELS: usize = 2_048;
 
 const HAND: u64 = 4;
@@ -56,12 +57,12 @@ const CARDS_LEFT: u64 = 2;
 const PASSED: u64 = 1;
 const ROLE: u64 = 1;
 const PLAYED: u64 = 1;
-/// A whole difference. In whole numbers, so that what is equally similar is so on every machine.
+/// A difference of 1. Integers make ties the same on every machine.
 const WHOLE: u64 = 1_000_000;
 
 impl RecordedPlayer {
-    /// The player of these decisions, in the order in which they were taken. Those whose observation has no decision open, or whose action
-    /// was not legal, are left out: nothing can be learnt from them.
+    /// The player of these decisions, in order. Skips decisions without an open decision in the
+    /// observation, or with an illegal action.
     pub fn new(decisions: impl IntoIterator<Item = RecordedDecision>) -> Self {
         let sound = |decision: &RecordedDecision| {
             decision.observation.kind.is_some()
@@ -80,15 +81,15 @@ impl RecordedPlayer {
         }
     }
 
-    /// Its decisions, in the order in which they were taken.
+    /// The decisions, in order.
     pub fn decisions(&self) -> &[RecordedDecision] {
         &self.decisions
     }
 
-    /// Decides. The action is one of `legal`.
+    /// Chooses one of the legal actions.
     ///
     /// # Panics
-    /// When `legal` is empty or no decision is open for the seat of the observation.
+    /// If `legal` is empty, or no decision is open for the observation's seat.
     pub fn decide(&self, observation: &Observation, legal: &Mask) -> ActionId {
         self.repeated(observation, legal)
             .or_else(|| self.most_similar(observation, legal))
@@ -96,7 +97,7 @@ impl RecordedPlayer {
             .expect("a decision has a legal action")
     }
 
-    /// What it did where it saw exactly this.
+    /// The decision recorded for exactly this situation.
     fn repeated(&self, observation: &Observation, legal: &Mask) -> Option<ActionId> {
         self.by_glance
             .get(&glance(observation))?
@@ -106,7 +107,7 @@ impl RecordedPlayer {
             .map(|then| then.action)
     }
 
-    /// What it did where it saw what is most like this.
+    /// The decision recorded for the most similar situation.
     fn most_similar(&self, observation: &Observation, legal: &Mask) -> Option<ActionId> {
         let now = space(observation);
         let mut best: Option<(u64, ActionId)> = None;
@@ -131,7 +132,7 @@ impl RecordedPlayer {
     }
 }
 
-/// How different two decisions look to their seats, in millionths: the sum of [`RecordedPlayer`]'s table.
+/// The difference of two decisions in millionths: the sum of the table at [`RecordedPlayer`].
 fn difference(a: &Observation, b: &Observation) -> u64 {
     HAND * cards_apart(a.hand, b.hand)
         + BOARD_FACE * apart(board_face(a), board_face(b))
@@ -141,7 +142,7 @@ fn difference(a: &Observation, b: &Observation) -> u64 {
         + PLAYED * cards_apart(a.played, b.played)
 }
 
-/// How far apart two fractions are that are at most 1, in millionths.
+/// The difference of two fractions of at most 1, in millionths.
 fn apart(a: (u8, u8), b: (u8, u8)) -> u64 {
     let [(a, of_a), (b, of_b)] = [a, b].map(|(part, of)| (u64::from(part), u64::from(of)));
     (a * of_b).abs_diff(b * of_a) * WHOLE / (of_a * of_b)
@@ -173,7 +174,8 @@ fn own_role(observation: &Observation) -> Option<chefshat_engine::Role> {
     observation.seat.and_then(|seat| observation.roles[seat])
 }
 
-/// What sets the other seats apart: the cards left to them, and who of them may not play any more. With its weights, in millionths.
+/// The weighted difference of the other seats, in millionths: their cards, and whether they have
+/// passed or finished.
 fn others_apart(a: &Observation, b: &Observation) -> u64 {
     let seats = a.cards_left.len().max(b.cards_left.len());
     let (mut left, mut passed) = (0, 0);
@@ -186,7 +188,7 @@ fn others_apart(a: &Observation, b: &Observation) -> u64 {
     CARDS_LEFT * (left / others) + PASSED * (passed / others)
 }
 
-/// The cards left to the seat at this distance to the left, and whether it may not play any more.
+/// The cards of the seat at this distance to the left, and whether it has passed or finished.
 fn other(observation: &Observation, distance: usize) -> (u8, bool) {
     let seats = observation.cards_left.len();
     let Some(own) = observation.seat.filter(|_| distance < seats) else {
@@ -215,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn each_difference_counts_with_its_weight() {
+    fn differences_are_weighted() {
         let base = observation();
         let own = base.seat.expect("a seat's observation");
         let left = |distance: usize| Seat::new((own.index() + distance) % 4);
@@ -262,12 +264,12 @@ mod tests {
         for (line, (found, expected)) in table.into_iter().enumerate() {
             assert_eq!(found, expected, "line {line}");
         }
-        // Points, Shift and pizza say nothing of what is wise now.
+        // Points, Shift and pizza do not count.
         assert_eq!(changed(&|seen| (seen.shift, seen.pizza) = (7, 7)), 0);
     }
 
     #[test]
-    fn seats_are_counted_from_the_own_one() {
+    fn seats_are_counted_from_the_own_seat() {
         let base = observation();
         let own = base.seat.expect("a seat's observation");
         let turned = Observation {

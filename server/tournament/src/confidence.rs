@@ -11,6 +11,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use statrs::distribution::{ContinuousCDF as _, StudentsT};
+
 use super::Tournament;
 use crate::statistics::Moments;
 
@@ -195,16 +197,12 @@ fn standard_error(upper: &[Scored], lower: &[Scored], means: [f64; 2]) -> f64 {
     if error < ROUNDING { 0.0 } else { error }
 }
 
-/// Student's cumulative distribution for at least one degree of freedom, by Wallace's approximation
-/// (1959), accurate to a few thousandths. With few occasions the standard error itself is
-/// uncertain.
+/// Student's cumulative distribution with at least one degree of freedom.
 fn below(errors: f64, freedom: usize) -> f64 {
-    let freedom = freedom as f64;
-    let shrunk = (freedom * (errors * errors / freedom).ln_1p())
-        .sqrt()
-        .copysign(errors);
-    let deviations = shrunk * (8.0 * freedom + 1.0) / (8.0 * freedom + 3.0);
-    libm::erfc(-deviations / std::f64::consts::SQRT_2) / 2.0
+    let distribution = StudentsT::new(0.0, 1.0, freedom as f64);
+    distribution
+        .expect("there is at least one degree of freedom")
+        .cdf(errors)
 }
 
 #[cfg(test)]
@@ -231,13 +229,13 @@ mod tests {
         // The differences are 2, 2, 2, 1, 0: mean 1.4, variance 0.8.
         close(sure.difference, 1.4);
         close(sure.standard_error, (0.8f64 / 5.0).sqrt());
-        // 3.5 standard errors, 4 degrees of freedom; from a table of Student's distribution.
-        assert!((sure.confidence - 0.9876).abs() < 0.001, "{sure:?}");
+        // 3.5 standard errors, 4 degrees of freedom.
+        assert!((sure.confidence - 0.987_551_9).abs() < 1e-6, "{sure:?}");
         assert_eq!(sure.more_games, None);
     }
 
     #[test]
-    fn scores_that_share_nothing_are_compared_as_welch_does() {
+    fn without_common_occasions_it_is_welchs_test() {
         let sure = order_confidence(&scores(0, &UPPER), &scores(10, &LOWER[..4]));
         // Variances 3.2 of five and 2.25 of four; means 3.8 and 1.75.
         close(sure.difference, 2.05);
@@ -245,7 +243,7 @@ mod tests {
     }
 
     #[test]
-    fn what_one_gains_and_the_other_loses_makes_the_difference_less_sure() {
+    fn opposed_scores_increase_the_error() {
         let upper = [5.0, 3.0, 5.0, 3.0, 5.0, 3.0, 3.0];
         let lower = upper.map(|score| 8.0 - score);
         let apart = order_confidence(&scores(0, &upper), &scores(10, &lower));
@@ -265,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn so_many_more_games_would_settle_it() {
+    fn the_stated_number_of_games_settles_it() {
         let upper = [5.0, 3.0, 0.0, 5.0, 1.0, 3.0, 5.0, 0.0];
         let lower = [3.0, 5.0, 1.0, 0.0, 3.0, 1.0, 3.0, 5.0];
         let now = order_confidence(&scores(0, &upper), &scores(20, &lower));
@@ -284,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn what_nothing_is_known_of_is_left_open() {
+    fn too_few_occasions_leave_the_order_open() {
         let none = order_confidence(&[], &scores(0, &LOWER));
         let one = order_confidence(&scores(0, &[5.0]), &scores(0, &LOWER));
         for unknown in [none, one] {
@@ -300,7 +298,7 @@ mod tests {
     }
 
     #[test]
-    fn a_few_games_that_all_tell_the_same_are_not_certainty() {
+    fn a_few_unanimous_games_are_not_certain() {
         let always = |games: usize| {
             let first = scores(0, &vec![5.0; games]);
             order_confidence(&first, &scores(0, &vec![3.0; games]))

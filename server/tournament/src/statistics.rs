@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn moments_are_those_of_the_sample_however_it_is_split() {
+    fn moments_do_not_depend_on_how_a_sample_is_split() {
         let values = [3.0, -1.5, 8.25, 8.25, 0.0, 1e6, 1e6 + 1.0];
         let mean = values.iter().sum::<f64>() / 7.0;
         let squares = values.iter().map(|value| (value - mean).powi(2));

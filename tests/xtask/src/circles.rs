@@ -39,39 +39,12 @@ const REMAINING: &[&[&str]] = &[
         "server/src/tournaments/shown.rs",
     ],
     &[
-        "server/agents/src/built_in.rs",
-        "server/agents/src/network/mod.rs",
-    ],
-    &[
         "server/engine/src/game/error.rs",
         "server/engine/src/game/legal.rs",
         "server/engine/src/game/mod.rs",
         "server/engine/src/game/start.rs",
         "server/engine/src/game/table.rs",
         "server/engine/src/observation.rs",
-    ],
-    &[
-        "server/simulation/src/conformance/deal.rs",
-        "server/simulation/src/conformance/game.rs",
-        "server/simulation/src/conformance/mod.rs",
-    ],
-    &[
-        "server/simulation/src/vector/columns.rs",
-        "server/simulation/src/vector/mod.rs",
-        "server/simulation/src/vector/setup.rs",
-        "server/simulation/src/vector/slot.rs",
-    ],
-    &[
-        "server/tournament/src/draw.rs",
-        "server/tournament/src/knockout.rs",
-        "server/tournament/src/lib.rs",
-        "server/tournament/src/round_robin/mod.rs",
-        "server/tournament/src/standings.rs",
-        "server/tournament/src/swiss.rs",
-    ],
-    &[
-        "server/tournament/src/ratings/mod.rs",
-        "server/tournament/src/ratings/update.rs",
     ],
     &[
         "server/record/src/replay/game.rs",

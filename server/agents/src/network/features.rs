@@ -1,20 +1,21 @@
-//! What a network is shown with the input `table`: everything that a seat may know, as numbers. The Python package computes the same
-//! (`chefshat.learn.features`); a fixture holds the two together. The input `classic` is the engine's.
+//! The input `table` of a network: everything a seat may know, as numbers. The Python package
+//! computes the same (`chefshat.learn.features`); a shared fixture keeps the two equal. The engine
+//! computes the input `classic`.
 
 use chefshat_engine::{ActionSpace, Cards, DecisionKind, Mask, Observation, Seat};
 
-/// Points from which on more make no difference.
+/// Upper bound of points.
 const MAX_POINTS: u8 = 15;
-/// Pizzas from which on more make no difference.
+/// Upper bound of the pizza's number.
 const MAX_PIZZAS: u8 = 30;
-/// Values of a role: none, and five of them.
+/// Values of a role: none and five roles.
 const ROLES: usize = 6;
 /// Kinds of decisions.
 const KINDS: usize = 3;
-/// Jokers that count as 1.
+/// Number of jokers scaled to 1.
 const JOKERS: f32 = 2.0;
 
-/// How many numbers [`table_features`] gives.
+/// Length of [`table_features`].
 pub(super) fn table_len(players: usize, space: ActionSpace) -> usize {
     let faces = usize::from(space.faces());
     let cards = 5 * (faces + 1);
@@ -23,9 +24,9 @@ pub(super) fn table_len(players: usize, space: ActionSpace) -> usize {
     cards + 1 + board + seats + KINDS + 1 + usize::from(space.size())
 }
 
-/// Everything that a seat may know at a decision, as numbers from 0 to about 1: 334 in the standard game. In this order, where F is the
-/// number of faces, N of players, H of cards dealt to a hand and A of actions, and where what there is one of for each seat begins with the
-/// own seat and goes on to its left:
+/// Everything a seat may know at a decision, as numbers from 0 to about 1; 334 numbers in the
+/// default game. F is the number of faces, N of players, H of cards dealt to a hand, A of actions.
+/// Values by seat start with the own seat and continue to its left:
 ///
 /// | numbers | what |
 /// |---|---|
@@ -47,7 +48,7 @@ pub(super) fn table_len(players: usize, space: ActionSpace) -> usize {
 /// | 1 | number of the pizza, at most 30, / 30 |
 /// | A | whether each action is legal |
 ///
-/// An observation without a seat, a spectator's, is seen from seat 0.
+/// A spectator's observation, which has no seat, is seen from seat 0.
 pub fn table_features(observation: &Observation, legal: &Mask) -> Vec<f32> {
     let faces = observation.faces;
     let players = observation.cards_left.len();
@@ -108,18 +109,18 @@ pub fn table_features(observation: &Observation, legal: &Mask) -> Vec<f32> {
     out
 }
 
-/// How many cards of each face a deck has, jokers last.
+/// Number of cards of each face in a deck, jokers last.
 fn sizes(faces: u8) -> impl Iterator<Item = u8> {
     (1..=faces).chain([chefshat_engine::MAX_JOKERS])
 }
 
-/// Each count as a share of the deck's.
+/// Each count as a share of the deck's count.
 fn shares(out: &mut Vec<f32>, cards: Cards, faces: u8) {
     let counts = cards.counts(faces).zip(sizes(faces));
     out.extend(counts.map(|(count, size)| f32::from(count) / f32::from(size)));
 }
 
-/// `length` zeros, with a 1 at `index` if it is below.
+/// `length` zeros, with a 1 at `index` if that is in range.
 fn one_hot(out: &mut Vec<f32>, index: usize, length: usize) {
     out.extend((0..length).map(|slot| flag(slot == index)));
 }

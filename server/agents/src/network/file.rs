@@ -1,6 +1,6 @@
-//! Reading a network from its file: safetensors with the tensors `layer0.weight` [out, in], `layer0.bias` [out], `layer1.weight` and so on
-//! in 16- or 32-bit floats, ReLU between them, and a few words of metadata. Files come from anywhere, so everything is checked here and
-//! nothing afterwards; files are not written.
+//! Reads a network file: safetensors with the tensors `layer0.weight` [out, in], `layer0.bias`
+//! [out], `layer1.weight` and so on in 16- or 32-bit floats, ReLU between layers, and metadata.
+//! Files are untrusted: everything is validated here. Files are written by the Python package only.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -16,41 +16,42 @@ use thiserror::Error;
 use super::layers::{Hidden, Output};
 use super::{Network, NetworkInfo, NetworkInput, NetworkOutput};
 
-/// The form of the file, as its metadata name it.
+/// The format, as named in the metadata.
 const FORMAT: &str = "chefshat-network-1";
-/// Largest file that is read. The largest network of the bounds below is larger; nobody needs it for this game.
+/// Maximum size of a file. The bounds below would allow larger networks, which this game does not
+/// need.
 pub const MAX_FILE_BYTES: u64 = 64 << 20;
-/// Most layers.
+/// Maximum number of layers.
 const MAX_LAYERS: usize = 16;
-/// Most units of a layer.
+/// Maximum number of units of a layer.
 const MAX_UNITS: usize = 8192;
-/// Most bytes of one of the metadata.
+/// Maximum length of a metadata value, in bytes.
 const MAX_TEXT: usize = 16 << 10;
 
-/// Why a file is no network.
+/// Why a file is not a valid network.
 #[derive(Debug, Error)]
 pub enum NetworkError {
-    /// It cannot be read.
+    /// The file cannot be read.
     #[error("{0}")]
     Read(#[from] std::io::Error),
-    /// More than [`MAX_FILE_BYTES`].
+    /// The file is larger than [`MAX_FILE_BYTES`].
     #[error("larger than {} MiB, which no network for this game needs", MAX_FILE_BYTES >> 20)]
     TooLarge,
-    /// Not in the container's form.
+    /// The file is not valid safetensors.
     #[error("not a safetensors file: {0}")]
     Container(SafeTensorError),
-    /// The metadata lack something.
+    /// A metadata key is missing.
     #[error("the metadata have no {0:?}; files written by chefshat.learn.network.save have")]
     Missing(&'static str),
-    /// The metadata say what makes no sense.
+    /// A metadata value is invalid.
     #[error("metadata {key:?}: {problem}")]
     Metadata {
-        /// Which of them.
+        /// The key.
         key: &'static str,
         /// What is wrong.
         problem: String,
     },
-    /// A tensor is missing, too many, or of the wrong form.
+    /// A tensor is missing, unexpected, or has the wrong type or shape.
     #[error("tensor {name:?}: {problem}")]
     Tensor {
         /// Its name.
@@ -64,10 +65,10 @@ impl Network {
     /// Reads a network from a file.
     ///
     /// # Errors
-    /// If the file cannot be read, or is none of a network: what is wrong.
+    /// If the file cannot be read or is not a valid network.
     pub fn load(path: &Path) -> Result<Network, NetworkError> {
         let mut bytes = Vec::new();
-        // One more than allowed, so that what is larger is seen without its being read.
+        // One byte more than allowed, to detect larger files without reading them.
         let mut file = File::open(path)?.take(MAX_FILE_BYTES + 1);
         file.read_to_end(&mut bytes)?;
         Network::from_bytes(&bytes)
@@ -76,7 +77,7 @@ impl Network {
     /// Reads a network from the bytes of its file.
     ///
     /// # Errors
-    /// What is wrong with the file.
+    /// If they are not a valid network.
     pub fn from_bytes(bytes: &[u8]) -> Result<Network, NetworkError> {
         if bytes.len() as u64 > MAX_FILE_BYTES {
             return Err(NetworkError::TooLarge);
@@ -122,7 +123,7 @@ impl Network {
     }
 }
 
-/// What the metadata say, and the rule set of the game's size, whose other fields are standard.
+/// The validated metadata, and a rule set of the game's size with defaults otherwise.
 fn read_info(texts: &BTreeMap<&str, &str>) -> Result<(NetworkInfo, RuleSet), NetworkError> {
     for (&key, text) in texts {
         if text.len() > MAX_TEXT {
@@ -171,7 +172,7 @@ fn read_info(texts: &BTreeMap<&str, &str>) -> Result<(NetworkInfo, RuleSet), Net
     Ok((info, rules))
 }
 
-/// A layer as files have it.
+/// A layer as stored in the file.
 struct Layer {
     /// By unit.
     weights: Vec<f32>,
@@ -179,7 +180,7 @@ struct Layer {
     inputs: usize,
 }
 
-/// All layers, at least one, each with as many inputs as the one before has units.
+/// All layers, at least one. The inputs of each match the units of the one before.
 fn read_layers(tensors: &SafeTensors<'_>) -> Result<Vec<Layer>, NetworkError> {
     let mut layers: Vec<Layer> = Vec::new();
     while layers.len() < MAX_LAYERS {
@@ -267,7 +268,7 @@ fn floats(name: &str, view: &TensorView<'_>) -> Result<Vec<f32>, NetworkError> {
     }
 }
 
-/// One of the metadata that has few values.
+/// A metadata value with few possible values.
 fn one_of<T: Copy>(
     texts: &BTreeMap<&str, &str>,
     key: &'static str,
@@ -282,7 +283,7 @@ fn one_of<T: Copy>(
     })
 }
 
-/// One of the metadata that is a small number.
+/// A metadata value that is a small number.
 fn number(texts: &BTreeMap<&str, &str>, key: &'static str) -> Result<u8, NetworkError> {
     let text = *texts.get(key).ok_or(NetworkError::Missing(key))?;
     text.parse().map_err(|_| {
@@ -293,7 +294,7 @@ fn number(texts: &BTreeMap<&str, &str>, key: &'static str) -> Result<u8, Network
     })
 }
 
-/// The beginning of a text of any length, for a message.
+/// The beginning of a text, for a message.
 fn shortened(text: &str) -> String {
     text.chars().take(60).collect()
 }

@@ -1,20 +1,20 @@
-//! The arithmetic of a network: dense layers in 32-bit floats, laid out so that the inner loops run over neighbouring numbers. There are
-//! only sums, products and ReLU, and the compiler neither fuses nor reorders them, so the same file gives the same values on every machine;
-//! tanh, which does not, is left to who shows the outputs. What goes in and what comes out is not known here.
+//! Dense layers in 32-bit floats, laid out for inner loops over contiguous memory. Only sums,
+//! products and ReLU are used, which the compiler neither fuses nor reorders, so a file gives the
+//! same values on every machine. tanh does not; it is applied only where outputs are displayed.
 
-/// Numbers that are summed beside each other in a dot product, so that they fit one vector register or two.
+/// Independent partial sums of a dot product, to fill one or two vector registers.
 const LANES: usize = 8;
 
 /// A hidden layer with ReLU.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Hidden {
-    /// By input: the weights that lead from it to every unit. So inputs that are zero, of which there are many, cost nothing.
+    /// Weights by input, so that inputs of 0, which are common, are skipped.
     by_input: Vec<f32>,
     bias: Vec<f32>,
 }
 
 impl Hidden {
-    /// A layer of `bias.len()` units (at least 1); `weights` by unit, as files have them.
+    /// A layer of `bias.len()` units (at least 1); `weights` by unit, as in files.
     pub(super) fn new(weights: &[f32], bias: Vec<f32>) -> Hidden {
         let (units, inputs) = (bias.len(), weights.len() / bias.len());
         let by_input = (0..inputs)
@@ -23,7 +23,7 @@ impl Hidden {
         Hidden { by_input, bias }
     }
 
-    /// Computes the units' values into `out`, whatever was in it.
+    /// Computes the units' values into `out`, replacing its content.
     pub(super) fn forward(&self, input: &[f32], out: &mut Vec<f32>) {
         assert_eq!(
             input.len() * self.bias.len(),
@@ -45,16 +45,17 @@ impl Hidden {
     }
 }
 
-/// The last layer, without an activation. Its outputs are computed one at a time, because few actions are legal.
+/// The last layer, without an activation. Its outputs are computed one at a time, because few
+/// actions are legal.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Output {
-    /// By output.
+    /// Weights by output.
     weights: Vec<f32>,
     bias: Vec<f32>,
 }
 
 impl Output {
-    /// A layer of `bias.len()` outputs (at least 1); `weights` by output, as files have them.
+    /// A layer of `bias.len()` outputs (at least 1); `weights` by output, as in files.
     pub(super) fn new(weights: Vec<f32>, bias: Vec<f32>) -> Output {
         Output { weights, bias }
     }
@@ -69,7 +70,7 @@ impl Output {
         self.weights.len() / self.bias.len()
     }
 
-    /// One output, for as many inputs as the layer has.
+    /// Computes one output. `input` must have the layer's number of inputs.
     pub(super) fn value(&self, index: usize, input: &[f32]) -> f32 {
         let row = &self.weights[index * input.len()..][..input.len()];
         self.bias[index] + dot(row, input)
@@ -95,8 +96,8 @@ mod tests {
     use crate::network::layers::*;
 
     #[test]
-    fn layers_agree_with_sums_written_down() {
-        // Two units of three inputs; the second is cut off by ReLU.
+    fn layers_agree_with_sums_by_hand() {
+        // Two units of three inputs; ReLU cuts off the second.
         let hidden = Hidden::new(&[1.0, 2.0, -3.0, 0.5, -4.0, 1.0], vec![0.25, 1.0]);
         let mut out = vec![9.0; 7];
         hidden.forward(&[2.0, 1.0, 0.0], &mut out);
@@ -111,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn a_dot_product_is_one_whatever_its_length() {
+    fn dot_products_of_every_length_are_right() {
         for length in 0..40u8 {
             let left: Vec<f32> = (0..length).map(f32::from).collect();
             let right: Vec<f32> = left.iter().map(|number| 2.0 * number - 3.0).collect();

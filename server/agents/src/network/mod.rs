@@ -1,5 +1,5 @@
-//! Agents that play from a network file: what a network is and how it decides. What it is shown is in `features`, how it computes in
-//! `layers`, how its file is read in `file`. Networks are trained elsewhere (the Python package does), never here.
+//! Agents that play by a network: what a network is and how it decides. `features` computes the
+//! inputs, `layers` the outputs, `file` reads network files. The Python package trains networks.
 
 mod features;
 mod file;
@@ -15,13 +15,13 @@ use layers::{Hidden, Output};
 
 pub use file::{MAX_FILE_BYTES, NetworkError};
 
-/// The network of the built-in agent `trained`, read once.
+/// The network of the built-in agent `trained`, loaded once.
 static TRAINED: LazyLock<Arc<Network>> = LazyLock::new(|| {
     let file = include_bytes!("trained.safetensors");
     Arc::new(Network::from_bytes(file).expect("the file within the program is sound"))
 });
 
-/// What a network is shown.
+/// The input of a network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NetworkInput {
     /// The paper's classic vector ([`Observation::classic_vector`]).
@@ -30,25 +30,25 @@ pub enum NetworkInput {
     Table,
 }
 
-/// What a network's outputs stand for.
+/// The outputs of a network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NetworkOutput {
-    /// The T actions of a turn. Other decisions are taken by default.
+    /// The T actions of a turn. For other decisions the default is taken.
     Turns,
     /// All A actions.
     Actions,
 }
 
-/// What a network's file says of it.
+/// The metadata of a network file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NetworkInfo {
-    /// What it is shown.
+    /// The input.
     pub input: NetworkInput,
-    /// What its outputs stand for.
+    /// The outputs.
     pub output: NetworkOutput,
-    /// Whether its outputs go through tanh. What it plays does not depend on it.
+    /// Whether outputs pass through tanh. Does not affect play.
     pub tanh: bool,
-    /// Whether it was trained to choose among the legal actions alone. It always plays so.
+    /// Whether it was trained on legal actions only. It always plays legal actions.
     pub masked: bool,
     /// Number of players it was trained for.
     pub players: u8,
@@ -58,15 +58,15 @@ pub struct NetworkInfo {
     pub jokers: u8,
     /// Cards dealt to a hand in these games.
     pub hand_size: u8,
-    /// The rule set it was trained under, as the protocol's JSON; empty if the file does not say. Shown to people, not looked at.
+    /// The rule set it was trained under, as the protocol's JSON, for display only. May be empty.
     pub rules: String,
-    /// Its name; may be empty.
+    /// Display name. May be empty.
     pub name: String,
-    /// The command that trained it; may be empty.
+    /// The training command. May be empty.
     pub trained_by: String,
 }
 
-/// A multilayer perceptron that plays: of the legal actions the one with the highest output.
+/// A multilayer perceptron that plays the legal action with the highest output.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Network {
     info: NetworkInfo,
@@ -80,22 +80,23 @@ impl Network {
         &TRAINED
     }
 
-    /// What its file says of it.
+    /// The metadata of its file.
     pub fn info(&self) -> &NetworkInfo {
         &self.info
     }
 
-    /// Whether it was trained for games of this size. In others it plays as `greedy`.
+    /// Whether it was trained for as many players, faces and cards dealt, whatever the jokers. In
+    /// other games it plays as `greedy`.
     pub fn fits(&self, rules: &RuleSet) -> bool {
         usize::from(self.info.players) == rules.players()
             && self.info.faces == rules.faces()
             && self.info.hand_size == rules.hand_size()
     }
 
-    /// What it is shown of a decision.
+    /// The input for an observation.
     ///
     /// # Panics
-    /// If `observation` is not of a game that it [fits](Network::fits) by its numbers of seats, faces and cards dealt.
+    /// If the observation's game does not [fit](Network::fits) the network.
     pub fn features(&self, observation: &Observation, legal: &Mask) -> Vec<f32> {
         assert!(
             self.knows(observation),
@@ -107,10 +108,11 @@ impl Network {
         }
     }
 
-    /// Its outputs, T or A numbers, for what [`Network::features`] gives. After tanh the last digits may differ between platforms.
+    /// The T or A outputs for an input from [`Network::features`]. After tanh the last digits may
+    /// differ between platforms.
     ///
     /// # Panics
-    /// If there are not as many features as it has inputs.
+    /// If the input has the wrong length.
     pub fn outputs(&self, features: &[f32]) -> Vec<f32> {
         let last = self.last_hidden(features);
         (0..self.output.len())
@@ -119,13 +121,13 @@ impl Network {
             .collect()
     }
 
-    /// Decides: of the legal actions the one with the highest output, of equal ones that with the lowest index. Outputs are compared
-    /// before tanh; one that is no number, because weights are too large to be summed, counts as the lowest. A decision without an
-    /// output is taken by default ([`Observation::default_action`]); in a game with other numbers of seats, faces or cards dealt than
-    /// it was trained for it plays as the built-in agent `greedy`.
+    /// Chooses the legal action with the highest output before tanh, the lowest index of equals.
+    /// NaN, from weights too large to sum, counts as the lowest. Without an output for the decision
+    /// takes the default action ([`Observation::default_action`]). In a game that the network does
+    /// not fit plays as the built-in agent `greedy`.
     ///
     /// # Panics
-    /// When `legal` is empty: there is no decision to take.
+    /// If `legal` is empty.
     pub fn decide(&self, observation: &Observation, legal: &Mask) -> ActionId {
         if !self.knows(observation) {
             let space =
@@ -147,8 +149,8 @@ impl Network {
             if index >= self.output.len() {
                 continue;
             }
-            // Not tanh of it: that changes no order, but differs between platforms and makes equal what is far from 0. What is no
-            // number is not above anything.
+            // Before tanh, which keeps the order but differs between platforms and saturates. NaN
+            // compares as not greater.
             let sum = self.output.value(index, &last);
             if sum > highest {
                 (best, highest) = (action, sum);
@@ -157,7 +159,7 @@ impl Network {
         best
     }
 
-    /// Whether an observation has the numbers of seats, faces and cards dealt that it was trained for.
+    /// Whether the observation's numbers of seats, faces and cards dealt are those of training.
     fn knows(&self, observation: &Observation) -> bool {
         observation.cards_left.len() == usize::from(self.info.players)
             && observation.faces == self.info.faces
@@ -182,10 +184,10 @@ impl Network {
 }
 
 impl NetworkInput {
-    /// Both.
+    /// Both inputs.
     const ALL: [NetworkInput; 2] = [NetworkInput::Classic, NetworkInput::Table];
 
-    /// Its name in files.
+    /// The name in files.
     pub fn name(self) -> &'static str {
         match self {
             NetworkInput::Classic => "classic",
@@ -193,7 +195,7 @@ impl NetworkInput {
         }
     }
 
-    /// How many numbers a network is shown in games of `rules`.
+    /// The length of the input in games of `rules`.
     fn len(self, rules: &RuleSet) -> usize {
         match self {
             NetworkInput::Classic => {
@@ -207,10 +209,10 @@ impl NetworkInput {
 }
 
 impl NetworkOutput {
-    /// Both.
+    /// Both kinds.
     const ALL: [NetworkOutput; 2] = [NetworkOutput::Turns, NetworkOutput::Actions];
 
-    /// Its name in files.
+    /// The name in files.
     pub fn name(self) -> &'static str {
         match self {
             NetworkOutput::Turns => "turns",
@@ -218,7 +220,7 @@ impl NetworkOutput {
         }
     }
 
-    /// How many outputs that is.
+    /// The number of outputs.
     fn len(self, space: ActionSpace) -> usize {
         usize::from(match self {
             NetworkOutput::Turns => space.turn_actions(),

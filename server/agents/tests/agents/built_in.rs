@@ -1,5 +1,5 @@
-//! The built-in agents: what greedy chooses in a table of positions, how evenly the random ones choose, and that all are functions of what
-//! they see and of their generator.
+//! The built-in agents: greedy's choices in a table of positions, uniformity of the random ones,
+//! and dependence on observation and generator alone.
 
 use chefshat_agents::{AgentKind, BuiltInAgent};
 use chefshat_engine::{
@@ -20,7 +20,7 @@ fn actions(texts: &str) -> Mask {
         .collect()
 }
 
-/// What seat 0 sees, as far as agents look at it.
+/// The parts of seat 0's observation that agents use.
 fn observation(kind: DecisionKind, role: Option<Role>) -> Observation {
     let rules = RuleSetSpec::default().validate().unwrap();
     let mut observation =
@@ -31,13 +31,13 @@ fn observation(kind: DecisionKind, role: Option<Role>) -> Observation {
 }
 
 #[test]
-fn greedy_chooses_as_it_says() {
+fn greedy_follows_its_documented_order() {
     use DecisionKind::{Exchange, SpecialAction, Turn};
     let table = [
-        // The least rare face, as many cards of it as it can.
+        // The highest face, with as many cards of it as possible.
         (Turn, None, "C9;Q1;J0, C9;Q2;J0, C8;Q4;J0, pass", "C9;Q2;J0"),
         (Turn, None, "C1;Q1;J0, C2;Q1;J0, pass", "C2;Q1;J0"),
-        // Jokers are kept while anything else can be played …
+        // Without jokers while anything else can be played …
         (
             Turn,
             None,
@@ -45,12 +45,12 @@ fn greedy_chooses_as_it_says() {
             "C11;Q3;J0",
         ),
         (Turn, None, "C3;Q1;J0, C9;Q2;J1, pass", "C3;Q1;J0"),
-        // … and as few of them as possible are played otherwise, alone last of all.
+        // … otherwise with as few as possible, and a lone joker last.
         (Turn, None, "C4;Q2;J1, C9;Q1;J2, C5;Q2;J1, pass", "C5;Q2;J1"),
         (Turn, None, "C2;Q1;J1, C0;Q0;J1, pass", "C2;Q1;J1"),
         (Turn, None, "C0;Q0;J1, pass", "C0;Q0;J1"),
         (Turn, None, "pass", "pass"),
-        // Gives away its least rare card, a joker only when there is nothing else.
+        // Gives the highest face, a joker only without other cards.
         (
             Exchange,
             Some(Role::Chef),
@@ -59,7 +59,7 @@ fn greedy_chooses_as_it_says() {
         ),
         (Exchange, Some(Role::SousChef), "give C1, give J", "give C1"),
         (Exchange, Some(Role::Chef), "give J", "give J"),
-        // Declares exactly where the exchange would cost it cards.
+        // Declares only where the exchange would cost cards.
         (
             SpecialAction,
             Some(Role::Dishwasher),
@@ -118,7 +118,7 @@ fn random_is_even_over_the_legal_actions() {
     let legal =
         actions("C1;Q1;J0, C2;Q1;J0, C3;Q1;J0, C9;Q4;J1, C11;Q11;J2, C0;Q0;J1, pass, give C1");
     for kind in [AgentKind::Random, AgentKind::RandomUnmasked] {
-        // An exchange, where both choose among the legal actions.
+        // At an exchange both choose among the legal actions.
         let counts = counts(kind, DecisionKind::Exchange, &legal, 8_000);
         for action in space().iter() {
             let count = counts[usize::from(action.index())];
@@ -181,7 +181,7 @@ fn an_agent_is_a_function_of_observation_and_generator() {
 }
 
 #[test]
-fn names_lead_back_to_agents() {
+fn names_round_trip() {
     for kind in AgentKind::ALL {
         assert_eq!(AgentKind::from_name(kind.name()), Some(kind));
     }

@@ -1,4 +1,4 @@
-//! The tests of agents, one binary. Each module below is a subject.
+//! Tests of the crate, one binary with a module for each subject.
 
 #![allow(
     clippy::unwrap_used,

@@ -1,5 +1,6 @@
-//! Network agents: the same features, outputs and actions as the Python package (the fixtures of tests/fixtures/network, which
-//! clients/python/tools/network_fixtures.py makes), and decisions that follow from the outputs. Files, sound and broken, are in `network_file`.
+//! Networks: features, outputs and actions equal those of the Python package (fixtures in
+//! tests/fixtures/network, written by clients/python/tools/network_fixtures.py), and decisions
+//! follow from the outputs. `network_file` tests files.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -17,7 +18,7 @@ use serde::Deserialize;
 
 use crate::network_file::NetworkFile;
 
-/// A row of a fixture: what a seat sees, and what follows from it.
+/// A row of a fixture: an observation and the results for it.
 #[derive(Deserialize)]
 struct Row {
     seat: usize,
@@ -120,7 +121,7 @@ fn features_outputs_and_actions_are_those_of_the_python_package() {
         for (number, row) in rows.iter().enumerate() {
             let (observation, legal) = (row.observation(hand_size), row.mask());
             let features = network.features(&observation, &legal);
-            // To the last bit: all are 0, 1 or one division of small numbers.
+            // Exact: all values are 0, 1 or a quotient of small numbers.
             assert_eq!(features, row.features, "{name}, row {number}");
             if input == Table {
                 assert_eq!(table_features(&observation, &legal), features);
@@ -139,7 +140,7 @@ fn features_outputs_and_actions_are_those_of_the_python_package() {
     }
 }
 
-/// Every decision of a game of greedy agents, with what its seat sees.
+/// Every decision of a game of greedy agents, with its observation.
 fn decisions(spec: &RuleSetSpec) -> Vec<(Observation, Mask)> {
     let rules = spec.validate().unwrap();
     let mut game = Game::new(rules, Seed([8; 32]), |_| {});
@@ -163,11 +164,11 @@ fn shifts(count: u32) -> RuleSetSpec {
 }
 
 #[test]
-fn the_highest_output_is_played_and_of_equal_ones_the_first() {
+fn the_highest_output_is_played_and_the_first_of_equals() {
     let ascending: Vec<f32> = (0..214u8).map(f32::from).collect();
     let highest = NetworkFile::preferring(&ascending).network();
     let lowest = NetworkFile::preferring(&[0.5; 214]).network();
-    // Saturated: tanh makes equal what is not, so what is played is found before it.
+    // Saturated: tanh makes all outputs equal, so the choice must precede it.
     let saturated =
         NetworkFile::preferring(&ascending.iter().map(|n| 20.0 + n).collect::<Vec<_>>());
     let saturated = saturated.with("output_activation", "tanh").network();
@@ -184,11 +185,11 @@ fn the_highest_output_is_played_and_of_equal_ones_the_first() {
     }
 }
 
-/// A network with the outputs 0, 1, 2 and so on for whatever it is shown, but no number for the actions in `broken`.
+/// A network with the constant outputs 0, 1, 2 and so on, and NaN for the actions in `broken`.
 fn overflowing(broken: Range<usize>) -> Network {
     let mut file = NetworkFile::new("classic", "actions");
     file.layer(0, 228, &[0.0; 2 * 228], &[f32::MAX; 2]);
-    // Infinity less infinity, though every number of the file is finite.
+    // Infinity minus infinity, although every number of the file is finite.
     let mut weights = [0.0; 2 * 214];
     for row in broken.clone() {
         (weights[2 * row], weights[2 * row + 1]) = (f32::MAX, -f32::MAX);
@@ -203,9 +204,9 @@ fn overflowing(broken: Range<usize>) -> Network {
 }
 
 #[test]
-fn outputs_that_are_no_numbers_never_win() {
+fn nan_outputs_never_win() {
     let seen = decisions(&shifts(6));
-    // A pass alone, which is the last of a turn's actions; those before it, all or some; everything.
+    // Only the pass, which is the last action of a turn; all or some before it; everything.
     for broken in [199..200, 0..199, 0..40, 0..214] {
         let network = overflowing(broken.clone());
         let (mut mixed, mut without) = (0, 0);
@@ -214,7 +215,7 @@ fn outputs_that_are_no_numbers_never_win() {
             let count = legal.iter().filter(sound).count();
             mixed += u32::from(count > 0 && count < legal.len());
             without += u32::from(count == 0 && legal.len() > 1);
-            // Of none that is a number, all are equal.
+            // If all are NaN, all are equal.
             let expected = legal.iter().filter(sound).last().or(legal.nth(0));
             let chosen = network.decide(observation, legal);
             assert_eq!(Some(chosen), expected, "{broken:?} of {legal:?}");
@@ -272,7 +273,7 @@ fn a_network_fits_rules_with_as_many_players_faces_and_cards_dealt() {
 }
 
 #[test]
-fn unknown_games_are_played_as_greedy_would() {
+fn games_that_do_not_fit_are_played_as_greedy() {
     let network = NetworkFile::preferring(&[0.5; 214]).network();
     let network = Arc::new(network);
     for spec in [
@@ -325,7 +326,8 @@ fn the_trained_agent_plays_by_its_network_and_fits_the_default_rules() {
 
 #[test]
 fn hidden_layers_and_half_floats_count() {
-    // One hidden unit that sees whether action 0 is legal (the last 200 of the classic vector), twice over, cut off below 0.
+    // One hidden unit for whether action 0 is legal (the last 200 of the classic vector), twice,
+    // cut off below 0.
     let mut file = NetworkFile::new("classic", "turns");
     let mut weights = vec![0.0; 2 * 228];
     (weights[28], weights[228 + 28]) = (3.0, -3.0);
@@ -337,7 +339,7 @@ fn hidden_layers_and_half_floats_count() {
     file.floats("layer1.bias", &[200], &[1.0; 200]);
     let network = file.network();
     let mut features = vec![0.0; 228];
-    // The output layer looks at the second unit alone.
+    // The output layer uses the second unit alone.
     assert_eq!(network.outputs(&features), [1.25; 200]);
     features[28] = 1.0;
     assert_eq!(network.outputs(&features), [1.0; 200]);

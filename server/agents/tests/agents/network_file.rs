@@ -1,4 +1,4 @@
-//! Network files: made up here for the other tests too, and named for what they are where they are broken.
+//! Network files: a builder for tests, and the errors of broken files.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -7,7 +7,7 @@ use chefshat_agents::{MAX_FILE_BYTES, Network};
 use safetensors::Dtype;
 use safetensors::tensor::{TensorView, serialize};
 
-/// A network file in the making.
+/// A builder for a network file.
 #[derive(Clone)]
 pub(crate) struct NetworkFile {
     pub(crate) texts: BTreeMap<String, String>,
@@ -15,7 +15,7 @@ pub(crate) struct NetworkFile {
 }
 
 impl NetworkFile {
-    /// A file of a standard game, without tensors.
+    /// A file for the default game, without tensors.
     pub(crate) fn new(input: &str, output: &str) -> NetworkFile {
         let texts = [
             ("format", "chefshat-network-1"),
@@ -38,7 +38,7 @@ impl NetworkFile {
         }
     }
 
-    /// A network of the classic vector whose outputs are always these, so that it plays by a fixed order of preference.
+    /// A network of the classic vector with constant outputs, hence a fixed order of preference.
     pub(crate) fn preferring(outputs: &[f32]) -> NetworkFile {
         let (name, count) = if outputs.len() == 200 {
             ("turns", 200)
@@ -73,13 +73,13 @@ impl NetworkFile {
             .push((name.to_owned(), kind, shape.to_vec(), bytes));
     }
 
-    /// Sets one of the metadata.
+    /// Sets a metadata value.
     pub(crate) fn with(mut self, key: &str, text: &str) -> NetworkFile {
         self.texts.insert(key.to_owned(), text.to_owned());
         self
     }
 
-    /// Takes one of the metadata away.
+    /// Removes a metadata value.
     pub(crate) fn without(mut self, key: &str) -> NetworkFile {
         assert!(self.texts.remove(key).is_some());
         self
@@ -96,14 +96,14 @@ impl NetworkFile {
         Network::from_bytes(&self.bytes()).unwrap()
     }
 
-    /// Why it is no network.
+    /// The error of reading it.
     pub(crate) fn problem(&self) -> String {
         Network::from_bytes(&self.bytes()).unwrap_err().to_string()
     }
 }
 
 #[test]
-fn broken_files_are_named_for_what_they_are() {
+fn broken_files_are_refused_with_the_reason() {
     let sound = NetworkFile::preferring(&[0.0; 214]);
     let mut table: Vec<(NetworkFile, &str)> = vec![
         (sound.clone().without("format"), "no \"format\""),
@@ -234,10 +234,10 @@ fn broken_files_are_named_for_what_they_are() {
 }
 
 #[test]
-fn what_is_no_safetensors_file_is_refused() {
+fn files_other_than_safetensors_are_refused() {
     let bytes = NetworkFile::preferring(&[0.0; 214]).bytes();
     assert!(Network::from_bytes(&bytes).is_ok());
-    // Cut off anywhere, or with a byte too many, or of another kind.
+    // Truncated anywhere, with an extra byte, or of another format.
     for length in (0..bytes.len()).step_by(97) {
         let problem = Network::from_bytes(&bytes[..length])
             .unwrap_err()
@@ -249,7 +249,7 @@ fn what_is_no_safetensors_file_is_refused() {
         let problem = Network::from_bytes(junk).unwrap_err().to_string();
         assert!(problem.starts_with("not a safetensors file: "), "{problem}");
     }
-    // A byte changed in the header gives an error or another sound network, never a panic.
+    // A changed byte in the header gives an error or another valid network, never a panic.
     let header = 8 + usize::try_from(u64::from_le_bytes(bytes[..8].try_into().unwrap())).unwrap();
     for index in 0..header {
         for flip in [1, 0x10, 0x80] {

@@ -1,4 +1,4 @@
-//! One game: who is asked, and what follows from answers that are not legal.
+//! Playing one game: whom it asks, and the effect of illegal actions.
 
 use std::num::NonZeroU32;
 
@@ -32,7 +32,7 @@ impl Listener for Counts {
 }
 
 #[test]
-fn who_never_answers_legally_plays_by_defaults() {
+fn only_illegal_answers_lead_to_default_decisions() {
     let spec = RuleSetSpec {
         stop: Stop::Shifts(2),
         ..RuleSetSpec::default()
@@ -52,7 +52,7 @@ fn who_never_answers_legally_plays_by_defaults() {
 }
 
 #[test]
-fn every_question_is_put_to_the_seat_that_decides() {
+fn the_deciding_seat_is_asked() {
     let rules = RuleSetSpec::default().validate().unwrap();
     let mut counts = Counts::default();
     let mut kinds = Vec::new();

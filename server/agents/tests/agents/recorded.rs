@@ -1,5 +1,5 @@
-//! Playing as a recorded player: the same game is the same again, from any point on; elsewhere the most similar decision counts, and what
-//! was not the player's own does not.
+//! Imitating a recorded player: its own game repeats from any point; elsewhere the most similar
+//! decision of its own counts.
 
 use std::sync::Arc;
 
@@ -14,7 +14,7 @@ fn rules(spec: RuleSetSpec) -> RuleSet {
     spec.validate().unwrap()
 }
 
-/// Plays with one agent for each seat. Gives every decision with its seat.
+/// Plays with one agent for each seat and returns every decision with its seat.
 fn played(
     rules: RuleSet,
     seed: Seed,
@@ -119,7 +119,7 @@ impl Listener for Steps {
 }
 
 #[test]
-fn players_play_other_games_to_their_end_and_always_alike() {
+fn players_finish_other_games_deterministically() {
     let standard = rules(RuleSetSpec::default());
     let first = played(standard, Seed([1; 32]), &mut random(4, 50));
     let own = players(4, &first);
@@ -161,7 +161,7 @@ fn actions(texts: &str) -> Mask {
     texts.split(", ").map(action).collect()
 }
 
-/// What seat 0 sees, with this face and number of cards on the board.
+/// Seat 0's observation with this face and number of cards on the board.
 fn observation(kind: DecisionKind, face: u8, size: u8) -> Observation {
     let game = Game::new(rules(RuleSetSpec::default()), Seed([1; 32]), |_| {});
     let mut observation = game.observe(Viewer::Seat(Seat::new(0)));
@@ -174,7 +174,7 @@ fn observation(kind: DecisionKind, face: u8, size: u8) -> Observation {
 #[test]
 fn the_most_similar_decision_with_a_legal_action_counts() {
     use DecisionKind::{Exchange, SpecialAction, Turn};
-    // Kind, board, action, whether it was the player's own.
+    // Kind, board, action, whether the player took it itself.
     let past = [
         (Turn, (0, 0), "C11;Q2;J0", true),
         (Turn, (9, 2), "C8;Q2;J0", true),
@@ -200,9 +200,10 @@ fn the_most_similar_decision_with_a_legal_action_counts() {
         );
     assert_eq!(player.decisions().len(), past.len());
     let table = [
-        // Exactly as it was, even where it was not its own.
+        // An exact match, even if a substitute took it.
         (Turn, (7, 3), all(Turn), "C2;Q1;J2"),
-        // The same board, but something else is legal too: the most similar, and what was not its own is no model.
+        // The same board with more legal actions: the most similar decision that the player took
+        // itself.
         (
             Turn,
             (7, 3),
@@ -212,10 +213,10 @@ fn the_most_similar_decision_with_a_legal_action_counts() {
         (Turn, (5, 2), actions("C4;Q2;J0, pass"), "C4;Q2;J0"),
         (Turn, (6, 2), all(Turn), "C4;Q2;J0"),
         (Turn, (8, 2), all(Turn), "C8;Q2;J0"),
-        // What is not legal is passed over.
+        // Illegal actions are skipped.
         (Turn, (8, 2), actions("C4;Q2;J0, pass"), "C4;Q2;J0"),
         (Turn, (8, 2), actions("C3;Q2;J0, pass"), "pass"),
-        // Nothing it did is legal: the default decision.
+        // No recorded action is legal: the default decision.
         (Turn, (0, 0), actions("C2;Q1;J0, C3;Q1;J0"), "C2;Q1;J0"),
         (SpecialAction, (0, 0), all(SpecialAction), "decline"),
         // The earliest of two that are equally similar.
@@ -233,7 +234,7 @@ fn the_most_similar_decision_with_a_legal_action_counts() {
 }
 
 #[test]
-fn actions_are_carried_over_by_their_meaning() {
+fn actions_are_translated_by_meaning() {
     let decision = RecordedDecision {
         observation: observation(DecisionKind::Turn, 11, 1),
         legal: actions("C9;Q2;J1, pass"),
@@ -260,7 +261,7 @@ fn actions_are_carried_over_by_their_meaning() {
 }
 
 #[test]
-fn what_makes_no_sense_is_left_out() {
+fn invalid_decisions_are_skipped() {
     let sound = RecordedDecision {
         observation: observation(DecisionKind::Turn, 0, 0),
         legal: actions("C9;Q2;J1, pass"),
@@ -277,7 +278,7 @@ fn what_makes_no_sense_is_left_out() {
     };
     let player = RecordedPlayer::new([closed, nobodys, sound.clone(), illegal]);
     assert_eq!(player.decisions(), [sound]);
-    // A player of nothing plays by default.
+    // A player without decisions takes default decisions.
     let nobody = RecordedPlayer::new([]);
     let now = observation(DecisionKind::Exchange, 0, 0);
     let legal = actions("give C2, give C3");

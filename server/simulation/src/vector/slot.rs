@@ -6,7 +6,7 @@ use chefshat_engine::{
     Standings, Viewer,
 };
 
-use super::columns::{Batch, Ending, Row, Totals, places_taken};
+use super::columns::{Batch, Ending, PlayedGame, Row, Totals, places_taken};
 use super::{Decisions, Episode, VectorSetup};
 use chefshat_agents::{AgentKind, BuiltInAgent, agent_seed, ask, is_wrong_action};
 use chefshat_engine::PlayedDecision;

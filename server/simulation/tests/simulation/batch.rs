@@ -1,4 +1,4 @@
-//! Batches: the same whatever the number of threads, nothing lost in adding up, and every game playable again alone.
+//! Batches: independent of the number of threads, with correct totals and reproducible games.
 
 use std::num::NonZeroU32;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -24,7 +24,7 @@ fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
         .install(work)
 }
 
-/// Bit for bit the same, fractions included.
+/// Asserts equality bit for bit, fractions included.
 fn assert_identical(left: &BatchTable, right: &BatchTable) {
     assert_eq!(left, right);
     for (seat, sums) in left.seats.iter() {
@@ -60,7 +60,7 @@ fn any_number_of_threads_gives_the_same_table() {
 
 #[test]
 fn a_fold_keeps_the_order_of_the_games() {
-    // More games than are held at a time, and not a multiple of anything.
+    // More games than one wave, and not a multiple of the chunk.
     let games = 70_001;
     let batch = Batch::new(standard(), &[Random; 4], games, 0).unwrap();
     for threads in [1, 3] {
@@ -86,7 +86,7 @@ fn progress_counts_every_game() {
 }
 
 #[test]
-fn nothing_is_lost_in_adding_up() {
+fn totals_are_complete() {
     for players in 2u8..=6 {
         for (preset, scheme) in [
             ("paper", RewardScheme::Validity),
@@ -147,7 +147,7 @@ fn nothing_is_lost_in_adding_up() {
     }
 }
 
-/// Writes down what happens in a game.
+/// Records what happens in a game.
 #[derive(Default, PartialEq, Debug)]
 struct Diary {
     decisions: Vec<(Decision, ActionId)>,
@@ -244,8 +244,8 @@ fn a_limit_of_invalid_attempts_bounds_the_wrong_actions() {
 }
 
 #[test]
-fn seeds_are_distinct_and_stay_as_they_are() {
-    // From an implementation of ChaCha20 that is not the one used here.
+fn seeds_are_distinct_and_stable() {
+    // From another implementation of ChaCha20.
     assert_eq!(
         hex::encode(game_seed(7, 0).0),
         "c89111a5c2dc3d7997e9f34b9887a06c070bf5cbaf4e13f4811668bcb6f81f28"
@@ -269,7 +269,7 @@ fn seeds_are_distinct_and_stay_as_they_are() {
 }
 
 #[test]
-fn what_seed_7_brings_stays_as_it_is() {
+fn results_of_seed_7_are_stable() {
     let batch = Batch::new(
         standard(),
         &[Greedy, Random, RandomUnmasked, Random],
@@ -292,7 +292,7 @@ fn what_seed_7_brings_stays_as_it_is() {
 }
 
 #[test]
-fn batches_that_make_no_sense_are_refused() {
+fn invalid_batches_are_refused() {
     let refused =
         |agents: &[AgentKind], games| Batch::new(standard(), agents, games, 0).unwrap_err();
     assert_eq!(

@@ -1,4 +1,4 @@
-//! The vectors of `tests/fixtures/vectors`: all agree, and every kind of damage is named where it is.
+//! The vectors of `tests/fixtures/vectors` agree, and every kind of damage is reported where it is.
 
 use std::fs::File;
 use std::io::{self, BufReader, Cursor, Read};
@@ -55,7 +55,7 @@ fn all_vectors_agree() {
 
 type Damage = fn(&mut Value);
 
-/// Damages the second line of a file; gives place, step, expected and got of what is reported.
+/// Damages the second line of a file. Returns place, step, expected and got of the report.
 fn damaged(file: &str, damage: impl FnOnce(&mut Value)) -> (String, Option<usize>, String, String) {
     let lines = lines(file);
     let mut vector: Value = serde_json::from_str(&lines[1]).unwrap();
@@ -80,7 +80,7 @@ fn raise(number: &mut Value) {
 }
 
 #[test]
-fn damage_to_a_game_is_named() {
+fn damage_to_a_game_is_located() {
     let table: [(&str, Option<usize>, Damage); 12] = [
         ("steps[7], seat", Some(7), |game| {
             game["steps"][7][0] = json!((game["steps"][7][0].as_u64().unwrap() + 1) % 4)
@@ -128,7 +128,7 @@ fn damage_to_a_game_is_named() {
 }
 
 #[test]
-fn wrong_legal_actions_are_told_apart() {
+fn wrong_legal_actions_are_listed() {
     let table: [(&str, Damage); 4] = [
         (", which lacks [0]", |game| {
             game["steps"][1][2]
@@ -156,7 +156,7 @@ fn wrong_legal_actions_are_told_apart() {
 }
 
 #[test]
-fn a_game_cut_short_or_drawn_out_is_named() {
+fn a_shortened_or_extended_game_is_reported() {
     let (place, _, expected, got) = damaged("games.jsonl", |game| {
         drop(game["steps"].as_array_mut().unwrap().pop())
     });
@@ -193,7 +193,7 @@ fn another_legal_action_shows_where_it_makes_a_difference() {
 }
 
 #[test]
-fn damage_to_a_deal_is_named() {
+fn damage_to_a_deal_is_located() {
     let table: [(&str, Damage); 5] = [
         ("leader", |deal| raise(&mut deal["leader"])),
         ("hands[2]", |deal| {
@@ -215,7 +215,7 @@ fn damage_to_a_deal_is_named() {
 }
 
 #[test]
-fn lines_that_are_no_vectors_are_refused_in_words() {
+fn lines_that_are_not_vectors_are_explained() {
     let changed = |change: Damage| {
         let mut vector: Value = serde_json::from_str(&lines("deals.jsonl")[0]).unwrap();
         change(&mut vector);
@@ -288,7 +288,7 @@ impl Read for Broken {
 }
 
 #[test]
-fn a_file_that_breaks_off_is_reported() {
+fn a_read_error_is_reported() {
     let line = format!("{}\n", lines("deals.jsonl")[0]);
     let report = check(BufReader::new(Cursor::new(line).chain(Broken)), |_| {});
     assert_eq!(report.agreed.deals, 1);

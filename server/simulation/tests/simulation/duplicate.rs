@@ -1,5 +1,5 @@
-//! Duplicate deals: every deal in every seating, nobody favoured, exactly nothing between agents that do the same, and less chance in the
-//! result than with deals of their own.
+//! Duplicate deals: every deal in every seating, no bias, no difference between identical agents,
+//! and smaller errors than independent deals.
 
 use std::num::NonZeroU32;
 use std::sync::Arc;
@@ -94,7 +94,7 @@ fn all_seatings_are_played_and_seats_are_shared_fairly() {
 }
 
 #[test]
-fn agents_that_do_the_same_come_out_exactly_even() {
+fn identical_agents_are_exactly_even() {
     for players in 2..=5 {
         for plan in [Half, One] {
             let comparison = compared(Greedy, Greedy, plan, players, 12);
@@ -110,7 +110,7 @@ fn agents_that_do_the_same_come_out_exactly_even() {
 }
 
 #[test]
-fn agents_that_draw_differ_from_themselves_by_chance_alone() {
+fn random_agents_differ_from_themselves_only_by_chance() {
     for plan in [Half, One] {
         let comparison = compared(Random, Random, plan, 4, 150);
         for figure in [&comparison.points, &comparison.places, &comparison.wins] {
@@ -139,7 +139,7 @@ fn the_better_agent_is_found() {
 }
 
 #[test]
-fn means_add_up_to_what_a_shift_brings() {
+fn means_add_up_to_the_totals_of_a_shift() {
     for (plan, b_seats) in [(Half, 1.0), (One, 3.0)] {
         let comparison = compared(Greedy, Random, plan, 4, 30);
         let seatings = plan.seatings(4).len() as u64;
@@ -160,7 +160,7 @@ fn means_add_up_to_what_a_shift_brings() {
 }
 
 #[test]
-fn duplicate_deals_leave_less_to_chance() {
+fn duplicate_deals_reduce_the_error() {
     let contenders = [Contender::Kind(Greedy), careless()];
     let comparison = duplicate(contenders, Half, 4, 200).unwrap().run(|_| {});
     let points = &comparison.points;
@@ -174,7 +174,7 @@ fn duplicate_deals_leave_less_to_chance() {
     assert!(points.gain().unwrap() > 1.3);
 }
 
-/// What was dealt in the Shifts of a game.
+/// The deals of a game's Shifts.
 #[derive(Default, PartialEq, Debug)]
 struct Deals {
     hands: Vec<BySeat<Option<Cards>>>,
@@ -192,7 +192,7 @@ impl Listener for Deals {
 }
 
 #[test]
-fn the_deals_are_the_same_in_all_seatings_and_the_draws_are_not() {
+fn deals_are_the_same_in_all_seatings_and_random_choices_are_not() {
     let contenders = [Contender::Kind(Random), Contender::Kind(Random)];
     let duplicate = duplicate(contenders, Half, 4, 2).unwrap();
     let game = |deal, seating| {
@@ -219,7 +219,7 @@ fn the_deals_are_the_same_in_all_seatings_and_the_draws_are_not() {
     }
     assert_eq!(game(0, 0), first);
     assert_ne!(game(1, 0).hands, first.hands);
-    // Game d of a batch of this seed.
+    // Game d of a batch with this seed.
     let mut batch = Deals::default();
     let mut engine = chefshat_engine::Game::new(*duplicate.rules(), game_seed(9, 0), |event| {
         batch.on_event(&event);
@@ -267,7 +267,7 @@ fn a_small_comparison_has_these_numbers() {
 }
 
 #[test]
-fn what_cannot_be_compared_is_refused() {
+fn invalid_comparisons_are_refused() {
     let greedy = || Contender::Kind(Greedy);
     for deals in [0, 1] {
         let refused = duplicate([greedy(), greedy()], Half, 4, deals).unwrap_err();

@@ -1,4 +1,5 @@
-//! Experiment 1: which rules a condition has, how its Shifts are played, and golden numbers of the paper's size.
+//! Experiment 1: the rules of each condition, how its Shifts are played, and golden numbers of the
+//! paper's size.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -57,7 +58,7 @@ fn a_condition_leaves_out_one_mechanic() {
     assert_eq!(All.rules("chess"), None);
 }
 
-/// Of 250 Shifts with seed 0: Shifts that the starter won, laps, turns, special actions.
+/// Of 250 Shifts with seed 0: wins of the starter, laps, turns, special actions.
 const GOLDEN: [(&str, Condition, [u64; 4]); 8] = [
     ("paper", All, [71, 7_699, 24_723, 23]),
     ("paper", WithoutJokers, [75, 7_621, 24_437, 0]),

@@ -1,4 +1,4 @@
-//! Ratings come out in the right order, and claim no more than they know.
+//! Ratings have the right order and honest uncertainties.
 
 use chefshat_simulation::calibration::{Calibration, Fields, calibration};
 use chefshat_tournament::ratings::{
@@ -24,7 +24,7 @@ fn many() -> Vec<Fields> {
 
 const ROUNDS: [u32; 4] = [20, 50, 100, 300];
 
-/// The library's own update of several teams.
+/// The library's own update for several teams.
 fn library(players: &[(Rating, u32)]) -> Vec<Rating> {
     let teams: Vec<[WengLinRating; 1]> = players
         .iter()
@@ -44,7 +44,7 @@ fn library(players: &[(Rating, u32)]) -> Vec<Rating> {
         .collect()
 }
 
-/// Of all kinds of fields and numbers of games, the shares covered.
+/// Shares covered, for all kinds of fields and numbers of games.
 fn shares(update: impl Fn(&[(Rating, u32)]) -> Vec<Rating> + Sync) -> Vec<f64> {
     let measured = many()
         .into_iter()
@@ -67,7 +67,7 @@ fn the_stated_uncertainty_covers_the_truth_as_often_as_it_claims() {
 
 #[test]
 fn the_same_test_finds_the_library_overconfident() {
-    // Were it not for this, nobody would know that the test above can fail.
+    // Shows that the test above can fail.
     let shares = shares(library);
     let worst = shares.iter().copied().fold(1.0, f64::min);
     assert!(worst < 0.9, "{shares:?}");
@@ -92,7 +92,7 @@ fn more_games_make_ratings_better_and_surer() {
 }
 
 #[test]
-fn games_of_other_numbers_of_players_are_no_less_honest() {
+fn uncertainty_is_honest_for_other_numbers_of_players() {
     for players in [2, 3, 5, 6] {
         let fields = Fields {
             fields: 30,
@@ -110,7 +110,8 @@ fn games_of_other_numbers_of_players_are_no_less_honest() {
 
 #[test]
 fn a_field_of_known_strengths_comes_out_in_their_order() {
-    // Eight participants, each better than the next by a skill difference that wins two games of three.
+    // Eight participants, each better than the next by a skill difference that wins two games of
+    // three.
     let step = 5.0;
     assert!((0.68..0.72).contains(&win_chance(step, 0.0)));
     let mut ratings = Ratings::default();
@@ -142,7 +143,7 @@ fn a_field_of_known_strengths_comes_out_in_their_order() {
 }
 
 #[test]
-fn a_leaderboard_shows_those_asked_for_best_first() {
+fn a_leaderboard_is_filtered_and_sorted() {
     let mut ratings = Ratings::default();
     for _ in 0..3 {
         ratings.fold(&[("a", 1), ("b", 2), ("c", 3)]).unwrap();
@@ -152,7 +153,7 @@ fn a_leaderboard_shows_those_asked_for_best_first() {
         let lines = ratings.leaderboard(|who| *who != "b", least);
         lines.iter().map(|(who, _)| **who).collect()
     };
-    // One game won leaves open too much to be first.
+    // One win leaves too much uncertainty for the first place.
     assert!(ratings.rating(&"d").mean > ratings.rating(&"c").mean);
     assert_eq!(shown(0), ["a", "d", "c"]);
     assert_eq!(shown(2), ["a", "c"]);
@@ -163,7 +164,7 @@ fn a_leaderboard_shows_those_asked_for_best_first() {
 }
 
 #[test]
-fn what_cannot_be_rated_changes_nothing() {
+fn invalid_games_change_no_rating() {
     let mut ratings = Ratings::default();
     ratings.fold(&[(0, 1), (1, 2)]).unwrap();
     let before = ratings.clone();

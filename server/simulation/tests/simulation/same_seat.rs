@@ -1,4 +1,4 @@
-//! Two agents in the same seats: what is dealt alike tells them apart with fewer games, and the stated errors are true.
+//! Comparison in the same seats: duplicate deals need fewer games, and the stated errors are right.
 
 use chefshat_agents::AgentKind;
 use chefshat_engine::{RuleSetSpec, Stop};
@@ -23,7 +23,7 @@ fn measured(random_percent: [u8; 2], seed: u64, games: &[u64]) -> Vec<Measured> 
 }
 
 #[test]
-fn agents_that_do_the_same_do_not_differ_on_the_same_deals() {
+fn identical_agents_do_not_differ_on_the_same_deals() {
     let [same] = measured([0, 0], 1, &[200])[..] else {
         panic!("one was asked for")
     };
@@ -36,7 +36,7 @@ fn agents_that_do_the_same_do_not_differ_on_the_same_deals() {
 }
 
 #[test]
-fn what_is_known_grows_with_the_games() {
+fn more_games_reduce_the_error() {
     let steps = measured([0, 20], 2, &[100, 400, 1600]);
     let games: Vec<u64> = steps.iter().map(|step| step.games).collect();
     assert_eq!(games, [100, 400, 1600]);
@@ -44,18 +44,18 @@ fn what_is_known_grows_with_the_games() {
         assert!(step.duplicate_error < step.independent_error, "{step:?}");
     }
     assert!(steps[2].gain().unwrap() > 1.5, "{steps:?}");
-    // The error halves when the games are four times as many.
+    // Four times as many games halve the error.
     for two in steps.windows(2) {
         let ratio = two[0].duplicate_error / two[1].duplicate_error;
         assert!((1.5..2.7).contains(&ratio), "{ratio}");
     }
-    // The same games come to the same, however they are asked for.
+    // Intermediate results do not affect the final one.
     let at_once = measured([0, 20], 2, &[400]);
     assert!((at_once[0].difference - steps[1].difference).abs() < 1e-12);
 }
 
 #[test]
-fn the_stated_error_is_that_of_many_repetitions() {
+fn the_stated_error_matches_many_repetitions() {
     let repetitions: Vec<Measured> = (0..60)
         .map(|seed| measured([0, 20], 100 + seed, &[50])[0])
         .collect();

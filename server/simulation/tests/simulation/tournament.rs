@@ -1,4 +1,4 @@
-//! Tournaments of built-in agents, played offline: the same for the same seed, whatever the number of threads; better agents stand higher.
+//! Offline tournaments: independent of the number of threads; better agents rank higher.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -60,7 +60,7 @@ fn better_agents_stand_higher_in_every_format() {
 }
 
 #[test]
-fn threads_make_no_difference_and_the_seed_does() {
+fn the_seed_matters_and_the_number_of_threads_does_not() {
     let start = field(Format::Swiss, Deals::SameAtAllTables, 12);
     let [one, three, other] = [(5, 1), (5, 3), (6, 1)].map(|(seed, threads)| {
         let mut tournament = start.clone();
@@ -73,7 +73,8 @@ fn threads_make_no_difference_and_the_seed_does() {
 
 #[test]
 fn duplicate_deals_are_the_same_cards() {
-    // Agents that draw nothing, the same in all seats: rotating them through a deal changes who, not what happens.
+    // The same deterministic agents on all seats: rotating them through a deal changes nothing but
+    // names.
     let settings = Settings {
         deals: Deals::Rotated,
         rounds: Some(2),
@@ -103,7 +104,7 @@ fn duplicate_deals_are_the_same_cards() {
 }
 
 #[test]
-fn what_cannot_be_played_offline_is_refused() {
+fn people_and_other_player_counts_are_refused() {
     let mut with_people = begun(settings(Format::Swiss), [None; 4]);
     let refused = play_offline(&mut with_people, rules(), 0, || {});
     assert_eq!(refused, Err(OfflineProblem::NotBuiltIn(0)));

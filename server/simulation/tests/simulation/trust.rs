@@ -1,5 +1,5 @@
-//! How far a tournament's results can be trusted: an order that nobody earned is seldom called sure, and ratings come from the games that all
-//! played themselves.
+//! Reliability of tournament results: equal participants are seldom called different, and only
+//! games without forfeit or substitute are rated.
 
 use chefshat_agents::AgentKind;
 use chefshat_engine::{RuleSet, RuleSetSpec, Stop};
@@ -13,7 +13,7 @@ use crate::support::{begun, settings};
 
 const POINTS: [f64; 4] = [5.0, 3.0, 1.0, 0.0];
 
-/// Numbers from 0 to 1, the same every time.
+/// Reproducible numbers from 0 to 1.
 struct Chance(u64);
 
 impl Chance {
@@ -36,7 +36,7 @@ impl Chance {
         [POINTS[first], POINTS[second]]
     }
 
-    /// The scores of two who were dealt the same cards: mostly the cards decide.
+    /// The scores of two participants with the same cards, which mostly decide.
     fn same_cards(&mut self) -> [f64; 2] {
         let luck = self.score();
         [luck, luck].map(|luck| {
@@ -49,8 +49,8 @@ impl Chance {
     }
 }
 
-/// How often of two who are equally good the first is called the better one with confidence. Their scores in game n are `of(n)`, each with
-/// its occasion.
+/// How often the first of two equal participants is called better. Their scores in game n are
+/// `of(n)`, each with its occasion.
 fn called_sure(games: u64, of: impl Fn(&mut Chance, u64) -> [Scored; 2]) -> f64 {
     let repetitions = 3000;
     let mut chance = Chance(17);
@@ -65,7 +65,7 @@ fn called_sure(games: u64, of: impl Fn(&mut Chance, u64) -> [Scored; 2]) -> f64 
 }
 
 #[test]
-fn an_order_that_nobody_earned_is_called_sure_as_seldom_as_it_says() {
+fn equal_participants_are_called_different_as_rarely_as_stated() {
     let on = |occasions: [u64; 2], scores: [f64; 2]| {
         [0, 1].map(|who| Scored {
             occasion: occasions[who],
@@ -131,7 +131,7 @@ fn easier_opponents_do_not_make_a_participant_look_better() {
             let mut tournament = swiss(&agents, deals, draw);
             play_offline(&mut tournament, rules(), 4, || {}).unwrap();
             for pair in tournament.order_confidence() {
-                // Two of one kind play alike, whoever they met.
+                // Agents of one kind play alike, whatever their opponents.
                 if agents[pair.upper] == agents[pair.lower] {
                     pairs += 1;
                     sure += usize::from(pair.order.confidence > SURE);
@@ -144,7 +144,7 @@ fn easier_opponents_do_not_make_a_participant_look_better() {
 }
 
 #[test]
-fn unlike_neighbours_are_told_apart_and_equal_ones_are_not() {
+fn different_neighbours_are_told_apart_and_equal_ones_are_not() {
     use AgentKind::{Greedy, Random, Trained};
     let agents = [
         Trained, Trained, Greedy, Greedy, Greedy, Random, Random, Random,
@@ -166,7 +166,7 @@ fn unlike_neighbours_are_told_apart_and_equal_ones_are_not() {
         let settled = pair.order.confidence >= SURE;
         assert_eq!(pair.order.more_games.is_none(), settled, "{pair:?}");
     }
-    // Between trained and greedy, and between greedy and random, which is the larger step.
+    // Between trained and greedy, and between greedy and random, the larger step.
     assert!(sure(1) > 0.8 && sure(4) > 0.99, "{neighbours:?}");
 
     let ratings = tournament.ratings();
@@ -183,7 +183,7 @@ fn unlike_neighbours_are_told_apart_and_equal_ones_are_not() {
 }
 
 #[test]
-fn games_that_somebody_did_not_play_are_not_rated() {
+fn games_with_forfeits_or_substitutes_are_not_rated() {
     let mut tournament = swiss(&[AgentKind::Greedy; 4], Deals::SameAtAllTables, 3);
     let seats = |forfeited: bool, substituted: bool| {
         let seat = |participant: usize| SeatResult {

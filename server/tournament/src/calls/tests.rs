@@ -1,4 +1,4 @@
-//! What follows is the same as if every game that is due were looked at whenever somebody asks, but few are.
+//! The scheduler gives the same changes as checking every due game each time, with few checks.
 
 use std::collections::BTreeMap;
 
@@ -53,7 +53,7 @@ fn played() -> Ended {
     }
 }
 
-/// Begins, with so many rounds in which everybody meets anybody.
+/// Begins with `rounds` rounds of random pairings.
 fn draw(tournament: &mut Tournament, rounds: u32, chance: &mut Chance) {
     tournament.fold(&Change::Begun { rounds });
     let mut order: Vec<usize> = (0..tournament.participants().len()).collect();
@@ -68,7 +68,7 @@ fn draw(tournament: &mut Tournament, rounds: u32, chance: &mut Chance) {
     }
 }
 
-/// Looks at every game that is due, in order.
+/// Checks every due game, in order.
 #[derive(Default)]
 struct Scan {
     waits: BTreeMap<usize, u64>,
@@ -129,7 +129,7 @@ impl Scan {
     }
 }
 
-/// Plays a tournament in which everything happens, by chance; gives how often it was asked and what became of it.
+/// Plays a random tournament. Returns the number of changes asked for, and how often each happened.
 fn compare(seed: u8) -> (usize, BTreeMap<&'static str, usize>) {
     let mut chance = Chance::of_round([seed; 32], 1);
     let mut tournament = Tournament::new(Settings {
@@ -171,7 +171,7 @@ fn compare(seed: u8) -> (usize, BTreeMap<&'static str, usize>) {
         now_ms += chance.below(700) as u64;
         for _ in 0..chance.below(4) {
             let who = chance.below(participants);
-            // Mostly there, but for the first, who comes seldom.
+            // Mostly present, except the first participant.
             let present = chance.below(8) >= if who == 0 { 7 } else { 2 };
             tournament.set_present(who, present);
             let Tournament {
@@ -197,7 +197,7 @@ fn compare(seed: u8) -> (usize, BTreeMap<&'static str, usize>) {
 }
 
 #[test]
-fn what_follows_is_what_looking_at_every_game_would_tell() {
+fn changes_equal_those_of_checking_every_game() {
     let mut happened: BTreeMap<&str, usize> = BTreeMap::new();
     for seed in 0..100 {
         let (asked, tally) = compare(seed);
@@ -211,7 +211,7 @@ fn what_follows_is_what_looking_at_every_game_would_tell() {
     }
 }
 
-/// A tournament of so many rounds, all of them drawn.
+/// A tournament with all of its rounds paired.
 fn drawn(participants: usize, rounds: u32) -> Tournament {
     let mut tournament = Tournament::new(settings()).expect("it makes sense");
     (0..participants).for_each(|_| join(&mut tournament, 1, None));
@@ -229,14 +229,14 @@ fn follow(tournament: &mut Tournament, now_ms: u64) -> usize {
 }
 
 #[test]
-fn few_games_are_looked_at_when_one_has_ended() {
+fn few_games_are_checked_after_one_has_ended() {
     let mut tournament = drawn(400, 50);
     (0..400).for_each(|who| tournament.set_present(who, true));
     follow(&mut tournament, 0);
     let games = tournament.games().len() as u64;
     assert_eq!(games, 5000);
     assert!(tournament.scheduler.checks < 2 * games);
-    // One after the other, the one that was called first ends first.
+    // Games end in the order of their calls.
     loop {
         let Some(game) = tournament.playing().next() else {
             break;
@@ -250,7 +250,7 @@ fn few_games_are_looked_at_when_one_has_ended() {
 }
 
 #[test]
-fn few_games_are_looked_at_while_everybody_is_away() {
+fn few_games_are_checked_while_everyone_is_absent() {
     let mut tournament = drawn(400, 50);
     let games = tournament.games().len() as u64;
     assert_eq!(follow(&mut tournament, 0), 0);
@@ -262,7 +262,7 @@ fn few_games_are_looked_at_while_everybody_is_away() {
     tournament.set_present(0, true);
     assert_eq!(follow(&mut tournament, 100), 0);
     assert_eq!(tournament.scheduler.checks, games + 50, "only its own");
-    // Called again, then given up.
+    // Called again, then voided.
     assert_eq!(follow(&mut tournament, 1000) as u64, games);
     assert_eq!(follow(&mut tournament, 2000) as u64, games - 49);
     let checks = tournament.scheduler.checks;

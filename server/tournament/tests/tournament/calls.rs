@@ -1,4 +1,4 @@
-//! When games are called, who is waited for and how long, who forfeits, what is given up.
+//! Calls of games: order, waiting for absent participants, forfeits, voided games.
 
 use chefshat_tournament::{Change, Ended, Format, Game, GameState, Settings, State, Tournament};
 
@@ -44,7 +44,7 @@ fn seat(tournament: &Tournament, game: usize, seat: usize) -> usize {
 }
 
 #[test]
-fn games_are_called_in_order_as_many_as_may_be_played_at_a_time() {
+fn games_are_called_in_order_up_to_the_maximum() {
     let mut tournament = two_tables(|settings| {
         settings.games_per_pairing = 2;
         settings.max_parallel = 1;
@@ -63,7 +63,7 @@ fn games_are_called_in_order_as_many_as_may_be_played_at_a_time() {
 }
 
 #[test]
-fn nobody_plays_more_games_at_a_time_than_it_said() {
+fn nobody_exceeds_its_games_at_a_time() {
     let mut tournament = two_tables(|settings| settings.games_per_pairing = 3);
     assert_eq!(follow(&mut tournament, 0), [called(0), called(3)]);
     end(&mut tournament, 0, played(&[1, 2, 3, 4]));
@@ -71,7 +71,7 @@ fn nobody_plays_more_games_at_a_time_than_it_said() {
 }
 
 #[test]
-fn who_does_not_come_is_waited_for_then_called_again_then_forfeits() {
+fn absent_participants_are_waited_for_then_called_again_then_forfeit() {
     let mut tournament = two_tables(|_| {});
     let away = seat(&tournament, 0, 2);
     tournament.set_present(away, false);
@@ -93,7 +93,7 @@ fn who_does_not_come_is_waited_for_then_called_again_then_forfeits() {
     let game = &tournament.games()[0];
     assert_eq!((game.calls, &game.forfeited), (2, &vec![away]));
 
-    // The filler in its seat wins; the others move up.
+    // The filler in the forfeited seat wins; the others move up.
     end(&mut tournament, 0, played(&[2, 3, 1, 4]));
     let result = tournament.games()[0].result().unwrap();
     let places: Vec<usize> = result.seats.iter().map(|seat| seat.did.place).collect();
@@ -114,7 +114,7 @@ fn who_does_not_come_is_waited_for_then_called_again_then_forfeits() {
 }
 
 #[test]
-fn whoever_comes_in_time_plays() {
+fn participants_who_come_in_time_play() {
     let mut tournament = two_tables(|_| {});
     let away = seat(&tournament, 0, 0);
     tournament.set_present(away, false);
@@ -126,13 +126,14 @@ fn whoever_comes_in_time_plays() {
 }
 
 #[test]
-fn time_counts_only_while_nothing_but_absent_ones_hold_a_game_up() {
+fn waiting_time_counts_only_while_only_absence_blocks_a_game() {
     let mut settings = settings(Format::RoundRobin);
     settings.rounds = Some(2);
     let mut tournament = begun(settings, 4);
     let away = seat(&tournament, 1, 0);
     assert_eq!(follow(&mut tournament, 0), [called(0)]);
-    // It left its game, a substitute plays on: the next game waits for the others, too.
+    // The participant left its game, where a substitute plays: the next game waits for the others
+    // too.
     tournament.set_present(away, false);
     assert_eq!(follow(&mut tournament, 10_000), []);
     assert_eq!(tournament.wake_at(), None);
@@ -160,7 +161,7 @@ fn a_rescheduled_game_comes_after_the_others() {
 }
 
 #[test]
-fn whoever_did_not_sit_down_at_the_last_call_forfeits_though_connected() {
+fn missing_the_last_call_forfeits_even_when_connected() {
     let mut tournament = two_tables(|_| {});
     let [silent, late] = [1, 3].map(|place| seat(&tournament, 0, place));
     let never_started = |missing: &[usize]| Ended::NeverStarted {
@@ -181,7 +182,7 @@ fn whoever_did_not_sit_down_at_the_last_call_forfeits_though_connected() {
         [forfeited(0, &[silent])],
         "nobody waits any longer"
     );
-    // Now somebody else does not come.
+    // Now another participant is absent.
     end(&mut tournament, 0, never_started(&[silent, late]));
     let mut both = [silent, late];
     both.sort_by_key(|&who| {
@@ -200,13 +201,13 @@ fn whoever_did_not_sit_down_at_the_last_call_forfeits_though_connected() {
 }
 
 #[test]
-fn a_game_that_cannot_be_played_to_its_end_is_given_up() {
+fn a_game_aborted_on_its_last_call_is_voided() {
     for ended in [
         Ended::Aborted,
-        // Of nobody in particular.
+        // No such participant.
         Ended::NeverStarted { missing: vec![] },
         Ended::NeverStarted { missing: vec![99] },
-        // Not the seats of this game.
+        // The wrong number of seats.
         played(&[1, 2, 3]),
     ] {
         let mut tournament = two_tables(|_| {});
@@ -224,7 +225,7 @@ fn a_game_that_cannot_be_played_to_its_end_is_given_up() {
 }
 
 #[test]
-fn a_game_that_nobody_comes_to_is_given_up() {
+fn a_game_that_everyone_forfeits_is_voided() {
     let mut tournament = two_tables(|settings| settings.max_calls = 1);
     for place in 0..4 {
         let who = seat(&tournament, 0, place);
@@ -246,7 +247,7 @@ fn only_a_game_that_is_being_played_can_end() {
     let counted = end(&mut tournament, 0, played(&[1, 2, 3, 4]));
     assert_eq!(tournament.ended(0, played(&[4, 3, 2, 1])), None);
     let before = tournament.clone();
-    // Whatever is folded twice counts once.
+    // Folding a change twice has no further effect.
     tournament.fold(&counted);
     tournament.fold(&Change::Voided { game: 0 });
     tournament.fold(&called(0));
@@ -257,7 +258,7 @@ fn only_a_game_that_is_being_played_can_end() {
 }
 
 #[test]
-fn strangers_are_never_present() {
+fn unknown_participants_are_never_present() {
     let mut tournament = two_tables(|_| {});
     tournament.set_present(99, true);
     assert!(!tournament.is_present(99));
@@ -265,7 +266,7 @@ fn strangers_are_never_present() {
 }
 
 #[test]
-fn who_comes_and_goes_does_not_spare_those_who_do_not_come_at_all() {
+fn coming_and_going_does_not_prolong_the_wait_for_others() {
     let mut tournament = two_tables(|_| {});
     let (away, restless) = (seat(&tournament, 0, 1), seat(&tournament, 0, 3));
     tournament.set_present(away, false);
@@ -294,7 +295,7 @@ fn after_a_restart_only_those_who_missed_the_last_call_forfeit_at_once() {
         end(&mut tournament, 0, never_started.clone());
     }
     assert_eq!(tournament.games()[0].calls, 2, "that was the last call");
-    // The server is back: nobody is there yet, and nobody has lost a game by it.
+    // After a restart nobody is present, and nobody has lost a game by it.
     for who in 0..8 {
         tournament.set_present(who, false);
     }

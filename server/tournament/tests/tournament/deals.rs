@@ -1,4 +1,4 @@
-//! Which games are dealt alike, and when their deals may be shown.
+//! Which games share a deal, and when deals may be published.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -14,7 +14,7 @@ fn tournament(format: Format, deals: Deals, games_per_pairing: u32) -> Tournamen
     begun(settings, 8)
 }
 
-/// The games of each deal, by their numbers.
+/// The numbers of the games of each deal.
 fn series(tournament: &Tournament) -> BTreeMap<u32, Vec<usize>> {
     let mut series: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
     for (index, game) in tournament.games().iter().enumerate() {
@@ -31,7 +31,7 @@ fn independent_games_have_no_common_deal() {
 }
 
 #[test]
-fn tables_of_a_round_share_deals_and_nobody_meets_one_twice() {
+fn tables_of_a_round_share_deals_and_nobody_plays_one_twice() {
     for format in Format::ALL {
         let mut tournament = tournament(format, Deals::SameAtAllTables, 2);
         play_through(&mut tournament);
@@ -103,12 +103,12 @@ fn a_deal_opens_when_its_last_game_is_over() {
 }
 
 #[test]
-fn whoever_has_seen_a_deal_does_not_play_it_again() {
+fn a_deal_that_was_seen_is_not_played_again() {
     let mut tournament = tournament(Format::Swiss, Deals::SameAtAllTables, 1);
     follow(&mut tournament, 0);
     let deal = tournament.games()[0].deal;
     let who = tournament.games()[0].seats[0];
-    // Not a card was dealt: the deal is as good as before.
+    // The game never started, so its deal can be used again.
     end(
         &mut tournament,
         0,

@@ -1,4 +1,4 @@
-//! Which tournaments can be held, who may join them, and how they begin and close.
+//! Valid settings, joining, beginning and closing.
 
 use chefshat_agents::AgentKind;
 use chefshat_tournament::{
@@ -69,7 +69,7 @@ fn settings_are_refused_by_the_name_of_their_field() {
 }
 
 #[test]
-fn names_of_formats_and_deals_are_read_as_they_are_written() {
+fn names_of_formats_and_deals_round_trip() {
     for format in Format::ALL {
         assert_eq!(Format::from_name(format.name()), Some(format));
     }
@@ -81,7 +81,7 @@ fn names_of_formats_and_deals_are_read_as_they_are_written() {
 }
 
 #[test]
-fn who_may_join() {
+fn joining_is_refused_with_a_reason() {
     let mut settings = settings(Format::Swiss);
     settings.max_participants = 3;
     settings.deals = Deals::Rotated;
@@ -155,7 +155,7 @@ fn a_filler_takes_a_name_that_is_free() {
 }
 
 #[test]
-fn it_begins_by_itself_when_so_many_have_joined() {
+fn it_begins_automatically_at_the_set_number() {
     for format in Format::ALL {
         let mut settings = settings(format);
         settings.start_when_joined = Some(6);
@@ -169,7 +169,7 @@ fn it_begins_by_itself_when_so_many_have_joined() {
         let followed = follow(&mut by_itself, 0);
         assert_eq!(followed[..begun.len()], begun);
         assert!(matches!(followed[begun.len()], Change::Called { .. }));
-        // As if the server had gone down in between.
+        // As after a restart between the changes.
         for cut in 0..begun.len() {
             let mut resumed = by_owner.clone();
             begun[..cut].iter().for_each(|change| resumed.fold(change));
@@ -187,7 +187,7 @@ fn it_begins_by_itself_when_so_many_have_joined() {
 }
 
 #[test]
-fn closing_gives_up_what_is_not_over() {
+fn closing_voids_unfinished_games() {
     let mut tournament = begun(settings(Format::RoundRobin), 8);
     follow(&mut tournament, 0);
     end(&mut tournament, 0, played(&[1, 2, 3, 4]));

@@ -1,4 +1,5 @@
-//! The form of a knockout: tables of four, two of each go on, halves that meet in the final, fillers spread evenly.
+//! Structure of a knockout: tables of four, two of each advance, halves meet in the final, fillers
+//! are spread evenly.
 
 use chefshat_tournament::{Change, Format, State, Tournament};
 
@@ -26,7 +27,8 @@ fn sixteen_become_eight_become_four() {
     let rounds = drawn(&changes);
     let sizes: Vec<usize> = rounds.iter().map(|round| round.tables.len()).collect();
     assert_eq!(sizes, [2, 1], "the first was drawn before");
-    // The two lower numbers of each table go on, two neighbouring tables to one: halves stay apart until the final.
+    // The two lower numbers of each table advance, two neighbouring tables to one: halves stay
+    // apart until the final.
     let best = |tables: &[Vec<usize>]| {
         let mut on: Vec<usize> = tables.iter().flat_map(|table| lowest(table, 2)).collect();
         on.sort_unstable();
@@ -55,7 +57,7 @@ fn sixteen_become_eight_become_four() {
 }
 
 #[test]
-fn whoever_wins_the_final_stands_first_whatever_it_scored_before() {
+fn the_winner_of_the_final_is_first_whatever_its_score() {
     let mut tournament = begun(settings(Format::Knockout), 8);
     follow(&mut tournament, 0);
     for game in [0, 1] {
@@ -66,7 +68,7 @@ fn whoever_wins_the_final_stands_first_whatever_it_scored_before() {
         .collect();
     follow(&mut tournament, 0);
     let seats = tournament.games()[2].seats.clone();
-    // Whoever came second at the first table wins.
+    // The second of the first table wins.
     let winner = tournament.games()[0].seats[1];
     let places: Vec<usize> = seats
         .iter()
@@ -86,7 +88,7 @@ fn whoever_wins_the_final_stands_first_whatever_it_scored_before() {
 }
 
 #[test]
-fn fillers_are_labelled_and_spread() {
+fn fillers_are_marked_and_spread() {
     for joined in 2..=64 {
         let tournament = begun(settings(Format::Knockout), joined);
         let field = joined.next_power_of_two().max(4);
@@ -103,7 +105,7 @@ fn fillers_are_labelled_and_spread() {
             let seats = games.iter().flat_map(|game| &game.seats);
             seats.filter(|&&who| participants[who].filler).count()
         };
-        // So it is with tables, with halves, with quarters.
+        // Likewise for tables, halves and quarters.
         let tables = field / 4;
         for parts in (0..).map(|doublings| 1 << doublings) {
             if parts > tables {
@@ -143,7 +145,7 @@ fn games_of_a_pairing_add_up() {
 }
 
 #[test]
-fn a_table_that_nobody_came_to_sends_the_drawn_on() {
+fn tie_breaks_decide_a_table_without_games() {
     let mut settings = settings(Format::Knockout);
     settings.max_calls = 1;
     let mut tournament = begun(settings, 8);
@@ -163,7 +165,7 @@ fn a_table_that_nobody_came_to_sends_the_drawn_on() {
 }
 
 #[test]
-fn the_tables_of_a_round_that_was_not_played_to_its_end_decide_nothing() {
+fn tables_of_an_unfinished_round_decide_nothing() {
     let mut tournament = begun(settings(Format::Knockout), 8);
     follow(&mut tournament, 0);
     let seats = tournament.games()[0].seats.clone();

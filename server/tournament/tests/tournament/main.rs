@@ -1,4 +1,4 @@
-//! Tournaments: getting in, who plays whom, who is waited for, what counts. ratings.
+//! Tests of the crate: entry, pairings, calls, results, standings.
 
 #![allow(
     clippy::unwrap_used,
@@ -6,9 +6,9 @@
 )]
 
 mod calls;
-mod course;
 mod deals;
 mod entry;
+mod invariants;
 mod knockout;
 mod round_robin;
 mod standings;

@@ -1,10 +1,10 @@
-//! How even a round robin is: meetings, byes and seats, for fields of all sizes.
+//! Evenness of a round robin: meetings, byes and seats, for fields of all sizes.
 
 use chefshat_tournament::Format;
 
 use super::support::{Round, begun, drawn, joined, meetings, play_through, range, settings};
 
-/// The rounds of a round robin of so many participants.
+/// The rounds of a round robin with this number of participants.
 fn rounds(participants: usize, players: usize, rounds: Option<u32>) -> Vec<Round> {
     let mut settings = settings(Format::RoundRobin);
     settings.players = players;
@@ -13,13 +13,13 @@ fn rounds(participants: usize, players: usize, rounds: Option<u32>) -> Vec<Round
     drawn(&joined(settings, participants).begin().unwrap())
 }
 
-/// How often those who met least and most did so.
+/// Fewest and most meetings of a pair.
 fn met(rounds: &[Round], participants: usize) -> (u32, u32) {
     let tables = rounds.iter().flat_map(|round| &round.tables);
     range(meetings(tables, participants).into_iter())
 }
 
-/// Byes of those who had fewest and most.
+/// Fewest and most byes of a participant.
 fn byes(rounds: &[Round], participants: usize) -> (u32, u32) {
     let mut byes = vec![0; participants];
     for &who in rounds.iter().flat_map(|round| &round.byes) {
@@ -28,7 +28,7 @@ fn byes(rounds: &[Round], participants: usize) -> (u32, u32) {
     range(byes.into_iter())
 }
 
-/// The most by which anybody had one seat more often than another.
+/// The largest difference between two seats of one participant.
 fn seats(rounds: &[Round], participants: usize, players: usize) -> u32 {
     let mut had = vec![vec![0; players]; participants];
     for table in rounds.iter().flat_map(|round| &round.tables) {
@@ -42,9 +42,9 @@ fn seats(rounds: &[Round], participants: usize, players: usize) -> u32 {
 
 #[test]
 fn all_meet_about_equally_often() {
-    // Participants, players, rounds; least and most meetings of two; least and most byes.
+    // Participants, players, rounds; fewest and most meetings; fewest and most byes.
     for (participants, players, asked, expected, sat_out) in [
-        // Whole tables: everybody meets everybody three times.
+        // Full tables: every pair meets three times.
         (4, 4, None, (3, 3), (0, 0)),
         (8, 4, None, (3, 3), (0, 0)),
         (12, 4, None, (3, 3), (0, 0)),
@@ -53,13 +53,13 @@ fn all_meet_about_equally_often() {
         (24, 4, None, (3, 3), (0, 0)),
         (28, 4, None, (3, 3), (0, 0)),
         (32, 4, None, (3, 3), (0, 0)),
-        // One more: so it would be with one round more.
+        // One participant more: even with one round more.
         (5, 4, None, (2, 3), (0, 1)),
         (9, 4, None, (2, 3), (0, 1)),
         (13, 4, None, (2, 3), (0, 1)),
         (5, 4, Some(5), (3, 3), (1, 1)),
         (9, 4, Some(9), (3, 3), (1, 1)),
-        // Of six, three pairs meet once and three thrice.
+        // Of six, three pairs meet once and three meet three times.
         (6, 4, None, (1, 3), (1, 2)),
         (7, 4, None, (1, 2), (2, 3)),
         (10, 4, None, (2, 3), (1, 2)),
@@ -72,7 +72,7 @@ fn all_meet_about_equally_often() {
         (8, 4, Some(1), (0, 1), (0, 0)),
         (12, 4, Some(5), (0, 3), (0, 0)),
         (7, 4, Some(21), (6, 6), (9, 9)),
-        // Other tables. Where two tables are all there are it can hardly be even.
+        // Other table sizes. With only two tables it can hardly be even.
         (2, 2, None, (1, 1), (0, 0)),
         (20, 2, None, (1, 1), (0, 0)),
         (21, 2, None, (0, 1), (0, 1)),

@@ -1,4 +1,4 @@
-//! In which order participants stand, and what their lines say.
+//! The order of the standings and the values in them.
 
 use std::collections::BTreeSet;
 
@@ -14,7 +14,7 @@ fn script(games: &Script) -> Tournament {
     drawn_by(7, games)
 }
 
-/// The same, drawn by another seed.
+/// The same with another draw seed.
 fn drawn_by(seed: u8, games: &Script) -> Tournament {
     let mut settings = settings(Format::RoundRobin);
     settings.draw_seed = [seed; 32];
@@ -51,8 +51,8 @@ fn scores_come_first_then_points_then_meetings() {
 }
 
 #[test]
-fn of_those_level_in_scores_and_points_whoever_was_ahead_more_often_stands_higher() {
-    // One has 3 + 3 + 3, the other 5 + 1 + 1 + 1 + 1 and is ahead in three of the five games.
+fn head_to_head_results_break_ties_of_scores_and_points() {
+    // One has 3 + 3 + 3; the other 5 + 1 + 1 + 1 + 1, and is ahead in three of the five games.
     let games = [
         [2, 1, 3, 4],
         [2, 3, 1, 4],
@@ -78,7 +78,7 @@ fn of_those_level_in_scores_and_points_whoever_was_ahead_more_often_stands_highe
 }
 
 #[test]
-fn a_line_says_what_was_done() {
+fn a_standing_adds_up_the_games() {
     let mut settings = settings(Format::Swiss);
     settings.rounds = Some(2);
     let mut tournament = begun(settings, 5);
@@ -123,7 +123,7 @@ fn a_line_says_what_was_done() {
 }
 
 #[test]
-fn who_has_played_less_is_not_behind_for_it() {
+fn playing_fewer_games_is_no_disadvantage() {
     let mut settings = settings(Format::Swiss);
     settings.rounds = Some(2);
     let mut tournament = begun(settings, 5);
@@ -132,7 +132,7 @@ fn who_has_played_less_is_not_behind_for_it() {
     end(&mut tournament, 0, played(&[1, 2, 3, 4]));
     follow(&mut tournament, 0);
     assert_eq!(order(&tournament)[0], winner);
-    // Whoever wins the only other game with a mean of 5 from one game stands level with it.
+    // The winner of the only other game, with a mean of 5 from one game, is level with it.
     let seats = tournament.games()[1].seats.clone();
     let fresh = (0..5).find(|who| !tournament.games()[0].seats.contains(who));
     let fresh = fresh.unwrap();
@@ -161,8 +161,8 @@ fn who_has_played_less_is_not_behind_for_it() {
 }
 
 #[test]
-fn what_is_level_is_drawn_by_the_seed() {
-    // The first and the last of one game change places in the other, and so do those between.
+fn the_seed_breaks_remaining_ties() {
+    // The second game reverses the places of the first.
     let games = [([1, 2, 3, 4], [4; 4]), ([4, 3, 2, 1], [4; 4])];
     let ahead = |seed: u8| {
         let order = order(&drawn_by(seed, &games));

@@ -1,12 +1,11 @@
-//! Tournaments for tests: settings, participants, and a hall in which games end without being played. What is expected is in the other
-//! modules.
+//! Settings, participants and results for tests; games end without being played.
 
 use chefshat_agents::AgentKind;
 use chefshat_tournament::{
     Change, Deals, Ended, Entrant, EntrantKind, Format, SeatPlayed, Settings, State, Tournament,
 };
 
-/// Settings of a tournament of up to 64 at tables of four.
+/// Settings of a tournament of up to 64 participants in games of four.
 pub(crate) fn settings(format: Format) -> Settings {
     Settings {
         format,
@@ -25,7 +24,7 @@ pub(crate) fn settings(format: Format) -> Settings {
     }
 }
 
-/// An agent, one game at a time.
+/// An agent that plays one game at a time.
 pub(crate) fn entrant(name: &str) -> Entrant {
     Entrant {
         name: name.to_owned(),
@@ -37,7 +36,7 @@ pub(crate) fn entrant(name: &str) -> Entrant {
     }
 }
 
-/// A tournament that so many have joined, all of them present.
+/// A tournament with this number of participants, all present.
 pub(crate) fn joined(settings: Settings, participants: usize) -> Tournament {
     let mut tournament = Tournament::new(settings).unwrap();
     for number in 0..participants {
@@ -50,7 +49,7 @@ pub(crate) fn joined(settings: Settings, participants: usize) -> Tournament {
     tournament
 }
 
-/// The same, begun.
+/// The same after the beginning.
 pub(crate) fn begun(settings: Settings, participants: usize) -> Tournament {
     let mut tournament = joined(settings, participants);
     for change in tournament.begin().unwrap() {
@@ -59,7 +58,7 @@ pub(crate) fn begun(settings: Settings, participants: usize) -> Tournament {
     tournament
 }
 
-/// A result by the places of the seats, with 10 points less the place.
+/// A result with these places by seat, and 10 points minus the place.
 pub(crate) fn played(places: &[usize]) -> Ended {
     let seats = places.iter().map(|&place| SeatPlayed {
         place,
@@ -73,7 +72,7 @@ pub(crate) fn played(places: &[usize]) -> Ended {
     }
 }
 
-/// A result in which a lower number of the participant is better.
+/// A result in which lower participant numbers win.
 pub(crate) fn played_by_number(tournament: &Tournament, game: usize) -> Ended {
     let seats = &tournament.games()[game].seats;
     let better = |who: usize| seats.iter().filter(|&&other| other < who).count();
@@ -81,7 +80,7 @@ pub(crate) fn played_by_number(tournament: &Tournament, game: usize) -> Ended {
     played(&places)
 }
 
-/// Folds everything that follows at this time.
+/// Folds all changes that follow at this time.
 pub(crate) fn follow(tournament: &mut Tournament, now_ms: u64) -> Vec<Change> {
     let mut changes = Vec::new();
     while let Some(change) = tournament.next(now_ms) {
@@ -98,7 +97,7 @@ pub(crate) fn end(tournament: &mut Tournament, game: usize, ended: Ended) -> Cha
     change
 }
 
-/// Plays to the end, nobody absent; the lower number wins. Gives the changes.
+/// Plays to the end with all participants present; lower numbers win. Returns the changes.
 pub(crate) fn play_through(tournament: &mut Tournament) -> Vec<Change> {
     let mut changes = Vec::new();
     while tournament.state() == State::Playing {
@@ -116,7 +115,7 @@ pub(crate) fn play_through(tournament: &mut Tournament) -> Vec<Change> {
     changes
 }
 
-/// A round that was drawn.
+/// The pairings of a round.
 #[derive(Debug, Clone)]
 pub(crate) struct Round {
     pub(crate) tables: Vec<Vec<usize>>,
@@ -124,7 +123,7 @@ pub(crate) struct Round {
 }
 
 impl Round {
-    /// Everybody is in it once, at a full table or with a bye; no more byes than there have to be.
+    /// Every participant is at a full table or has a bye, with as few byes as possible.
     pub(crate) fn check(&self, participants: usize, players: usize) {
         assert!(self.tables.iter().all(|table| table.len() == players));
         assert_eq!(self.byes.len(), participants % players);
@@ -134,7 +133,7 @@ impl Round {
     }
 }
 
-/// The rounds that were drawn.
+/// The rounds paired by these changes.
 pub(crate) fn drawn(changes: &[Change]) -> Vec<Round> {
     changes
         .iter()
@@ -166,7 +165,7 @@ pub(crate) fn meetings<'t>(
         .collect()
 }
 
-/// Least and most.
+/// Minimum and maximum.
 pub(crate) fn range(numbers: impl Iterator<Item = u32> + Clone) -> (u32, u32) {
     (numbers.clone().min().unwrap(), numbers.max().unwrap())
 }

@@ -1,4 +1,5 @@
-//! The rounds of a Swiss tournament: those who score alike meet, few meet twice, byes go to the lowest who had none.
+//! Rounds of a Swiss tournament: similar scores meet, few pairs meet twice, byes go to the lowest
+//! without one.
 
 use chefshat_tournament::{Format, Tournament};
 
@@ -6,7 +7,7 @@ use super::support::{
     Round, begun, drawn, end, follow, meetings, played_by_number, range, settings,
 };
 
-/// Plays all rounds, the lower number winning, and looks at the standings before each.
+/// Plays all rounds with lower numbers winning, and calls back with the standings before each.
 fn play(
     mut tournament: Tournament,
     mut look: impl FnMut(&Tournament, &Round),
@@ -36,7 +37,7 @@ fn play(
     (tournament, rounds)
 }
 
-/// The first round is drawn when the tournament begins.
+/// The first round is paired when the tournament begins.
 fn first_round(tournament: &Tournament) -> Round {
     let tables: Vec<Vec<usize>> = tournament
         .games()
@@ -54,16 +55,16 @@ fn first_round(tournament: &Tournament) -> Round {
 
 #[test]
 fn few_meet_twice() {
-    // Participants, rounds, meetings of those who met most, how many pairs met more than once.
+    // Participants, rounds, most meetings of a pair, number of pairs that met more than once.
     for (participants, rounds, most, repeated) in [
         (40, None, 1, 0),
         (64, None, 1, 0),
         (22, None, 1, 0),
         (16, Some(3), 1, 0),
-        // Nobody has twelve others left to meet, given whom the scores brought together before.
+        // Twelve new opponents are impossible after the pairings that the scores forced.
         (16, Some(4), 2, 4),
         (17, Some(4), 2, 2),
-        // With 8 at two tables two rounds repeat four meetings at least.
+        // With 8 participants at two tables, two rounds repeat at least four meetings.
         (8, Some(2), 2, 4),
         (4, Some(3), 3, 6),
     ] {
@@ -82,7 +83,7 @@ fn few_meet_twice() {
 }
 
 #[test]
-fn those_who_stand_alike_meet() {
+fn similar_standings_meet() {
     let mut apart = Vec::new();
     let (tournament, _) = play(begun(settings(Format::Swiss), 40), |before, round| {
         let mut rank = vec![0; 40];
@@ -97,7 +98,8 @@ fn those_who_stand_alike_meet() {
         apart.push(pairs.sum::<usize>() as f64 / 60.0);
     });
     assert_eq!((apart.len(), tournament.rounds()), (5, 6));
-    // Ranks at a table at random would be 13.7 apart, four neighbours 1.7. The later, the more neighbours have met before.
+    // Random ranks at a table would differ by 13.7, four neighbours by 1.7. In later rounds more
+    // neighbours have already met.
     for (apart, most) in apart.iter().zip([1.7, 3.0, 6.0, 9.0, 12.0]) {
         assert!(*apart < most, "{apart}");
     }
@@ -156,7 +158,7 @@ fn everybody_has_each_seat_about_equally_often() {
 }
 
 #[test]
-fn the_standard_number_of_rounds_can_find_a_winner() {
+fn the_default_number_of_rounds_can_find_a_winner() {
     for (participants, rounds) in [(2, 2), (4, 2), (5, 3), (16, 4), (17, 5), (40, 6), (64, 6)] {
         assert_eq!(
             begun(settings(Format::Swiss), participants).rounds(),

@@ -1,4 +1,4 @@
-//! What episodes bring and how they end: rewards, last views, places.
+//! Episodes: rewards, final observations, places.
 
 use std::collections::BTreeMap;
 use std::num::NonZeroU64;
@@ -12,7 +12,7 @@ use chefshat_simulation::vector::{
 use super::*;
 
 #[test]
-fn rewards_add_up_to_what_the_shifts_say() {
+fn rewards_add_up_to_the_statistics() {
     for scheme in RewardScheme::ALL {
         for episode in [Episode::Shift, Episode::Game] {
             let setup = all_client(4)
@@ -23,7 +23,8 @@ fn rewards_add_up_to_what_the_shifts_say() {
                 .with_statistics(true)
                 .with_invalid_actions(InvalidActions::AskAgain { limit: None });
             let (mut games, mut batch) = VectorGames::new(setup);
-            // By game and seat, of the episode that goes on: what was told, and what the Shifts say.
+            // By game and seat, within the running episode: rewards received, and rewards by the
+            // Shifts' statistics.
             let mut told: BTreeMap<(u32, u8), f64> = BTreeMap::new();
             let mut counted: BTreeMap<(u32, u8), f64> = BTreeMap::new();
             let (mut wrong, mut episodes, mut brought) = (0u64, 0, false);
@@ -55,7 +56,7 @@ fn rewards_add_up_to_what_the_shifts_say() {
                 if batch.done {
                     break;
                 }
-                // Every fifth answer at a turn is wrong: no card is given there.
+                // Every fifth action at a turn is illegal: a gift.
                 let mut actions = some_actions(&batch);
                 for (row, action) in actions.iter_mut().enumerate() {
                     if batch.kinds[row] == 1 && (batch.step + row as u64).is_multiple_of(5) {
@@ -73,8 +74,9 @@ fn rewards_add_up_to_what_the_shifts_say() {
 }
 
 #[test]
-fn an_episode_ends_for_every_seat_with_what_it_saw_last() {
-    // A game of one Shift ends where the same Shift of a longer game does, so its last view is the one wanted.
+fn an_episode_ends_for_every_seat_with_its_final_observation() {
+    // A one-Shift game ends where the same Shift of a longer game does, so its last observation is
+    // the expected one.
     let spec = |shifts| RuleSetSpec {
         stop: Stop::Shifts(shifts),
         ..RuleSetSpec::default()
@@ -176,8 +178,8 @@ fn a_game_as_episode_ends_with_the_places_of_the_game() {
 }
 
 #[test]
-fn a_shift_joined_midway_counts_its_seats_from_there() {
-    // Greedy players until the first seat has finished; from there on random ones.
+fn statistics_of_a_shift_joined_midway_count_from_there() {
+    // Greedy agents until the first seat has finished, then random ones.
     let mut game = Game::new(rules(), game_seed(3, 3), |_| {});
     let mut greedy = BuiltInAgent::new(AgentKind::Greedy, [0; 32]);
     let mut turns = 0;
@@ -215,7 +217,7 @@ fn a_shift_joined_midway_counts_its_seats_from_there() {
     }
     let counted: u32 = u32s(&batch.shifts.valid).iter().sum();
     assert_eq!(u32s(&batch.shifts.turns), [counted + turns]);
-    // The rewards of the places fit those that were taken before.
+    // The rewards of the places match those received.
     for (sum, told) in f32s(&batch.shifts.reward_sums).into_iter().zip(told) {
         assert!((sum - told).abs() < 1e-4, "{sum} {told}");
     }

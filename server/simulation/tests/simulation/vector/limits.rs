@@ -1,4 +1,4 @@
-//! What the owner may and may not do, and what bounds a step.
+//! Options of the client, refused input, and bounds of a step.
 
 use std::num::{NonZeroU32, NonZeroU64};
 
@@ -26,7 +26,7 @@ fn an_invalid_action_is_refused_or_asked_again() {
         games.step(&actions[..1]).unwrap_err(),
         StepError::Actions { given: 1, rows: 2 }
     );
-    // Nothing was moved: the right answers are still taken.
+    // Nothing has changed: the right actions are still accepted.
     let next = games.step(&some_actions(&batch)).unwrap();
     assert_eq!((next.step, next.totals.decisions), (2, 2));
 
@@ -61,7 +61,7 @@ fn an_invalid_action_is_refused_or_asked_again() {
 }
 
 #[test]
-fn the_owner_takes_turns_alone_if_it_wants_so() {
+fn the_client_can_take_turns_only() {
     for others in [None, Some(AgentKind::Greedy)] {
         let setup = against([AgentKind::Greedy; 3], 4)
             .with_decisions(Decisions::Turns { others })
@@ -96,7 +96,7 @@ fn the_owner_takes_turns_alone_if_it_wants_so() {
 }
 
 #[test]
-fn forced_decisions_can_be_left_out() {
+fn forced_decisions_can_be_skipped() {
     let total = |skip| {
         let setup = all_client(3)
             .with_skip_forced(skip)
@@ -120,7 +120,7 @@ fn forced_decisions_can_be_left_out() {
 }
 
 #[test]
-fn what_makes_no_sense_is_refused() {
+fn invalid_options_are_refused() {
     let kinds = [None; 4];
     let new = |games, agents: &[Option<AgentKind>], seeds| {
         VectorSetup::new(rules(), games, agents, seeds).unwrap_err()
@@ -174,7 +174,7 @@ fn what_makes_no_sense_is_refused() {
 
 #[test]
 fn small_hands_do_not_keep_a_step_from_ending() {
-    // With three cards in a hand a Shift may end before the owner is asked at all, and many may in a row.
+    // With hands of three cards a Shift may end before the client is asked, several times in a row.
     let rules = RuleSetSpec {
         players: 2,
         faces: 4,
@@ -193,7 +193,7 @@ fn small_hands_do_not_keep_a_step_from_ending() {
     let mut shifts = 0;
     let mut before = 0;
     play_out(setup, |_, batch| {
-        // Of each game two, and one that the owner's answer ends.
+        // Two of each game, and one that the client's action ends.
         assert!(batch.totals.shifts - before <= 2 * 3);
         before = batch.totals.shifts;
         shifts = batch.totals.shifts;
@@ -202,8 +202,8 @@ fn small_hands_do_not_keep_a_step_from_ending() {
 }
 
 #[test]
-fn what_is_kept_for_records_is_bounded() {
-    // A game that never ends: its only Shift has turns without number, and everybody may pass for ever.
+fn records_in_memory_are_bounded() {
+    // An endless game: its only Shift has no practical turn limit, and everyone may pass forever.
     let rules = RuleSetSpec {
         max_turns: u32::MAX,
         max_idle_pizzas: u32::MAX,
@@ -233,8 +233,9 @@ fn what_is_kept_for_records_is_bounded() {
 }
 
 #[test]
-fn a_step_leaves_what_would_take_too_long() {
-    // One legal attempt in hundreds, and the owner out of most Shifts early: each step takes many attempts, and ends all the same.
+fn a_step_has_bounded_work() {
+    // One attempt in hundreds is legal, and the client finishes most Shifts early, so steps take
+    // many attempts but still end.
     let rules = RuleSetSpec {
         faces: 15,
         ..RuleSetSpec::default()

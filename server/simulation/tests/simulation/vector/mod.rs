@@ -1,4 +1,4 @@
-//! Games stepped together. Here is what the tests share: setups, a policy, columns read; the modules are subjects.
+//! Vector environments. Shared here: setups, a policy, and reading columns.
 
 mod episodes;
 mod limits;
@@ -69,7 +69,7 @@ fn some_actions(batch: &Batch) -> Vec<ActionId> {
         .collect()
 }
 
-/// Plays until all games are over; calls back with every batch.
+/// Plays until all games are over and calls back with every batch.
 fn play_out(setup: VectorSetup, mut look: impl FnMut(&VectorGames, &Batch)) -> Vec<PlayedGame> {
     let (mut games, mut batch) = VectorGames::new(setup);
     let mut played = Vec::new();

@@ -1,4 +1,4 @@
-//! Each game goes as it goes alone, from wherever it begins.
+//! Games in a vector environment equal games played alone, from any start.
 
 use std::collections::BTreeMap;
 use std::num::NonZeroU64;
@@ -10,7 +10,7 @@ use chefshat_simulation::vector::{Seeds, Start, StepError, VectorGames, VectorSe
 use super::*;
 
 #[test]
-fn every_game_goes_as_it_goes_alone() {
+fn every_game_equals_the_same_game_played_alone() {
     let setup = against(
         [
             AgentKind::Greedy,
@@ -22,7 +22,7 @@ fn every_game_goes_as_it_goes_alone() {
     .with_total_games(NonZeroU64::new(23))
     .unwrap()
     .with_records(true);
-    // The mask, hand and cards left that were shown, and the answer, game by game.
+    // Mask, hand, cards left and action of each decision, by game.
     type Shown = (Mask, Vec<u8>, Vec<u8>, ActionId);
     let mut rows: BTreeMap<u64, Vec<Shown>> = BTreeMap::new();
     let mut indices: BTreeMap<u32, u64> = BTreeMap::new();
@@ -73,7 +73,7 @@ fn every_game_goes_as_it_goes_alone() {
 }
 
 #[test]
-fn with_the_owner_as_a_built_in_agent_the_games_are_those_of_a_batch() {
+fn with_built_in_agents_as_client_games_equal_a_batch() {
     struct Taken(Vec<ActionId>);
     impl Listener for Taken {
         fn on_decision(&mut self, _: Decision, action: ActionId) {
@@ -96,7 +96,7 @@ fn with_the_owner_as_a_built_in_agent_the_games_are_those_of_a_batch() {
     let (mut games, mut batch) = VectorGames::new(setup);
     let mut minds: BTreeMap<(u32, usize), BuiltInAgent> = BTreeMap::new();
     let mut played = Vec::new();
-    // The owner's agents see the game as the engine shows it, so the games are followed beside.
+    // The client's agents need full observations, so the games are replayed alongside.
     let mut tables: BTreeMap<u32, Game> = BTreeMap::new();
     let mut others: BTreeMap<(u32, usize), BuiltInAgent> = BTreeMap::new();
     while !batch.done {
@@ -147,7 +147,7 @@ fn with_the_owner_as_a_built_in_agent_the_games_are_those_of_a_batch() {
 }
 
 #[test]
-fn games_begin_anew_when_asked() {
+fn games_restart_on_request() {
     let setup = all_client(3);
     let (mut games, first) = VectorGames::new(setup.clone());
     let mut batch = games.step(&some_actions(&first)).unwrap();
@@ -189,7 +189,7 @@ fn games_begin_anew_when_asked() {
     assert_eq!((none.rows, none.beginnings.rows), (3, 0));
     assert_eq!(none.observations.hands, other.observations.hands);
 
-    // No more games are begun than there are to be in all.
+    // No more games begin than the total.
     let setup = all_client(3).with_total_games(NonZeroU64::new(4)).unwrap();
     let (mut games, _) = VectorGames::new(setup);
     let next = games.reset(None);
@@ -200,7 +200,7 @@ fn games_begin_anew_when_asked() {
 }
 
 #[test]
-fn games_begin_with_hands_or_at_a_point() {
+fn games_start_from_a_script_or_a_position() {
     let dealt = Game::new(rules(), game_seed(1, 1), |_| {});
     let script = Script::first_shift(*dealt.hands());
     let setup = all_client(3)
@@ -228,7 +228,7 @@ fn games_begin_with_hands_or_at_a_point() {
             .counts(11)
             .collect();
         assert_eq!(batch.observations.hands, seen.repeat(2));
-        // Both games are played alike until the next deal, which is one for both, or each game's own.
+        // Both games are equal up to the next deal, which is shared or each game's own.
         while u32s(&batch.observations.shifts) == [2, 2] {
             let action = some_action(&masks(&batch)[0], 1, 1);
             batch = games.step(&[action, action]).unwrap();

@@ -1,5 +1,6 @@
-//! What always holds, whoever comes and goes and whatever becomes of games: a tournament ends, nobody sits at too many tables, every game
-//! counts once, the same changes lead to the same tournament, and one that was interrupted goes on.
+//! Invariants under arbitrary arrivals, departures and results: a tournament ends, limits of
+//! parallel games hold, every game counts once, and the same changes give the same tournament, also
+//! after an interruption.
 
 use std::collections::BTreeMap;
 
@@ -11,12 +12,12 @@ use proptest::prelude::*;
 
 use super::support::{played, settings};
 
-/// Who takes part in a run, and what happens to whom.
+/// The participants of a run and their behaviour.
 #[derive(Debug, Clone)]
 struct Plan {
     settings: Settings,
     entrants: Vec<Entrant>,
-    /// What chance decides, one number after the other, over and over.
+    /// Random choices, repeated cyclically.
     dice: Vec<u8>,
 }
 
@@ -73,7 +74,7 @@ fn plans() -> impl Strategy<Value = Plan> {
     })
 }
 
-/// A run of a plan: the tournament, its changes so far, and who is there.
+/// A run of a plan: the tournament, its changes so far, and who is present.
 struct Run {
     tournament: Tournament,
     changes: Vec<Change>,
@@ -85,7 +86,7 @@ struct Run {
 
 impl Run {
     fn die(&mut self, sides: u8) -> u8 {
-        // When they are used up they begin again, each one higher: a course of events that goes round in circles is no test of whether it ends.
+        // Each repetition adds one to the choices, so that a run cannot repeat itself forever.
         let (turn, roll) = (self.rolls / self.dice.len(), self.rolls % self.dice.len());
         self.rolls += 1;
         self.dice[roll].wrapping_add(turn as u8) % sides
@@ -105,7 +106,7 @@ impl Run {
         self.check();
     }
 
-    /// Nobody sits at more tables than it said, and there are no more games than may be.
+    /// Checks the limits of parallel games, for each participant and in total.
     fn check(&self) {
         let games = self.tournament.games();
         let mut sits = vec![0; self.tournament.participants().len()];
@@ -127,7 +128,7 @@ impl Run {
         }
     }
 
-    /// Somebody comes or goes.
+    /// A participant arrives or leaves.
     fn wander(&mut self) {
         let participants = self.tournament.participants().len();
         let who = (usize::from(self.die(255)) * 7 + usize::from(self.die(255))) % participants;
@@ -159,7 +160,7 @@ impl Run {
         self.fold(change);
     }
 
-    /// The server goes down and comes up again: nobody is there, games that were being played are not.
+    /// The server restarts: nobody is present, and running games are lost.
     fn restart(&mut self) {
         let mut tournament = Tournament::new(self.tournament.settings().clone()).unwrap();
         self.changes
@@ -202,7 +203,8 @@ fn run(plan: Plan) -> Run {
         .unwrap()
         .into_iter()
         .for_each(|change| run.fold(change));
-    // Each game ends at most once for each call and each participant; half of the steps below end one, or let time pass.
+    // A game ends at most once for each call and participant; half of the steps below end one, or
+    // let time pass.
     let calls = run.tournament.settings().max_calls as usize;
     let players = run.tournament.settings().players;
     let most = 40 * (run.games_left() + 1) * (calls + players);
@@ -218,7 +220,7 @@ fn run(plan: Plan) -> Run {
             _ if run.tournament.playing().next().is_some() => run.end_one(),
             _ => match run.tournament.wake_at() {
                 Some(at_ms) => run.now_ms = run.now_ms.max(at_ms),
-                // Only somebody who is to come can hold it up.
+                // Only an absent participant can block it.
                 None => panic!("nothing goes on, and nobody is waited for"),
             },
         }
@@ -237,7 +239,7 @@ proptest! {
         prop_assert_eq!(tournament.games().len(), tournament.games_expected());
         prop_assert!(tournament.games().iter().all(|game| game.is_over()));
 
-        // Every game counted or was given up once.
+        // Every game was counted or voided once.
         let mut over = vec![0; tournament.games().len()];
         for change in &run.changes {
             if let Change::Counted { game, .. } | Change::Voided { game } = change {
@@ -246,7 +248,7 @@ proptest! {
         }
         prop_assert!(over.iter().all(|&times| times == 1));
 
-        // The standings are those of the games.
+        // The standings agree with the games.
         let standings = tournament.standings();
         let places: Vec<u32> = standings.iter().map(|line| line.place).collect();
         let expected: Vec<u32> = match tournament.has_counted() {
@@ -280,7 +282,7 @@ proptest! {
 }
 
 #[test]
-fn it_goes_on_from_wherever_it_was_interrupted() {
+fn it_resumes_after_any_interruption() {
     for format in Format::ALL {
         let plan = Plan {
             settings: settings(format),
@@ -303,7 +305,7 @@ fn it_goes_on_from_wherever_it_was_interrupted() {
             let (before, after) = whole.changes.split_at(cut);
             before.iter().for_each(|change| resumed.fold(change));
             for change in after {
-                // What the tournament decides by itself it decides as before.
+                // The tournament's own decisions are the same as before.
                 if resumed.state() == State::Playing
                     && !matches!(
                         change,
@@ -325,7 +327,7 @@ fn it_goes_on_from_wherever_it_was_interrupted() {
 }
 
 #[test]
-fn every_size_comes_to_its_end_in_every_format() {
+fn every_size_ends_in_every_format() {
     for format in Format::ALL {
         for participants in 2..=33 {
             let mut settings = settings(format);
