@@ -74,13 +74,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("xtask", &[]),
 ];
 
-/// What the tests of a crate may depend on besides [`ALLOWED`].
-const ALLOWED_IN_TESTS: &[(&str, &[&str])] = &[
-    // The crate itself, with its feature for tests.
-    ("chefshat-server", &["chefshat-room"]),
-    // Remaining from the time when these three were one crate.
-    ("chefshat-record", &["chefshat-dataset", "chefshat-render"]),
-];
+/// Crates that the tests of a crate may depend on besides [`ALLOWED`] and, for its own test features, itself.
+const ALLOWED_IN_TESTS: &[(&str, &[&str])] = &[];
 
 /// Refuses dependencies between crates of the workspace that the tables do not allow.
 pub(crate) fn check(places: &Places) -> Result<(), Failure> {
@@ -129,7 +124,9 @@ fn problems(metadata: &Value, allowed: Table<'_>, in_tests: Table<'_>) -> Vec<St
             let kind = dependency["kind"].as_str().unwrap_or("normal");
             let may = |row: &[&str]| row.contains(&other) || row.contains(&"*");
             let is_allowed = match kind {
-                "dev" => may(row) || in_tests.get(name).is_some_and(|row| may(row)),
+                "dev" => {
+                    other == *name || may(row) || in_tests.get(name).is_some_and(|row| may(row))
+                }
                 _ => may(row),
             };
             if !is_allowed {
@@ -189,6 +186,8 @@ mod tests {
             problems(&metadata, TABLE, &[]),
             ["low must not depend on high (dev dependency)"]
         );
+        let itself = json!([{ "name": "low", "kind": "dev" }]);
+        assert!(problems(&workspace(&itself, &json!([])), TABLE, &[]).is_empty());
         let in_tests: Table<'_> = &[("low", &["high"])];
         assert!(problems(&metadata, TABLE, in_tests).is_empty());
         let normal = workspace(&json!([{ "name": "high", "kind": null }]), &json!([]));
