@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use chefshat_proto::v1::{self, record_line::Line};
+use chefshat_record::import;
+use chefshat_record::import::MAX_TRANSCRIPT_BYTES;
 use chefshat_record::jsonl;
 use chefshat_record::replay::{Replayed, replay};
-use chefshat_record::table;
-use chefshat_record::table::MAX_TRANSCRIPT_BYTES;
 use clap::Args;
 use serde_json::json;
 
@@ -82,7 +82,7 @@ impl Import {
             File::open(&self.file)
                 .and_then(|file| file.take(most.saturating_add(1)).read_to_end(&mut text))
                 .map_err(|error| format!("{name}: {error}"))?;
-            table::import(&text).map_err(|error| format!("{name}: {error}"))?
+            import::import(&text).map_err(|error| format!("{name}: {error}"))?
         };
         let replayed = replay(&lines).map_err(|error| format!("{name}: {error}"))?;
         Ok((lines, replayed))

@@ -16,7 +16,8 @@ pub struct WriteError {
     pub source: io::Error,
 }
 
-/// A file being written. Dropping it before [`finish`](Self::finish) leaves the target unchanged and removes what was written.
+/// A file being written. Dropping it before [`finish`](Self::finish) leaves the target unchanged
+/// and removes what was written.
 #[derive(Debug)]
 pub struct AtomicFile {
     path: PathBuf,
@@ -24,7 +25,8 @@ pub struct AtomicFile {
 }
 
 impl AtomicFile {
-    /// Opens a new file `NAME.RANDOM.part` in the folder of `path`. Writers of the same path do not disturb each other: the last to finish wins.
+    /// Opens a new file `NAME.RANDOM.part` in the folder of `path`. Writers of the same path do
+    /// not disturb each other: the last to finish wins.
     ///
     /// # Errors
     /// The file cannot be created.

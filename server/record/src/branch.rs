@@ -1,4 +1,4 @@
-//! What a game that branches from a record takes over from it. The game itself, and whose seats it has, are made elsewhere.
+//! Branches: the part of a recorded game that a new game takes over.
 
 use std::collections::BTreeSet;
 
@@ -8,61 +8,61 @@ use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 use crate::convert::{FieldProblem, rules_from_proto, script_from_proto, seat_cards};
 use crate::replay::{Moment, ReplayError, reveal, walk};
 
-/// The beginning of a recorded game, up to a point: from these values alone the game can be played up to there again, as
-/// [`Branch::played`] does.
+/// The beginning of a recorded game up to a branch point, sufficient to replay it
+/// ([`Branch::played`]).
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Branch {
     /// The rule set.
     pub rules: RuleSet,
-    /// The first Shift, where its hands were given.
+    /// The first Shift, if its hands were given.
     pub script: Option<Script>,
-    /// The decisions taken over, in order, by the seed of the Shifts dealt among them. At least one part, which may have no decisions: its
-    /// seed deals the first Shift.
+    /// The decisions taken over, grouped by the seed of the Shifts dealt in them. Never empty: the
+    /// first part deals the first Shift, even without decisions.
     pub taken_over: Vec<TakenOver>,
-    /// The seed of all Shifts that the recorded game dealt after the point. `None` if there was not one such seed: then later Shifts
-    /// cannot be dealt as they were there.
+    /// The seed of all later Shifts of the recorded game; `None` if they have several, so that
+    /// they cannot be dealt again.
     pub later_deals: Option<Seed>,
 }
 
-/// Why no game can branch from a record at a point.
+/// Why a game cannot branch from a record.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum BranchError {
-    /// The record does not fit.
+    /// The record does not verify.
     #[error("the record cannot be replayed: {0}")]
     Record(#[from] ReplayError),
-    /// Its rules or first hands do not fit.
-    #[error("the record makes no sense: {0}")]
+    /// Its rules or first hands are invalid.
+    #[error("the record is invalid: {0}")]
     Field(#[from] FieldProblem),
-    /// The game was aborted before it began.
-    #[error("the recorded game never began")]
+    /// The game was aborted before its start.
+    #[error("the recorded game never started")]
     NeverBegan,
-    /// The record ends before.
+    /// The record has fewer decisions.
     #[error("the recorded game has {has} decisions, not {asked}")]
     TooFar {
-        /// Decisions there are.
+        /// Decisions recorded.
         has: u64,
-        /// Decisions asked for.
+        /// Decisions requested.
         asked: u64,
     },
-    /// Nothing is left to decide.
+    /// The game was over at the point.
     #[error("after {0} decisions the recorded game was over; take over fewer")]
     Over(u64),
-    /// A game from a real table without everybody's cards.
-    #[error("the hands of the recorded game are not all known")]
+    /// An imported game with unknown hands.
+    #[error("some hands of the recorded game are unknown")]
     HandsUnknown,
-    /// A game from a real table has no seed.
+    /// An imported game has no seed for later Shifts.
     #[error(
-        "the cards of the recorded game were real: another can go on with it in its first Shift alone"
+        "the recorded game was played with real cards: it can only be branched in its first Shift"
     )]
     RealCards,
-    /// A game from a real table with gaps.
-    #[error("not all decisions of the recorded game before this point are known")]
+    /// An imported game with unknown decisions.
+    #[error("some decisions of the recorded game before this point are unknown")]
     DecisionsUnknown,
 }
 
 impl Branch {
-    /// The recorded game at the point, with this seed for later Shifts. `None` if the decisions do not fit; those of a branch that
-    /// [`branch_of`] gives do.
+    /// The game at the branch point, with this seed for later Shifts. `None` if a decision is
+    /// illegal, which never happens for a result of [`branch_of`].
     pub fn played(&self, later: Seed) -> Option<Game> {
         let first = self.taken_over.first().map_or(later, |part| part.seed);
         let mut game = match &self.script {
@@ -80,14 +80,14 @@ impl Branch {
     }
 }
 
-/// What a game takes over that branches from a record after so many decisions.
+/// The branch of a record after `decisions`.
 ///
 /// # Errors
-/// The record does not fit, or the game cannot be gone on with from there.
+/// The record does not verify, or the game cannot branch at this point.
 pub fn branch_of(lines: &[v1::RecordLine], decisions: u64) -> Result<Branch, BranchError> {
-    let mut beginning = Beginning::default();
-    let replayed = walk(lines, |moment| beginning.visit(&moment, decisions))?;
-    let first_deal = beginning.first_deal.ok_or(BranchError::NeverBegan)?;
+    let mut collector = Collector::default();
+    let replayed = walk(lines, |moment| collector.visit(&moment, decisions))?;
+    let first_deal = collector.first_deal.ok_or(BranchError::NeverBegan)?;
     if decisions > replayed.decisions {
         return Err(BranchError::TooFar {
             has: replayed.decisions,
@@ -97,19 +97,19 @@ pub fn branch_of(lines: &[v1::RecordLine], decisions: u64) -> Result<Branch, Bra
     if decisions == replayed.decisions && replayed.state == v1::RoomState::Finished {
         return Err(BranchError::Over(decisions));
     }
-    let header = &beginning.header;
+    let header = &collector.header;
     let rules = rules_from_proto(&header.rules.clone().unwrap_or_default())?;
     let scripted = header
         .start
         .as_ref()
         .and_then(|start| start.scripted.clone());
-    let shifts = beginning.shifts.iter().copied();
+    let shifts = collector.shifts.iter().copied();
     let seeds = Seeds::of(header, lines);
     let (script, later_deals) = if header.origin() == v1::GameOrigin::Imported {
         if !first_deal.known {
             return Err(BranchError::HandsUnknown);
         }
-        if shifts.filter(|begun_by| *begun_by <= decisions).count() > 1 {
+        if shifts.filter(|started_by| *started_by <= decisions).count() > 1 {
             return Err(BranchError::RealCards);
         }
         let dealt = v1::ScriptedShift {
@@ -118,7 +118,7 @@ pub fn branch_of(lines: &[v1::RecordLine], decisions: u64) -> Result<Branch, Bra
         };
         (Some(dealt), None)
     } else {
-        let later = shifts.filter(|begun_by| *begun_by > decisions);
+        let later = shifts.filter(|started_by| *started_by > decisions);
         (scripted, seeds.one_of(later))
     };
     let script = script
@@ -127,12 +127,12 @@ pub fn branch_of(lines: &[v1::RecordLine], decisions: u64) -> Result<Branch, Bra
     let branch = Branch {
         rules,
         script,
-        taken_over: seeds.parts(&beginning.actions),
+        taken_over: seeds.parts(&collector.actions),
         later_deals,
     };
-    // Decisions of a real game may have gaps, and then lead elsewhere.
+    // With decisions missing, an imported game leads elsewhere.
     let any = Seed([0; 32]);
-    let same = beginning.at_point.is_some_and(|mut game| {
+    let same = collector.at_point.is_some_and(|mut game| {
         game.reseed(any);
         branch.played(any) == Some(game)
     });
@@ -143,16 +143,16 @@ pub fn branch_of(lines: &[v1::RecordLine], decisions: u64) -> Result<Branch, Bra
     }
 }
 
-/// What is seen of a record on the way to the point and behind it.
+/// The state collected while walking a record.
 #[derive(Default)]
-struct Beginning {
+struct Collector {
     header: v1::RecordHeader,
     /// Decisions taken so far.
     decisions: u64,
-    /// The actions of those up to the point.
+    /// The actions up to the point.
     actions: Vec<ActionId>,
     first_deal: Option<FirstDeal>,
-    /// For each Shift, the number of the decision that it began with; 0: none.
+    /// For each Shift, the number of the decision that started it; 0: none.
     shifts: Vec<u64>,
     /// The game at the point.
     at_point: Option<Game>,
@@ -160,11 +160,11 @@ struct Beginning {
 
 struct FirstDeal {
     hands: Vec<v1::SeatCards>,
-    /// Whether they are what was dealt, all of them.
+    /// Whether all hands are known.
     known: bool,
 }
 
-impl Beginning {
+impl Collector {
     fn visit(&mut self, moment: &Moment<'_>, point: u64) {
         match moment.entry {
             Line::Header(header) => self.header = header.clone(),
@@ -183,7 +183,7 @@ impl Beginning {
                     self.first_deal = self.first_deal.take().or_else(|| first_deal(moment));
                 }
             }
-            // A game that was given up has no decision after the point.
+            // An aborted game may have no decision after the point.
             Line::Footer(_) if self.decisions == point => self.at_point = moment.game.cloned(),
             Line::PrivateExpression(_) | Line::Footer(_) => {}
         }
@@ -203,11 +203,11 @@ fn first_deal(moment: &Moment<'_>) -> Option<FirstDeal> {
     })
 }
 
-/// The seeds of a recorded game, with the number of decisions up to which each deals; the last deals without end.
+/// The seeds of a recorded game, each with the number of decisions up to which it deals.
 struct Seeds(Vec<(u64, Seed)>);
 
 impl Seeds {
-    /// The seeds that the game took over, and its own. The record has been replayed: its seeds are whole.
+    /// The seeds taken over, then the game's own. The record must be verified.
     fn of(header: &v1::RecordHeader, lines: &[v1::RecordLine]) -> Self {
         let seed = |bytes: &[u8]| Seed(bytes.try_into().unwrap_or_default());
         let mut end = 0;
@@ -221,16 +221,17 @@ impl Seeds {
         Self(seeds)
     }
 
-    /// The seed of a Shift that begins with this decision, counted from 1; for 0 the seed of the first Shift.
-    fn of_shift(&self, begun_by: u64) -> Seed {
-        let part = self.0.iter().find(|(end, _)| begun_by <= *end);
-        part.expect("the last seed has no end").1
+    /// The seed of a Shift that starts with this decision, from 1; for 0, of the first Shift.
+    fn of_shift(&self, started_by: u64) -> Seed {
+        let part = self.0.iter().find(|(end, _)| started_by <= *end);
+        part.expect("the last seed has no limit").1
     }
 
-    /// The seed of all these Shifts, if it is one; the last if there are none.
-    fn one_of(&self, begun_by: impl Iterator<Item = u64>) -> Option<Seed> {
-        let seeds: BTreeSet<[u8; 32]> =
-            begun_by.map(|begun_by| self.of_shift(begun_by).0).collect();
+    /// The common seed of these Shifts; the last seed if there are none.
+    fn one_of(&self, started_by: impl Iterator<Item = u64>) -> Option<Seed> {
+        let seeds: BTreeSet<[u8; 32]> = started_by
+            .map(|started_by| self.of_shift(started_by).0)
+            .collect();
         match seeds.len() {
             0 => Some(self.of_shift(u64::MAX)),
             1 => seeds.first().copied().map(Seed),
@@ -238,14 +239,14 @@ impl Seeds {
         }
     }
 
-    /// The decisions from the first on, each with its seed.
+    /// The decisions grouped by seed.
     fn parts(&self, actions: &[ActionId]) -> Vec<TakenOver> {
         let mut parts = vec![TakenOver {
             seed: self.of_shift(0),
             actions: Vec::new(),
         }];
-        for (begun_by, action) in (1..).zip(actions) {
-            let seed = self.of_shift(begun_by);
+        for (started_by, action) in (1..).zip(actions) {
+            let seed = self.of_shift(started_by);
             match parts.last_mut() {
                 Some(part) if part.seed == seed => part.actions.push(*action),
                 _ => parts.push(TakenOver {

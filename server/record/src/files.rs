@@ -1,4 +1,4 @@
-//! Which files are records: those that are named, and those in folders that are named. How one is read is in [`crate::jsonl`].
+//! Finds the record files among files and folders.
 
 use std::collections::BTreeSet;
 use std::io;
@@ -7,30 +7,30 @@ use std::path::{Path, PathBuf};
 /// A file that may be a record.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RecordFile {
-    /// Where it is.
+    /// Its path.
     pub path: PathBuf,
-    /// Its size.
+    /// Its size in bytes.
     pub bytes: u64,
 }
 
-/// Why there are no records to read.
+/// A failure to find records.
 #[derive(Debug, thiserror::Error)]
 pub enum FindError {
-    /// There is nothing at a path, or nothing that may be read.
+    /// A path does not exist or cannot be read.
     #[error("{path}: {source}")]
     Unreadable {
         /// The path.
         path: PathBuf,
-        /// What the system said.
+        /// The cause.
         source: io::Error,
     },
-    /// A folder has no record in it.
-    #[error("{0} holds no records (*.jsonl); in a data folder they are in its folder `records`")]
+    /// A folder contains no record.
+    #[error("{0} contains no records (*.jsonl); a data folder has them in its folder `records`")]
     NoRecords(PathBuf),
 }
 
-/// The record files among `paths`: files as they are named, of folders all files `*.jsonl` by name (not those of folders within). A file
-/// that is named twice comes once.
+/// The record files among `paths`: files as given, and the `*.jsonl` files of folders, by name and
+/// without subfolders. Duplicates are dropped.
 ///
 /// # Errors
 /// A path that cannot be read, or a folder without a record.
@@ -44,9 +44,9 @@ pub fn find_records(paths: &[PathBuf]) -> Result<Vec<RecordFile>, FindError> {
             vec![path.clone()]
         };
         for path in files {
-            let whole = std::fs::canonicalize(&path).map_err(unreadable(&path))?;
+            let canonical = std::fs::canonicalize(&path).map_err(unreadable(&path))?;
             let bytes = std::fs::metadata(&path).map_err(unreadable(&path))?.len();
-            if known.insert(whole) {
+            if known.insert(canonical) {
                 found.push(RecordFile { path, bytes });
             }
         }

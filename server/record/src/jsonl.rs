@@ -1,5 +1,5 @@
-//! Records as JSON Lines: one `RecordLine` a line in its canonical JSON form. A file appears whole or not at all. Whether a record's lines
-//! go together is decided in [`crate::replay`].
+//! Reads and writes records as JSON Lines, one `RecordLine` in canonical JSON per line. Writes are
+//! atomic. Contents are verified in [`crate::replay`].
 
 mod lists;
 
@@ -12,24 +12,26 @@ use chefshat_proto::v1::{RecordLine, record_line::Line};
 use crate::atomic_file::{AtomicFile, WriteError};
 pub use lists::{Excess, excess};
 
-/// Version of the form that this crate writes, and the newest that it reads.
+/// The format version that this crate writes, and the newest it reads.
 pub const FORMAT_VERSION: u32 = 1;
-/// Longest line of a record, bytes: the largest decision, with ten thousand invalid attempts and all its annotations, takes half of it.
+/// The longest line, bytes. The largest decision, with ten thousand invalid attempts and all
+/// annotations, takes half of it.
 pub const MAX_LINE_BYTES: usize = 256 * 1024;
-/// Most lines of a record: a server aborts a game that grows beyond a million events, and decisions are fewer.
+/// The most lines. A server aborts a game after a million events, and decisions are fewer.
 pub const MAX_LINES: usize = 2_100_000;
-/// Largest record, bytes. One of a thousand Shifts has some 25 MB; one of as many events as a server allows stays below it, too.
+/// The largest record, bytes. A thousand Shifts take about 25 MB; the most events a server allows
+/// also stay below it.
 pub const MAX_RECORD_BYTES: u64 = 512 * 1024 * 1024;
 
-/// Why a record could not be written or read.
+/// A failure to write or read a record.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordFileError {
-    /// The file system refused.
+    /// An error of the file system.
     #[error("{path}: {source}")]
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// Its cause.
         source: std::io::Error,
     },
     /// A line is not a record line.
@@ -39,60 +41,60 @@ pub enum RecordFileError {
         path: PathBuf,
         /// Number of the line, from 1.
         line: usize,
-        /// What is wrong with it.
+        /// The problem.
         problem: LineProblem,
     },
 }
 
-/// Why a line of a file is no line of a record.
+/// Why a line of a file is not a line of a record.
 #[derive(Debug, thiserror::Error)]
 pub enum LineProblem {
-    /// There is no line at all.
+    /// The file is empty.
     #[error("is missing: the file is empty")]
     Empty,
     /// The file ends within the line.
-    #[error("is cut off: the file was not written or copied to its end")]
+    #[error("is truncated: the file was not written or copied completely")]
     CutOff,
-    /// It is no text.
+    /// The line is not UTF-8.
     #[error("is not UTF-8 text (at byte {0} of the line)")]
     NotText(usize),
-    /// It is longer than any line of a record.
-    #[error("is longer than {MAX_LINE_BYTES} bytes, the most that a line of a record may have")]
+    /// The line exceeds [`MAX_LINE_BYTES`].
+    #[error("is longer than {MAX_LINE_BYTES} bytes, the most a line may have")]
     TooLong,
-    /// There are more lines than any record has.
+    /// The file exceeds [`MAX_LINES`].
     #[error("is one too many: a record has at most {MAX_LINES} lines")]
     TooMany,
-    /// With it the record is larger than any.
-    #[error("goes beyond the {MAX_RECORD_BYTES} bytes that a record may have")]
+    /// The file exceeds [`MAX_RECORD_BYTES`].
+    #[error("exceeds the {MAX_RECORD_BYTES} bytes a record may have")]
     TooLarge,
-    /// One of its lists is longer than any record's.
+    /// A list exceeds its bound.
     #[error("has more than {most} entries in `{field}`")]
     LongList {
         /// The field.
         field: &'static str,
-        /// Most entries that it may have.
+        /// The most entries allowed.
         most: usize,
     },
-    /// A record begins a second time.
+    /// The file contains a second header.
     #[error("is a second header: a file holds one record")]
     SecondHeader,
-    /// It is not JSON.
+    /// The line is not JSON.
     #[error("is not JSON: {0}")]
     NotJson(String),
-    /// It is JSON of something else.
+    /// The line is JSON, but not a `RecordLine`.
     #[error("is not a line of a record: {0}")]
     NotARecord(String),
 }
 
-/// Where the record of a game lies under a data directory: `records/GAME-ID.jsonl`.
+/// The path of a game's record in a data directory: `records/GAME-ID.jsonl`.
 pub fn path_of(data_dir: &Path, game_id: &str) -> PathBuf {
     data_dir.join("records").join(format!("{game_id}.jsonl"))
 }
 
-/// Writes a record, whole or not at all; folders on the way to it are made.
+/// Writes a record atomically, creating parent folders.
 ///
 /// # Errors
-/// The first failure of the file system; `path` is then as it was.
+/// The first error of the file system; `path` is then unchanged.
 pub fn write(path: &Path, lines: &[RecordLine]) -> Result<(), RecordFileError> {
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder).map_err(|source| io_error(path, source))?;
@@ -121,7 +123,7 @@ fn io_error(path: &Path, source: io::Error) -> RecordFileError {
 /// Reads a record.
 ///
 /// # Errors
-/// The first failure of the file system, or the first line that is no record line, or that no record can have there.
+/// The first error of the file system, or the first line that is malformed or exceeds a bound.
 pub fn read(path: &Path) -> Result<Vec<RecordLine>, RecordFileError> {
     let file = File::open(path).map_err(|source| io_error(path, source))?;
     let mut lines = Vec::new();
@@ -136,11 +138,11 @@ pub fn read(path: &Path) -> Result<Vec<RecordLine>, RecordFileError> {
     }
 }
 
-/// Why reading stopped before the end.
+/// Why reading stopped.
 #[derive(Debug)]
 enum Stopped {
     Io(io::Error),
-    /// The line after those that were read.
+    /// A problem of the next line.
     Line(LineProblem),
 }
 
@@ -150,7 +152,7 @@ impl From<LineProblem> for Stopped {
     }
 }
 
-/// Reads a record of at most so many bytes to its end.
+/// Reads a record of at most `most_bytes`.
 fn read_lines(
     mut file: impl BufRead,
     most_bytes: u64,
@@ -179,7 +181,7 @@ fn read_lines(
         }
         let line = parse(&bytes).map_err(|problem| match bytes.last() {
             Some(b'\n') => problem,
-            // A file that was cut within a line has no end of it either.
+            // A truncated file has no final line feed.
             _ => LineProblem::CutOff,
         })?;
         check(&line, lines.is_empty())?;
@@ -191,7 +193,8 @@ fn read_lines(
     Ok(())
 }
 
-/// Checks a line for what would let a small file become large in memory; the rest is left to a replay.
+/// Checks the bounds that keep a small file from becoming large in memory; the replay checks the
+/// rest.
 fn check(line: &RecordLine, is_first: bool) -> Result<(), LineProblem> {
     let Some(line) = &line.line else {
         return Ok(());
@@ -209,15 +212,15 @@ fn parse(bytes: &[u8]) -> Result<RecordLine, LineProblem> {
     let text = std::str::from_utf8(bytes)
         .map_err(|error| LineProblem::NotText(error.valid_up_to() + 1))?;
     serde_json::from_str(text).map_err(|error| {
-        // The parser sees one line at a time: its number says nothing.
-        let said = error.to_string();
-        let said = said
+        // The parser sees one line at a time; drop its line number.
+        let message = error.to_string();
+        let message = message
             .rsplit_once(" at line ")
-            .map_or(said.as_str(), |(said, _)| said);
+            .map_or(message.as_str(), |(message, _)| message);
         if error.is_data() {
-            LineProblem::NotARecord(said.to_owned())
+            LineProblem::NotARecord(message.to_owned())
         } else {
-            LineProblem::NotJson(format!("{said} (column {})", error.column()))
+            LineProblem::NotJson(format!("{message} (column {})", error.column()))
         }
     })
 }
@@ -227,7 +230,7 @@ mod tests {
     use crate::jsonl::*;
 
     #[test]
-    fn a_record_of_too_many_bytes_is_refused_where_they_are_too_many() {
+    fn a_record_is_rejected_at_the_line_that_exceeds_the_bytes_allowed() {
         let text = "{\"footer\":{}}\n".repeat(3);
         let size = u64::try_from(text.len()).expect("a few bytes");
         let read = |most| {
@@ -237,16 +240,16 @@ mod tests {
         };
         assert!(matches!(read(size), (3, Ok(()))));
         let too_large = Err::<(), _>(Stopped::Line(LineProblem::TooLarge));
-        for (most, whole) in [(size - 1, 2), (size / 3, 1), (0, 0)] {
+        for (most, complete) in [(size - 1, 2), (size / 3, 1), (0, 0)] {
             let (lines, read) = read(most);
-            assert_eq!(lines, whole, "{most}");
+            assert_eq!(lines, complete, "{most}");
             assert_eq!(format!("{read:?}"), format!("{too_large:?}"), "{most}");
         }
     }
 
     #[test]
-    fn as_many_empty_lines_as_there_may_be_take_less_than_two_gibibytes() {
-        // They are what takes most memory for its bytes in the file.
+    fn the_most_empty_lines_take_less_than_two_gibibytes() {
+        // Empty lines take the most memory per byte of the file.
         assert!(size_of::<RecordLine>() * MAX_LINES < 2 * 1024 * 1024 * 1024);
     }
 }

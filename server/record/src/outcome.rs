@@ -1,5 +1,5 @@
-//! What each seat did in a finished game, from the lines of its record as they stand: nothing is replayed, so whoever does not trust a
-//! record replays it first. What a tournament or a rating makes of it is decided elsewhere.
+//! The outcome of a finished game: places, points and counts by seat, for tournaments and ratings.
+//! Reads the lines as they are; verify untrusted records first.
 
 use std::collections::BTreeSet;
 
@@ -8,83 +8,84 @@ use chefshat_proto::v1::{
     record_line::Line,
 };
 
-/// Name of the built-in agent that plays a recorded player.
+/// The built-in agent that imitates a recorded player.
 const REPLAY: &str = "replay";
 
-/// What came of a finished game.
+/// The outcome of a finished game.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
     /// Identifies the game.
     pub game_id: String,
-    /// The tournament it belonged to; empty if it belonged to none.
+    /// Its tournament; empty if none.
     pub tournament_id: String,
     /// Milliseconds since the Unix epoch when it ended.
     pub ended_at_ms: u64,
     /// Shifts played.
     pub shifts: u32,
-    /// What each seat did; index = seat.
+    /// The result of each seat, in order.
     pub seats: Vec<SeatOutcome>,
-    /// Why it counts for no rating; `None` if it does. Whether a built-in agent sits in the seat of somebody who did not come is not seen
-    /// here.
+    /// Why the game is unrated; `None` if it is rated. Does not detect a built-in agent in the
+    /// seat of a missing participant.
     pub unrated: Option<Unrated>,
 }
 
 impl Outcome {
-    /// Whether it counts for ratings, as far as its record can tell.
+    /// Whether the game is rated, as far as the record shows.
     pub fn is_rated(&self) -> bool {
         self.unrated.is_none()
     }
 
-    /// Who played, and the place of each, as a rating is told of a game.
+    /// The players with their places, for a rating.
     pub fn places(&self) -> Vec<(Identity, u32)> {
         let seats = self.seats.iter();
         seats.map(|seat| (seat.identity(), seat.place)).collect()
     }
 }
 
-/// What one seat did.
+/// The result of one seat.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SeatOutcome {
-    /// Name it was shown by.
+    /// Displayed name.
     pub name: String,
-    /// What the participant was; a built-in agent is an agent.
+    /// Kind of participant; built-in agents are agents.
     pub kind: ParticipantKind,
-    /// Name of the built-in agent that filled the seat; `None` for all others.
+    /// Name of the built-in agent; `None` for other participants.
     pub built_in: Option<String>,
     /// Place in the game, from 1.
     pub place: u32,
     /// Points in the game.
     pub points: u64,
-    /// Whether a substitute played for it at any time.
+    /// Whether a substitute ever played for the seat.
     pub substituted: bool,
-    /// Decisions that it took itself or lost to the clock or to invalid attempts: all but those of a substitute and those taken over from
-    /// another record.
+    /// Decisions of the participant, including timeouts and invalid attempts; excludes those of a
+    /// substitute or taken over from another record.
     pub decisions: u64,
-    /// Invalid attempts at those, of every kind of decision.
+    /// Invalid attempts at those decisions.
     pub wrong_actions: u64,
-    /// Those of them that were lost to the clock, connected or not.
+    /// Those decisions that timed out, connected or not.
     pub timeouts: u64,
-    /// Measured time of the decisions it took itself, microseconds, in all.
+    /// Total measured time of the participant's own decisions, microseconds.
     pub decision_time_us: u64,
-    /// How many of those were measured; those of built-in agents are not.
+    /// The number of decisions measured; those of built-in agents are not.
     pub timed_decisions: u64,
-    /// Performance score: the mean over the Shifts of 10 times its points by the number of pizzas.
+    /// Performance score: the mean over Shifts of 10 × points / pizzas.
     pub performance_score: f64,
 }
 
-/// Who a rating is of. Built-in agents go by the agent's name, not by the one they were shown by.
+/// The identity a rating belongs to. Built-in agents are identified by the agent's name, not the
+/// displayed one.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Identity {
     /// The name.
     pub name: String,
-    /// What it is.
+    /// Kind of participant.
     pub kind: ParticipantKind,
-    /// Whether it is a built-in agent.
+    /// Whether this is a built-in agent.
     pub built_in: bool,
 }
 
 impl Identity {
-    /// Who a rating of this seat's player is of.
+    /// The identity of this seat's player.
     pub fn of(seat: &v1::Participant) -> Self {
         let built_in = !seat.built_in_agent.is_empty();
         let (name, kind) = match built_in {
@@ -100,7 +101,7 @@ impl Identity {
 }
 
 impl SeatOutcome {
-    /// Who a rating is of.
+    /// The identity of a participant.
     pub fn identity(&self) -> Identity {
         let (name, kind) = match &self.built_in {
             Some(agent) => (agent, ParticipantKind::Agent),
@@ -114,25 +115,25 @@ impl SeatOutcome {
     }
 }
 
-/// Why a finished game counts for no rating.
+/// Why a finished game is unrated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
 pub enum Unrated {
-    /// Its deals were not the server's own.
-    #[error("the deals did not come from a seed that the server committed to")]
+    /// The deals came from a given seed or hands.
+    #[error("the deals did not come from a seed committed by the server")]
     NotDealt,
-    /// Somebody else played for a participant.
+    /// A substitute played for a participant.
     #[error("a substitute played")]
     Substituted,
-    /// A rating cannot say who of the two was better.
+    /// One participant had several seats.
     #[error("a participant had more than one seat")]
     SameParticipant,
-    /// It plays as another player in every game.
+    /// A recorded player was imitated.
     #[error("a recorded player took part")]
     RecordedPlayer,
 }
 
 impl Unrated {
-    /// In a word, for programs.
+    /// The reason as a word for programs.
     pub fn name(self) -> &'static str {
         match self {
             Self::NotDealt => "not_dealt",
@@ -143,27 +144,27 @@ impl Unrated {
     }
 }
 
-/// Why a record tells no outcome.
+/// Why a record has no outcome.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum OutcomeError {
-    /// The game has no result.
+    /// The game was aborted.
     #[error("the game was not finished")]
     NotFinished,
     /// The record does not begin with its header.
     #[error("the record has no header")]
     NoHeader,
-    /// The final table does not name every seat once, with the places from 1 on.
-    #[error("the final table does not fit the seats")]
+    /// The final standings do not list every seat once with places from 1.
+    #[error("the final standings do not match the seats")]
     Standings,
-    /// A line names a seat that the game does not have, or leaves one out.
-    #[error("line {0} does not fit the seats")]
+    /// A line has a wrong seat or a wrong number of seats.
+    #[error("line {0} does not match the seats")]
     Seat(usize),
 }
 
-/// What came of the game of a record.
+/// Reads the outcome of a record.
 ///
 /// # Errors
-/// If the game was not finished, or the lines do not go together.
+/// The game was not finished, or the lines are inconsistent.
 pub fn outcome(lines: &[v1::RecordLine]) -> Result<Outcome, OutcomeError> {
     let Some(Line::Header(header)) = lines.first().and_then(|line| line.line.as_ref()) else {
         return Err(OutcomeError::NoHeader);
@@ -188,7 +189,7 @@ pub fn outcome(lines: &[v1::RecordLine]) -> Result<Outcome, OutcomeError> {
     let mut seats = gathered.seats;
     place(&mut seats, standings).ok_or(OutcomeError::Standings)?;
     for seat in &mut seats {
-        // Until now the sum.
+        // The sum until now.
         seat.performance_score /= f64::from(gathered.shifts.max(1));
     }
     Ok(Outcome {
@@ -202,7 +203,7 @@ pub fn outcome(lines: &[v1::RecordLine]) -> Result<Outcome, OutcomeError> {
 }
 
 impl SeatOutcome {
-    /// A seat that has done nothing yet.
+    /// A seat before its first decision.
     fn of(participant: &v1::Participant) -> Self {
         let built_in = &participant.built_in_agent;
         Self {
@@ -222,7 +223,7 @@ impl SeatOutcome {
     }
 }
 
-/// What the lines came to so far.
+/// The totals of the lines so far.
 struct Gathered<'a> {
     seats: Vec<SeatOutcome>,
     shifts: u32,
@@ -231,7 +232,7 @@ struct Gathered<'a> {
 }
 
 impl<'a> Gathered<'a> {
-    /// Takes in a line; `None` if it does not fit the seats.
+    /// Adds a line; `None` if it does not match the seats.
     fn line(&mut self, line: Option<&'a Line>) -> Option<()> {
         match line {
             Some(Line::Decision(decision)) => self.decision(decision),
@@ -292,7 +293,7 @@ impl<'a> Gathered<'a> {
     }
 }
 
-/// Gives the seats their places and points; `None` unless each has one of the places from 1 on.
+/// Sets places and points; `None` unless every seat gets one of the places from 1.
 fn place(seats: &mut [SeatOutcome], standings: &[v1::Standing]) -> Option<()> {
     let mut places = BTreeSet::new();
     for line in standings {

@@ -1,4 +1,4 @@
-//! What a recorded player decided, and what it knew when it did. How an agent plays from that is not known here.
+//! The decisions of a recorded player with its observations, for agents that imitate it.
 
 use chefshat_engine::{ActionId, RecordedDecision, Seat, Viewer};
 use chefshat_proto::v1::{self, record_line::Line};
@@ -6,29 +6,29 @@ use chefshat_proto::v1::{self, record_line::Line};
 use crate::convert::{seat_from_number, seat_number};
 use crate::replay::{Moment, ReplayError, walk};
 
-/// Why there is no such player.
+/// Why a recorded player is not available.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum PlayerError {
-    /// The record does not fit.
+    /// The record does not verify.
     #[error("the record cannot be replayed: {0}")]
     Record(#[from] ReplayError),
     /// The game has no such seat.
-    #[error("the recorded game has the seats 0 to {}, not {seat}", players - 1)]
+    #[error("the recorded game has seats 0 to {}, not {seat}", players - 1)]
     NoSuchSeat {
-        /// The seat asked for.
+        /// The seat requested.
         seat: u32,
-        /// Seats of the game.
+        /// The number of seats.
         players: usize,
     },
-    /// There is nothing to play from.
-    #[error("seat {0} of the recorded game took no decision with a hand that is known")]
+    /// No decision has a known hand.
+    #[error("seat {0} of the recorded game took no decision with a known hand")]
     NothingKnown(u32),
 }
 
-/// The decisions of a seat of a recorded game, in order. Those for which its hand is not known are left out.
+/// The decisions of a seat in order, except those with an unknown hand.
 ///
 /// # Errors
-/// The record does not fit, has no such seat, or says nothing of its decisions.
+/// The record does not verify, has no such seat, or no decision of it with a known hand.
 pub fn recorded_player(
     lines: &[v1::RecordLine],
     seat: u32,
@@ -48,7 +48,7 @@ pub fn recorded_player(
     Ok(decisions)
 }
 
-/// The decision a line tells of, if it is the seat's.
+/// The decision of a line, if it is the seat's.
 fn decision_of(moment: &Moment<'_>, seat: Seat) -> Option<RecordedDecision> {
     let (Line::Decision(decision), Some(game)) = (moment.entry, moment.game) else {
         return None;

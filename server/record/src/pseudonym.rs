@@ -1,25 +1,24 @@
-//! Taking a participant out of a record: the name gives way to a pseudonym, and what the participant expressed or said about decisions is
-//! dropped. What was played stays, so that the record still replays. Where records are kept, and which of them a participant is in, is not
-//! known here.
+//! Pseudonymizes a participant in a record: replaces the name and drops expressions and
+//! annotations. Decisions stay, so the record still verifies.
 
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 
-/// Longest name of a room, characters.
+/// The longest name of a room, characters.
 const MAX_ROOM_NAME: usize = 64;
 
-/// Who is to be taken out, and what stands in its place.
+/// A participant and its pseudonym.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Pseudonym {
-    /// The name.
+    /// The name to replace.
     pub name: String,
-    /// What takes its place, 1..=64 characters.
+    /// The pseudonym, 1..=64 characters.
     pub pseudonym: String,
 }
 
-/// What was taken out.
+/// The changes made to a record.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct TakenOut {
-    /// Places in which the name stood.
+    /// Occurrences of the name replaced.
     pub names: u64,
     /// Expressions dropped.
     pub expressions: u64,
@@ -35,12 +34,12 @@ impl std::ops::AddAssign for TakenOut {
     }
 }
 
-/// The seats that one participant has in a game, as it is followed from its beginning.
+/// The seats of one participant, followed through the events of a game.
 #[derive(Debug, Clone, Default)]
 pub struct OwnSeats(Vec<u32>);
 
 impl OwnSeats {
-    /// Those at the beginning of a record: of a real table, where nobody sits down.
+    /// The seats at the start of a record; in imported games no event seats a participant.
     pub fn at_start(lines: &[v1::RecordLine], name: &str) -> Self {
         let mut own = Self::default();
         for line in lines.iter().filter_map(|line| line.line.as_ref()) {
@@ -62,7 +61,7 @@ impl OwnSeats {
         own
     }
 
-    /// Follows the next event.
+    /// Applies an event.
     pub fn follow(&mut self, event: &v1::GameEvent, name: &str) {
         match &event.kind {
             Some(Kind::Seated(seated)) => self.seated(seated.seat, seated.name == name),
@@ -71,7 +70,7 @@ impl OwnSeats {
         }
     }
 
-    /// Somebody sits down.
+    /// Applies a seating.
     pub fn seated(&mut self, seat: u32, own: bool) {
         self.vacated(seat);
         if own {
@@ -79,7 +78,7 @@ impl OwnSeats {
         }
     }
 
-    /// A seat becomes free again.
+    /// Applies a vacated seat.
     pub fn vacated(&mut self, seat: u32) {
         self.0.retain(|known| *known != seat);
     }
@@ -91,7 +90,7 @@ impl OwnSeats {
 }
 
 impl Pseudonym {
-    /// Takes the participant out of a record. Built-in agents of the same name stay.
+    /// Pseudonymizes a record. Built-in agents of the same name are unaffected.
     pub fn take_out(&self, lines: &mut Vec<v1::RecordLine>) -> TakenOut {
         let mut out = TakenOut::default();
         let mut own = OwnSeats::at_start(lines, &self.name);
@@ -140,7 +139,7 @@ impl Pseudonym {
             }
             None => true,
         });
-        // A room is often named after one of those who play in it.
+        // Rooms are often named after a player.
         if out.names > 0
             && let Some(Line::Header(header)) =
                 lines.first_mut().and_then(|line| line.line.as_mut())
@@ -150,7 +149,7 @@ impl Pseudonym {
         out
     }
 
-    /// Puts the pseudonym in the place of the name among seats; how often.
+    /// Replaces the name among seats; returns the number of replacements.
     pub fn in_seats(&self, seats: &mut [v1::Participant]) -> u64 {
         let mut found = 0;
         for seat in seats {
@@ -162,24 +161,25 @@ impl Pseudonym {
         found
     }
 
-    /// Puts the pseudonym in the place of the name where it stands as words of its own in the name of a room; how often.
+    /// Replaces the name where it occurs as whole words in a room name; returns the number of
+    /// replacements.
     pub fn in_text(&self, text: &mut String) -> u64 {
         let is_part = |character: Option<char>| character.is_some_and(char::is_alphanumeric);
-        let (mut said, mut rest, mut found) = (String::new(), text.as_str(), 0);
+        let (mut replaced, mut rest, mut found) = (String::new(), text.as_str(), 0);
         while !self.name.is_empty()
             && let Some(at) = rest.find(&self.name)
         {
             let (before, after) = (&rest[..at], &rest[at + self.name.len()..]);
-            let alone = !is_part(before.chars().next_back().or(said.chars().next_back()))
+            let alone = !is_part(before.chars().next_back().or(replaced.chars().next_back()))
                 && !is_part(after.chars().next());
-            said.push_str(before);
-            said.push_str(if alone { &self.pseudonym } else { &self.name });
+            replaced.push_str(before);
+            replaced.push_str(if alone { &self.pseudonym } else { &self.name });
             found += u64::from(alone);
             rest = after;
         }
         if found > 0 {
-            said.push_str(rest);
-            *text = said.chars().take(MAX_ROOM_NAME).collect();
+            replaced.push_str(rest);
+            *text = replaced.chars().take(MAX_ROOM_NAME).collect();
         }
         found
     }
@@ -204,9 +204,9 @@ mod tests {
             ("Anatole", "Anatole", 0),
             ("", "", 0),
         ] {
-            let mut said = text.to_owned();
-            assert_eq!(pseudonym.in_text(&mut said), times, "{text}");
-            assert_eq!(said, expected);
+            let mut replaced = text.to_owned();
+            assert_eq!(pseudonym.in_text(&mut replaced), times, "{text}");
+            assert_eq!(replaced, expected);
         }
     }
 }

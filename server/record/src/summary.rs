@@ -1,10 +1,10 @@
-//! A record in short, from its lines: what lists of records show.
+//! The summary of a record, as listings show it.
 
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 
 use crate::replay::Replayed;
 
-/// A record in short; `None` if nothing was dealt in it. `replayed` is what replaying the lines gave.
+/// The summary of a verified record; `None` if nothing was dealt.
 pub fn summary(lines: &[v1::RecordLine], replayed: &Replayed) -> Option<v1::RecordSummary> {
     let mut summary = v1::RecordSummary {
         state: replayed.state.into(),

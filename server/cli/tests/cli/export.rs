@@ -231,7 +231,7 @@ fn a_folder_that_is_named_like_a_record_is_none() {
     let ended = stage.export(&format!("--force {}", text(&named)));
     assert_eq!(ended.code, Some(1));
     assert!(
-        ended.stderr.contains("old.jsonl holds no records"),
+        ended.stderr.contains("old.jsonl contains no records"),
         "{ended:?}"
     );
 }

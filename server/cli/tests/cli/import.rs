@@ -77,11 +77,7 @@ fn a_transcript_becomes_a_record_that_fits() {
     let before = std::fs::read(&path).unwrap();
     let ended = import(&file, &flags);
     assert_eq!((ended.code, ended.stdout.as_str()), (Some(1), ""));
-    assert!(
-        ended.stderr.contains("exists already"),
-        "{}",
-        ended.stderr
-    );
+    assert!(ended.stderr.contains("exists already"), "{}", ended.stderr);
     assert_eq!(std::fs::read(&path).unwrap(), before);
 }
 

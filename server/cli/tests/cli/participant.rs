@@ -193,7 +193,11 @@ fn a_participant_is_given_out_and_deleted_and_every_record_still_fits() {
 
     let again = participant(&["delete", NAME, "--yes"], &data_dir);
     assert_eq!(again.code, Some(1));
-    assert!(again.stderr.contains("nothing is stored"), "{}", again.stderr);
+    assert!(
+        again.stderr.contains("nothing is stored"),
+        "{}",
+        again.stderr
+    );
 }
 
 /// What was given out: the participant's own, all of it, and nothing of the other.
@@ -348,7 +352,11 @@ fn a_damaged_file_stops_nothing_and_is_named_where_the_name_stands_in_it() {
     std::fs::remove_file(&damaged).unwrap();
     let again = participant(&delete[..3], &data_dir);
     assert_eq!(again.code, Some(1));
-    assert!(again.stderr.contains("nothing is stored"), "{}", again.stderr);
+    assert!(
+        again.stderr.contains("nothing is stored"),
+        "{}",
+        again.stderr
+    );
 }
 
 #[test]

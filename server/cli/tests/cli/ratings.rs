@@ -121,6 +121,6 @@ fn what_is_missing_is_said() {
     let folder = TempDir::new().unwrap();
     let data_dir = folder.path().to_str().unwrap();
     chefshat(&["ratings", "--data-dir", data_dir]).assert_refused("--data-dir");
-    chefshat(&["ratings", data_dir]).assert_refused("holds no records");
+    chefshat(&["ratings", data_dir]).assert_refused("contains no records");
     chefshat(&["ratings", "--help"]).assert_helps("chefshat ratings ./chefshat-data/records");
 }

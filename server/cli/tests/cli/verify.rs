@@ -111,7 +111,7 @@ fn where_there_is_no_record_is_said() {
     let folder = tempfile::tempdir().unwrap();
     let nowhere = folder.path().join("nowhere");
     for (path, words) in [
-        (folder.path(), "holds no records (*.jsonl)"),
+        (folder.path(), "contains no records (*.jsonl)"),
         (nowhere.as_path(), "No such file"),
     ] {
         let ended = chefshat(&["verify", path.to_str().unwrap()]);

@@ -2,7 +2,7 @@
 
 use chefshat_engine::{RuleSet, RuleSetSpec, Stop};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
-use chefshat_record::table::import;
+use chefshat_record::import::import;
 use chefshat_record::testing::{Observed, TestGame, transcript};
 use serde_json::Value;
 

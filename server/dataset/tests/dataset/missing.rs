@@ -3,7 +3,7 @@
 use chefshat_dataset::{Export, ExportError, Filter, Layout};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 use chefshat_record::branch::branch_of;
-use chefshat_record::table::import;
+use chefshat_record::import::import;
 use chefshat_record::testing::{Observed, TestGame, transcript};
 use serde_json::Value;
 

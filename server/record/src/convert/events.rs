@@ -1,19 +1,19 @@
-//! Events of the engine as events of the protocol. What a viewer may see was decided before, by `Event::seen_by`: here everything that
-//! is present is written, and nothing else.
+//! Converts events of the engine to the protocol. Redaction comes before, in `Event::seen_by`:
+//! everything present is written.
 
 use chefshat_engine::{ActionSpace, BySeat, Cards, Event, Role, Seat, SpecialAction, Standings};
 use chefshat_proto::v1::{self, game_event::Kind};
 
-/// How the decision behind an event came about.
+/// The cause of an event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct By {
-    /// Who or what decided.
+    /// The source of the decision.
     pub source: v1::DecisionSource,
     /// Measured decision time, microseconds; 0 for built-in agents.
     pub decision_time_us: u64,
 }
 
-/// The protocol's form of an event. `None` for the end of the game, which the room tells itself (it adds what it reveals).
+/// Converts an event. `None` for the end of the game, which the room reports with the seed reveal.
 pub fn event_kind(event: &Event, space: ActionSpace, by: By) -> Option<Kind> {
     let faces = space.faces();
     Some(match *event {
@@ -99,7 +99,7 @@ pub fn event_kind(event: &Event, space: ActionSpace, by: By) -> Option<Kind> {
     })
 }
 
-/// One seat's cards as a message.
+/// Converts the cards of a seat.
 pub fn seat_cards(seat: Seat, cards: Cards, faces: u8) -> v1::SeatCards {
     v1::SeatCards {
         seat: seat_number(seat),
@@ -115,7 +115,7 @@ fn roles_to_proto(roles: &BySeat<Option<Role>>) -> Vec<i32> {
         .collect()
 }
 
-/// The protocol's name for a special action.
+/// Converts a special action.
 pub fn special_to_proto(special: SpecialAction) -> v1::SpecialAction {
     match special {
         SpecialAction::FoodFight => v1::SpecialAction::FoodFight,
@@ -127,7 +127,7 @@ fn ascending(cards: Cards, faces: u8) -> Vec<u32> {
     cards.ascending(faces).map(u32::from).collect()
 }
 
-/// The final table as messages write it, best first.
+/// Converts final standings, best first.
 pub fn final_table(standings: &Standings) -> Vec<v1::Standing> {
     standings
         .iter()
@@ -139,7 +139,7 @@ pub fn final_table(standings: &Standings) -> Vec<v1::Standing> {
         .collect()
 }
 
-/// The number of a seat as messages write it.
+/// The number of a seat in messages.
 pub fn seat_number(seat: Seat) -> u32 {
     u32::try_from(seat.index()).expect("a seat is below six")
 }

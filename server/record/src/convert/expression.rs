@@ -1,4 +1,4 @@
-//! What an expression may hold. Where it goes, and who is told, is decided by rooms.
+//! Validates expressions.
 
 use std::ops::RangeInclusive;
 
@@ -6,23 +6,22 @@ use chefshat_proto::v1;
 
 use super::rules::FieldProblem;
 
-/// Longest label of an expression, bytes.
+/// The longest label, bytes.
 const MAX_LABEL: usize = 64;
-/// Longest reference to recorded media, bytes.
+/// The longest reference to recorded media, bytes.
 const MAX_MEDIA: usize = 256;
-/// The years 1 to 9999, which alone a timestamp can be written for, in seconds since the Unix epoch.
+/// The range of timestamps, the years 1 to 9999, in seconds since the Unix epoch.
 const SECONDS: RangeInclusive<i64> = -62_135_596_800..=LAST_SECOND;
 /// The last second of the year 9999, since the Unix epoch.
 const LAST_SECOND: i64 = 253_402_300_799;
 /// The last millisecond of the year 9999, since the Unix epoch.
 pub(crate) const LAST_MS: u64 = LAST_SECOND as u64 * 1000 + 999;
-/// Nanoseconds within a second.
 const NANOS: RangeInclusive<i32> = 0..=999_999_999;
 
 /// Checks an expression.
 ///
 /// # Errors
-/// The field out of its range.
+/// The first field out of range.
 pub fn check_expression(expression: &v1::Expression) -> Result<(), FieldProblem> {
     let text = |field, text: &str, bytes: RangeInclusive<usize>| {
         if bytes.contains(&text.len()) {
@@ -31,7 +30,7 @@ pub fn check_expression(expression: &v1::Expression) -> Result<(), FieldProblem>
             let (least, most) = bytes.into_inner();
             Err(FieldProblem::new(
                 field,
-                format!("{} bytes are not in {least}..={most}", text.len()),
+                format!("{} bytes, must be {least}..={most}", text.len()),
             ))
         }
     };
@@ -53,7 +52,7 @@ pub fn check_expression(expression: &v1::Expression) -> Result<(), FieldProblem>
     {
         return Err(FieldProblem::new(
             "taken_at",
-            "not a time of the years 1 to 9999",
+            "must be a time in the years 1 to 9999",
         ));
     }
     if v1::ExpressionSource::try_from(expression.source).is_err() {

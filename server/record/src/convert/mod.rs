@@ -1,5 +1,4 @@
-//! Between the engine's values and the protocol's messages. The two crates know nothing of each other; this folder knows both, and
-//! nothing of rooms or files.
+//! Conversion between the engine's values and the protocol's messages.
 
 mod events;
 mod expression;

@@ -1,4 +1,4 @@
-//! Observations and kinds of decisions.
+//! Converts observations and kinds of decisions.
 
 use chefshat_engine::{
     Board, BySeat, Cards, DecisionKind, Observation, Requirement, RuleSet, Seat,
@@ -7,7 +7,7 @@ use chefshat_proto::v1;
 
 use super::{FieldProblem, role_from_number, seat_number, special_to_proto};
 
-/// The protocol's name for a kind of decision.
+/// Converts a kind of decision.
 pub fn decision_kind(kind: DecisionKind) -> v1::DecisionKind {
     match kind {
         DecisionKind::Turn => v1::DecisionKind::Turn,
@@ -16,7 +16,7 @@ pub fn decision_kind(kind: DecisionKind) -> v1::DecisionKind {
     }
 }
 
-/// What a viewer may know, as a message.
+/// Converts an observation.
 pub fn observation_to_proto(observation: &Observation) -> v1::Observation {
     let faces = observation.faces;
     let own = |cards: Cards| {
@@ -52,7 +52,7 @@ pub fn observation_to_proto(observation: &Observation) -> v1::Observation {
     }
 }
 
-/// Fills in what the rules require of the decision.
+/// Sets the requirement of a decision.
 pub fn put_requirement(request: &mut v1::DecisionRequest, requirement: Requirement) {
     match requirement {
         Requirement::Play(play) => {
@@ -78,10 +78,10 @@ pub fn put_requirement(request: &mut v1::DecisionRequest, requirement: Requireme
     }
 }
 
-/// The observation a decision request carries, for agents that are built in but play over the wire.
+/// Reads the observation of a decision request, for built-in agents that play over the protocol.
 ///
 /// # Errors
-/// The field that does not fit the rules the game is played by.
+/// The first field that does not match the rules.
 pub fn observation_from_proto(
     request: &v1::DecisionRequest,
     seat: Seat,
@@ -90,7 +90,7 @@ pub fn observation_from_proto(
     let message = request
         .observation
         .as_ref()
-        .ok_or_else(|| FieldProblem::new("observation", "a decision request has one"))?;
+        .ok_or_else(|| FieldProblem::new("observation", "missing from the decision request"))?;
     let faces = rules.faces();
     let players = rules.players();
     let cards = |field, counts: &[u8], golden| {
@@ -98,20 +98,20 @@ pub fn observation_from_proto(
             return Ok(Cards::EMPTY);
         }
         Cards::from_counts(faces, counts, golden)
-            .ok_or_else(|| FieldProblem::new(field, "not the counts of a hand of this deck"))
+            .ok_or_else(|| FieldProblem::new(field, "not the counts of a hand from this deck"))
     };
     let of_seats = |field, bytes: &[u8]| {
         if bytes.len() == players {
             Ok(BySeat::from_fn(players, |seat: Seat| bytes[seat.index()]))
         } else {
-            Err(FieldProblem::new(field, "not one byte for each seat"))
+            Err(FieldProblem::new(field, "must have one byte per seat"))
         }
     };
     let small = |field, value: u32| {
-        u8::try_from(value).map_err(|_| FieldProblem::new(field, "far out of range"))
+        u8::try_from(value).map_err(|_| FieldProblem::new(field, "out of range"))
     };
     if message.points.len() != players {
-        return Err(FieldProblem::new("points", "not one number for each seat"));
+        return Err(FieldProblem::new("points", "must have one number per seat"));
     }
     Ok(Observation {
         seat: Some(seat),

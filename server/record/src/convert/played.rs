@@ -1,6 +1,5 @@
-//! The record of a game that was played without a room (simulated, or stepped by a client), in the form of those of hosted games: its
-//! decisions are taken again and written down with the events that follow from them. There is no clock in it: all times are zero, and so is
-//! that of its making.
+//! Records of games played without a room (simulated, or stepped by a client), in the format of
+//! hosted games. All times are zero.
 
 use crate::convert::{
     By, action_space, event_kind, final_table, invalid_reward, rules_to_proto, seat_number,
@@ -14,33 +13,33 @@ use sha2::{Digest as _, Sha256};
 
 use super::decision_kind;
 
-/// Most invalid attempts after which a record can say that the default was taken.
+/// The most invalid attempts before a default decision that a record can state.
 pub const MAX_RECORDED_ATTEMPTS: u32 = 1000;
 
-/// A game that was played to its end: dealt from a seed, all decisions known.
+/// A complete game: dealt from a seed, with all decisions.
 #[derive(Debug, Clone, Copy)]
 pub struct Played<'a> {
-    /// What played it; shown as the name of its room.
+    /// The program that played it, recorded as the room name.
     pub by: &'a str,
     /// The rule set.
     pub rules: &'a RuleSet,
-    /// The built-in agent on each seat; `None` for a client's.
+    /// The built-in agent of each seat; `None` for a client's.
     pub agents: &'a BySeat<Option<&'static str>>,
     /// Its seed.
     pub seed: Seed,
     /// The scheme of rewards.
     pub scheme: Option<RewardScheme>,
-    /// The policy that its header states: nobody waits for anybody, so only its limits and rewards mean something.
+    /// The policy of the header; only its limits and rewards have a meaning.
     pub policy: &'a v1::RoomPolicy,
     /// All its decisions.
     pub decisions: &'a [PlayedDecision],
 }
 
 impl Played<'_> {
-    /// The lines of its record.
+    /// The lines of the record.
     ///
     /// # Panics
-    /// When the decisions are not those of such a game.
+    /// If the decisions are illegal or incomplete.
     pub fn record(&self) -> Vec<v1::RecordLine> {
         let mut lines = Lines::new(self);
         let rules = *self.rules;
@@ -49,7 +48,9 @@ impl Played<'_> {
         lines.events(self, &events, v1::DecisionSource::Agent);
         let mut numbers = BySeat::filled(rules.players(), 0);
         for decision in self.decisions {
-            let open = game.decision().expect("the game goes as it went");
+            let open = game
+                .decision()
+                .expect("the decisions are those of this game");
             numbers[open.seat] += 1;
             let action = decision.action;
             let source = if decision.by_default {
@@ -73,14 +74,14 @@ impl Played<'_> {
             }));
             events.clear();
             game.apply(action, |event| events.push(event))
-                .expect("the game goes as it went");
+                .expect("the decisions are those of this game");
             lines.events(self, &events, source);
         }
         let standings = game.standings().expect("the game has ended");
         lines.end(self, final_table(&standings))
     }
 
-    /// The name of the game, which is also that of its file.
+    /// The game id, also the name of its file.
     pub fn game_id(&self) -> String {
         self.header().game_id
     }
@@ -110,11 +111,11 @@ impl Played<'_> {
             action_space: Some(action_space(&self.rules.actions())),
             ..v1::RecordHeader::default()
         };
-        // What the game follows from names it, so that the same game has the same record.
+        // Derived from the inputs, so the same game has the same record.
         let mut hash = Sha256::new()
             .chain_update(b"chefshat.v1 simulated game")
             .chain_update(self.seed.0);
-        hash.update(serde_json::to_vec(&header).expect("a header is written without failing"));
+        hash.update(serde_json::to_vec(&header).expect("a header serializes"));
         for decision in self.decisions {
             for attempt in &decision.attempts {
                 hash.update(attempt.index().to_le_bytes());

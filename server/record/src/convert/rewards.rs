@@ -1,12 +1,11 @@
-//! What a reward scheme gives, beside what brings it: the events of one action with their rewards, and what refused attempts cost. How much
-//! that is, the engine says.
+//! Attaches rewards to events and invalid attempts. The engine defines the schemes.
 
 use chefshat_engine::{DecisionKind, Event, RewardScheme, RuleSet, Seat};
 use chefshat_proto::v1;
 
 use super::seat_number;
 
-/// The events that one action (or a deal) brought, each with the rewards that it brings by the scheme; none where there is no scheme.
+/// The events of one action or deal, each with its rewards; none without a scheme.
 pub fn with_rewards<'a>(
     events: &'a [Event],
     rules: &'a RuleSet,
@@ -29,8 +28,8 @@ pub fn with_rewards<'a>(
     })
 }
 
-/// What the refused attempts at a decision bring its seat together. `None` where they bring nothing: there is no scheme, the decision is
-/// no turn, or there were none.
+/// The total reward of the invalid attempts at a decision. `None` without a scheme or attempts, or
+/// if the decision is not a turn.
 pub fn invalid_reward(
     scheme: Option<RewardScheme>,
     kind: DecisionKind,

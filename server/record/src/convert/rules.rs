@@ -1,22 +1,22 @@
-//! Rule sets, roles and the numbering of actions, in both directions.
+//! Converts rule sets, roles, reward schemes and action spaces.
 
 use chefshat_engine::{
     ActionSpace, Opening, PassScope, RewardScheme, Role, RuleSet, RuleSetError, RuleSetSpec, Stop,
 };
 use chefshat_proto::v1;
 
-/// A field of a request that cannot be accepted, and why.
+/// An invalid field of a message.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{field}: {message}")]
 pub struct FieldProblem {
-    /// Name of the field, as in the `.proto`.
+    /// The name in the `.proto`.
     pub field: &'static str,
-    /// What is wrong and what to do.
+    /// The problem and what to do.
     pub message: String,
 }
 
 impl FieldProblem {
-    /// A problem with one field.
+    /// A problem of one field.
     pub fn new(field: &'static str, message: impl Into<String>) -> Self {
         Self {
             field,
@@ -25,10 +25,10 @@ impl FieldProblem {
     }
 }
 
-/// The rule set a message asks for: its preset with every field that is set in place of the preset's.
+/// Reads a rule set: its preset, overridden by every field that is set.
 ///
 /// # Errors
-/// The first field that makes no sense.
+/// The first invalid field.
 pub fn rules_from_proto(message: &v1::RuleSet) -> Result<RuleSet, FieldProblem> {
     let preset = if message.preset.is_empty() {
         "paper"
@@ -89,19 +89,19 @@ pub fn rules_from_proto(message: &v1::RuleSet) -> Result<RuleSet, FieldProblem> 
         spec.max_turns = max_turns;
     }
     spec.validate().map_err(|error| {
-        let said = match error {
-            // Whoever left the points to the preset has not given any number of them.
+        let message = match error {
+            // Default points of the preset follow the number of players.
             RuleSetError::PointsCount { given, players } if message.points.is_empty() => format!(
                 "the preset {preset} has points for {given} players, not for {players}: give the points of each place \
                  as well, or choose another preset"
             ),
             _ => error.to_string(),
         };
-        FieldProblem::new(error.field(), said)
+        FieldProblem::new(error.field(), message)
     })
 }
 
-/// A rule set with every field set. The preset is left empty: the fields say it all.
+/// Converts a rule set, with every field set and no preset.
 pub fn rules_to_proto(rules: &RuleSet) -> v1::RuleSet {
     let spec = rules.spec();
     v1::RuleSet {
@@ -132,7 +132,7 @@ pub fn rules_to_proto(rules: &RuleSet) -> v1::RuleSet {
     }
 }
 
-/// The numbering of actions as a message.
+/// Converts an action space.
 pub fn action_space(space: &ActionSpace) -> v1::ActionSpace {
     v1::ActionSpace {
         id: space.id(),
@@ -141,7 +141,7 @@ pub fn action_space(space: &ActionSpace) -> v1::ActionSpace {
     }
 }
 
-/// The role with a number of `chefshat.v1.Role`; `None` for 0 and for numbers that name no role.
+/// The role with a number of `chefshat.v1.Role`; `None` for 0 and unknown numbers.
 pub fn role_from_number(number: u8) -> Option<Role> {
     [
         Role::Chef,
@@ -154,7 +154,7 @@ pub fn role_from_number(number: u8) -> Option<Role> {
     .find(|role| *role as u8 == number)
 }
 
-/// The reward scheme a message names; `None` when it names none.
+/// Reads a reward scheme; `None` if unspecified.
 pub fn reward_scheme_from_proto(scheme: v1::RewardScheme) -> Option<RewardScheme> {
     match scheme {
         v1::RewardScheme::Unspecified => None,
@@ -166,7 +166,7 @@ pub fn reward_scheme_from_proto(scheme: v1::RewardScheme) -> Option<RewardScheme
     }
 }
 
-/// The message's name for a reward scheme, or for none.
+/// Converts a reward scheme.
 pub fn reward_scheme_to_proto(scheme: Option<RewardScheme>) -> v1::RewardScheme {
     match scheme {
         None => v1::RewardScheme::Unspecified,
@@ -179,8 +179,7 @@ pub fn reward_scheme_to_proto(scheme: Option<RewardScheme>) -> v1::RewardScheme 
 }
 
 fn small(field: &'static str, value: u32) -> Result<u8, FieldProblem> {
-    u8::try_from(value)
-        .map_err(|_| FieldProblem::new(field, format!("{value} is far out of range")))
+    u8::try_from(value).map_err(|_| FieldProblem::new(field, format!("{value} is out of range")))
 }
 
 fn unknown_value(field: &'static str, value: i32) -> FieldProblem {

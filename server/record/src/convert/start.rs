@@ -1,5 +1,4 @@
-//! Scripted Shifts in both directions. Whether a game may begin with given hands is decided by the engine; here its answer becomes the name
-//! of a field.
+//! Converts scripted Shifts. The engine validates them; its errors become field names here.
 
 use chefshat_engine::{BySeat, Cards, Game, RuleSet, Script, ScriptError, Seat, SeatOrder, Seed};
 use chefshat_proto::v1;
@@ -7,10 +6,10 @@ use chefshat_proto::v1;
 use super::events::{seat_cards, seat_number};
 use super::rules::FieldProblem;
 
-/// The script a message describes. One that is returned makes a game: `Game::scripted` accepts it with these rules and any seed.
+/// Reads a script. `Game::scripted` accepts the result with these rules and any seed.
 ///
 /// # Errors
-/// The first field that makes no sense, or does not fit the rule set.
+/// The first invalid field.
 pub fn script_from_proto(
     message: &v1::ScriptedShift,
     rules: &RuleSet,
@@ -26,7 +25,7 @@ pub fn script_from_proto(
         .ok_or_else(|| {
             FieldProblem::new(
                 "last_order",
-                format!("name each of the seats 0..{players} once, best place first"),
+                format!("list each of the seats 0..{players} once, best place first"),
             )
         })?;
     let scores = match message.points.as_slice() {
@@ -36,7 +35,7 @@ pub fn script_from_proto(
     .ok_or_else(|| {
         FieldProblem::new(
             "points",
-            format!("give one number for each of the {players} seats, or none at all"),
+            format!("give one number for each of the {players} seats, or none"),
         )
     })?;
     let drawn = message
@@ -58,7 +57,7 @@ pub fn script_from_proto(
     Ok(script)
 }
 
-/// The message that describes a script of a game with so many faces.
+/// Converts a script of a game with `faces` faces.
 pub fn script_to_proto(script: &Script, faces: u8) -> v1::ScriptedShift {
     v1::ScriptedShift {
         shift: script.shift,
@@ -75,8 +74,8 @@ pub fn script_to_proto(script: &Script, faces: u8) -> v1::ScriptedShift {
     }
 }
 
-/// Cards as messages list them, in any order: faces 1..=F, F+1 for a joker, one of face F the Golden card if `golden`. `None` if no deck of
-/// so many faces holds them all.
+/// Reads cards in any order: faces 1..=F, F+1 for a joker; one card of face F is Golden if
+/// `golden`. `None` if no deck with F faces contains them.
 pub fn cards_from_numbers(numbers: &[u32], golden: bool, faces: u8) -> Option<Cards> {
     let mut counts = vec![0u8; usize::from(faces) + 1];
     for &number in numbers {
@@ -87,7 +86,7 @@ pub fn cards_from_numbers(numbers: &[u32], golden: bool, faces: u8) -> Option<Ca
     Cards::from_counts(faces, &counts, golden)
 }
 
-/// The seat with a number, or `None` if there are not so many players.
+/// The seat with a number; `None` if out of range.
 pub fn seat_from_number(number: u32, players: usize) -> Option<Seat> {
     usize::try_from(number)
         .ok()
@@ -95,7 +94,7 @@ pub fn seat_from_number(number: u32, players: usize) -> Option<Seat> {
         .map(Seat::new)
 }
 
-/// Every seat's hand, from a list that names each seat once.
+/// The hands of all seats, each of which must be listed once.
 fn hands_from_proto(
     listed: &[v1::SeatCards],
     rules: &RuleSet,
@@ -109,7 +108,7 @@ fn hands_from_proto(
         let cards =
             cards_from_numbers(&hand.cards, hand.golden, rules.faces()).ok_or_else(|| {
                 problem(format!(
-                    "no deck of {} faces holds the cards of seat {seat} (a joker is {}; the Golden card is of face {})",
+                    "no deck of {} faces contains the cards of seat {seat} (a joker is {}; the Golden card has face {})",
                     rules.faces(),
                     rules.faces() + 1,
                     rules.faces(),

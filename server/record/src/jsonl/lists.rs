@@ -1,16 +1,16 @@
-//! How long the lists of a line may be. An entry of few bytes in a file can take a hundred in memory, so that what a line becomes is not
-//! bounded by its length alone. Whether a list is as long as it must be is decided in [`crate::replay`].
+//! Bounds on the lists of a line. An entry of a few bytes in a file can take a hundred in memory,
+//! so the length of the line alone does not bound it. The replay checks exact lengths.
 
 use chefshat_engine::{MAX_FACES, MAX_JOKERS, MAX_SEATS};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 
-/// Most cards of a deck, and so of a hand.
+/// The most cards of a deck, and so of a hand.
 const MAX_CARDS: usize = MAX_FACES as usize * (MAX_FACES as usize + 1) / 2 + MAX_JOKERS as usize;
-/// Most invalid attempts at one decision: a server takes the default after as many.
+/// The most invalid attempts per decision, after which a server takes the default.
 const MAX_ATTEMPTS: usize = 10_000;
-/// Most scores, and most keys, that annotations of a decision may have: more do not fit what a server takes of them.
+/// The most scores or keys of annotations; a server accepts no more.
 const MAX_ANNOTATIONS: usize = 1_024;
-/// Most parts that a branched game may have taken over: each is a branch of the game before it.
+/// The most parts a branched game may have taken over, one per branch before it.
 const MAX_TAKEN_OVER: usize = 2_048;
 
 /// A list that is too long.
@@ -18,11 +18,11 @@ const MAX_TAKEN_OVER: usize = 2_048;
 pub struct Excess {
     /// The field, as the file spells it.
     pub field: &'static str,
-    /// Most entries that it may have.
+    /// The most entries allowed.
     pub most: usize,
 }
 
-/// The first list of a line that is longer than any such list can be.
+/// The first list of a line that exceeds its bound.
 pub fn excess(line: &Line) -> Option<Excess> {
     match line {
         Line::Header(header) => of_header(header),
@@ -58,10 +58,9 @@ fn of_header(header: &v1::RecordHeader) -> Option<Excess> {
 }
 
 fn of_decision(decision: &v1::DecisionRecord) -> Option<Excess> {
-    let (scores, extra) = decision
-        .annotations
-        .as_ref()
-        .map_or((0, 0), |said| (said.action_scores.len(), said.extra.len()));
+    let (scores, extra) = decision.annotations.as_ref().map_or((0, 0), |annotations| {
+        (annotations.action_scores.len(), annotations.extra.len())
+    });
     first([
         (
             "invalidAttempts",
@@ -88,7 +87,7 @@ fn of_event(kind: &Kind) -> Option<Excess> {
         Kind::GameEnded(ended) => first([("standings", ended.standings.len(), MAX_SEATS)])
             .or_else(|| of_reveal(ended.reveal.as_ref())),
         Kind::GameAborted(aborted) => of_reveal(aborted.reveal.as_ref()),
-        // These have no lists.
+        // No lists.
         Kind::Seated(_)
         | Kind::Vacated(_)
         | Kind::Disconnected(_)
@@ -120,7 +119,7 @@ fn of_reveal(reveal: Option<&v1::SeedReveal>) -> Option<Excess> {
     first([("seatEntropy", reveal?.seat_entropy.len(), MAX_SEATS)])
 }
 
-/// The first of some lists, each with its length and the most that it may have, that is too long.
+/// The first list that exceeds its bound, of lists given with length and bound.
 fn first<const N: usize>(lists: [(&'static str, usize, usize); N]) -> Option<Excess> {
     lists
         .into_iter()

@@ -1,51 +1,50 @@
-//! Checking a decision's line against the game as it stood before it: whose it was, what was legal, how it can have come about, and what
-//! time it can have taken.
+//! Checks a decision against the game before it: seat, legality, source and time.
 
 use chefshat_engine::{ActionId, ActionSpace, DecisionKind, Game, Mask, Seat};
 use chefshat_proto::v1::{self, DecisionSource as Source};
 
+use super::difference::must_be;
 use super::header::Setup;
-use super::words::must_be;
-use crate::convert::{invalid_reward, seat_number};
+use crate::convert::{decision_kind, invalid_reward, seat_number};
 
-/// Invalid attempts after which the default is taken even where they are unlimited.
+/// Invalid attempts before the default decision, even if the policy sets no limit.
 const MAX_ATTEMPTS: u32 = 10_000;
 
-/// How a seat stands between its decisions.
+/// The state of a seat between its decisions.
 #[derive(Debug, Clone)]
 pub(super) struct SeatClock {
-    /// Decisions it has taken.
+    /// The number of decisions so far.
     pub(super) decisions: u64,
-    /// Its time for a decision before the bank is touched, milliseconds.
+    /// Time per decision before the time bank is used, milliseconds.
     pub(super) decision_time_ms: u32,
-    /// What is left of its bank, milliseconds.
+    /// Time bank left, milliseconds.
     pub(super) bank_ms: u32,
-    /// Whether a built-in agent holds the seat.
+    /// Whether the seat is a built-in agent's.
     pub(super) built_in: bool,
-    /// Whether a substitute plays for it.
+    /// Whether a substitute plays for the seat.
     pub(super) substituted: bool,
 }
 
-/// What a decision is checked against.
-pub(super) struct Asked<'a> {
+/// The context of a decision.
+pub(super) struct OpenDecision<'a> {
     pub(super) setup: &'a Setup,
     pub(super) game: &'a Game,
     pub(super) seat: Seat,
     pub(super) kind: DecisionKind,
     pub(super) clock: &'a SeatClock,
-    /// Whether the decision is one of those taken over from another record.
+    /// Whether the decision is taken over from another record.
     pub(super) taken_over: bool,
-    /// Whether its hand is known, and with it what was legal.
+    /// Whether the hand, and so the legal actions, are known.
     pub(super) hand_known: bool,
-    /// Milliseconds since the decision before, or since the game began.
+    /// Milliseconds since the previous decision or the start of the game.
     pub(super) since_last_ms: u64,
 }
 
-impl Asked<'_> {
-    /// Checks everything but the action's own consequences, and gives the action.
+impl OpenDecision<'_> {
+    /// Checks everything except the events that follow, and returns the action.
     ///
     /// # Errors
-    /// The first field that does not fit, in words.
+    /// The first wrong field.
     pub(super) fn check(&self, record: &v1::DecisionRecord) -> Result<ActionId, String> {
         let seat = seat_number(self.seat);
         if record.seat != seat {
@@ -55,7 +54,7 @@ impl Asked<'_> {
         if record.decision_id != id {
             return Err(must_be("decisionId", record.decision_id, id));
         }
-        let kind = kind_to_proto(self.kind);
+        let kind = decision_kind(self.kind);
         if record.kind() != kind {
             return Err(must_be(
                 "kind",
@@ -77,12 +76,12 @@ impl Asked<'_> {
         if self.hand_known {
             check_mask(&record.action_mask, &legal, space)?;
         } else if !record.action_mask.is_empty() {
-            return Err("actionMask is there, but nobody knows the hand".into());
+            return Err("actionMask is present, but the hand is unknown".into());
         }
-        let action = number(record.action);
+        let action = action_id(record.action);
         let text = space.text(action).ok_or_else(|| {
             format!(
-                "action is {}, but actions are numbered below {}",
+                "action is {} and must be below {}",
                 record.action,
                 space.size()
             )
@@ -99,23 +98,23 @@ impl Asked<'_> {
     fn check_attempts(&self, record: &v1::DecisionRecord) -> Result<(), String> {
         let legal = self.game.legal_actions();
         for (index, attempt) in record.invalid_attempts.iter().enumerate() {
-            if self.hand_known && legal.contains(number(*attempt)) {
+            if self.hand_known && legal.contains(action_id(*attempt)) {
                 return Err(format!(
                     "invalidAttempts[{index}] is {attempt}, which was legal"
                 ));
             }
         }
-        let made = record.invalid_attempts.len();
-        let right = invalid_reward(self.setup.scheme, self.kind, made);
-        if record.invalid_reward == right {
+        let attempts = record.invalid_attempts.len();
+        let expected = invalid_reward(self.setup.scheme, self.kind, attempts);
+        if record.invalid_reward == expected {
             return Ok(());
         }
         let shown =
-            |reward: Option<f32>| reward.map_or("left out".into(), |reward| reward.to_string());
+            |reward: Option<f32>| reward.map_or("absent".into(), |reward| reward.to_string());
         Err(must_be(
             "invalidReward",
             shown(record.invalid_reward),
-            shown(right),
+            shown(expected),
         ))
     }
 
@@ -127,7 +126,7 @@ impl Asked<'_> {
                 must_be("source", name, Source::Recorded.as_str_name())
             } else {
                 format!(
-                    "source is {name}, but the decisions taken over from another record are over"
+                    "source is {name}, but all decisions taken over from another record came before"
                 )
             });
         }
@@ -147,8 +146,8 @@ impl Asked<'_> {
         let real_table = self.setup.origin == v1::GameOrigin::Imported;
         if !possible || (real_table && source != Source::Agent) {
             let whose = match (real_table, built_in, substituted) {
-                (true, ..) => "at a real table every player decides",
-                (_, true, _) => "a built-in agent holds the seat",
+                (true, ..) => "every player of a real table decides",
+                (_, true, _) => "the seat is a built-in agent's",
                 (_, _, true) => "a substitute plays for the seat",
                 _ => "the seat's own agent plays",
             };
@@ -163,7 +162,7 @@ impl Asked<'_> {
             || exhausted != (source == Source::Invalid)
         {
             return Err(format!(
-                "source is {name} after {} invalid attempts; the default decision is taken after {limit}",
+                "source is {name} after {} invalid attempts, but the default decision follows after {limit}",
                 record.invalid_attempts.len()
             ));
         }
@@ -173,7 +172,7 @@ impl Asked<'_> {
         );
         match self.game.default_action() {
             Some(default) if by_default && default != action => Err(format!(
-                "action is {} and must be {default}, the default, because source is {name}",
+                "action is {} and must be {default}, the default decision, because source is {name}",
                 record.action
             )),
             _ => Ok(()),
@@ -189,18 +188,18 @@ impl Asked<'_> {
         if time > 0 && (!timed || self.clock.built_in) {
             return Err(must_be("decisionTimeUs", time, 0));
         }
-        // Both ends of the span are cut to whole milliseconds.
+        // Both ends of the span are truncated to milliseconds.
         let most = self.since_last_ms.saturating_add(1).saturating_mul(1000);
         if time > most && self.setup.origin != v1::GameOrigin::Imported {
             return Err(format!(
-                "decisionTimeUs is {time}, but only {} ms have passed since the decision before",
+                "decisionTimeUs is {time}, but only {} ms passed since the previous decision",
                 self.since_last_ms
             ));
         }
         let beyond_us = time.saturating_sub(u64::from(self.clock.decision_time_ms) * 1000);
         let bank_us = u64::from(self.clock.bank_ms) * 1000;
         let left = bank_us.saturating_sub(beyond_us) / 1000;
-        // The time was cut to whole microseconds after the bank was counted.
+        // The time was truncated to microseconds after the bank was charged.
         let least = bank_us.saturating_sub(beyond_us + u64::from(beyond_us > 0)) / 1000;
         if (least..=left).contains(&record.bank_left_ms.into()) {
             Ok(())
@@ -210,58 +209,49 @@ impl Asked<'_> {
     }
 }
 
-/// What a kind of decision is called in messages.
-pub(crate) fn kind_to_proto(kind: DecisionKind) -> v1::DecisionKind {
-    match kind {
-        DecisionKind::Turn => v1::DecisionKind::Turn,
-        DecisionKind::Exchange => v1::DecisionKind::Exchange,
-        DecisionKind::SpecialAction => v1::DecisionKind::SpecialAction,
-    }
-}
-
-/// The action with a number; one that is out of every range, where the number is.
-pub(crate) fn number(action: u32) -> ActionId {
+/// The action with an index; an index out of range gives an action that does not exist.
+pub(crate) fn action_id(action: u32) -> ActionId {
     ActionId::new(u16::try_from(action).unwrap_or(u16::MAX))
 }
 
 fn check_mask(found: &[u8], legal: &Mask, space: ActionSpace) -> Result<(), String> {
-    let right = legal.to_bytes(space.size());
-    if found == right {
+    let expected = legal.to_bytes(space.size());
+    if found == expected {
         return Ok(());
     }
-    if found.len() != right.len() {
+    if found.len() != expected.len() {
         return Err(format!(
             "actionMask has {} bytes and must have {}",
             found.len(),
-            right.len()
+            expected.len()
         ));
     }
-    let said = |action: u16| {
+    let stated = |action: u16| {
         found
             .get(usize::from(action / 8))
             .is_some_and(|byte| byte >> (action % 8) & 1 == 1)
     };
     let wrong =
-        (0..space.size()).find(|&action| said(action) != legal.contains(ActionId::new(action)));
+        (0..space.size()).find(|&action| stated(action) != legal.contains(ActionId::new(action)));
     Err(match wrong {
         Some(action) => format!(
-            "actionMask says that {} is {}legal, but it is{}",
+            "actionMask has {} as {}legal, but it is{}",
             space.text(ActionId::new(action)).unwrap_or_default(),
-            if said(action) { "" } else { "not " },
-            if said(action) { " not" } else { "" },
+            if stated(action) { "" } else { "not " },
+            if stated(action) { " not" } else { "" },
         ),
         None => "actionMask has bits beyond the last action".into(),
     })
 }
 
 fn check_annotations(annotations: Option<&v1::Annotations>) -> Result<(), String> {
-    let finite = annotations.is_none_or(|said| {
-        let mut numbers = said.action_scores.iter().chain(&said.value_estimate);
+    let finite = annotations.is_none_or(|annotations| {
+        let mut numbers = (annotations.action_scores.iter()).chain(&annotations.value_estimate);
         numbers.all(|number| number.is_finite())
     });
     if finite {
         Ok(())
     } else {
-        Err("annotations hold a number that is not finite".into())
+        Err("annotations contain a number that is not finite".into())
     }
 }

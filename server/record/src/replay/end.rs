@@ -1,23 +1,23 @@
-//! How the game of a record ended: its final table, what it reveals of its seed, the footer.
+//! Checks the end of a game: final standings, revealed seed and footer.
 
 use chefshat_engine::{Game, Seed};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 
+use super::difference::difference;
 use super::game::Replay;
 use super::seed::{check_reveal, dealing_seed};
-use super::words::difference;
 use super::{Fault, reveal};
 use crate::convert::final_table;
 
-const NOT_OVER: &str = "the footer stands here, but the game is not over";
+const NOT_OVER: &str = "the footer comes here, but the game is not over";
 
 impl Replay<'_> {
-    /// The game's own seed, from the end of the record.
+    /// The game's own seed, revealed at the end of the record.
     pub(super) fn dealing_seed(&self) -> Result<Seed, Fault> {
         let Some(line) = self.reveal_line() else {
             return Err(Fault {
                 line: Some(self.lines.len() + 1),
-                problem: "the record ends here, before the game does: it was cut off".into(),
+                problem: "the record is truncated: it ends before the game does".into(),
             });
         };
         reveal(&self.lines[line - 1])
@@ -32,7 +32,7 @@ impl Replay<'_> {
             })
     }
 
-    /// The line of the game's end, which reveals the seed; where the footer stands at its place, that one.
+    /// The line that ends the game and reveals the seed, or the footer if it comes first.
     pub(super) fn reveal_line(&self) -> Option<usize> {
         let end = |line: &v1::RecordLine| match &line.line {
             Some(Line::Event(event)) => {
@@ -45,20 +45,20 @@ impl Replay<'_> {
     }
 
     pub(super) fn game_ended(&mut self, ended: &v1::GameEnded) -> Result<(), Fault> {
-        self.nothing_missing()?;
+        self.check_complete()?;
         let game = self
             .game
             .as_ref()
-            .ok_or("the game ends, but it has not begun")?;
+            .ok_or("the game ends, but it has not started")?;
         let standings = game
             .standings()
-            .ok_or("the game ends here, but by the rules it goes on")?;
+            .ok_or("the game ends here, but by the rules it is not over")?;
         self.check_reveal(ended.reveal.as_ref())?;
-        let right = v1::GameEnded {
+        let expected = v1::GameEnded {
             standings: final_table(&standings),
             reveal: ended.reveal.clone(),
         };
-        if let Some(problem) = difference(ended, &right) {
+        if let Some(problem) = difference(ended, &expected) {
             return Err(format!("gameEnded.{problem}").into());
         }
         self.over = Some(v1::RoomState::Finished);
@@ -67,20 +67,20 @@ impl Replay<'_> {
 
     pub(super) fn game_aborted(&mut self, aborted: &v1::GameAborted) -> Result<(), Fault> {
         use v1::AbortReason::{NeverStarted, Unspecified};
-        self.nothing_missing()?;
+        self.check_complete()?;
         if self.game.as_ref().is_some_and(Game::is_over) {
-            return Err("the game is aborted, but the rules have ended it with a result".into());
+            return Err("the game is aborted, but by the rules it has ended with a result".into());
         }
         let reason = v1::AbortReason::try_from(aborted.reason).unwrap_or(Unspecified);
         if reason == Unspecified || (reason == NeverStarted && self.game.is_some()) {
             return Err(format!(
-                "gameAborted.reason is {}, which it cannot be here",
+                "gameAborted.reason is {}, which is impossible here",
                 reason.as_str_name()
             )
             .into());
         }
         match (&self.game, &aborted.reveal) {
-            (None, Some(_)) => Err("gameAborted.reveal is there, but nothing was dealt".into()),
+            (None, Some(_)) => Err("gameAborted.reveal is present, but nothing was dealt".into()),
             (None, None) => Ok(()),
             (Some(_), reveal) => self.check_reveal(reveal.as_ref()),
         }?;
@@ -89,27 +89,25 @@ impl Replay<'_> {
     }
 
     fn check_reveal(&self, reveal: Option<&v1::SeedReveal>) -> Result<(), Fault> {
-        if self.table.is_some() {
+        if self.imported.is_some() {
             return match reveal {
-                Some(_) => {
-                    Err("reveal is there, but no seed dealt the cards of a real table".into())
-                }
+                Some(_) => Err("reveal is present, but a real table has no seed".into()),
                 None => Ok(()),
             };
         }
-        let reveal = reveal.ok_or("reveal is missing, so that no deal can be checked")?;
+        let reveal = reveal.ok_or("reveal is missing")?;
         Ok(check_reveal(self.header, reveal)?)
     }
 
     pub(super) fn end(&mut self, footer: &v1::RecordFooter) -> Result<(), Fault> {
-        self.nothing_missing()?;
+        self.check_complete()?;
         let state = self.over.ok_or(NOT_OVER)?;
-        let right = v1::RecordFooter {
+        let expected = v1::RecordFooter {
             state: state.into(),
             events: self.events,
             decisions: self.decisions,
         };
-        if let Some(problem) = difference(footer, &right) {
+        if let Some(problem) = difference(footer, &expected) {
             return Err(format!("footer.{problem}").into());
         }
         self.seats.end(self.header)?;

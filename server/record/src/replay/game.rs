@@ -1,21 +1,22 @@
-//! The game of a record, played again line by line: its decisions are applied, and the events that follow from each must be the next ones.
+//! Replays the game of a record line by line: applies each decision and requires exactly the
+//! events that follow from it.
 
 use std::collections::VecDeque;
 
 use chefshat_engine::{BySeat, Event, Game};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 
-use super::decision::Asked;
+use super::decision::OpenDecision;
+use super::difference::{difference, kind_name, must_be};
 use super::header::{Setup, check};
 use super::seats::Seats;
 use super::seed::Seeds;
-use super::words::{difference, kind_name, must_be};
 use super::{Fault, Replayed};
 use crate::convert::{By, LAST_MS, event_kind, final_table, with_rewards};
-use crate::table::{Table, facts_of_record};
+use crate::import::{ImportedGame, facts_of_record};
 
-/// How nobody decided: the deal at the beginning.
-const NOBODY: By = By {
+/// The cause of the first deal, which follows from no decision.
+const NO_DECISION: By = By {
     source: v1::DecisionSource::Agent,
     decision_time_us: 0,
 };
@@ -28,9 +29,9 @@ pub(super) struct Replay<'a> {
     pub(super) seats: Seats,
     seeds: Option<Seeds>,
     /// The Shifts of an imported game.
-    pub(super) table: Option<Table>,
+    pub(super) imported: Option<ImportedGame>,
     pub(super) game: Option<Game>,
-    /// Events that must follow, with the rewards they bring.
+    /// Events that must follow, with their rewards.
     expected: VecDeque<(Kind, Vec<v1::SeatReward>)>,
     pub(super) decisions: u64,
     pub(super) events: u64,
@@ -51,8 +52,8 @@ impl<'a> Replay<'a> {
             header,
             lines,
             seeds: None,
-            table: (setup.origin == v1::GameOrigin::Imported)
-                .then(|| Table::new(setup.rules, facts_of_record(&setup.rules, lines))),
+            imported: (setup.origin == v1::GameOrigin::Imported)
+                .then(|| ImportedGame::new(setup.rules, facts_of_record(&setup.rules, lines))),
             setup,
             game: None,
             expected: VecDeque::new(),
@@ -69,18 +70,20 @@ impl<'a> Replay<'a> {
         self.game.as_ref()
     }
 
-    /// Whose hands are known, and of whom it is known whether it holds the Golden card.
+    /// Whether each hand is known, and whether it is known to contain the Golden card or not.
     pub(super) fn known(&self) -> (BySeat<bool>, BySeat<bool>) {
-        match (&self.table, &self.game) {
-            (Some(table), Some(game)) => (table.hands_known(game), table.golden_known(game)),
-            (table, _) => {
-                let all = BySeat::filled(self.setup.rules.players(), table.is_none());
+        match (&self.imported, &self.game) {
+            (Some(imported), Some(game)) => {
+                (imported.hands_known(game), imported.golden_known(game))
+            }
+            (imported, _) => {
+                let all = BySeat::filled(self.setup.rules.players(), imported.is_none());
                 (all, all)
             }
         }
     }
 
-    /// What the record says, if it has come to its end.
+    /// The result; `None` before the footer.
     pub(super) fn finish(self) -> Option<Replayed> {
         let state = self.over.filter(|_| self.ended)?;
         let standings = match (state, &self.game) {
@@ -95,10 +98,10 @@ impl<'a> Replay<'a> {
         })
     }
 
-    /// Takes a line that is neither a header nor a decision.
+    /// Checks a line that is neither a header nor a decision.
     pub(super) fn take(&mut self, line: usize, entry: &Line) -> Result<(), Fault> {
         if self.ended {
-            return Err("the record goes on after its footer".into());
+            return Err("the record continues after its footer".into());
         }
         match entry {
             Line::Event(event) => self.event(line, event),
@@ -112,26 +115,30 @@ impl<'a> Replay<'a> {
         }
     }
 
-    /// Takes a decision.
+    /// Checks and applies a decision.
     pub(super) fn decide(&mut self, line: usize, record: &v1::DecisionRecord) -> Result<(), Fault> {
         if self.ended {
-            return Err("the record goes on after its footer".into());
+            return Err("the record continues after its footer".into());
         }
         self.not_over()?;
-        self.nothing_missing()?;
+        self.check_complete()?;
         self.time(record.elapsed_ms)?;
-        self.fits_table(line)?;
+        self.check_facts(line)?;
         let (known, _) = self.known();
         let game = self
             .game
             .as_mut()
-            .ok_or("a decision, but the game has not begun")?;
-        if self.table.as_ref().is_some_and(|table| !table.is_open()) {
-            return Err("a decision, but its Shift has not been started".into());
+            .ok_or("a decision, but the game has not started")?;
+        if self
+            .imported
+            .as_ref()
+            .is_some_and(|imported| !imported.is_open())
+        {
+            return Err("a decision, but its Shift has not started".into());
         }
         let open = game
             .decision()
-            .ok_or("a decision, but the rules have ended the game")?;
+            .ok_or("a decision, but by the rules the game is over")?;
         let taken_over: u64 = self
             .setup
             .taken_over
@@ -139,7 +146,7 @@ impl<'a> Replay<'a> {
             .map(|part| part.decisions)
             .sum();
         let clock = self.seats.clock(open.seat);
-        let asked = Asked {
+        let open_decision = OpenDecision {
             setup: &self.setup,
             game,
             seat: open.seat,
@@ -149,16 +156,16 @@ impl<'a> Replay<'a> {
             hand_known: known[open.seat],
             since_last_ms: record.elapsed_ms.saturating_sub(self.last_decision_ms),
         };
-        let action = asked.check(record)?;
+        let action = open_decision.check(record)?;
         clock.decisions += 1;
         clock.bank_ms = record.bank_left_ms;
         let mut events = Vec::new();
         game.apply(action, |event| events.push(event))
             .map_err(|error| error.to_string())?;
-        if let Some(table) = &mut self.table {
-            table.took_told(open.seat, open.kind);
-            table
-                .applied(game, &mut events)
+        if let Some(imported) = &mut self.imported {
+            imported.count_decision(open.seat, open.kind);
+            imported
+                .advance(game, &mut events)
                 .map_err(|error| error.to_string())?;
         }
         self.decisions += 1;
@@ -177,11 +184,11 @@ impl<'a> Replay<'a> {
     fn expect(&mut self, events: &[Event], by: By) {
         let space = self.setup.rules.actions();
         for (event, rewards) in with_rewards(events, &self.setup.rules, self.setup.scheme) {
-            let told = match &self.table {
-                Some(table) => table.as_told(event.clone()),
+            let event = match &self.imported {
+                Some(imported) => imported.redact(event.clone()),
                 None => event.clone(),
             };
-            if let Some(kind) = event_kind(&told, space, by) {
+            if let Some(kind) = event_kind(&event, space, by) {
                 self.expected.push_back((kind, rewards));
             }
         }
@@ -189,17 +196,14 @@ impl<'a> Replay<'a> {
 
     fn event(&mut self, line: usize, event: &v1::GameEvent) -> Result<(), Fault> {
         self.not_over()?;
-        self.fits_table(line)?;
+        self.check_facts(line)?;
         self.events += 1;
         if event.sequence != self.events {
             return Err(must_be("sequence", event.sequence, self.events).into());
         }
         self.time(event.elapsed_ms)?;
-        let kind = event
-            .kind
-            .as_ref()
-            .ok_or("the event does not say what happened")?;
-        let of_the_room = match kind {
+        let kind = event.kind.as_ref().ok_or("the event is empty")?;
+        let is_room_event = match kind {
             Kind::GameStarted(started) => {
                 self.begin(started)?;
                 true
@@ -214,65 +218,63 @@ impl<'a> Replay<'a> {
             }
             kind => self.seats.take(kind, self.header)?,
         };
-        if of_the_room {
+        if is_room_event {
             return match event.rewards.as_slice() {
                 [] => Ok(()),
-                _ => Err("rewards are there, but this event brings none".into()),
+                _ => Err("rewards are present, but this event has none".into()),
             };
         }
         self.game_event(line, event)
     }
 
-    /// An event of the game itself, which must be the next that follows from the decision before.
+    /// Checks an event of the game against the next one that follows from the last decision.
     fn game_event(&mut self, line: usize, event: &v1::GameEvent) -> Result<(), Fault> {
         let Some((kind, rewards)) = self.expected.pop_front() else {
             return Err(format!(
-                "`{}` follows from no decision: a decision or the end of the game must come here",
+                "`{}` follows from no decision; a decision or the end of the game must come here",
                 kind_name(event)
             )
             .into());
         };
-        let right = v1::GameEvent {
+        let expected = v1::GameEvent {
             kind: Some(kind),
             rewards,
-            // It happened with the decision before. Events count in fewer bits than decisions.
+            // The time of the last decision, in the narrower type of events.
             elapsed_ms: self.last_decision_ms.min(u32::MAX.into()),
             ..event.clone()
         };
-        if *event == right {
+        if *event == expected {
             return Ok(());
         }
-        let (found, needed) = (kind_name(event), kind_name(&right));
+        let (found, needed) = (kind_name(event), kind_name(&expected));
         if found != needed {
             return Err(format!("the event is `{found}` and must be `{needed}`").into());
         }
-        let problem = difference(event, &right)
-            .unwrap_or_else(|| "a number is not the one that follows".into());
+        let problem = difference(event, &expected).unwrap_or_else(|| "a number is wrong".into());
         let first_deal = matches!(&event.kind, Some(Kind::ShiftStarted(_))) && self.decisions == 0;
         match self
             .reveal_line()
             .filter(|_| first_deal && self.setup.script.is_none())
         {
-            Some(reveal) if reveal != line => Err(format!(
-                "{problem}, as the seed deals that is revealed on line {reveal}"
-            )
-            .into()),
+            Some(reveal) if reveal != line => {
+                Err(format!("{problem}, by the seed revealed on line {reveal}").into())
+            }
             _ => Err(problem.into()),
         }
     }
 
     fn begin(&mut self, started: &v1::GameStarted) -> Result<(), Fault> {
         if self.seats.have_begun() {
-            return Err("the game begins a second time".into());
+            return Err("the game starts a second time".into());
         }
         self.seats.begin(started, self.header, &self.setup.rules)?;
         self.last_decision_ms = self.elapsed_ms;
-        if let (Some(table), Some(beginning)) = (&mut self.table, &self.setup.table) {
+        if let (Some(imported), Some(start)) = (&mut self.imported, &self.setup.imported) {
             let mut events = Vec::new();
-            self.game = table
-                .begin(beginning, &mut events)
+            self.game = imported
+                .start(start, &mut events)
                 .map_err(|error| error.to_string())?;
-            self.expect(&events, NOBODY);
+            self.expect(&events, NO_DECISION);
             return Ok(());
         }
         let own = self.dealing_seed()?;
@@ -282,23 +284,23 @@ impl<'a> Replay<'a> {
         };
         let (rules, seed) = (self.setup.rules, seeds.after(0));
         let mut events = Vec::new();
-        let note = |event| events.push(event);
+        let push = |event| events.push(event);
         let mut game = match &self.setup.script {
-            None => Game::new(rules, seed, note),
-            Some(script) => Game::scripted(rules, seed, script, note)
+            None => Game::new(rules, seed, push),
+            Some(script) => Game::scripted(rules, seed, script, push)
                 .map_err(|error| format!("start.scripted of the header: {error}"))?,
         };
         game.reseed(seeds.after(0));
         self.seeds = Some(seeds);
         self.game = Some(game);
-        self.expect(&events, NOBODY);
+        self.expect(&events, NO_DECISION);
         Ok(())
     }
 
     fn time(&mut self, elapsed_ms: u64) -> Result<(), Fault> {
         if elapsed_ms < self.elapsed_ms {
             return Err(format!(
-                "elapsedMs is {elapsed_ms}, earlier than the {} of a line before",
+                "elapsedMs is {elapsed_ms}, but an earlier line has {}",
                 self.elapsed_ms
             )
             .into());
@@ -314,9 +316,13 @@ impl<'a> Replay<'a> {
         Ok(())
     }
 
-    /// Whether what a line tells of a real table can be, and is about a Shift that has begun.
-    fn fits_table(&self, line: usize) -> Result<(), Fault> {
-        match self.table.as_ref().and_then(|table| table.misfit(line)) {
+    /// Checks a line of an imported game against the facts before it.
+    fn check_facts(&self, line: usize) -> Result<(), Fault> {
+        match self
+            .imported
+            .as_ref()
+            .and_then(|imported| imported.contradiction(line))
+        {
             Some(problem) => Err(problem.into()),
             None => Ok(()),
         }
@@ -329,7 +335,7 @@ impl<'a> Replay<'a> {
         }
     }
 
-    pub(super) fn nothing_missing(&self) -> Result<(), Fault> {
+    pub(super) fn check_complete(&self) -> Result<(), Fault> {
         match self.expected.front() {
             None => Ok(()),
             Some((kind, _)) => {
@@ -338,7 +344,7 @@ impl<'a> Replay<'a> {
                     ..v1::GameEvent::default()
                 };
                 Err(format!(
-                    "`{}` must come here, which follows from the decision before",
+                    "`{}` must come here: it follows from the last decision",
                     kind_name(&event)
                 )
                 .into())

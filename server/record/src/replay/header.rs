@@ -1,5 +1,4 @@
-//! Checking a record's first line: its own form, and that its parts go together. What it says of the seed is checked where the seed is
-//! revealed.
+//! Checks the header of a record, except for the seed commitment, which is checked at the reveal.
 
 use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
@@ -7,50 +6,49 @@ use std::ops::RangeInclusive;
 use chefshat_engine::{RULES_VERSION, RewardScheme, RuleSet, Script};
 use chefshat_proto::v1;
 
+use super::difference::{difference, must_be};
 use super::seed::Part;
-use super::words::{difference, must_be};
 use crate::convert::{
     LAST_MS, action_space, reward_scheme_from_proto, rules_from_proto, rules_to_proto,
     script_from_proto,
 };
+use crate::import::StartState;
 use crate::jsonl::FORMAT_VERSION;
-use crate::table::Beginning;
 
-/// Bytes of a seed commitment.
 const COMMITMENT_BYTES: usize = 32;
-/// Milliseconds of a day, the longest time a policy may name.
+/// Milliseconds of a day, the longest time of a policy.
 const DAY_MS: u32 = 86_400_000;
 
-/// What a header says, checked.
+/// A checked header.
 #[derive(Debug)]
 pub(super) struct Setup {
     pub(super) rules: RuleSet,
     pub(super) scheme: Option<RewardScheme>,
     pub(super) origin: v1::GameOrigin,
-    /// Invalid attempts at one decision after which the default is taken; 0: unlimited.
+    /// Invalid attempts per decision before the default decision; 0: unlimited.
     pub(super) max_invalid_attempts: u32,
-    /// The first Shift, where its hands were given.
+    /// The first Shift, if its hands were given.
     pub(super) script: Option<Script>,
-    /// Where the game of a real table begins.
-    pub(super) table: Option<Beginning>,
-    /// What was taken over from the record that the game branched from.
+    /// The start of an imported game.
+    pub(super) imported: Option<StartState>,
+    /// The decisions taken over from the parent game.
     pub(super) taken_over: Vec<Part>,
 }
 
 /// Checks a header.
 ///
 /// # Errors
-/// The first field that cannot stand there, in words.
+/// The first wrong field.
 pub(super) fn check(header: &v1::RecordHeader) -> Result<Setup, String> {
     if header.format_version != FORMAT_VERSION {
         return Err(format!(
-            "the record has form {}; this version reads form {FORMAT_VERSION}",
+            "the record has format version {}; this program reads version {FORMAT_VERSION}",
             header.format_version
         ));
     }
     if header.rules_version != RULES_VERSION {
         return Err(format!(
-            "the game was played by version {} of the rules; this version knows version {RULES_VERSION}",
+            "the game was played by version {} of the rules; this program has version {RULES_VERSION}",
             header.rules_version
         ));
     }
@@ -62,9 +60,9 @@ pub(super) fn check(header: &v1::RecordHeader) -> Result<Setup, String> {
             header.created_at_ms
         ));
     }
-    let said = header.rules.as_ref().ok_or("rules are missing")?;
-    let rules = rules_from_proto(said).map_err(|problem| format!("rules.{problem}"))?;
-    within("rules", difference(said, &rules_to_proto(&rules)))?;
+    let stated = header.rules.as_ref().ok_or("rules are missing")?;
+    let rules = rules_from_proto(stated).map_err(|problem| format!("rules.{problem}"))?;
+    within("rules", difference(stated, &rules_to_proto(&rules)))?;
     let space = header.action_space.clone().unwrap_or_default();
     within(
         "actionSpace",
@@ -76,15 +74,15 @@ pub(super) fn check(header: &v1::RecordHeader) -> Result<Setup, String> {
     let origin = v1::GameOrigin::try_from(header.origin)
         .ok()
         .filter(|origin| *origin != v1::GameOrigin::Unspecified)
-        .ok_or("origin does not say where the game came from")?;
+        .ok_or("origin is missing or unknown")?;
     check_commitment(origin, header.seed_commitment.len())?;
     let imported = origin == v1::GameOrigin::Imported;
     let scripted = header
         .start
         .as_ref()
         .and_then(|start| start.scripted.as_ref());
-    let table = imported
-        .then(|| Beginning::of(scripted, &rules))
+    let imported = imported
+        .then(|| StartState::of(scripted, &rules))
         .transpose()
         .map_err(|problem| format!("start.scripted.{problem}"))?;
     let (script, taken_over) = check_start(origin, header.start.as_ref(), &rules)?;
@@ -94,12 +92,12 @@ pub(super) fn check(header: &v1::RecordHeader) -> Result<Setup, String> {
         origin,
         max_invalid_attempts: policy.max_invalid_attempts(),
         script,
-        table,
+        imported,
         taken_over,
     })
 }
 
-/// The bytes of an id; an error unless it is 32 hexadecimal digits, small ones.
+/// Decodes an id of 32 lower-case hexadecimal digits.
 pub(super) fn check_id(field: &str, id: &str) -> Result<[u8; 16], String> {
     let mut bytes = [0; 16];
     match hex::decode_to_slice(id, &mut bytes) {
@@ -115,7 +113,7 @@ fn within(field: &str, problem: Option<String>) -> Result<(), String> {
 fn check_seats(seats: &[v1::Participant], players: usize) -> Result<(), String> {
     if seats.len() != players {
         return Err(format!(
-            "seats are {}, but the rule set has {players} players",
+            "there are {} seats, but the rule set has {players} players",
             seats.len()
         ));
     }
@@ -150,7 +148,7 @@ fn check_policy(policy: &v1::RoomPolicy) -> Result<(), String> {
     ];
     for (field, value, range) in numbers {
         if !value.is_some_and(|value| range.contains(&value)) {
-            let found = value.map_or("left out".to_owned(), |value| value.to_string());
+            let found = value.map_or("absent".to_owned(), |value| value.to_string());
             return Err(format!(
                 "policy.{field} is {found} and must be in {}..={}",
                 range.start(),
@@ -167,7 +165,7 @@ fn check_policy(policy: &v1::RoomPolicy) -> Result<(), String> {
         let fits = (times.iter()).all(|(ms, range)| ms.is_none_or(|ms| range.contains(&ms)));
         let named = clock.kind() != v1::ParticipantKind::Unspecified;
         if !(fits && named && kinds.insert(clock.kind)) {
-            return Err("policy.clocks has a kind or a time that cannot be".into());
+            return Err("policy.clocks has an invalid kind or time".into());
         }
     }
     let known = [
@@ -185,7 +183,7 @@ fn check_policy(policy: &v1::RoomPolicy) -> Result<(), String> {
         ("spectatorsSeeHands", policy.spectators_see_hands.is_some()),
     ];
     match known.iter().find(|(_, known)| !known) {
-        Some((field, _)) => Err(format!("policy.{field} is not set to anything it can be")),
+        Some((field, _)) => Err(format!("policy.{field} is missing or invalid")),
         None => Ok(()),
     }
 }
@@ -200,13 +198,13 @@ fn check_commitment(origin: v1::GameOrigin, bytes: usize) -> Result<(), String> 
         COMMITMENT_BYTES if committed => Ok(()),
         0 if fixed => Ok(()),
         _ => {
-            let right = match (committed, fixed) {
-                (true, true) => "32, or left out",
-                (true, false) => "32",
-                (false, _) => "left out",
+            let expected = match (committed, fixed) {
+                (true, true) => "32 bytes or absent",
+                (true, false) => "32 bytes",
+                (false, _) => "absent",
             };
             Err(format!(
-                "seedCommitment has {bytes} bytes; for {} it must be {right}",
+                "seedCommitment has {bytes} bytes; for {} it must be {expected}",
                 origin.as_str_name()
             ))
         }
@@ -227,7 +225,7 @@ fn check_start(
             origin.as_str_name()
         )),
         (true, false) if !allowed => Err(format!(
-            "start.{field} is there, but origin is {}",
+            "start.{field} is present, but origin is {}",
             origin.as_str_name()
         )),
         _ => Ok(()),
@@ -260,17 +258,17 @@ fn check_start(
     let parts = start
         .taken_over
         .iter()
-        .map(|part| Part::new(part).ok_or("start.takenOver: a gameSeed is not 32 bytes"))
+        .map(|part| Part::new(part).ok_or("start.takenOver: a gameSeed does not have 32 bytes"))
         .collect::<Result<Vec<_>, _>>()?;
     if let Some(point) = &start.branched_from {
         check_id("start.branchedFrom.gameId", &point.game_id)?;
         let taken_over = parts
             .iter()
             .try_fold(0u64, |sum, part| sum.checked_add(part.decisions))
-            .ok_or("start.takenOver adds up to too many decisions")?;
+            .ok_or("start.takenOver has too many decisions")?;
         if point.decisions != taken_over {
             return Err(format!(
-                "start.branchedFrom.decisions is {} and must be {taken_over}, as start.takenOver adds up",
+                "start.branchedFrom.decisions is {} and must be {taken_over}, the sum of start.takenOver",
                 point.decisions
             ));
         }

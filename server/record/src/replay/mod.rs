@@ -1,75 +1,75 @@
-//! Replaying a record: the rules are applied to its decisions again, and every line must be what follows from them. What does not fit is
-//! named with its line. The parts: `header` (the first line), `seed` (what is revealed, which seed dealt what), `seats` (events of the
-//! room), `decision` (a decision against the game before it), `game` (the game's own events),
-//! `end` (how it ended), `words` (what differs). How a file is read
-//! is in [`crate::jsonl`]; games of real tables are completed in [`crate::table`].
+//! Verifies a record by replaying it: the rule engine applies its decisions again, and every line
+//! must be exactly what follows. The first line that does not is reported. Files are read in
+//! [`crate::jsonl`]; imported games are completed in [`crate::import`].
 
 mod decision;
+mod difference;
 mod end;
 mod game;
 mod header;
 mod seats;
 mod seed;
-mod words;
 
 use chefshat_engine::{BySeat, Game};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 
-pub(crate) use decision::{kind_to_proto, number};
+pub(crate) use decision::action_id;
 use game::Replay;
 pub(crate) use seats::game_started;
 
-/// What a record that replays says.
+/// The result of a verified record.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Replayed {
-    /// How the game ended.
+    /// Finished or aborted.
     pub state: v1::RoomState,
-    /// Decisions in it.
+    /// The number of decisions.
     pub decisions: u64,
-    /// Events in it.
+    /// The number of events.
     pub events: u64,
-    /// The final table, best first; empty for an aborted game.
+    /// The final standings, best first; empty for an aborted game.
     pub standings: Vec<v1::Standing>,
 }
 
-/// The first line of a record that does not fit, and why.
+/// The first wrong line of a record.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("line {line}: {problem}")]
 pub struct ReplayError {
-    /// Number of the line, from 1; one more than there are lines when something is missing at the end.
+    /// Number of the line, from 1; one past the last line if the end is missing.
     pub line: usize,
-    /// What does not fit.
+    /// A description for people.
     pub problem: String,
 }
 
-/// Where a recorded game stands at one of its lines.
+/// A line of a record and the game at that line.
 #[derive(Debug, Clone, Copy)]
 pub struct Moment<'a> {
     /// Number of the line, from 1.
     pub line: usize,
     /// The line.
     pub entry: &'a Line,
-    /// The game as it stands at the line: before a decision, and after the decision whose events follow. `None` before it begins.
+    /// The game before a decision, or after the decision whose events follow. `None` before the
+    /// start.
     pub game: Option<&'a Game>,
-    /// Whose hand is known: everybody's, but in an imported game. A hand that is not known stands in `game` as one that would fit.
+    /// Whether each hand is known; only imported games have unknown hands. `game` then has a
+    /// possible hand.
     pub hands_known: BySeat<bool>,
-    /// Of whose hand, which is known, it is known as well whether it holds the Golden card: of everybody's, but in an imported game. Where it
-    /// is not, the hand may stand in `game` with the Golden card instead of another of the top face, or the other way round.
+    /// Whether it is also known if each hand contains the Golden card. If not, `game` may have the
+    /// Golden card in place of another top-face card, or vice versa.
     pub golden_known: BySeat<bool>,
 }
 
-/// Replays a record: seeds, deals, masks, decisions, events, rewards, scores and counts.
+/// Verifies a record: seeds, deals, masks, decisions, events, rewards, scores and counts.
 ///
 /// # Errors
-/// The first line that does not fit.
+/// The first wrong line.
 pub fn replay(lines: &[v1::RecordLine]) -> Result<Replayed, ReplayError> {
     walk(lines, |_| {})
 }
 
-/// Replays a record and shows every line that fits, the header first, with the game as it stands there.
+/// Verifies a record and calls `visit` for every line, the header first.
 ///
 /// # Errors
-/// The first line that does not fit; it is not shown.
+/// The first wrong line, which is not visited.
 pub fn walk(
     lines: &[v1::RecordLine],
     mut visit: impl FnMut(Moment<'_>),
@@ -116,16 +116,16 @@ pub fn walk(
     match replay {
         None => Err(ReplayError {
             line: 1,
-            problem: "there is nothing in it, not even a header".into(),
+            problem: "the record is empty".into(),
         }),
         Some(replay) => replay.finish().ok_or_else(|| ReplayError {
             line: lines.len() + 1,
-            problem: "the record ends here, before its footer: it was cut off".into(),
+            problem: "the record is truncated: it ends before its footer".into(),
         }),
     }
 }
 
-/// What a game reveals of its seed at its end.
+/// The seed reveal of a line that ends the game.
 pub(crate) fn reveal(line: &v1::RecordLine) -> Option<&v1::SeedReveal> {
     match line.line.as_ref()? {
         Line::Event(event) => match event.kind.as_ref()? {
@@ -137,7 +137,7 @@ pub(crate) fn reveal(line: &v1::RecordLine) -> Option<&v1::SeedReveal> {
     }
 }
 
-/// Why a line does not fit, and, where the fault is seen on another line than the one being taken, on which.
+/// A problem, with its line if that is not the current one.
 #[derive(Debug)]
 struct Fault {
     line: Option<usize>,

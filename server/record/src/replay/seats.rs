@@ -1,16 +1,17 @@
-//! Checking the events of the room: who took which seat, who was lost and came back, what was expressed. Nothing of this changes the game.
+//! Checks the events of the room: seating, connections, substitution and expressions. They do not
+//! affect the game.
 
 use chefshat_engine::{RuleSet, Seat};
 use chefshat_proto::v1::{self, game_event::Kind};
 
 use super::decision::SeatClock;
-use super::words::{difference, must_be};
+use super::difference::{difference, must_be};
 use crate::convert::{check_expression, seat_from_number};
 
-/// The seats of a recorded room, as its events so far tell of them.
+/// The seats of a recorded room after the events so far.
 #[derive(Debug)]
 pub(super) struct Seats {
-    /// Name and kind of who sits there, where the events have told.
+    /// Name and kind of the participant, if seated by an event.
     occupants: Vec<Option<(String, i32)>>,
     clocks: Vec<SeatClock>,
     begun: bool,
@@ -26,7 +27,7 @@ impl Seats {
                 .iter()
                 .map(|seat| {
                     let built_in = !seat.built_in_agent.is_empty();
-                    // The room's own clock goes for its built-in agents, whatever their kind.
+                    // Clocks by kind do not apply to built-in agents.
                     let own =
                         (policy.clocks.iter()).find(|clock| !built_in && clock.kind == seat.kind);
                     SeatClock {
@@ -50,12 +51,12 @@ impl Seats {
         &mut self.clocks[seat.index()]
     }
 
-    /// Whether the game has begun.
+    /// Whether the game has started.
     pub(super) fn have_begun(&self) -> bool {
         self.begun
     }
 
-    /// Takes an event of the room; `false` if it is none.
+    /// Checks an event of the room; `false` if it is an event of the game.
     pub(super) fn take(&mut self, kind: &Kind, header: &v1::RecordHeader) -> Result<bool, String> {
         match kind {
             Kind::Seated(seated) => {
@@ -68,7 +69,7 @@ impl Seats {
             Kind::Vacated(vacated) => {
                 let seat = self.before_the_game("vacated", vacated.seat)?;
                 if self.occupants[seat].take().is_none() {
-                    return Err(format!("seat {seat} becomes free, but nobody sits there"));
+                    return Err(format!("seat {seat} is vacated, but it is free"));
                 }
             }
             Kind::Disconnected(lost) => {
@@ -85,9 +86,9 @@ impl Seats {
                     return Err(format!(
                         "seat {seat} is substituted, but {}",
                         if self.begun {
-                            "it was already"
+                            "it already is"
                         } else {
-                            "the game has not begun"
+                            "the game has not started"
                         }
                     ));
                 }
@@ -110,13 +111,13 @@ impl Seats {
         Ok(true)
     }
 
-    /// Takes an expression that was made for the record only.
+    /// Checks an expression for the record only.
     pub(super) fn private(&self, private: &v1::PrivateExpression) -> Result<(), String> {
         self.seat("privateExpression", private.seat)?;
         check_shown("privateExpression", private.expression.as_ref(), true)
     }
 
-    /// The game begins: what everybody was told of it must be what the header says.
+    /// Checks the start of the game against the header.
     pub(super) fn begin(
         &mut self,
         started: &v1::GameStarted,
@@ -124,15 +125,15 @@ impl Seats {
         rules: &RuleSet,
     ) -> Result<(), String> {
         self.check_occupants(header)?;
-        let right = game_started(header, rules);
+        let expected = game_started(header, rules);
         self.begun = true;
-        match difference(started, &right) {
+        match difference(started, &expected) {
             Some(problem) => Err(format!("gameStarted.{problem}, as in the header")),
             None => Ok(()),
         }
     }
 
-    /// The record is over: the header must say of its seats what they were at the end.
+    /// Checks the header against the state of the seats at the end.
     pub(super) fn end(&self, header: &v1::RecordHeader) -> Result<(), String> {
         if !self.begun {
             self.check_occupants(header)?;
@@ -140,7 +141,7 @@ impl Seats {
         for (index, (seat, clock)) in header.seats.iter().zip(&self.clocks).enumerate() {
             if seat.substituted != clock.substituted {
                 return Err(format!(
-                    "the header says that seat {index} was {}substituted at the end, but it was{}",
+                    "the header has seat {index} as {}substituted at the end, but it was{}",
                     if seat.substituted { "" } else { "not " },
                     if seat.substituted { " not" } else { "" },
                 ));
@@ -151,21 +152,21 @@ impl Seats {
 
     fn check_occupants(&self, header: &v1::RecordHeader) -> Result<(), String> {
         for (index, (seat, occupant)) in header.seats.iter().zip(&self.occupants).enumerate() {
-            let said = (seat.name.as_str(), seat.kind);
+            let stated = (seat.name.as_str(), seat.kind);
             let sits = match occupant {
                 Some((name, kind)) => (name.as_str(), *kind),
-                None if self.clocks[index].built_in => said,
+                None if self.clocks[index].built_in => stated,
                 None => ("", 0),
             };
-            if said != sits {
+            if stated != sits {
                 return Err(format!(
-                    "the header has {:?} on seat {index}, but there {}",
+                    "the header has {:?} on seat {index}, but {}",
                     seat.name,
                     match sits {
-                        ("", _) => "nobody took a seat".to_owned(),
+                        ("", _) => "it is free".to_owned(),
                         (name, _) if name == seat.name =>
-                            "a participant of another kind sits".into(),
-                        (name, _) => format!("{name:?} sits"),
+                            "its participant is of another kind".into(),
+                        (name, _) => format!("the events have {name:?}"),
                     }
                 ));
             }
@@ -175,7 +176,7 @@ impl Seats {
 
     fn before_the_game(&self, event: &str, seat: u32) -> Result<usize, String> {
         if self.begun {
-            return Err(format!("`{event}` after the game began"));
+            return Err(format!("`{event}` after the start of the game"));
         }
         self.of_an_agent(event, seat)
     }
@@ -184,7 +185,7 @@ impl Seats {
         let seat = self.seat(event, seat)?;
         if self.clocks[seat].built_in {
             return Err(format!(
-                "{event}.seat is {seat}, which a built-in agent holds from the start"
+                "{event}.seat is {seat}, which is a built-in agent's"
             ));
         }
         Ok(seat)
@@ -195,7 +196,7 @@ impl Seats {
             .map(Seat::index)
             .ok_or_else(|| {
                 format!(
-                    "{event}.seat is {seat}, but the seats are 0..={}",
+                    "{event}.seat is {seat} and must be in 0..={}",
                     self.clocks.len() - 1
                 )
             })
@@ -220,7 +221,7 @@ fn check_shown(
     }
 }
 
-/// What everybody is told when a game begins.
+/// The event that starts the game of a header.
 pub(crate) fn game_started(header: &v1::RecordHeader, rules: &RuleSet) -> v1::GameStarted {
     v1::GameStarted {
         game_id: header.game_id.clone(),

@@ -1,13 +1,13 @@
-//! What a record reveals of its seed at its end, against what its header committed to, and which seed dealt which Shift.
+//! Checks the revealed seed against the commitment of the header, and finds the seed of each
+//! Shift.
 
-use chefshat_engine::Seed;
+use chefshat_engine::{MAX_ENTROPY, Seed, SeedPlan};
 use chefshat_proto::v1;
 
+use super::difference::must_be;
 use super::header::check_id;
-use super::words::must_be;
-use chefshat_engine::{MAX_ENTROPY, SeedPlan};
 
-/// Decisions taken over from another record, and the seed of the Shifts dealt among them.
+/// Decisions taken over from another record, with the seed of the Shifts dealt in them.
 #[derive(Debug, Clone)]
 pub(super) struct Part {
     pub(super) decisions: u64,
@@ -15,7 +15,7 @@ pub(super) struct Part {
 }
 
 impl Part {
-    /// `None` if the seed is not one.
+    /// `None` if the seed does not have 32 bytes.
     pub(super) fn new(part: &v1::TakenOver) -> Option<Self> {
         Some(Self {
             decisions: part.decisions,
@@ -24,7 +24,7 @@ impl Part {
     }
 }
 
-/// The seeds of a game: those taken over, and its own after them.
+/// The seeds of a game: those taken over, then its own.
 #[derive(Debug)]
 pub(super) struct Seeds {
     pub(super) taken_over: Vec<Part>,
@@ -32,8 +32,8 @@ pub(super) struct Seeds {
 }
 
 impl Seeds {
-    /// The seed of a Shift that begins after so many decisions. The first Shift is dealt from the first part, even if no decision of it was
-    /// taken over.
+    /// The seed of a Shift that starts after `decisions`. The first Shift is dealt from the first
+    /// part, even if it has no decisions.
     pub(super) fn after(&self, decisions: u64) -> Seed {
         let mut end = 0u64;
         self.taken_over
@@ -46,8 +46,8 @@ impl Seeds {
     }
 }
 
-/// The seed to deal from. If the parts of a commitment are not whole, the game seed as revealed must do: the deals then show whether that
-/// is right, and the reveal's own line is refused in any case.
+/// The seed to deal from. If the reveal does not match the commitment, its game seed is used: the
+/// deals are then checked first, and the reveal is rejected on its own line.
 pub(super) fn dealing_seed(header: &v1::RecordHeader, reveal: &v1::SeedReveal) -> Option<Seed> {
     plan(header, reveal)
         .and_then(|plan| {
@@ -67,7 +67,7 @@ pub(super) fn check_reveal(
     let seed = revealed(reveal)?;
     match plan(header, reveal)? {
         Some(plan) if plan.game_seed(&reveal.seat_entropy) != seed => Err(must_be(
-            "reveal.gameSeed (in hexadecimal)",
+            "reveal.gameSeed (hexadecimal)",
             hex::encode(seed.0),
             hex::encode(plan.game_seed(&reveal.seat_entropy).0),
         )),
@@ -80,7 +80,7 @@ pub(super) fn check_reveal(
             ];
             match others.iter().find(|(_, empty)| !empty) {
                 Some((field, _)) => Err(format!(
-                    "reveal.{field} is there, but the header has no seedCommitment"
+                    "reveal.{field} is present, but the header has no seedCommitment"
                 )),
                 None => Ok(()),
             }
@@ -88,7 +88,7 @@ pub(super) fn check_reveal(
     }
 }
 
-/// The plan that header and reveal tell of, its commitment checked; `None` for a fixed seed.
+/// The committed seed plan, checked; `None` for a fixed seed.
 fn plan(header: &v1::RecordHeader, reveal: &v1::SeedReveal) -> Result<Option<SeedPlan>, String> {
     if header.seed_commitment.is_empty() {
         return Ok(None);
@@ -99,7 +99,7 @@ fn plan(header: &v1::RecordHeader, reveal: &v1::SeedReveal) -> Result<Option<See
     };
     if reveal.seat_entropy.len() != header.seats.len() {
         return Err(format!(
-            "reveal.seatEntropy has {} entries and must have one for each of the {} seats",
+            "reveal.seatEntropy has {} entries and must have {}, one per seat",
             reveal.seat_entropy.len(),
             header.seats.len()
         ));
@@ -110,15 +110,15 @@ fn plan(header: &v1::RecordHeader, reveal: &v1::SeedReveal) -> Result<Option<See
         .any(|part| part.len() > MAX_ENTROPY)
     {
         return Err(format!(
-            "reveal.seatEntropy: a seat added more than {MAX_ENTROPY} bytes"
+            "reveal.seatEntropy has an entry of more than {MAX_ENTROPY} bytes"
         ));
     }
     let game_id = check_id("gameId", &header.game_id)?;
     let commitment = plan.commitment(&game_id).map(Vec::from);
     if commitment.as_ref() != Some(&header.seed_commitment) {
         return Err(format!(
-            "serverSeed and nonce of the reveal are not what was committed to: the header's seedCommitment is {} and they give {} \
-             (in hexadecimal)",
+            "reveal.serverSeed and reveal.nonce do not match the commitment: seedCommitment is {} and they give {} \
+             (hexadecimal)",
             hex::encode(&header.seed_commitment),
             hex::encode(commitment.unwrap_or_default())
         ));

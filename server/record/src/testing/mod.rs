@@ -1,4 +1,5 @@
-//! Records for tests: games played by random choices and recorded as a server records them, and transcripts of them.
+//! Records for tests: games played by random choices and recorded as a server records them, and
+//! transcripts of them.
 #![allow(
     clippy::unwrap_used,
     missing_docs,

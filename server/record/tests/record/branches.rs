@@ -5,9 +5,9 @@ use chefshat_engine::TakenOver;
 use chefshat_engine::{ActionId, Game, RuleSet, RuleSetSpec, Script, Seat, Seed, Stop, Viewer};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 use chefshat_record::branch::{Branch, BranchError, branch_of};
+use chefshat_record::import::import;
 use chefshat_record::players::{PlayerError, recorded_player};
 use chefshat_record::replay::{replay, walk};
-use chefshat_record::table::import;
 
 use chefshat_record::testing::{TestGame, taken_over};
 

@@ -8,6 +8,6 @@
 mod branches;
 mod damage;
 mod files;
+mod import;
 mod outcome;
-mod table;
 mod verify;

@@ -184,7 +184,7 @@ fn a_branched_game_replays_from_the_seeds_it_took_over() {
         (
             "half a seed",
             |lines| start(lines).taken_over[0].game_seed.truncate(16),
-            "a gameSeed is not 32 bytes",
+            "a gameSeed does not have 32 bytes",
         ),
         (
             "fewer decisions",
@@ -197,7 +197,7 @@ fn a_branched_game_replays_from_the_seeds_it_took_over() {
                 start(lines).taken_over[0].decisions -= 1;
                 start(lines).branched_from.as_mut().unwrap().decisions -= 1;
             },
-            "taken over from another record are over",
+            "all decisions taken over from another record came before",
         ),
         (
             "an agent took the last one that was taken over",

@@ -8,8 +8,8 @@ use chefshat_engine::{
 };
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 use chefshat_record::branch::Branch;
+use chefshat_record::import::import;
 use chefshat_record::replay::walk;
-use chefshat_record::table::import;
 use chefshat_record::testing::{Observed, TestGame, transcript};
 use chefshat_render::{Card, Eyes, Film, Frame, Hand, Happening, Now, Painter, Scene, When};
 

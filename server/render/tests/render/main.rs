@@ -13,8 +13,8 @@ use std::path::Path;
 
 use chefshat_engine::{BySeat, Game, PlayRequirement, RuleSet, RuleSetSpec, Stop, Viewer};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
+use chefshat_record::import::import;
 use chefshat_record::jsonl;
-use chefshat_record::table::import;
 use chefshat_render::{
     Card, Chronicle, Eyes, Film, FilmError, Hand, Happening, Now, Painter, Scene, Sort, When,
 };

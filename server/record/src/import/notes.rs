@@ -1,27 +1,26 @@
-//! What somebody noted at a real table of roles, points and places, compared with what the rules say of the Shift that the row is about. It
-//! moves nothing in the game, and a transcript need not have it.
+//! Checks of the optional rows `role`, `points` and `finishes` against the rules.
 
 use chefshat_engine::{BySeat, Event, Game, Role};
 
-use super::transcript::{Row, Seen};
+use super::transcript::{Entry, Row};
 
-/// What the rules said of each Shift.
+/// The results of each Shift by the rules.
 #[derive(Debug, Default)]
-pub(super) struct Ruled {
+pub(super) struct RuledShifts {
     shifts: Vec<RuledShift>,
 }
 
 #[derive(Debug)]
 struct RuledShift {
     shift: u32,
-    /// After a Food Fight, those that follow from it.
+    /// After a Food Fight, the reversed roles.
     roles: BySeat<Option<Role>>,
     /// From 1; 0 for a seat that has not finished.
     places: BySeat<u8>,
 }
 
-impl Ruled {
-    /// Takes the next event of the game, as the engine has it.
+impl RuledShifts {
+    /// Records an event of the engine.
     pub(super) fn note(&mut self, event: &Event) {
         if let Event::ShiftStarted { shift, ref hands } = *event {
             self.shifts.push(RuledShift {
@@ -45,18 +44,18 @@ impl Ruled {
         }
     }
 
-    /// Compares what a row notes of the game. Rows that tell of anything else are not looked at.
+    /// Checks a row against the rules. Other kinds of rows pass.
     ///
     /// # Errors
     /// What the rules say instead.
     pub(super) fn check(&self, row: &Row, game: &Game) -> Result<(), String> {
         let ruled = self.shifts.iter().rev().find(|of| of.shift == row.shift);
         let ruled =
-            ruled.ok_or_else(|| format!("by the rules Shift {} has not begun", row.shift))?;
-        match &row.seen {
-            Seen::Role(name) => ruled.check_role(row, name),
-            Seen::Points(points) => check_points(row, *points, game.scores()[row.seat]),
-            Seen::Finishes(place) => ruled.check_place(row, *place),
+            ruled.ok_or_else(|| format!("by the rules, Shift {} has not begun", row.shift))?;
+        match &row.entry {
+            Entry::Role(name) => ruled.check_role(row, name),
+            Entry::Points(points) => check_points(row, *points, game.scores()[row.seat]),
+            Entry::Finishes(place) => ruled.check_place(row, *place),
             _ => Ok(()),
         }
     }
@@ -67,20 +66,20 @@ impl RuledShift {
         match self.roles[row.seat] {
             Some(role) if role.name() == name => Ok(()),
             Some(role) => Err(format!(
-                "seat {} is {} by the rules, not {name}",
+                "by the rules, seat {} is {}, not {name}",
                 row.seat,
                 role.name()
             )),
-            None => Err("in the first Shift there are no roles".into()),
+            None => Err("the first Shift has no roles".into()),
         }
     }
 
     fn check_place(&self, row: &Row, place: u8) -> Result<(), String> {
         match self.places[row.seat] {
             found if found == place => Ok(()),
-            0 => Err(format!("seat {} has not finished by the rules", row.seat)),
+            0 => Err(format!("by the rules, seat {} has not finished", row.seat)),
             found => Err(format!(
-                "seat {} has place {found} by the rules, not {place}",
+                "by the rules, seat {} has place {found}, not {place}",
                 row.seat
             )),
         }
@@ -92,7 +91,7 @@ fn check_points(row: &Row, points: u64, score: u64) -> Result<(), String> {
         Ok(())
     } else {
         Err(format!(
-            "seat {} has {score} points by the rules, not {points}",
+            "by the rules, seat {} has {score} points, not {points}",
             row.seat
         ))
     }

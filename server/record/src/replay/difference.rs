@@ -1,26 +1,25 @@
-//! Where two messages differ, in words: the first field in which what stands in a record is not what must stand there. Fields are named as
-//! in the record's file, because that is where a person will look for them.
+//! Describes the first difference between two messages, with fields named as in the record's file.
 
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-/// Most characters shown of a value.
+/// The most characters shown of a value.
 const MAX_SHOWN: usize = 120;
 
-/// The first field in which two messages differ, what stands there and what must; `None` if they are equal.
-pub(super) fn difference<M: Serialize + PartialEq>(found: &M, right: &M) -> Option<String> {
-    if found == right {
+/// The first field that differs, with both values; `None` if the messages are equal.
+pub(super) fn difference<M: Serialize + PartialEq>(found: &M, expected: &M) -> Option<String> {
+    if found == expected {
         return None;
     }
-    let said = match (serde_json::to_value(found), serde_json::to_value(right)) {
-        (Ok(found), Ok(right)) => differing(String::new(), Some(&found), Some(&right)),
-        // A number that its field does not know has no JSON form.
+    let problem = match (serde_json::to_value(found), serde_json::to_value(expected)) {
+        (Ok(found), Ok(expected)) => differing(String::new(), Some(&found), Some(&expected)),
+        // An unknown enum value has no JSON form.
         _ => None,
     };
-    Some(said.unwrap_or_else(|| "a field holds a number that it does not know".into()))
+    Some(problem.unwrap_or_else(|| "a field has an unknown enum value".into()))
 }
 
-/// The words for one field that is not right.
+/// The message for one wrong field.
 pub(super) fn must_be(field: &str, found: impl Into<Value>, right: impl Into<Value>) -> String {
     must_be_value(field, Some(&found.into()), Some(&right.into()))
 }
@@ -53,7 +52,7 @@ fn differing(path: String, found: Option<&Value>, right: Option<&Value>) -> Opti
     }
 }
 
-/// The names of both objects: first those that must be there.
+/// The names of both objects, expected ones first.
 fn names<'a>(
     found: &'a Map<String, Value>,
     right: &'a Map<String, Value>,
@@ -70,10 +69,10 @@ fn must_be_value(field: &str, found: Option<&Value>, right: Option<&Value>) -> S
     )
 }
 
-/// A value in few characters. One that is left out is what its neighbour's kind of value is by default.
+/// A value, shortened. An absent value is shown as the default of the other value's type.
 fn shown(value: Option<&Value>, beside: Option<&Value>) -> String {
     let text = match (value, beside) {
-        (Some(Value::Object(_)), _) => "there".to_owned(),
+        (Some(Value::Object(_)), _) => "present".to_owned(),
         (Some(Value::Array(values)), _) if values.iter().any(Value::is_object) => {
             format!("a list of {}", values.len())
         }
@@ -82,7 +81,7 @@ fn shown(value: Option<&Value>, beside: Option<&Value>) -> String {
         (None, Some(Value::String(text))) if text.parse::<u64>().is_ok() => "\"0\"".to_owned(),
         (None, Some(Value::Bool(_))) => "false".to_owned(),
         (None, Some(Value::Array(_))) => "[]".to_owned(),
-        (None, _) => "left out".to_owned(),
+        (None, _) => "absent".to_owned(),
     };
     if text.chars().count() <= MAX_SHOWN {
         return text;
@@ -103,5 +102,5 @@ pub(super) fn kind_name(event: &impl Serialize) -> String {
                 .find(|name| !BESIDE.contains(&name.as_str()))
                 .cloned()
         })
-        .unwrap_or_else(|| "of no known kind".into())
+        .unwrap_or_else(|| "of an unknown kind".into())
 }

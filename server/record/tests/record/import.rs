@@ -8,8 +8,8 @@ use std::fmt::Write as _;
 
 use chefshat_engine::{RuleSetSpec, Stop};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
+use chefshat_record::import::import;
 use chefshat_record::replay::replay;
-use chefshat_record::table::import;
 use chefshat_record::testing::{Observed, TestGame, transcript};
 
 fn spec(players: u8, faces: u8, shifts: u32) -> RuleSetSpec {

@@ -1,8 +1,8 @@
 //! What cannot have happened at a real table is refused, at its row or at its line of the record.
 
 use chefshat_proto::v1::{self, record_line::Line};
+use chefshat_record::import::import;
 use chefshat_record::replay::replay;
-use chefshat_record::table::import;
 
 use super::{NOTED, SPARSE, documented, from_the_second_shift};
 
@@ -17,19 +17,19 @@ fn rows_that_cannot_be_are_named() {
         ("players=2", "players=7", 3, "rules: players"),
         ("players=2", "players=3", 7, "each of the seats 0..=2 needs one row"),
         ("faces=4", "faces=four", 3, "\"four\" is not a value of faces"),
-        ("2026-03-14T15:00:00Z", "yesterday", 4, "a time is written like"),
-        ("2026-03-14T15:00:00Z", "1969-12-31T23:59:59Z", 4, "before the year 1970"),
+        ("2026-03-14T15:00:00Z", "yesterday", 4, "a time must be written like"),
+        ("2026-03-14T15:00:00Z", "1969-12-31T23:59:59Z", 4, "times before 1970"),
         (",0,human,Ana", ",1,human,Ana", 6, "seat 1 is taken already"),
-        ("1,0,hand,1 3 3 4 G", "1,0,hand,1 3 3 4", 7, "seat 0 was dealt 4 cards, but 5 are dealt to each"),
-        ("1,0,hand,1 3 3 4 G", "1,0,hand,1 1 3 4 G", 7, "no deck has so many cards of one kind"),
-        ("1,0,hand,1 3 3 4 G", "1,0,hand,1 3 3 4 5", 7, "\"5\" is no card"),
+        ("1,0,hand,1 3 3 4 G", "1,0,hand,1 3 3 4", 7, "seat 0 was dealt 4 cards, but every hand has 5"),
+        ("1,0,hand,1 3 3 4 G", "1,0,hand,1 1 3 4 G", 7, "no deck has that many cards of one kind"),
+        ("1,0,hand,1 3 3 4 G", "1,0,hand,1 3 3 4 5", 7, "\"5\" is not a card"),
         ("1,0,hand,1 3 3 4 G", "1,0,hand,1 3 3 4 4", 8, "the Golden card"),
-        ("1,0,hand,1 3 3 4 G", "1,0,hand,1 2 3 4 G", 9, "of face 2 were dealt to or played by all seats together: 3, but the deck has 2"),
+        ("1,0,hand,1 3 3 4 G", "1,0,hand,1 2 3 4 G", 9, "of face 2 were dealt to or played by the seats together: 3, but the deck has 2"),
         ("1,0,hand,1 3 3 4 G", "1,0,holds,1 3 3 4 G", 7, "`what` is \"holds\""),
         ("1,0,hand,", "1,2,hand,", 7, "there is no seat 2"),
         ("1,0,plays,4 G,4.5", "1,0,plays,3 3,4.5", 8, "must play the Golden card"),
-        ("1,0,plays,4 G,4.5", "1,0,plays,4 3,4.5", 8, "a play is cards of one face"),
-        ("1,0,plays,4 G,4.5", "1,0,plays,J J,4.5", 8, "or one of them alone"),
+        ("1,0,plays,4 G,4.5", "1,0,plays,4 3,4.5", 8, "a play must be cards of one face"),
+        ("1,0,plays,4 G,4.5", "1,0,plays,J J,4.5", 8, "or a single one alone"),
         ("1,0,plays,4 G,4.5", "1,0,passes,,4.5", 8, "passing is not allowed on the Shift's first turn"),
         ("1,1,plays,2 2,9", "1,1,plays,2,9", 9, "at least 2 cards must be played"),
         ("1,1,plays,2 2,9", "1,1,plays,4 4,9", 9, "the face must be lower than the 4"),
@@ -38,17 +38,17 @@ fn rows_that_cannot_be_are_named() {
         ("1,1,plays,2 2,9", "1,1,plays,2 2,3", 9, "`seconds` is earlier"),
         ("1,1,plays,2 2,9", "1,1,plays,2 2,soon", 9, "`seconds` is \"soon\""),
         ("surprise,0.4", "surprise,1.4", 11, "valence: 1.4 is not in -1..=1"),
-        ("1,1,plays,4 J,15", "2,1,plays,4 J,15", 13, "Shifts are told of one after the other"),
-        ("1,0,plays,1,21,,,,\n1,0,fin", "2,0,plays,1,21,,,,\n2,0,fin", 15, "by the rules Shift 1 is being played, not Shift 2"),
+        ("1,1,plays,4 J,15", "2,1,plays,4 J,15", 13, "Shifts must follow one another"),
+        ("1,0,plays,1,21,,,,\n1,0,fin", "2,0,plays,1,21,,,,\n2,0,fin", 15, "by the rules, Shift 1 is in progress, not Shift 2"),
         ("1,1,plays,4 J,15", "1,1,plays,4 J J,15", 12, "too many jokers"),
-        ("1,1,plays,4 J,15", "1,1,declares,,15", 12, "before the Shift's first turn"),
-        ("1,0,finishes,1", "1,0,finishes,2", 16, "seat 0 has place 1 by the rules, not 2"),
-        ("1,0,finishes,1", "1,1,passes,", 16, "by the rules the Shift, or the game, ended"),
-        ("1,0,finishes,1", "1,0,points,3", 16, "seat 0 has 5 points by the rules, not 3"),
-        ("1,0,finishes,1", "1,0,points,5000000000", 16, "5 points by the rules, not 5000000000"),
+        ("1,1,plays,4 J,15", "1,1,declares,,15", 12, "before the first turn of the Shift"),
+        ("1,0,finishes,1", "1,0,finishes,2", 16, "by the rules, seat 0 has place 1, not 2"),
+        ("1,0,finishes,1", "1,1,passes,", 16, "by the rules, the Shift or the game ended"),
+        ("1,0,finishes,1", "1,0,points,3", 16, "by the rules, seat 0 has 5 points, not 3"),
+        ("1,0,finishes,1", "1,0,points,5000000000", 16, "5 points, not 5000000000"),
         ("1,0,finishes,1", "1,0,points,99999999999999999999", 16, "which is too large"),
-        ("1,0,finishes,1", "1,0,role,Chef", 16, "in the first Shift there are no roles"),
-        ("1,0,finishes,1", "1,0,tries,1", 16, "its turn is not told of"),
+        ("1,0,finishes,1", "1,0,role,Chef", 16, "the first Shift has no roles"),
+        ("1,0,finishes,1", "1,0,tries,1", 16, "its turn is missing"),
         ("1,0,finishes,1,,,,,", "1,0,finishes,1", 16, "the row has 4 cells and must have 9"),
     ];
     check_refused(&documented(), &cases);
@@ -73,13 +73,13 @@ fn check_refused(text: &str, cases: &[(&str, &str, usize, &str)]) {
 fn what_is_noted_is_compared_with_the_shift_of_its_row() {
     #[rustfmt::skip] // A table is read by its rows.
     let cases = [
-        ("1,1,points,0", "1,1,points,1", 8, "seat 1 has 0 points by the rules, not 1"),
-        ("1,1,points,0", "1,1,role,Dishwasher", 8, "in the first Shift there are no roles"),
-        ("1,1,points,0", "2,1,role,Chef", 8, "seat 1 is Dishwasher by the rules, not Chef"),
-        ("2,1,finishes,1", "2,1,finishes,2", 13, "seat 1 has place 1 by the rules, not 2"),
-        ("2,0,role,Chef", "2,0,role,Dishwasher", 14, "seat 0 is Chef by the rules, not Dishwasher"),
-        ("2,1,plays,3\n2,1,finishes,1\n2,0,role,Chef\n2,0,points,5\n", "", 12, "by the rules Shift 3 has not begun"),
-        ("3,0,role,Dishwasher", "3,0,role,Chef", 16, "seat 0 is Dishwasher by the rules, not Chef"),
+        ("1,1,points,0", "1,1,points,1", 8, "by the rules, seat 1 has 0 points, not 1"),
+        ("1,1,points,0", "1,1,role,Dishwasher", 8, "the first Shift has no roles"),
+        ("1,1,points,0", "2,1,role,Chef", 8, "by the rules, seat 1 is Dishwasher, not Chef"),
+        ("2,1,finishes,1", "2,1,finishes,2", 13, "by the rules, seat 1 has place 1, not 2"),
+        ("2,0,role,Chef", "2,0,role,Dishwasher", 14, "by the rules, seat 0 is Chef, not Dishwasher"),
+        ("2,1,plays,3\n2,1,finishes,1\n2,0,role,Chef\n2,0,points,5\n", "", 12, "by the rules, Shift 3 has not begun"),
+        ("3,0,role,Dishwasher", "3,0,role,Chef", 16, "by the rules, seat 0 is Dishwasher, not Chef"),
     ];
     check_refused(NOTED, &cases);
 }
@@ -88,16 +88,16 @@ fn what_is_noted_is_compared_with_the_shift_of_its_row() {
 fn what_no_gifts_could_explain_is_refused() {
     #[rustfmt::skip] // A table is read by its rows.
     let cases = [
-        ("2,0,plays,G 15", "2,0,plays,1", 17, "too many cards of face 1 were dealt to or played by all seats together: 2, but the deck has 1"),
+        ("2,0,plays,G 15", "2,0,plays,1", 17, "too many cards of face 1 were dealt to or played by the seats together: 2, but the deck has 1"),
         ("2,0,plays,G 15", "2,0,plays,14", 17, "must play the Golden card"),
         ("2,0,plays,G 15", "2,2,plays,G 15", 17, "seat 2 does not hold these cards"),
-        ("8 8 9 9 9 9", "8 8 9 9 9 G", 17, "nobody can have been dealt the Golden card"),
+        ("8 8 9 9 9 9", "8 8 9 9 9 G", 17, "no seat can have been dealt the Golden card"),
         // The Dishwasher plays a card rarer than those it gave, and was given none that rare.
-        ("2,0,plays,G 15", "2,5,gives,14 14\n2,0,gives,10 10\n2,0,plays,15\n2,1,passes,\n2,2,passes,\n2,3,passes,\n2,4,passes,\n2,5,plays,13", 24, "no exchange fits"),
+        ("2,0,plays,G 15", "2,5,gives,14 14\n2,0,gives,10 10\n2,0,plays,15\n2,1,passes,\n2,2,passes,\n2,3,passes,\n2,4,passes,\n2,5,plays,13", 24, "no deal and exchange fit"),
         // The Golden card goes last of its face.
-        ("2,0,plays,G 15", "2,0,hand,10 10 10 10 10 11 11 11 11 11 12 12 12 12 13 13 13 13 15 G\n2,0,gives,15 G\n2,0,plays,15", 19, "nobody can have been dealt the Golden card"),
-        ("2,0,plays,G 15", "2,0,hand,10 10 10 10 10 11 11 11 11 11 12 12 12 12 13 13 13 13 15 G\n2,0,gives,15 15\n2,0,plays,15", 18, "cannot have given these cards of its hand"),
-        ("2,0,plays,G 15", "2,0,gives,9 9 9\n2,0,plays,15", 17, "no exchange fits"),
+        ("2,0,plays,G 15", "2,0,hand,10 10 10 10 10 11 11 11 11 11 12 12 12 12 13 13 13 13 15 G\n2,0,gives,15 G\n2,0,plays,15", 19, "no seat can have been dealt the Golden card"),
+        ("2,0,plays,G 15", "2,0,hand,10 10 10 10 10 11 11 11 11 11 12 12 12 12 13 13 13 13 15 G\n2,0,gives,15 15\n2,0,plays,15", 18, "cannot have given these cards from its hand"),
+        ("2,0,plays,G 15", "2,0,gives,9 9 9\n2,0,plays,15", 17, "no deal and exchange fit"),
     ];
     check_refused(SPARSE, &cases);
 }
@@ -142,7 +142,7 @@ fn a_damaged_record_of_a_real_table_is_named() {
         (
             |lines| edit(lines, 8, |decision| decision.action_mask = vec![1]),
             8,
-            "nobody knows the hand",
+            "the hand is unknown",
         ),
         (
             |lines| {
@@ -151,7 +151,7 @@ fn a_damaged_record_of_a_real_table_is_named() {
                 })
             },
             8,
-            "at a real table every player decides",
+            "every player of a real table decides",
         ),
         (
             |lines| {

@@ -1,33 +1,34 @@
-//! A game of a real table, played by the rule engine: each Shift is completed from what is told of it and put in place of the one the engine
-//! would deal. Decisions that nobody wrote down are taken silently, as the completion has them; what is not known is left out of the events.
+//! A game at a real table, played by the rule engine. Each Shift is completed from its facts and
+//! replaces the one the engine would deal. Unstated decisions are applied without a line of their
+//! own; cards that were not stated are redacted from the events.
 
 use chefshat_engine::{
-    Action, ActionId, BySeat, Deal, DecisionKind, Event, Face, Game, RuleSet, Script, ScriptError,
-    Seat, SeatOrder, Seed,
+    Action, BySeat, Deal, DecisionKind, Event, Face, Game, RuleSet, Script, ScriptError, Seat,
+    SeatOrder, Seed,
 };
 use chefshat_proto::v1;
 
-use super::complete::{Completer, Misfit, Plan};
+use super::complete::{Completer, Contradiction, Plan};
 use super::facts::{Fact, JOKER, ShiftFacts, index};
 use super::known::Known;
 use crate::convert::{FieldProblem, script_from_proto};
 
-/// No cards come from it: it stands where the engine wants a seed.
+/// The engine requires a seed, but deals nothing from it.
 const NO_SEED: Seed = Seed([0; 32]);
 
-/// Where a game begins of which not all Shifts were watched.
+/// The state of a game before its first stated Shift.
 #[derive(Debug, Clone)]
-pub(crate) struct Beginning {
-    /// Number of the first Shift that is told of.
+pub(crate) struct StartState {
+    /// Number of the first stated Shift.
     pub(crate) shift: u32,
     /// The order of the Shift before; `None` for the first.
     pub(crate) last_order: Option<SeatOrder>,
-    /// Points before.
+    /// Points before it.
     pub(crate) scores: BySeat<u32>,
 }
 
-impl Beginning {
-    /// What the header of an imported record says: a scripted Shift without hands, or nothing.
+impl StartState {
+    /// Reads the header of an imported record: a scripted Shift without hands, or none.
     pub(crate) fn of(
         scripted: Option<&v1::ScriptedShift>,
         rules: &RuleSet,
@@ -36,7 +37,7 @@ impl Beginning {
         if !scripted.hands.is_empty() || scripted.drawn_seat.is_some() {
             return Err(FieldProblem::new(
                 "hands",
-                "the Shifts of a real table tell of their hands themselves",
+                "hands of an imported game are stated in its Shifts",
             ));
         }
         let deal = Deal::new(rules, NO_SEED, 1);
@@ -58,28 +59,28 @@ impl Beginning {
     }
 }
 
-/// The Shifts of a real table, one after the other.
+/// An imported game in progress.
 #[derive(Debug)]
-pub(crate) struct Table {
+pub(crate) struct ImportedGame {
     rules: RuleSet,
     shifts: Vec<ShiftFacts>,
     completer: Completer,
-    /// How many Shifts have begun.
-    begun: usize,
+    /// The number of Shifts started.
+    started: usize,
     plan: Option<Plan>,
-    misfit: Option<Misfit>,
-    /// What is told of the decisions before the first turn and has not been taken yet.
-    told: BySeat<ToldDecisions>,
+    contradiction: Option<Contradiction>,
+    /// Stated decisions before the first turn that have not been applied yet.
+    pending: BySeat<PendingDecisions>,
 }
 
-/// Decisions of one seat before a Shift's first turn.
+/// Numbers of stated decisions of one seat before the first turn.
 #[derive(Debug, Clone, Copy, Default)]
-struct ToldDecisions {
+struct PendingDecisions {
     special: u8,
     gifts: u8,
 }
 
-impl ToldDecisions {
+impl PendingDecisions {
     fn of_kind(&mut self, kind: DecisionKind) -> Option<&mut u8> {
         match kind {
             DecisionKind::SpecialAction => Some(&mut self.special),
@@ -89,49 +90,43 @@ impl ToldDecisions {
     }
 }
 
-impl Table {
+impl ImportedGame {
     pub(crate) fn new(rules: RuleSet, shifts: Vec<ShiftFacts>) -> Self {
         Self {
             rules,
             shifts,
             completer: Completer::default(),
-            begun: 0,
+            started: 0,
             plan: None,
-            misfit: None,
-            told: BySeat::filled(rules.players(), ToldDecisions::default()),
+            contradiction: None,
+            pending: BySeat::filled(rules.players(), PendingDecisions::default()),
         }
     }
 
-    /// Begins the game: with its first Shift, if there is one. `None` if nothing is told of any.
-    pub(crate) fn begin(
+    /// Starts the first stated Shift; `None` if there is none.
+    pub(crate) fn start(
         &mut self,
-        beginning: &Beginning,
+        start: &StartState,
         events: &mut Vec<Event>,
     ) -> Result<Option<Game>, ScriptError> {
-        let started = self.start_shift(
-            beginning.shift,
-            beginning.last_order,
-            beginning.scores,
-            events,
-        )?;
-        Ok(started)
+        self.start_shift(start.shift, start.last_order, start.scores, events)
     }
 
-    /// Whether a Shift is being played that is told of.
+    /// Whether a stated Shift is in progress.
     pub(crate) fn is_open(&self) -> bool {
         self.plan.is_some()
     }
 
-    /// Why what a line tells cannot be, if it cannot.
-    pub(crate) fn misfit(&self, line: usize) -> Option<&str> {
-        self.misfit
+    /// The reason why a line contradicts the facts before it.
+    pub(crate) fn contradiction(&self, line: usize) -> Option<&str> {
+        self.contradiction
             .as_ref()
-            .filter(|misfit| misfit.line == line)
-            .map(|misfit| misfit.problem.as_str())
+            .filter(|found| found.line == line)
+            .map(|found| found.problem.as_str())
     }
 
-    /// A decision has been applied: goes on with the next Shift, or with decisions that nobody wrote down, as far as it can.
-    pub(crate) fn applied(
+    /// Continues after a decision: starts the next Shift or applies unstated decisions.
+    pub(crate) fn advance(
         &mut self,
         game: &mut Game,
         events: &mut Vec<Event>,
@@ -141,15 +136,14 @@ impl Table {
             _ => None,
         });
         let Some((shift, order, scores)) = ended.filter(|_| !game.is_over()) else {
-            self.decide_silently(game, events);
+            self.apply_unstated(game, events);
             return Ok(());
         };
-        // The engine has dealt a Shift of its own, which was never played.
+        // Drop the Shift the engine has dealt.
         let end = events
             .iter()
             .position(|event| matches!(event, Event::ShiftEnded(_)));
         events.truncate(end.map_or(0, |end| end + 1));
-        // Points of a real game are far below the bound.
         let scores = scores.map(|score| u32::try_from(score).unwrap_or(u32::MAX));
         if let Some(next) = self.start_shift(shift + 1, Some(order), scores, events)? {
             *game = next;
@@ -157,20 +151,20 @@ impl Table {
         Ok(())
     }
 
-    /// A decision has been taken that was told.
-    pub(crate) fn took_told(&mut self, seat: Seat, kind: DecisionKind) {
-        if let Some(told) = self.told[seat].of_kind(kind) {
-            *told = told.saturating_sub(1);
+    /// Counts a stated decision as applied.
+    pub(crate) fn count_decision(&mut self, seat: Seat, kind: DecisionKind) {
+        if let Some(pending) = self.pending[seat].of_kind(kind) {
+            *pending = pending.saturating_sub(1);
         }
     }
 
-    /// Whose hand is known as it stands in the game, but for which card of the top face is the Golden one.
+    /// Whether each hand is known as counts, not necessarily which top-face card is Golden.
     pub(crate) fn hands_known(&self, game: &Game) -> BySeat<bool> {
         self.known(game)
             .map_or_else(|| self.all(false), |known| known.hands)
     }
 
-    /// Whose hand is known, the Golden card in it too, if it is there.
+    /// Whether each hand is known, including whether it contains the Golden card.
     pub(crate) fn golden_known(&self, game: &Game) -> BySeat<bool> {
         let Some(known) = self.known(game) else {
             return self.all(false);
@@ -196,15 +190,15 @@ impl Table {
         BySeat::filled(self.rules.players(), known)
     }
 
-    /// An event with what nobody wrote down left out.
-    pub(crate) fn as_told(&self, event: Event) -> Event {
+    /// Removes the cards that were not stated from an event.
+    pub(crate) fn redact(&self, event: Event) -> Event {
         let facts = self.current().map_or(&[][..], |shift| &shift.facts);
         match event {
             Event::ShiftStarted { shift, hands } => Event::ShiftStarted {
                 shift,
                 hands: Box::new(BySeat::from_fn(hands.len(), |seat| {
-                    let told = |(_, fact): &(usize, Fact)| matches!(fact, Fact::Hand(told, _) if *told == seat);
-                    hands[seat].filter(|_| facts.iter().any(told))
+                    let stated = |(_, fact): &(usize, Fact)| matches!(fact, Fact::Hand(of, _) if *of == seat);
+                    hands[seat].filter(|_| facts.iter().any(stated))
                 })),
             },
             Event::CardsExchanged {
@@ -213,12 +207,12 @@ impl Table {
                 count,
                 cards,
             } => {
-                let told = |(_, fact): &(usize, Fact)| matches!(fact, Fact::Given(told, Some(_)) if *told == giver);
+                let stated = |(_, fact): &(usize, Fact)| matches!(fact, Fact::Given(of, Some(_)) if *of == giver);
                 Event::CardsExchanged {
                     giver,
                     receiver,
                     count,
-                    cards: cards.filter(|_| facts.iter().any(told)),
+                    cards: cards.filter(|_| facts.iter().any(stated)),
                 }
             }
             public => public,
@@ -226,7 +220,7 @@ impl Table {
     }
 
     fn current(&self) -> Option<&ShiftFacts> {
-        self.shifts.get(self.begun.checked_sub(1)?)
+        self.shifts.get(self.started.checked_sub(1)?)
     }
 
     fn start_shift(
@@ -237,15 +231,15 @@ impl Table {
         events: &mut Vec<Event>,
     ) -> Result<Option<Game>, ScriptError> {
         self.plan = None;
-        let Some(told) = self.shifts.get(self.begun) else {
+        let Some(shift_facts) = self.shifts.get(self.started) else {
             return Ok(None);
         };
-        self.begun += 1;
-        let (plan, misfit) = self
-            .completer
-            .complete(&self.rules, last_order, &told.facts);
-        self.misfit = misfit;
-        self.told = told_decisions(&told.facts, &plan);
+        self.started += 1;
+        let (plan, contradiction) =
+            self.completer
+                .complete(&self.rules, last_order, &shift_facts.facts);
+        self.contradiction = contradiction;
+        self.pending = pending_decisions(&shift_facts.facts, &plan);
         let script = Script {
             shift,
             hands: plan.dealt,
@@ -255,44 +249,40 @@ impl Table {
         };
         self.plan = Some(plan);
         let mut game = Game::scripted(self.rules, NO_SEED, &script, |event| events.push(event))?;
-        self.decide_silently(&mut game, events);
+        self.apply_unstated(&mut game, events);
         Ok(Some(game))
     }
 
-    /// Takes the decisions before the first turn that nobody wrote down, if anything is told that comes after them.
-    fn decide_silently(&self, game: &mut Game, events: &mut Vec<Event>) {
+    /// Applies unstated decisions before the first turn, as planned, if a later fact requires
+    /// them.
+    fn apply_unstated(&self, game: &mut Game, events: &mut Vec<Event>) {
         let Some(plan) = &self.plan else { return };
         while let Some(open) = game.decision() {
-            let silent = match open.kind {
+            let planned = match open.kind {
                 DecisionKind::Turn => None,
-                kind if self.is_told(open.seat, kind) => None,
-                DecisionKind::SpecialAction if self.goes_on_after(open.kind) => {
+                kind if self.is_pending(open.seat, kind) => None,
+                DecisionKind::SpecialAction if self.continues_after(open.kind) => {
                     Some(Action::Decline)
                 }
-                DecisionKind::Exchange if self.goes_on_after(open.kind) => {
+                DecisionKind::Exchange if self.continues_after(open.kind) => {
                     self.next_gift(game, plan, open.seat)
                 }
                 _ => None,
             };
-            let action = silent.and_then(|decision| self.rules.actions().encode(decision));
-            let taken = action.is_some_and(|action| self.take(game, action, events));
-            if !taken {
+            let action = planned.and_then(|action| self.rules.actions().encode(action));
+            if !action.is_some_and(|id| game.apply(id, |event| events.push(event)).is_ok()) {
                 return;
             }
         }
     }
 
-    fn is_told(&self, seat: Seat, kind: DecisionKind) -> bool {
-        let mut told = self.told[seat];
-        told.of_kind(kind).is_some_and(|told| *told > 0)
+    fn is_pending(&self, seat: Seat, kind: DecisionKind) -> bool {
+        let mut pending = self.pending[seat];
+        pending.of_kind(kind).is_some_and(|number| *number > 0)
     }
 
-    fn take(&self, game: &mut Game, action: ActionId, events: &mut Vec<Event>) -> bool {
-        game.apply(action, |event| events.push(event)).is_ok()
-    }
-
-    /// Whether something is told that can only come after a decision of this kind.
-    fn goes_on_after(&self, kind: DecisionKind) -> bool {
+    /// Whether a fact implies that the decisions of this kind are over.
+    fn continues_after(&self, kind: DecisionKind) -> bool {
         let later = |(_, fact): &(usize, Fact)| match fact {
             Fact::Hand(..) | Fact::Special { .. } => false,
             Fact::Gives(..) => kind == DecisionKind::SpecialAction,
@@ -302,7 +292,7 @@ impl Table {
             .is_some_and(|shift| shift.facts.iter().any(later))
     }
 
-    /// The next card of a seat's planned gift.
+    /// The next card of the planned gift.
     fn next_gift(&self, game: &Game, plan: &Plan, seat: Seat) -> Option<Action> {
         let gave = game.gave()[seat];
         let faces = (1..=self.rules.faces()).filter_map(Face::new);
@@ -316,24 +306,25 @@ impl Table {
     }
 }
 
-/// Whether the hands are still those that were dealt.
+/// Whether the hands are still as dealt.
 fn before_first_turn(game: &Game) -> bool {
     game.decision()
         .is_some_and(|open| open.kind != DecisionKind::Turn)
 }
 
-/// The decisions before the first turn that are told: special actions, and every card of a gift that was chosen.
-fn told_decisions(facts: &[(usize, Fact)], plan: &Plan) -> BySeat<ToldDecisions> {
-    let mut told = plan.choosers.map(|_| ToldDecisions::default());
+/// Counts the stated decisions before the first turn: special actions and chosen gifts, card by
+/// card.
+fn pending_decisions(facts: &[(usize, Fact)], plan: &Plan) -> BySeat<PendingDecisions> {
+    let mut pending = plan.choosers.map(|_| PendingDecisions::default());
     for (_, fact) in facts {
         match *fact {
-            Fact::Special { seat, .. } => told[seat].special = 1,
-            Fact::Gives(seat, _) => told[seat].gifts = told[seat].gifts.saturating_add(1),
+            Fact::Special { seat, .. } => pending[seat].special = 1,
+            Fact::Gives(seat, _) => pending[seat].gifts = pending[seat].gifts.saturating_add(1),
             Fact::Given(seat, Some(cards)) if plan.choosers[seat] => {
-                told[seat].gifts = told[seat].gifts.max(cards.len());
+                pending[seat].gifts = pending[seat].gifts.max(cards.len());
             }
             _ => {}
         }
     }
-    told
+    pending
 }

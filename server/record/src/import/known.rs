@@ -1,13 +1,91 @@
-//! Where the Golden card of a real table is: who may have been dealt it, and whether it is known who holds it. A hand, a gift or the opening
-//! tells it; a play does not, because it counts as any other of its face.
+//! Which hands of a real table are known, because they were stated or follow from the facts, and
+//! who may hold the Golden card. A hand, a gift or the golden opening reveals it; other plays do
+//! not.
 
 use chefshat_engine::{BySeat, Cards, ExchangePair, Face, Opening, RuleSet, Seat};
 
 use super::facts::{Counts, Tally, counts_of};
-use super::known::Follows;
+use super::gifts::size_of;
 use super::puzzle::{Kept, Puzzle};
 
-/// Who may have been dealt the Golden card, by the hands and gifts that are told and by who opened.
+/// What is known of all hands at one moment.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Known {
+    /// Whether each hand is known, as counts.
+    pub(super) hands: BySeat<bool>,
+    /// Whether the holder of the Golden card is known.
+    pub(super) golden: bool,
+}
+
+/// Which cards are known, by seat.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct KnownCards {
+    /// The hand as dealt.
+    pub(super) dealt: BySeat<bool>,
+    /// The hand after the exchange.
+    pub(super) held: BySeat<bool>,
+    /// The gift.
+    pub(super) given: BySeat<bool>,
+}
+
+impl Puzzle<'_> {
+    /// What is known of the hands as dealt and after the exchange. Known hands are exact in the
+    /// completed Shift.
+    pub(super) fn known(&self, dealt: &BySeat<Cards>, gifts: &BySeat<Counts>) -> (Known, Known) {
+        let known = self.known_cards();
+        let (golden_dealt, golden_held) = self.golden_known(&known, dealt, gifts);
+        (
+            Known {
+                hands: known.dealt,
+                golden: golden_dealt,
+            },
+            Known {
+                hands: known.held,
+                golden: golden_held,
+            },
+        )
+    }
+
+    /// The cards known because they were stated, all played, or the only ones left.
+    fn known_cards(&self) -> KnownCards {
+        let (rules, tally) = (self.rules, &self.tally);
+        let players = rules.players();
+        let all_dealt = usize::from(rules.hand_size()) * players == usize::from(rules.deck_size());
+        let mut known = KnownCards {
+            dealt: tally.dealt.map(|hand| hand.is_some()),
+            held: tally
+                .played
+                .map(|counts| size_of(&counts) == rules.hand_size()),
+            given: BySeat::from_fn(players, |seat| {
+                self.gives_to(seat).is_none() || tally.given[seat].is_some()
+            }),
+        };
+        loop {
+            let before = known;
+            let KnownCards { dealt, held, given } = &mut known;
+            for seat in tally.dealt.seats() {
+                let received = self.gives_to(seat).is_none_or(|partner| given[partner]);
+                given[seat] |= dealt[seat] && (self.is_forced(seat) || (held[seat] && received));
+                let gifts_known = given[seat] && received;
+                held[seat] |= dealt[seat] && gifts_known;
+                dealt[seat] |= held[seat] && gifts_known;
+                for hands in [&mut *dealt, &mut *held] {
+                    let others = hands.iter().all(|(other, known)| other == seat || *known);
+                    hands[seat] |= all_dealt && others;
+                }
+            }
+            if known == before {
+                return known;
+            }
+        }
+    }
+
+    fn is_forced(&self, seat: Seat) -> bool {
+        self.pairs.iter().any(|pair| pair.forced == seat)
+    }
+}
+
+/// The seats that may have been dealt the Golden card, by the hands, gifts and opening stated.
 pub(super) fn golden_seats(
     rules: &RuleSet,
     tally: &Tally,
@@ -15,7 +93,7 @@ pub(super) fn golden_seats(
     top: usize,
 ) -> BySeat<bool> {
     let faces = rules.faces();
-    let told: u8 = tally
+    let stated: u8 = tally
         .dealt
         .values()
         .flatten()
@@ -30,8 +108,8 @@ pub(super) fn golden_seats(
             .given
             .iter()
             .all(|(giver, gift)| giver == seat || gift.is_none_or(|gift| !gift.has_golden()));
-        // All others of its face may be told of.
-        let is_there = tally.dealt[seat].is_some() || told < rules.faces();
+        // All other cards of its face may be stated.
+        let is_there = tally.dealt[seat].is_some() || stated < rules.faces();
         let given = tally.given[seat].map(|gift| gift.has_golden());
         let as_opened = match tally.opener.filter(|_| rules.opening() == Opening::Golden) {
             None => true,
@@ -46,7 +124,7 @@ pub(super) fn golden_seats(
 }
 
 impl Puzzle<'_> {
-    /// Who was dealt the Golden card, so that the opener holds it after the exchange.
+    /// A seat that can be dealt the Golden card so that the opener holds it after the exchange.
     pub(super) fn golden_dealt_to(
         &self,
         kept: &BySeat<Kept>,
@@ -74,10 +152,10 @@ impl Puzzle<'_> {
             })
     }
 
-    /// Whether it is known who was dealt the Golden card, and who held it after the exchange.
+    /// Whether the holder of the Golden card is known, as dealt and after the exchange.
     pub(super) fn golden_known(
         &self,
-        known: &Follows,
+        known: &KnownCards,
         dealt: &BySeat<Cards>,
         gifts: &BySeat<Counts>,
     ) -> (bool, bool) {
@@ -95,7 +173,7 @@ impl Puzzle<'_> {
                 self.golden[seat] && !had_none && !kept_it
             })
             .collect();
-        // Whether the seat that was dealt it gave it away: all others of its face are given before it.
+        // Whether the seat gave it away: all other cards of its face go first.
         let gave_it = |seat: Seat| match tally.given[seat] {
             Some(gift) => Some(gift.has_golden()),
             None if gave_none(seat) => Some(false),

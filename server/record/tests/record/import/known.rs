@@ -2,8 +2,8 @@
 
 use chefshat_engine::{BySeat, Cards, RuleSet, RuleSetSpec, Stop};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
+use chefshat_record::import::import;
 use chefshat_record::replay::walk;
-use chefshat_record::table::import;
 
 use chefshat_record::testing::{Observed, TestGame, transcript};
 
