@@ -11,7 +11,7 @@ use std::time::Duration;
 use chefshat_proto::v1;
 use chefshat_record::atomic_file::AtomicFile;
 use chefshat_record::jsonl;
-use chefshat_render::{Eyes, Film, Frame, Painter, When, figure_at};
+use chefshat_render::{Film, Frame, Painter, Perspective, When, figure_at};
 use clap::{Args, ValueEnum};
 use serde_json::json;
 
@@ -218,11 +218,11 @@ impl Render {
         Ok(())
     }
 
-    fn eyes(&self) -> Eyes {
+    fn perspective(&self) -> Perspective {
         match self.seat {
-            Some(seat) => Eyes::Seat(seat),
-            None if self.spectator => Eyes::Spectator,
-            None => Eyes::All,
+            Some(seat) => Perspective::Seat(seat),
+            None if self.spectator => Perspective::Spectator,
+            None => Perspective::All,
         }
     }
 
@@ -235,11 +235,12 @@ impl Render {
         let painter = Painter::new();
         let svg = match (self.figure, self.at) {
             (Drawn::Actions, Some(At::Decision(decision))) => {
-                let figure = figure_at(lines, self.eyes(), decision);
+                let figure = figure_at(lines, self.perspective(), decision);
                 painter.figure(&figure.map_err(|error| self.of_record(error))?)
             }
             (_, at) => {
-                let film = Film::new(lines, self.eyes()).map_err(|error| self.of_record(error))?;
+                let film =
+                    Film::new(lines, self.perspective()).map_err(|error| self.of_record(error))?;
                 let when = match (at, self.shift) {
                     (Some(At::Decision(decision)), _) => When::Decision(decision),
                     (_, Some(shift)) => When::ShiftEnd(shift),
@@ -267,7 +268,7 @@ impl Render {
     }
 
     fn film(&self, lines: &[v1::RecordLine], kind: Kind) -> Result<Written, CommandError> {
-        let film = Film::new(lines, self.eyes()).map_err(|error| self.of_record(error))?;
+        let film = Film::new(lines, self.perspective()).map_err(|error| self.of_record(error))?;
         let frames = match self.shift {
             Some(shift) => film.shift(shift),
             None => {

@@ -1,5 +1,4 @@
-//! The dataset card: the `README.md` of a dataset, with the front matter that dataset hubs read. What it says of columns comes from the
-//! tables of columns.
+//! The dataset card: the `README.md` of a dataset, with front matter for dataset hubs.
 
 use std::fmt::Write as _;
 
@@ -13,12 +12,12 @@ use chefshat_record::jsonl::FORMAT_VERSION;
 /// Name of the file.
 pub(super) const FILE_NAME: &str = "README.md";
 
-/// The line of the front matter by which a card is known as one of ours.
+/// The line of the front matter that identifies our cards.
 const NAME_LINE: &str = "pretty_name: Games of Chef's Hat";
 /// The line before and after the front matter.
 const FENCE: &str = "---";
 
-/// The paper whose game this is.
+/// The paper of the game.
 const CITATION: &str = "\
 @article{barros2020chefshat,
   title   = {The Chef's Hat Simulation Environment for Reinforcement-Learning-Based Agents},
@@ -29,7 +28,7 @@ const CITATION: &str = "\
   doi     = {10.48550/arXiv.2003.05861}
 }";
 
-/// The bounds that dataset hubs sort sizes by.
+/// The size categories of dataset hubs.
 const SIZES: [(u64, &str); 7] = [
     (1_000, "n<1K"),
     (10_000, "1K<n<10K"),
@@ -46,12 +45,12 @@ pub(super) fn write(export: &Export, exported: &Exported) -> String {
     text.push_str("\n# Games of Chef's Hat\n\n");
     text.push_str(match export.layout {
         Layout::Tables => {
-            "Games of the card game Chef's Hat, decision by decision: what the deciding player knew, what it could do, what it did, how\n\
-             long it took, and what came of it. Every game was replayed from its record by the rules before it was written here.\n"
+            "Games of the card game Chef's Hat, decision by decision: observation, legal actions, action,\n\
+             time and outcome. Every game was verified by replaying its record.\n"
         }
         Layout::ChefsHatGym => {
-            "Games of the card game Chef's Hat in the columns that the package `chefshatgym` writes as `Dataset.pkl.csv`, one file for each\n\
-             game. Every game was replayed from its record by the rules before it was written here.\n"
+            "Games of the card game Chef's Hat in the columns of the file `Dataset.pkl.csv` of the package `chefshatgym`, one file per\n\
+             game. Every game was verified by replaying its record.\n"
         }
     });
     contents(&mut text, export, exported);
@@ -62,7 +61,7 @@ pub(super) fn write(export: &Export, exported: &Exported) -> String {
     checksums(&mut text, exported);
     let _ = write!(
         text,
-        "\n## Licence and citation\n\nLicence: {}. The game and the environment it follows are described in this paper:\n\n```bibtex\n{CITATION}\n```\n",
+        "\n## Licence and citation\n\nLicence: {}. The game and its environment are described in this paper:\n\n```bibtex\n{CITATION}\n```\n",
         export.licence
     );
     text
@@ -79,7 +78,7 @@ fn front_matter(export: &Export, exported: &Exported) -> String {
         Layout::Tables => {
             let format = preferred(&export.formats);
             for (table, default) in [(DECISIONS, true), (EXPRESSIONS, false)] {
-                // A hub cannot tell types where there are no rows.
+                // Hubs cannot infer types without rows.
                 if !default && exported.expressions == 0 && format != Format::Parquet {
                     continue;
                 }
@@ -104,7 +103,7 @@ fn front_matter(export: &Export, exported: &Exported) -> String {
     yaml + FENCE + "\n"
 }
 
-/// Whether a text begins with the front matter of a card that was written here.
+/// Whether a text starts with the front matter of one of our cards.
 pub(super) fn is_ours(text: &str) -> bool {
     let mut lines = text.lines();
     lines.next() == Some(FENCE)
@@ -113,7 +112,7 @@ pub(super) fn is_ours(text: &str) -> bool {
             .any(|line| line == NAME_LINE)
 }
 
-/// The format that hubs are pointed to.
+/// The format for hubs.
 fn preferred(formats: &[Format]) -> Format {
     Format::ALL
         .into_iter()
@@ -133,8 +132,8 @@ fn contents(text: &mut String, export: &Export, exported: &Exported) {
     let _ = write!(
         text,
         "\n## Contents\n\n| | |\n|---|---|\n\
-         | games | {} ({} played to the end, {} aborted) |\n\
-         | where they came from | {} |\n\
+         | games | {} ({} finished, {} aborted) |\n\
+         | origins | {} |\n\
          | players | {} |\n\
          | decisions | {} |\n",
         exported.games,
@@ -146,14 +145,14 @@ fn contents(text: &mut String, export: &Export, exported: &Exported) {
     );
     if export.layout == Layout::Tables {
         let _ = writeln!(text, "| expressions | {} |", exported.expressions);
-        let _ = writeln!(text, "| version of the columns | {TABLES_VERSION} |");
+        let _ = writeln!(text, "| columns version | {TABLES_VERSION} |");
     }
     let _ = write!(
         text,
-        "| version of the records | {FORMAT_VERSION} |\n\
-         | version of the rules | {} |\n\
-         | hosted by version | {} |\n\
-         | exported by version | {} |\n",
+        "| record format version | {FORMAT_VERSION} |\n\
+         | rules version | {} |\n\
+         | server version | {} |\n\
+         | exporter version | {} |\n",
         listed(exported.rules_versions.iter().map(u32::to_string).collect()),
         listed(exported.servers.iter().cloned().collect()),
         export.version
@@ -163,10 +162,10 @@ fn contents(text: &mut String, export: &Export, exported: &Exported) {
 fn columns(text: &mut String) {
     let _ = write!(
         text,
-        "\n## Table `{DECISIONS}`\n\nOne row for each decision, in the order of the games and of the decisions in them.\n\n{}\
-         \n## Table `{EXPRESSIONS}`\n\nOne row for each expression of a player, in the same order.\n\n{}\
-         \nThe types are Arrow's. F is the number of faces (11 in the standard game). In CSV, lists and structs are JSON in a cell and\n\
-         null is an empty cell; in CSV and JSON Lines, binary is hexadecimal and moments are RFC 3339.\n",
+        "\n## Table `{DECISIONS}`\n\nOne row per decision, in order of games and decisions.\n\n{}\
+         \n## Table `{EXPRESSIONS}`\n\nOne row per expression of a player, in the same order.\n\n{}\
+         \nThe types are Arrow's. F is the number of faces (11 in the standard game). In CSV, lists and structs are JSON and\n\
+         null is an empty cell; in CSV and JSON Lines, binary is hexadecimal and times are RFC 3339.\n",
         markdown(&decisions::columns()),
         markdown(&expressions::columns())
     );
@@ -174,8 +173,8 @@ fn columns(text: &mut String) {
 
 fn sheets(text: &mut String) {
     text.push_str(
-        "\nA \"match\" is a Shift, a \"round\" a pizza. `Source` is a player's name or `SYSTEM`; lists and dictionaries are written as Python\n\
-         writes them (`ast.literal_eval` reads them).\n",
+        "\nA \"match\" is a Shift, a \"round\" a pizza. `Source` is a player's name or `SYSTEM`; lists and dictionaries are Python\n\
+         literals (read them with `ast.literal_eval`).\n",
     );
 }
 
@@ -197,7 +196,7 @@ fn size_category(rows: u64) -> &'static str {
         .map_or("n>100M", |(_, name)| name)
 }
 
-/// A text as YAML: plain where it is a plain word, else in double quotes, which YAML reads as JSON does.
+/// A YAML string: plain if possible, or else a JSON string.
 fn quoted(text: &str) -> String {
     let plain = text.starts_with(|letter: char| letter.is_ascii_alphabetic())
         && text

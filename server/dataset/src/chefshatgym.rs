@@ -1,6 +1,6 @@
-//! A record in the columns of the file `Dataset.pkl.csv` that the reference implementation (package `chefshatgym` 2.4) writes, so that
-//! scripts made for it can read our games. Its "match" is a Shift, its "round" a pizza, and lists and dictionaries stand in the cells as
-//! Python writes them (`python`); how the file is written is in `sheet`. Where the two differ in meaning, the documentation of datasets says so.
+//! A record in the columns of `Dataset.pkl.csv` of the reference implementation (package
+//! `chefshatgym` 2.4), for scripts written for it. Its "match" is a Shift, its "round" a pizza;
+//! lists and dictionaries are Python literals. docs/datasets.md lists the differences.
 
 use chefshat_engine::{Board, Cards, Game, Role, Seat, Viewer};
 use chefshat_proto::v1::{self, DecisionKind, game_event::Kind, record_line::Line};
@@ -10,13 +10,13 @@ use super::python;
 use super::sheet::{Row, Sheet};
 use chefshat_record::replay::{Moment, ReplayError, walk};
 
-/// Who does what no player does.
+/// The source of rows without a player.
 const SYSTEM: &str = "SYSTEM";
 
-/// Replays a record and lays it out.
+/// Verifies a record and converts it.
 ///
 /// # Errors
-/// The first line that does not fit.
+/// The first wrong line.
 pub(super) fn lay_out(lines: &[v1::RecordLine], info: &GameInfo) -> Result<Sheet, ReplayError> {
     let mut writer = Writer::new(info);
     let replayed = walk(lines, |moment| writer.take(moment))?;
@@ -26,10 +26,10 @@ pub(super) fn lay_out(lines: &[v1::RecordLine], info: &GameInfo) -> Result<Sheet
     })
 }
 
-/// What a turn's decision found, until the event that follows it is written.
+/// The state before a turn, until its event.
 struct Turn {
     pizza: u32,
-    /// F+1 counts; `None` where the hand is not known.
+    /// F+1 counts; `None` if unknown.
     hand: Option<Vec<u8>>,
     board: Board,
     text: String,
@@ -38,12 +38,12 @@ struct Turn {
 
 struct Writer<'a> {
     info: &'a GameInfo,
-    /// The players' names, each once.
+    /// The unique names of the players.
     names: Vec<String>,
     rows: Vec<Row>,
     shift: u32,
     turn: Option<Turn>,
-    /// The pizza of the last turn, and who played last in it.
+    /// The pizza of the last turn, and the last seat to play in it.
     pizza: u32,
     last_to_play: Option<usize>,
     exchanged: Vec<v1::CardsExchanged>,
@@ -78,7 +78,7 @@ impl<'a> Writer<'a> {
             Line::Event(event) => event.kind.as_ref(),
             _ => None,
         };
-        // The exchange is one row, written when all of it has been told.
+        // The exchange is one row, written after its last event.
         if !matches!(event, Some(Kind::CardsExchanged(_))) {
             self.exchange(&moment, game);
         }
@@ -99,7 +99,7 @@ impl<'a> Writer<'a> {
         }
     }
 
-    /// A new row of the Shift, with the number of the pizza (0 outside of pizzas).
+    /// Adds a row of the Shift; the pizza is 0 outside of pizzas.
     fn row(&mut self, pizza: u32, source: Option<usize>, action: &'static str) -> &mut Row {
         self.rows.push(Row {
             shift: self.shift.to_string(),
@@ -146,7 +146,8 @@ impl<'a> Writer<'a> {
         .to_owned();
     }
 
-    /// The reference's description: was there a special action, by whom, and what Dishwasher, Waiter, Sous-Chef and Chef gave.
+    /// Adds the row of the exchange. Its description: whether a special action was declared, its
+    /// seat, and the gifts of Dishwasher, Waiter, Sous-Chef and Chef.
     fn exchange(&mut self, moment: &Moment<'_>, game: &Game) {
         if self.exchanged.is_empty() {
             return;
@@ -228,7 +229,7 @@ impl<'a> Writer<'a> {
             jokers,
         };
         if let Some(hand) = self.turn.as_mut().and_then(|turn| turn.hand.as_mut()) {
-            // A joker alone bears the face after the last, where the jokers are counted: none of quantity 0 are taken there.
+            // A lone joker has face F+1, the index of the jokers, with quantity 0.
             for (card, gone) in [(face - 1, quantity), (faces, jokers)] {
                 let left = &mut hand[usize::from(card)];
                 *left = left.saturating_sub(gone);
@@ -262,14 +263,14 @@ impl<'a> Writer<'a> {
         row.possible = turn.possible;
     }
 
-    /// Whoever played last has made the pizza; if nobody has played, nobody has.
+    /// Attributes the pizza to the last seat to play, if any.
     fn pizza_done(&mut self) {
         let maker = self.last_to_play.take();
         self.row(self.pizza, maker, "DECLARE_PIZZA");
     }
 
     fn shift_ended(&mut self, ended: &v1::ShiftEnded) {
-        // The end of a Shift ends its last pizza, which counts as any other.
+        // The end of a Shift also ends its last pizza.
         self.pizza_done();
         self.shifts += 1;
         for (sum, points) in self.performance.iter_mut().zip(&ended.shift_points) {
@@ -309,7 +310,7 @@ impl<'a> Writer<'a> {
         row.performance = performance;
     }
 
-    /// A value for each seat, as a dictionary by names.
+    /// A dictionary from names to values.
     fn by_name(&self, values: impl IntoIterator<Item: ToString>) -> String {
         python::dictionary(self.names.iter().map(String::as_str).zip(values))
     }
@@ -326,7 +327,8 @@ impl<'a> Writer<'a> {
         cards.counts(self.info.rule_set.faces()).collect()
     }
 
-    /// The cards of a hand ascending, F+1 for a joker, after a zero for each card that has been played.
+    /// The cards of a hand ascending, F+1 for a joker, padded in front with a zero per card
+    /// played.
     fn hand(&self, counts: &[u8]) -> String {
         let mut cards: Vec<u8> = Vec::with_capacity(usize::from(self.info.rule_set.hand_size()));
         for (count, card) in counts.iter().zip(1u8..) {
@@ -336,7 +338,7 @@ impl<'a> Writer<'a> {
         python::list(std::iter::repeat_n(0, gone).chain(cards))
     }
 
-    /// The cards on the board in F slots, jokers as F+1; an empty board is F+2 in the first.
+    /// The cards on the board in F slots, jokers as F+1; an empty board has F+2 in the first slot.
     fn board(&self, board: Board) -> String {
         let faces = self.info.rule_set.faces();
         let mut slots = vec![0; usize::from(faces)];
@@ -353,7 +355,7 @@ impl<'a> Writer<'a> {
     }
 }
 
-/// A role as the reference spells it.
+/// The reference's name of a role.
 fn role_name(role: Option<Role>) -> &'static str {
     match role {
         None => "",

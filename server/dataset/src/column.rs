@@ -1,10 +1,9 @@
-//! What a table is made of: typed columns with their descriptions, and the values in their cells. The one table of columns of each kind of
-//! row (in `decisions` and `expressions`) is the source of the files' schema, of the dataset card and of the documentation. How a value is
-//! written into a file is decided in `formats`.
+//! Typed columns with descriptions, and the values of their cells. The columns in `decisions` and
+//! `expressions` define the schema of the files, the dataset card and the documentation.
 
 use std::fmt;
 
-/// The type of a column, of a list's elements or of a struct's fields. Everything may be null.
+/// The type of a column, list element or struct field. All are nullable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Type {
     /// True or false.
@@ -23,7 +22,7 @@ pub enum Type {
     Text,
     /// Bytes; in CSV and JSON Lines as lower-case hexadecimal digits.
     Binary,
-    /// A moment, microseconds since the Unix epoch in UTC; in CSV and JSON Lines as RFC 3339.
+    /// A time, microseconds since the Unix epoch in UTC; in CSV and JSON Lines as RFC 3339.
     Time,
     /// Any number of elements.
     List(&'static Type),
@@ -32,7 +31,7 @@ pub enum Type {
 }
 
 impl fmt::Display for Type {
-    /// As the documentation spells it, after Arrow's names: `list<uint8>`.
+    /// Arrow's name, as in the documentation: `list<uint8>`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Type::Bool => f.write_str("bool"),
@@ -57,16 +56,17 @@ impl fmt::Display for Type {
     }
 }
 
-/// A value of a cell. Which variant stands in a column follows from its [`Type`]: integers of every width are `Uint`.
+/// The value of a cell, according to the [`Type`] of its column; integers of every width are
+/// `Uint`.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Value {
-    /// Not known, or none.
+    /// Unknown or absent.
     Null,
     /// True or false.
     Bool(bool),
     /// An integer.
     Uint(u64),
-    /// A number.
+    /// A float.
     Float(f32),
     /// Text.
     Text(String),
@@ -149,29 +149,28 @@ impl<T: Copy + Into<Value>> From<&Vec<T>> for Value {
 /// A column of a table of rows `R`.
 #[derive(Debug)]
 pub(super) struct Column<R> {
-    /// Its name.
+    /// The name.
     pub(super) name: &'static str,
     /// Its type.
     pub(super) of: Type,
-    /// What stands in it: one sentence, with units, and when it is null.
+    /// A description: one sentence with units, and when it is null.
     pub(super) about: &'static str,
     /// Its value in a row.
     pub(super) value: fn(&R) -> Value,
 }
 
-/// A column without what it takes to fill it, as schemas and descriptions need it.
+/// Name, type and description of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ColumnInfo {
     /// Its name.
     pub name: &'static str,
     /// Its type.
     pub of: Type,
-    /// What stands in it.
+    /// The description.
     pub about: &'static str,
 }
 
 impl<R> Column<R> {
-    /// A column; its name, its type, what stands in it, and how it is read from a row.
     pub(super) const fn new(
         name: &'static str,
         of: Type,
@@ -196,9 +195,9 @@ impl<R> Column<R> {
     }
 }
 
-/// The columns as a Markdown table, as it stands in the dataset card and in the documentation.
+/// The columns as a Markdown table, for the dataset card and the documentation.
 pub fn markdown(columns: &[ColumnInfo]) -> String {
-    let mut text = String::from("| column | type | what it holds |\n|---|---|---|\n");
+    let mut text = String::from("| column | type | content |\n|---|---|---|\n");
     for ColumnInfo { name, of, about } in columns {
         text.push_str(&format!("| `{name}` | `{of}` | {about} |\n"));
     }

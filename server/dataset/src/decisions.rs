@@ -1,5 +1,5 @@
-//! The table of decisions: one row for each decision of each game, with what its seat knew, what it did and what came of it. How rows are
-//! gathered from a record is in `gather`.
+//! The table of decisions: one row per decision, with observation, action and outcome. Rows are
+//! gathered in `gather`.
 
 use std::sync::Arc;
 
@@ -20,7 +20,7 @@ pub(super) const RECORDED: &str = "recorded";
 pub(super) struct DecisionRow {
     /// The game.
     pub(super) game: Arc<GameInfo>,
-    /// What the deciding seat could see. Its hand, and what it gave and received, count only where they are known.
+    /// The observation of the seat. Hand and gifts are valid only where known.
     pub(super) seen: Observation,
     pub(super) hand_known: bool,
     pub(super) golden_known: bool,
@@ -53,7 +53,7 @@ impl DecisionRow {
         self.seen.faces
     }
 
-    /// The seat's player, unless the decision was taken in another game, by whoever sat there.
+    /// The seat's player; `None` for a decision taken over from another game.
     fn player(&self) -> Option<&SeatInfo> {
         (self.source != RECORDED).then(|| &*self.game.seats[self.seat])
     }
@@ -70,7 +70,7 @@ impl DecisionRow {
         Value::List(cards.counts(self.faces()).map(Value::from).collect())
     }
 
-    /// Cards given or received: null if there were none, or if they are not known.
+    /// Cards given or received: null if none or unknown.
     fn exchanged(&self, cards: Cards, known: bool) -> Value {
         if known && !cards.is_empty() {
             self.cards(cards)
@@ -107,7 +107,7 @@ pub(super) const COLUMNS: &[Column<DecisionRow>] = &[
     Column::new(
         "origin",
         Type::Text,
-        "Where the game came from: `dealt`, `fixed_seed`, `scripted`, `branched` or `imported`.",
+        "Origin of the game: `dealt`, `fixed_seed`, `scripted`, `branched` or `imported`.",
         |row| row.game.origin.into(),
     ),
     Column::new(
@@ -119,19 +119,19 @@ pub(super) const COLUMNS: &[Column<DecisionRow>] = &[
     Column::new(
         "rules_version",
         Type::Uint32,
-        "Version of the rules the game was played by.",
+        "Version of the rules of the game.",
         |row| row.game.rules_version.into(),
     ),
     Column::new(
         "created_at",
         Type::Time,
-        "When the room was created; null for a game that was simulated.",
+        "When the room was created; null for a simulated game.",
         |row| row.game.created_at.map_or(Value::Null, Value::Time),
     ),
     Column::new(
         "finished",
         Type::Bool,
-        "Whether the game was played to its end; false if it was aborted.",
+        "Whether the game finished; false if it was aborted.",
         |row| row.game.finished.into(),
     ),
     Column::new("players", Type::Uint8, "Number of seats.", |row| {
@@ -158,31 +158,31 @@ pub(super) const COLUMNS: &[Column<DecisionRow>] = &[
     Column::new(
         "turn",
         Type::Uint32,
-        "Number of the turn in its Shift, from 1; null for decisions that are no turns.",
+        "Number of the turn in its Shift, from 1; null for decisions that are not turns.",
         |row| row.turn.into(),
     ),
     Column::new(
         "seat",
         Type::Uint8,
-        "Who decided: the number of the seat, from 0.",
+        "The seat that decided, from 0.",
         |row| Value::Uint(row.seat as u64),
     ),
     Column::new(
         "agent",
         Type::Text,
-        "Name of the seat's player; null for a decision taken over from another game, where somebody else may have sat there.",
+        "Name of the player; null for a decision taken over from another game, which may have had another player in the seat.",
         |row| row.player().map(|player| player.name.as_str()).into(),
     ),
     Column::new(
         "agent_kind",
         Type::Text,
-        "What the player is: `agent` (a program), `human`, `robot` or `built_in` (an agent of the server); null as `agent` is.",
+        "Kind of player: `agent` (a program), `human`, `robot` or `built_in` (an agent of the server); null where `agent` is.",
         |row| row.player().map(|player| player.kind).into(),
     ),
     Column::new(
         "built_in_agent",
         Type::Text,
-        "Which built-in agent filled the seat; null for all others, and as `agent` is.",
+        "Name of the built-in agent; null for other players, and where `agent` is.",
         |row| {
             row.player()
                 .and_then(|player| player.built_in.as_ref())
@@ -192,25 +192,25 @@ pub(super) const COLUMNS: &[Column<DecisionRow>] = &[
     Column::new(
         "decision_id",
         Type::Uint64,
-        "Number of the decision among those of its seat, from 1.",
+        "Number of the decision at its seat, from 1.",
         |row| row.decision_id.into(),
     ),
     Column::new(
         "phase",
         Type::Text,
-        "What was decided: `turn` (play or pass), `exchange` (give a card) or `special_action` (declare or decline).",
+        "Kind of decision: `turn` (play or pass), `exchange` (give a card) or `special_action` (declare or decline).",
         |row| row.phase.into(),
     ),
     Column::new(
         "hand",
         COUNTS,
-        "The seat's hand before the decision, F+1 counts: index f-1 counts face f, index F the jokers; null where it is not known.",
+        "The seat's hand before the decision, F+1 counts: index f-1 counts face f, index F the jokers; null if unknown.",
         |row| row.known(row.cards(row.seen.hand)),
     ),
     Column::new(
         "golden",
         Type::Bool,
-        "Whether the hand holds the Golden card; null where that is not known.",
+        "Whether the hand contains the Golden card; null if unknown.",
         |row| match row.golden_known {
             true => row.known(row.seen.hand.has_golden()),
             false => Value::Null,
@@ -219,19 +219,19 @@ pub(super) const COLUMNS: &[Column<DecisionRow>] = &[
     Column::new(
         "board_face",
         Type::Uint8,
-        "Face on the board: 0 empty, 1..F, F+1 for a joker played alone.",
+        "Face on the board: 0 if empty, 1..F, F+1 for a lone joker.",
         |row| row.seen.board.face.into(),
     ),
     Column::new(
         "board_size",
         Type::Uint8,
-        "Cards on the board, jokers included.",
+        "Number of cards on the board, including jokers.",
         |row| row.seen.board.size.into(),
     ),
     Column::new(
         "board_jokers",
         Type::Uint8,
-        "Jokers among the cards on the board.",
+        "Number of jokers on the board.",
         |row| row.seen.board.jokers.into(),
     ),
     Column::new(
@@ -243,13 +243,13 @@ pub(super) const COLUMNS: &[Column<DecisionRow>] = &[
     Column::new(
         "passed",
         Type::List(&Type::Bool),
-        "Who has passed and is out of the pizza, index = seat.",
+        "Whether each seat has passed in this pizza, index = seat.",
         |row| row.seen.passed.as_slice().into(),
     ),
     Column::new(
         "places",
         COUNTS,
-        "Place in the Shift of each seat that has finished it, from 1, else 0; index = seat.",
+        "Place of each seat in the Shift, from 1; 0 if it has not finished; index = seat.",
         |row| row.seen.places.as_slice().into(),
     ),
     Column::new(
@@ -269,37 +269,37 @@ pub(super) const COLUMNS: &[Column<DecisionRow>] = &[
     Column::new(
         "points",
         Type::List(&Type::Uint64),
-        "Points of each seat in the Shifts before, index = seat.",
+        "Points of each seat from earlier Shifts, index = seat.",
         |row| row.seen.points.as_slice().into(),
     ),
     Column::new(
         "played",
         COUNTS,
-        "Cards played so far in the Shift by anybody, F+1 counts.",
+        "Cards played so far in the Shift by all seats, F+1 counts.",
         |row| row.cards(row.seen.played),
     ),
     Column::new(
         "gave",
         COUNTS,
-        "Cards the seat gave in the Shift's exchange, F+1 counts; null if none, or not known.",
+        "Cards the seat gave in the Shift's exchange, F+1 counts; null if none or unknown.",
         |row| row.exchanged(row.seen.gave, row.gave_known),
     ),
     Column::new(
         "received",
         COUNTS,
-        "Cards the seat received in the Shift's exchange, F+1 counts; null if none, or not known.",
+        "Cards the seat received in the Shift's exchange, F+1 counts; null if none or unknown.",
         |row| row.exchanged(row.seen.received, row.received_known),
     ),
     Column::new(
         "mask",
         Type::Binary,
-        "Legal actions as bits: bit i%8 of byte i/8 is action i (numpy.unpackbits with bitorder=\"little\"); null where the hand is not known.",
+        "Legal actions as bits: bit i%8 of byte i/8 is action i (numpy.unpackbits with bitorder=\"little\"); null if the hand is unknown.",
         |row| row.known(Value::Binary(row.mask.to_bytes(row.game.actions))),
     ),
     Column::new(
         "legal_actions",
         Type::List(&Type::Uint16),
-        "The same as ascending indices; null where the hand is not known.",
+        "Legal actions as ascending indices; null if the hand is unknown.",
         |row| {
             row.known(Value::List(
                 row.mask
@@ -309,58 +309,55 @@ pub(super) const COLUMNS: &[Column<DecisionRow>] = &[
             ))
         },
     ),
-    Column::new(
-        "action",
-        Type::Uint16,
-        "The action taken, by its index.",
-        |row| row.action.into(),
-    ),
+    Column::new("action", Type::Uint16, "Index of the action.", |row| {
+        row.action.into()
+    }),
     Column::new(
         "text",
         Type::Text,
-        "The action taken, in text: `C{face};Q{quantity};J{jokers}`, `pass`, `give C{face}`, `give J`, `declare` or `decline`.",
+        "The action as text: `C{face};Q{quantity};J{jokers}`, `pass`, `give C{face}`, `give J`, `declare` or `decline`.",
         |row| (&row.text).into(),
     ),
     Column::new(
         "valid",
         Type::Bool,
-        "Whether the decision was reached without an invalid attempt.",
+        "Whether there was no invalid attempt before the decision.",
         |row| row.invalid_attempts.is_empty().into(),
     ),
     Column::new(
         "invalid_count",
         Type::Uint32,
-        "Number of invalid attempts before it.",
+        "Number of invalid attempts before the decision.",
         |row| Value::Uint(row.invalid_attempts.len() as u64),
     ),
     Column::new(
         "invalid_attempts",
         Type::List(&Type::Uint32),
-        "The invalid attempts, by index, in order.",
+        "Indices of the invalid attempts, in order.",
         |row| (&row.invalid_attempts).into(),
     ),
     Column::new(
         "source",
         Type::Text,
-        "Who decided: `agent` (the seat's own player), `substitute` (a built-in agent in its place), `timeout`, `invalid` or `disconnected` (the default decision, and why), `recorded` (taken over from the game that this one branched from).",
+        "Who decided: `agent` (the seat's own player), `substitute` (a built-in agent in its place), `timeout`, `invalid` or `disconnected` (the default decision, with its reason), `recorded` (taken over from the parent game of a branch).",
         |row| row.source.into(),
     ),
     Column::new(
         "decision_time_us",
         Type::Uint64,
-        "Measured time of the decision, microseconds; null for built-in agents, substitutes and recorded decisions, and where nobody measured it.",
+        "Measured decision time, microseconds; null for built-in agents, substitutes and recorded decisions, and if not measured.",
         |row| row.decision_time_us.into(),
     ),
     Column::new(
         "elapsed_ms",
         Type::Uint64,
-        "When it was taken, milliseconds since the room was created.",
+        "Time of the decision, milliseconds since the room was created.",
         |row| row.elapsed_ms.into(),
     ),
     Column::new(
         "expressions",
         Type::List(&EXPRESSION),
-        "The latest expression of who sits on each seat, before the decision, index = seat, null where there was none; `public` tells those that the room was told from those for the record only, `age_ms` is its age in milliseconds.",
+        "The last expression of each participant before the decision, index = seat, null if none; `public` is false for expressions for the record only, `age_ms` is the age in milliseconds.",
         |row| {
             Value::List(
                 row.expressions
@@ -407,60 +404,59 @@ pub(super) const COLUMNS: &[Column<DecisionRow>] = &[
     Column::new(
         "invalid_reward_validity",
         Type::Float32,
-        "What the invalid attempts before it brought by `validity`, summed.",
+        "Total reward of the invalid attempts before the decision by `validity`.",
         |row| row.invalid_rewards[0].into(),
     ),
     Column::new(
         "invalid_reward_paper",
         Type::Float32,
-        "What they brought by `paper`.",
+        "The same by `paper`.",
         |row| row.invalid_rewards[1].into(),
     ),
     Column::new(
         "invalid_reward_paper_intended",
         Type::Float32,
-        "What they brought by `paper_intended`.",
+        "The same by `paper_intended`.",
         |row| row.invalid_rewards[2].into(),
     ),
     Column::new(
         "invalid_reward_winning",
         Type::Float32,
-        "What they brought by `winning`.",
+        "The same by `winning`.",
         |row| row.invalid_rewards[3].into(),
     ),
     Column::new(
         "invalid_reward_points",
         Type::Float32,
-        "What they brought by `points`.",
+        "The same by `points`.",
         |row| row.invalid_rewards[4].into(),
     ),
     Column::new(
         "shift_points",
         Type::Uint32,
-        "The seat's points of this Shift; null if the Shift was not played to its end.",
+        "Points of the seat in this Shift; null if the Shift was aborted.",
         |row| row.shift_points.into(),
     ),
     Column::new(
         "shift_place",
         Type::Uint8,
-        "The seat's place in this Shift, from 1; null if the Shift was not played to its end.",
+        "Place of the seat in this Shift, from 1; null if the Shift was aborted.",
         |row| row.shift_place.into(),
     ),
     Column::new(
         "game_points",
         Type::Uint64,
-        "The seat's points at the end of the game; null for an aborted game.",
+        "Points of the seat at the end of the game; null if the game was aborted.",
         |row| row.game_points.into(),
     ),
     Column::new(
         "game_place",
         Type::Uint8,
-        "The seat's place in the game, from 1; null for an aborted game.",
+        "Place of the seat in the game, from 1; null if the game was aborted.",
         |row| row.game_place.into(),
     ),
 ];
 
-/// Names, types and descriptions of the columns.
 pub(super) fn columns() -> Vec<ColumnInfo> {
     COLUMNS.iter().map(Column::info).collect()
 }

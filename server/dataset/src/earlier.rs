@@ -1,4 +1,5 @@
-//! What may be replaced: an earlier dataset, and nothing but that. A folder in which anything else lies is left as it is.
+//! Recognizes an earlier dataset, the only thing an export replaces. A folder with any other file
+//! is left unchanged.
 
 use std::collections::BTreeSet;
 use std::fs::File;
@@ -8,38 +9,37 @@ use std::path::{Path, PathBuf};
 use super::card;
 use super::folder::{CHECKSUMS, FolderError};
 
-/// Bytes of a list of checksums that are read: a hundred characters for each of half a million files. What is listed behind them counts as
+/// The most bytes read of a list of checksums: half a million files. Later entries count as
 /// foreign.
 const MAX_CHECKSUMS: u64 = 64 * 1024 * 1024;
-/// Bytes of a card that are read: its front matter takes few of them.
+/// The most bytes read of a card.
 const MAX_FRONT_MATTER: u64 = 64 * 1024;
 
-/// A dataset that lies in a folder: whatever is in the folder, each file listed in its checksums.
+/// A dataset: all files of a folder, each listed in its checksums.
 #[derive(Debug)]
 pub(super) struct EarlierDataset {
-    /// Its files, with their paths.
     files: Vec<PathBuf>,
-    /// Its folders, each before those within it.
+    /// Parents come before their subfolders.
     folders: Vec<PathBuf>,
 }
 
 impl EarlierDataset {
-    /// The dataset in a folder.
+    /// Reads the dataset in a folder.
     ///
     /// # Errors
-    /// The folder holds none, or something else as well.
+    /// The folder contains no dataset, or other files too.
     pub(super) fn of(folder: &Path) -> Result<Self, FolderError> {
-        let no_dataset = |why: String| FolderError::NoDataset {
+        let not_a_dataset = |why: String| FolderError::NotADataset {
             folder: folder.to_path_buf(),
             why,
         };
         let sums = beginning(&folder.join(CHECKSUMS), MAX_CHECKSUMS)
-            .map_err(|_| no_dataset(format!("it has no file {CHECKSUMS}")))?;
+            .map_err(|_| not_a_dataset(format!("it has no file {CHECKSUMS}")))?;
         let is_ours = beginning(&folder.join(card::FILE_NAME), MAX_FRONT_MATTER)
             .is_ok_and(|text| card::is_ours(&text));
         if !is_ours {
-            return Err(no_dataset(format!(
-                "its {} is not a dataset card of ours",
+            return Err(not_a_dataset(format!(
+                "its {} was not written by this program",
                 card::FILE_NAME
             )));
         }
@@ -64,8 +64,8 @@ impl EarlierDataset {
                     dataset.folders.push(path);
                 } else {
                     let name = path.strip_prefix(folder).unwrap_or(&path);
-                    return Err(no_dataset(format!(
-                        "{} is in it, which {CHECKSUMS} does not list",
+                    return Err(not_a_dataset(format!(
+                        "it contains {}, which {CHECKSUMS} does not list",
                         name.display()
                     )));
                 }
@@ -74,14 +74,14 @@ impl EarlierDataset {
         Ok(dataset)
     }
 
-    /// Removes what was found, and the folder if nothing has come into it since.
+    /// Removes the files, and the folders unless something was added since.
     pub(super) fn remove(self) -> io::Result<()> {
         self.files.iter().try_for_each(std::fs::remove_file)?;
         self.folders.iter().rev().try_for_each(std::fs::remove_dir)
     }
 }
 
-/// What is in a folder, by name. Links are not followed.
+/// The entries of a folder, by name. Does not follow links.
 fn entries(folder: &Path) -> Result<Vec<(PathBuf, std::fs::FileType)>, FolderError> {
     let entry_of = |entry: io::Result<std::fs::DirEntry>| {
         let entry = entry?;
@@ -97,7 +97,7 @@ fn entries(folder: &Path) -> Result<Vec<(PathBuf, std::fs::FileType)>, FolderErr
     Ok(entries)
 }
 
-/// The beginning of a file of text; what is no text in it becomes a mark.
+/// The beginning of a text file, with invalid UTF-8 replaced.
 fn beginning(path: &Path, most: u64) -> io::Result<String> {
     let mut bytes = Vec::new();
     File::open(path)?.take(most).read_to_end(&mut bytes)?;

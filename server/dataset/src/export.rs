@@ -1,5 +1,5 @@
-//! Exporting: records are read one after the other, replayed, filtered and written, so that memory holds one game at a time; at the end the
-//! dataset card and the checksums, and the folder is put in its place. Nothing is put there if something fails.
+//! Exports records: reads, verifies, filters and writes one game at a time, then writes the card
+//! and checksums and moves the folder into place. A failure leaves the target unchanged.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::io::{self, Write as _};
@@ -24,79 +24,79 @@ pub(super) const DECISIONS: &str = "decisions";
 /// Name of the table of expressions.
 pub(super) const EXPRESSIONS: &str = "expressions";
 
-/// Damaged records that an error names.
+/// The most damaged records listed in an error.
 const NAMED_DAMAGES: usize = 10;
 
-/// How a dataset is laid out.
+/// The layout of a dataset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Layout {
-    /// Two tables over all games.
+    /// Two tables of all games.
     Tables,
-    /// A CSV file for each game, in the columns of the reference implementation.
+    /// One CSV file per game, in the columns of the reference implementation.
     ChefsHatGym,
 }
 
-/// Which games are wanted: all conditions must hold.
+/// Which games to export; all conditions must hold.
 #[derive(Debug, Clone, Default)]
 pub struct Filter {
-    /// Games that were played to their end alone.
+    /// Only finished games.
     pub finished_only: bool,
-    /// Games of rooms of this name alone.
+    /// Only games of rooms with this name.
     pub room_name: Option<String>,
-    /// Games with at least one player of this kind alone: `agent`, `human`, `robot` or `built_in`.
+    /// Only games with at least one player of this kind: `agent`, `human`, `robot` or `built_in`.
     pub player_kind: Option<String>,
 }
 
-/// What is to be exported, and how.
+/// The settings of an export.
 #[derive(Debug, Clone)]
 pub struct Export {
-    /// The folder to make.
+    /// The target folder.
     pub out: PathBuf,
-    /// Whether an earlier dataset there may be replaced.
+    /// Whether to replace an earlier dataset.
     pub replace: bool,
     /// The layout.
     pub layout: Layout,
-    /// The formats of the tables; the other layout is CSV whatever stands here.
+    /// The formats of the tables; ignored by the other layout, which is CSV.
     pub formats: Vec<Format>,
-    /// Which games are wanted.
+    /// Which games to export.
     pub filter: Filter,
-    /// Whether records that do not replay are left out instead of failing the export.
+    /// Whether to skip damaged records instead of failing.
     pub skip_damaged: bool,
     /// Licence of the dataset, as an SPDX identifier.
     pub licence: String,
-    /// Version of the program that exports, for the card.
+    /// Version of the exporting program, for the card.
     pub version: String,
 }
 
-/// A record that was left out, and why.
+/// A skipped record.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LeftOut {
     /// The file.
     pub path: PathBuf,
-    /// What is wrong with it.
+    /// The reason.
     pub problem: String,
 }
 
-/// What an export came to.
+/// The result of an export.
 #[derive(Debug, Clone, Default)]
 pub struct Exported {
     /// Games.
     pub games: u64,
-    /// Games among them that were played to their end.
+    /// Finished games.
     pub finished: u64,
-    /// Decisions in them.
+    /// Decisions.
     pub decisions: u64,
-    /// Expressions in them (counted for the tables alone).
+    /// Expressions (counted only for tables).
     pub expressions: u64,
-    /// Games that the filter did not let through.
+    /// Games excluded by the filter.
     pub filtered: u64,
-    /// Damaged records and repeated games.
+    /// Damaged records and duplicate games.
     pub left_out: Vec<LeftOut>,
-    /// The files, but for the list of checksums.
+    /// The files except the list of checksums.
     pub files: Vec<FileSummary>,
-    /// Games by where they came from.
+    /// Games by origin.
     pub(super) origins: BTreeMap<&'static str, u64>,
-    /// Seats by the kind of their player.
+    /// Seats by kind of player.
     pub(super) kinds: BTreeMap<&'static str, u64>,
     /// Versions of the servers that hosted the games.
     pub(super) servers: BTreeSet<String>,
@@ -104,52 +104,52 @@ pub struct Exported {
     pub(super) rules_versions: BTreeSet<u32>,
 }
 
-/// Why nothing was exported.
+/// A failed export.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
-    /// The filter let no game through, or all were left out.
-    #[error("of {records} records none is left to export")]
+    /// All games were filtered or skipped.
+    #[error("none of {records} records is left to export")]
     NothingLeft {
-        /// Records looked at.
+        /// The number of records read.
         records: usize,
     },
-    /// Records do not replay.
+    /// Some records are damaged.
     #[error("{}", damages(.named, *.more))]
     Damaged {
         /// The first of them.
         named: Vec<LeftOut>,
-        /// How many more there are.
+        /// The number of further ones.
         more: u64,
     },
-    /// The folder cannot be made.
+    /// The target folder is unsuitable.
     #[error(transparent)]
     Folder(#[from] FolderError),
-    /// A file of the dataset cannot be written.
+    /// A file cannot be written.
     #[error("the dataset cannot be written to {path}: {source}")]
     Write {
-        /// The folder in the making.
+        /// The folder being written.
         path: PathBuf,
-        /// What the system said.
+        /// The cause.
         source: io::Error,
     },
 }
 
 fn damages(named: &[LeftOut], more: u64) -> String {
-    let mut text = String::from("nothing was exported, because records are damaged:\n");
+    let mut text = String::from("nothing was exported because of damaged records:\n");
     for LeftOut { path, problem } in named {
         text.push_str(&format!("  {}: {problem}\n", path.display()));
     }
     if more > 0 {
         text.push_str(&format!("  and {more} more\n"));
     }
-    text + "leave them out with --skip-damaged"
+    text + "use --skip-damaged to leave them out"
 }
 
 impl Export {
-    /// Exports the records, in their order. `progress` is told the size of each file that is done.
+    /// Exports the records in order. Calls `progress` with the size of each file read.
     ///
     /// # Errors
-    /// Whatever stands in the way; the folder is then as it was.
+    /// The first failure; the target is then unchanged.
     pub fn run(
         &self,
         records: &[RecordFile],
@@ -170,9 +170,9 @@ impl Export {
                     damaged += 1;
                     Some(problem)
                 }
-                // Nothing will come of it: only the damages are still looked for.
+                // The export has failed: keep looking for damaged records only.
                 Ok(_) if damaged > 0 && !self.skip_damaged => None,
-                Ok(game) if !self.filter.lets_through(game.info()) => {
+                Ok(game) if !self.filter.includes(game.info()) => {
                     exported.filtered += 1;
                     None
                 }
@@ -209,10 +209,10 @@ impl Export {
         Ok(exported)
     }
 
-    /// Reads and replays a record.
+    /// Reads and verifies a record.
     fn read(&self, path: &Path) -> Result<Game, String> {
         let lines = jsonl::read(path).map_err(|error| match error {
-            // The path is told by whoever tells the problem.
+            // The caller reports the path.
             RecordFileError::Io { source, .. } => source.to_string(),
             RecordFileError::Line { line, problem, .. } => format!("line {line} {problem}"),
         })?;
@@ -237,7 +237,7 @@ fn damaged_error(mut damaged: Vec<LeftOut>) -> ExportError {
 }
 
 impl Filter {
-    fn lets_through(&self, game: &GameInfo) -> bool {
+    fn includes(&self, game: &GameInfo) -> bool {
         (game.finished || !self.finished_only)
             && self
                 .room_name
@@ -271,7 +271,7 @@ impl Exported {
     }
 }
 
-/// A game, ready to be written.
+/// A game to write.
 enum Game {
     Rows(GameRows),
     Sheet(GameInfo, Sheet),
@@ -286,7 +286,7 @@ impl Game {
     }
 }
 
-/// Where games are written.
+/// The output of an export.
 enum Sink<'a> {
     Tables {
         decisions: Table<DecisionRow>,
@@ -334,7 +334,7 @@ impl<'a> Sink<'a> {
                 files.push(sheet.write(SummedFile::create(folder, &path)?)?);
                 Ok(())
             }
-            _ => unreachable!("games are read for the layout that they are written in"),
+            _ => unreachable!("games are read for the layout of the export"),
         }
     }
 

@@ -1,4 +1,4 @@
-//! Files that are summed up while they are written: their size and SHA-256, as dataset cards and `SHA256SUMS` state them.
+//! Files with size and SHA-256 computed while writing, for dataset cards and `SHA256SUMS`.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
@@ -9,11 +9,11 @@ use sha2::{Digest as _, Sha256};
 /// A file of a dataset.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FileSummary {
-    /// Its path within the dataset's folder, with `/` between folders.
+    /// The path in the dataset, separated by `/`.
     pub path: String,
-    /// Its size.
+    /// Size in bytes.
     pub bytes: u64,
-    /// SHA-256 of its content, lower-case hexadecimal digits.
+    /// SHA-256, lower-case hexadecimal.
     pub sha256: String,
 }
 
@@ -26,21 +26,21 @@ pub(super) struct SummedFile {
 }
 
 impl SummedFile {
-    /// A new file at `path` within `folder`; folders between are made.
+    /// Creates a file at `path` in `folder`, with its parent folders.
     pub(super) fn create(folder: &Path, path: &str) -> io::Result<Self> {
-        let whole = folder.join(path);
-        if let Some(parent) = whole.parent() {
+        let target = folder.join(path);
+        if let Some(parent) = target.parent() {
             std::fs::create_dir_all(parent)?;
         }
         Ok(Self {
             path: path.to_owned(),
-            file: BufWriter::new(File::create_new(whole)?),
+            file: BufWriter::new(File::create_new(target)?),
             hash: Sha256::new(),
             bytes: 0,
         })
     }
 
-    /// Ends the file, safe on disk.
+    /// Syncs the file and returns its summary.
     pub(super) fn finish(self) -> io::Result<FileSummary> {
         self.file.into_inner()?.sync_all()?;
         Ok(FileSummary {

@@ -1,5 +1,4 @@
-//! The folder of a dataset: made beside its place, whole or not at all, and moved there when it is complete. What may be replaced by it is
-//! decided in `earlier`.
+//! The folder of a dataset: written beside its target and moved into place when complete.
 
 use std::ffi::{OsStr, OsString};
 use std::io;
@@ -11,40 +10,40 @@ use super::earlier::EarlierDataset;
 use super::files::FileSummary;
 use chefshat_record::atomic_file::sync_folder_of;
 
-/// The file that lists the SHA-256 of the others, in the form that `sha256sum --check` reads.
+/// The list of checksums, in the format of `sha256sum --check`.
 pub(super) const CHECKSUMS: &str = "SHA256SUMS";
 
-/// Why a folder cannot be where a dataset goes.
+/// Why a folder cannot be the target.
 #[derive(Debug, thiserror::Error)]
 pub enum FolderError {
-    /// The path ends in no name.
-    #[error("{0} is no name for a new folder")]
+    /// The path has no final name.
+    #[error("{0} cannot be the name of a new folder")]
     NoName(PathBuf),
-    /// Something else is there.
+    /// The target is not a folder.
     #[error("{0} is not a folder")]
     NotAFolder(PathBuf),
-    /// The folder holds something, and replacing was not asked for.
+    /// The folder is not empty, and replacing was not requested.
     #[error("{0} is not empty; choose another folder, or replace the dataset in it with --force")]
     NotEmpty(PathBuf),
-    /// Replacing was asked for, but what is there is no dataset, or not only that.
-    #[error("{folder} holds something else than a dataset, so it is not replaced: {why}")]
-    NoDataset {
+    /// Replacing was requested, but the folder contains other files.
+    #[error("{folder} is not replaced, because it is not only a dataset: {why}")]
+    NotADataset {
         /// The folder.
         folder: PathBuf,
-        /// What is missing in it, or the first foreign file.
+        /// The missing or first foreign file.
         why: String,
     },
-    /// The file system refused.
+    /// An error of the file system.
     #[error("{path}: {source}")]
     Io {
         /// The file or folder.
         path: PathBuf,
-        /// What the system said.
+        /// The cause.
         source: io::Error,
     },
 }
 
-/// A folder in the making. What was made is removed again unless it is put in its place.
+/// A folder being written. Removed on drop unless moved into place.
 pub(super) struct NewFolder {
     target: PathBuf,
     parts: TempDir,
@@ -52,8 +51,8 @@ pub(super) struct NewFolder {
 }
 
 impl NewFolder {
-    /// A folder that will be `target`, which must be empty or not exist; with `replace` an earlier dataset may be there. If `target` is a
-    /// link, what it leads to is meant.
+    /// Starts a folder for `target`, which must be empty or not exist; with `replace` it may be an
+    /// earlier dataset. Follows a link.
     pub(super) fn begin(target: &Path, replace: bool) -> Result<Self, FolderError> {
         let target = &match target.is_symlink() {
             true => std::fs::canonicalize(target).map_err(|source| FolderError::Io {
@@ -77,12 +76,12 @@ impl NewFolder {
         })
     }
 
-    /// Where files are written for now.
+    /// The folder to write to.
     pub(super) fn path(&self) -> &Path {
         self.parts.path()
     }
 
-    /// Writes the list of checksums and puts the folder in its place.
+    /// Writes the checksums and moves the folder into place.
     pub(super) fn put_in_place(self, files: &[FileSummary]) -> Result<(), FolderError> {
         let target = self.target.clone();
         let io = |source| FolderError::Io {
@@ -98,7 +97,7 @@ impl NewFolder {
         std::fs::File::open(&sums_path)
             .and_then(|file| file.sync_all())
             .map_err(io)?;
-        // Somebody may have used the place meanwhile.
+        // The target may have changed meanwhile.
         check_target(&self.target, self.replace)?;
         let parts = self.parts.path();
         let old = parts.with_extension("old");
@@ -106,7 +105,7 @@ impl NewFolder {
         let mut earlier = None;
         if replaced {
             std::fs::rename(&self.target, &old).map_err(io)?;
-            // What lies there now is what will be removed, and nobody finds it by its name any more.
+            // Check again what will be removed, now that no other program finds it by its name.
             earlier = contents(&old).or_else(|error| {
                 std::fs::rename(&old, &self.target).map_err(io)?;
                 Err(error)
@@ -114,7 +113,7 @@ impl NewFolder {
         }
         if let Err(error) = std::fs::rename(parts, &self.target) {
             if replaced {
-                // As it was; if even that fails, the old folder still lies beside.
+                // If restoring fails too, the old folder remains beside the target.
                 let _ = std::fs::rename(&old, &self.target);
             }
             return Err(io(error));
@@ -124,7 +123,7 @@ impl NewFolder {
             None if replaced => std::fs::remove_dir(&old).map_err(io)?,
             None => {}
         }
-        // Not every file system can sync a folder, and the files in it are safe already.
+        // Not every file system can sync a folder; its files are synced already.
         let _ = sync_folder_of(&self.target);
         Ok(())
     }
@@ -146,7 +145,7 @@ fn check_target(target: &Path, replace: bool) -> Result<(), FolderError> {
     }
 }
 
-/// The dataset in a folder; `None` if the folder is empty.
+/// The dataset in a folder; `None` if empty.
 fn contents(folder: &Path) -> Result<Option<EarlierDataset>, FolderError> {
     if is_empty(folder)? {
         Ok(None)

@@ -1,5 +1,5 @@
-//! The files that a table is written into, and the two text formats among them: CSV, whose lists and structs are JSON in a cell, and JSON
-//! Lines. Parquet is in `parquet`.
+//! The files of a table: CSV, with lists and structs as JSON, JSON Lines, and Parquet (in
+//! `parquet`).
 
 use std::io::{self, Write as _};
 use std::path::Path;
@@ -15,17 +15,17 @@ use super::parquet::ParquetFile;
 pub enum Format {
     /// Apache Parquet, compressed with zstd.
     Parquet,
-    /// JSON Lines: an object a line.
+    /// JSON Lines: one object per line.
     Jsonl,
     /// Comma-separated values with a header.
     Csv,
 }
 
 impl Format {
-    /// All formats, the one to prefer first.
+    /// All formats, the preferred one first.
     pub const ALL: [Format; 3] = [Format::Parquet, Format::Jsonl, Format::Csv];
 
-    /// Its name, which is also the ending of its files.
+    /// Its name and file extension.
     pub const fn name(self) -> &'static str {
         match self {
             Format::Parquet => "parquet",
@@ -34,28 +34,28 @@ impl Format {
         }
     }
 
-    /// The format of a name.
+    /// The format with this name.
     pub fn from_name(name: &str) -> Option<Format> {
         Format::ALL.into_iter().find(|format| format.name() == name)
     }
 }
 
-/// A file that takes rows.
+/// A file of rows.
 pub(super) trait RowFile {
-    /// Adds a row: a value for each column.
+    /// Adds a row, one value per column.
     fn write(&mut self, row: &[Value]) -> io::Result<()>;
-    /// Ends the file.
+    /// Completes the file.
     fn finish(self: Box<Self>) -> io::Result<FileSummary>;
 }
 
-/// A table being written into one file of each format.
+/// A table being written in several formats.
 pub(super) struct Table<R: 'static> {
     columns: &'static [Column<R>],
     files: Vec<Box<dyn RowFile>>,
 }
 
 impl<R> Table<R> {
-    /// A table of this name in `folder`.
+    /// Creates the files in `folder`.
     pub(super) fn create(
         folder: &Path,
         name: &str,
@@ -69,7 +69,7 @@ impl<R> Table<R> {
                 let file = SummedFile::create(folder, &file_name(name, *format))?;
                 Ok(match format {
                     Format::Parquet => {
-                        Box::new(ParquetFile::new(file, &infos)?) as Box<dyn RowFile>
+                        Box::new(ParquetFile::new(file, infos.clone())?) as Box<dyn RowFile>
                     }
                     Format::Jsonl => Box::new(JsonlFile::new(file, infos.clone())),
                     Format::Csv => Box::new(CsvFile::new(file, infos.clone())?),
@@ -79,7 +79,6 @@ impl<R> Table<R> {
         Ok(Self { columns, files })
     }
 
-    /// Adds rows.
     pub(super) fn write(&mut self, rows: &[R]) -> io::Result<()> {
         for row in rows {
             let cells: Vec<Value> = self
@@ -94,13 +93,12 @@ impl<R> Table<R> {
         Ok(())
     }
 
-    /// Ends the files.
     pub(super) fn finish(self) -> io::Result<Vec<FileSummary>> {
         self.files.into_iter().map(RowFile::finish).collect()
     }
 }
 
-/// The file of a table.
+/// The name of a table's file.
 pub(super) fn file_name(table: &str, format: Format) -> String {
     format!("{table}.{}", format.name())
 }
@@ -121,6 +119,7 @@ impl RowFile for JsonlFile {
         let object = Object {
             columns: &self.columns,
             row,
+            encoding: Encoding::Text,
         };
         serde_json::to_writer(&mut self.file, &object)?;
         self.file.write_all(b"\n")
@@ -150,6 +149,7 @@ impl RowFile for CsvFile {
             let cell = Cell {
                 of: column.of,
                 value,
+                encoding: Encoding::Text,
             };
             match value {
                 Value::Null => self.file.write_field("")?,
@@ -173,32 +173,54 @@ impl RowFile for CsvFile {
     }
 }
 
-/// A row as a JSON object.
-struct Object<'a> {
-    columns: &'a [ColumnInfo],
-    row: &'a [Value],
+/// A row as an object.
+pub(super) struct Object<'a> {
+    pub(super) columns: &'a [ColumnInfo],
+    pub(super) row: &'a [Value],
+    pub(super) encoding: Encoding,
+}
+
+/// How binary values and times are serialized.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Encoding {
+    /// As hexadecimal and RFC 3339, for JSON and CSV.
+    Text,
+    /// As bytes and microseconds, for Arrow.
+    Arrow,
 }
 
 impl Serialize for Object<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(Some(self.row.len()))?;
         for (column, value) in self.columns.iter().zip(self.row) {
-            let of = column.of;
-            map.serialize_entry(column.name, &Cell { of, value })?;
+            let cell = Cell {
+                of: column.of,
+                value,
+                encoding: self.encoding,
+            };
+            map.serialize_entry(column.name, &cell)?;
         }
         map.end()
     }
 }
 
-/// A value as JSON; structs need their type for the names of the fields.
+/// A value with its type, which has the names of struct fields.
 struct Cell<'a> {
     of: Type,
     value: &'a Value,
+    encoding: Encoding,
 }
 
 impl Serialize for Cell<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let encoding = self.encoding;
         match (self.value, self.of) {
+            (Value::Binary(value), _) if encoding == Encoding::Arrow => {
+                serializer.serialize_bytes(value)
+            }
+            (Value::Time(value), _) if encoding == Encoding::Arrow => {
+                serializer.serialize_i64(*value)
+            }
             (Value::Bool(value), _) => serializer.serialize_bool(*value),
             (Value::Uint(value), _) => serializer.serialize_u64(*value),
             (Value::Float(value), _) => serializer.serialize_f32(*value),
@@ -208,18 +230,29 @@ impl Serialize for Cell<'_> {
             (Value::List(values), Type::List(of)) => {
                 let mut list = serializer.serialize_seq(Some(values.len()))?;
                 for value in values {
-                    list.serialize_element(&Cell { of: *of, value })?;
+                    list.serialize_element(&Cell {
+                        of: *of,
+                        value,
+                        encoding,
+                    })?;
                 }
                 list.end()
             }
             (Value::Struct(values), Type::Struct(fields)) => {
                 let mut map = serializer.serialize_map(Some(values.len()))?;
                 for ((name, of), value) in fields.iter().zip(values) {
-                    map.serialize_entry(name, &Cell { of: *of, value })?;
+                    map.serialize_entry(
+                        name,
+                        &Cell {
+                            of: *of,
+                            value,
+                            encoding,
+                        },
+                    )?;
                 }
                 map.end()
             }
-            (Value::Null | Value::List(_) | Value::Struct(_), _) => serializer.serialize_unit(),
+            (Value::Null | Value::List(_) | Value::Struct(_), _) => serializer.serialize_none(),
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Whose game a row is of: what the header and the footer of its record say, and who sits where. The rows themselves are in `gather`.
+//! The game of a row, from the header and footer of its record.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use chefshat_record::replay::{ReplayError, replay};
 /// The origin of games of real tables.
 pub(super) const IMPORTED: &str = "imported";
 
-/// What all rows of a game share.
+/// The values shared by all rows of a game.
 #[derive(Debug)]
 pub(super) struct GameInfo {
     pub(super) game_id: String,
@@ -20,18 +20,18 @@ pub(super) struct GameInfo {
     pub(super) rules: String,
     pub(super) rule_set: RuleSet,
     pub(super) rules_version: u32,
-    /// Microseconds since the Unix epoch; `None` for a game that no clock saw.
+    /// Microseconds since the Unix epoch; `None` for a simulated game.
     pub(super) created_at: Option<i64>,
     pub(super) finished: bool,
     pub(super) players: u8,
     /// Size of the action space.
     pub(super) actions: u16,
     pub(super) server_version: String,
-    /// Who sat there when the game began, by seat.
+    /// The participants at the start of the game, by seat.
     pub(super) seats: Vec<Arc<SeatInfo>>,
 }
 
-/// Who sits on a seat.
+/// A participant.
 #[derive(Debug)]
 pub(super) struct SeatInfo {
     pub(super) name: String,
@@ -40,7 +40,7 @@ pub(super) struct SeatInfo {
 }
 
 impl SeatInfo {
-    /// Whoever has this name and kind; `built_in` is empty where it is no built-in agent.
+    /// `built_in` is empty unless the participant is a built-in agent.
     pub(super) fn new(name: &str, kind: v1::ParticipantKind, built_in: &str) -> Self {
         let built_in = Some(built_in).filter(|name| !name.is_empty());
         Self {
@@ -56,12 +56,12 @@ impl SeatInfo {
     }
 }
 
-/// What the header and the footer say of a game, before it is replayed.
+/// Reads the header and footer of a record, before its replay.
 ///
 /// # Errors
-/// The first line that does not fit, where these lines are not as they must be.
+/// The first wrong line, if these lines are invalid.
 pub(super) fn checked_info(lines: &[v1::RecordLine]) -> Result<GameInfo, ReplayError> {
-    // What a replay says of a line that makes no sense is more to the point.
+    // The replay reports invalid lines more precisely.
     game_info(lines).or_else(|error| replay(lines).and(Err(error)))
 }
 
@@ -84,7 +84,7 @@ fn game_info(lines: &[v1::RecordLine]) -> Result<GameInfo, ReplayError> {
     let rule_set = rules_from_proto(rules).map_err(|error| at_header(error.to_string()))?;
     if header.seats.len() != rule_set.players() {
         return Err(at_header(format!(
-            "the header names {} seats, but the rule set has {} players",
+            "the header has {} seats, but the rule set has {} players",
             header.seats.len(),
             rule_set.players()
         )));

@@ -1,9 +1,8 @@
-//! From a record to rows: what each decision's seat knew, did and got, and the expressions between. The record is replayed on the way, so
-//! that only records that fit together become rows. What a row's cells are is decided by the tables of columns.
+//! Gathers the rows of a record while verifying it.
 //!
-//! Rewards: a turn's row holds what the turn itself brought its seat, finishing included. What a seat gets when a Shift ends (the last
-//! seat's finishing part, everybody's points) falls to its last turn of that Shift, whoever took the turn that ended it. A seat that took
-//! no turn in a Shift has no row that could carry it.
+//! Rewards: the row of a turn has the reward of that turn, including for finishing. Rewards at the
+//! end of a Shift (the finishing part of the last seat, points) are added to the seat's last turn
+//! of that Shift. A seat without a turn in a Shift has no row for them.
 
 use std::sync::Arc;
 
@@ -16,7 +15,7 @@ use super::expressions::ExpressionRow;
 use super::game::{GameInfo, IMPORTED, SeatInfo, checked_info};
 use chefshat_record::replay::{Moment, ReplayError, walk};
 
-/// A seat's latest expression.
+/// The last expression of a seat.
 #[derive(Debug, Clone)]
 pub(super) struct LatestExpression {
     expression: Arc<v1::Expression>,
@@ -25,7 +24,7 @@ pub(super) struct LatestExpression {
 }
 
 impl LatestExpression {
-    /// Its fields, as the column of expressions has them, seen at a later moment.
+    /// The value in the column `expressions` at a later time.
     pub(super) fn value_at(&self, elapsed_ms: u64) -> Value {
         let expression = &self.expression;
         Value::Struct(vec![
@@ -45,16 +44,14 @@ impl LatestExpression {
 #[derive(Debug)]
 pub(super) struct GameRows {
     pub(super) game: Arc<GameInfo>,
-    /// Its decisions, in order.
     pub(super) decisions: Vec<DecisionRow>,
-    /// Its expressions, in order.
     pub(super) expressions: Vec<ExpressionRow>,
 }
 
-/// Replays a record and gathers its rows.
+/// Verifies a record and gathers its rows.
 ///
 /// # Errors
-/// The first line that does not fit.
+/// The first wrong line.
 pub(super) fn gather(lines: &[v1::RecordLine]) -> Result<GameRows, ReplayError> {
     let game = Arc::new(checked_info(lines)?);
     let mut gatherer = Gatherer::new(game);
@@ -65,25 +62,25 @@ pub(super) fn gather(lines: &[v1::RecordLine]) -> Result<GameRows, ReplayError> 
     }
 }
 
-/// What is known of a seat's part in an exchange.
+/// Whether the gifts of a seat are known.
 #[derive(Debug, Clone, Copy, Default)]
-struct Told {
+struct KnownGifts {
     gave: bool,
     received: bool,
 }
 
-/// Gathers rows while a record is replayed.
+/// Gathers the rows of a game.
 struct Gatherer {
     rows: GameRows,
-    /// The first row of the Shift being played.
+    /// The first row of the current Shift.
     shift_from: usize,
-    /// The row of each seat's last turn in this Shift.
+    /// The row of each seat's last turn in the Shift.
     last_turn: BySeat<Option<usize>>,
-    /// Seats that have got rid of their cards in this Shift.
+    /// The number of seats that finished in the Shift.
     finished: u8,
-    /// Whose gifts, and whose gains, of this Shift's exchange are known.
-    told: BySeat<Told>,
-    /// Who sits where by now: before the game begins seats may change hands.
+    /// Known gifts of the Shift's exchange.
+    known_gifts: BySeat<KnownGifts>,
+    /// The current participants, which can change before the game.
     sitting: Vec<Option<Arc<SeatInfo>>>,
     latest: Vec<Option<LatestExpression>>,
     problem: Option<ReplayError>,
@@ -92,9 +89,9 @@ struct Gatherer {
 impl Gatherer {
     fn new(game: Arc<GameInfo>) -> Self {
         let players = game.seats.len();
-        let from_the_start = |seat: &Arc<SeatInfo>| seat.built_in.is_some().then(|| seat.clone());
+        let built_in = |seat: &Arc<SeatInfo>| seat.built_in.is_some().then(|| seat.clone());
         Self {
-            sitting: game.seats.iter().map(from_the_start).collect(),
+            sitting: game.seats.iter().map(built_in).collect(),
             rows: GameRows {
                 game,
                 decisions: Vec::new(),
@@ -103,7 +100,7 @@ impl Gatherer {
             shift_from: 0,
             last_turn: BySeat::filled(players, None),
             finished: 0,
-            told: BySeat::filled(players, Told::default()),
+            known_gifts: BySeat::filled(players, KnownGifts::default()),
             latest: vec![None; players],
             problem: None,
         }
@@ -123,17 +120,17 @@ impl Gatherer {
                 }
                 Some(Kind::Vacated(vacated)) => self.sit(vacated.seat, None),
                 Some(Kind::ShiftStarted(_)) => {
-                    // Where hands are dealt nothing is hidden from the record.
+                    // Only imported records lack cards.
                     let all = self.rows.game.origin != IMPORTED;
-                    let told = Told {
+                    let known_gifts = KnownGifts {
                         gave: all,
                         received: all,
                     };
-                    self.told = BySeat::filled(self.told.len(), told);
+                    self.known_gifts = BySeat::filled(self.known_gifts.len(), known_gifts);
                 }
                 Some(Kind::CardsExchanged(exchanged)) if !exchanged.cards.is_empty() => {
-                    self.told[Seat::new(exchanged.giver as usize)].gave = true;
-                    self.told[Seat::new(exchanged.receiver as usize)].received = true;
+                    self.known_gifts[Seat::new(exchanged.giver as usize)].gave = true;
+                    self.known_gifts[Seat::new(exchanged.receiver as usize)].received = true;
                 }
                 Some(Kind::SeatFinished(finished)) => self.seat_finished(finished),
                 Some(Kind::ShiftEnded(ended)) => self.shift_ended(ended),
@@ -158,7 +155,7 @@ impl Gatherer {
         }
     }
 
-    /// Somebody takes a seat or leaves it. What was expressed on it before was another's.
+    /// Changes the participant of a seat, dropping the last expression.
     fn sit(&mut self, seat: u32, who: Option<SeatInfo>) {
         let seat = seat as usize;
         if let (Some(sitting), Some(latest)) =
@@ -189,7 +186,7 @@ impl Gatherer {
             let left = seen.cards_left[seat].saturating_sub(shed);
             rewards = RewardScheme::ALL.map(|scheme| scheme.turn(&rules, left, None));
             let attempts = record.invalid_attempts.len() as f32;
-            // Added to zero, because none of something negative is a negative zero.
+            // Added to zero to avoid a negative zero.
             invalid_rewards = RewardScheme::ALL.map(|scheme| 0.0 + attempts * scheme.invalid());
             self.last_turn[seat] = Some(self.rows.decisions.len());
         }
@@ -205,8 +202,8 @@ impl Gatherer {
             game: info,
             hand_known: moment.hands_known[seat],
             golden_known: moment.golden_known[seat],
-            gave_known: self.told[seat].gave,
-            received_known: self.told[seat].received,
+            gave_known: self.known_gifts[seat].gave,
+            received_known: self.known_gifts[seat].received,
             number: self.rows.decisions.len() as u64 + 1,
             decision_id: record.decision_id,
             turn: is_turn.then(|| game.shift_turns() + 1),
@@ -234,7 +231,7 @@ impl Gatherer {
         });
     }
 
-    /// The seat's last turn made it finish.
+    /// Rewards the last turn of a seat that finished.
     fn seat_finished(&mut self, finished: &v1::SeatFinished) {
         self.finished += 1;
         let seat = Seat::new(finished.seat as usize);
@@ -294,7 +291,7 @@ impl Gatherer {
         let (Some(latest), Some(expression)) = (self.latest.get_mut(seat), expression) else {
             self.problem.get_or_insert_with(|| ReplayError {
                 line,
-                problem: "an expression of nobody, or of nothing".into(),
+                problem: "the expression has an invalid seat or no content".into(),
             });
             return;
         };
@@ -326,7 +323,7 @@ fn source_name(source: DecisionSource) -> &'static str {
     }
 }
 
-/// Where an expression was read from, if that is said.
+/// The source of an expression, if stated.
 pub(super) fn expression_source(expression: &v1::Expression) -> Option<&'static str> {
     match expression.source() {
         v1::ExpressionSource::Unspecified => None,
@@ -337,7 +334,7 @@ pub(super) fn expression_source(expression: &v1::Expression) -> Option<&'static 
     }
 }
 
-/// Microseconds since the Unix epoch. Parts of a microsecond are dropped.
+/// Microseconds since the Unix epoch, truncated.
 pub(super) fn moment_us(moment: &chefshat_proto::Timestamp) -> i64 {
     moment
         .seconds

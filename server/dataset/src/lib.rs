@@ -1,5 +1,5 @@
-//! Records as datasets: two typed tables, one row for each decision and one for each expression, as Parquet, CSV and JSON Lines with a
-//! dataset card; or the columns of the older reference implementation. Reading command lines and showing progress is the server's.
+//! Datasets from records: typed tables of decisions and expressions as Parquet, CSV and JSON Lines
+//! with a dataset card, or the columns of the reference implementation.
 
 mod card;
 mod chefshatgym;
@@ -23,15 +23,16 @@ pub use files::FileSummary;
 pub use folder::FolderError;
 pub use formats::Format;
 
-/// Version of the tables' columns. It grows when a column changes its meaning or type, or goes; new columns at the end do not change it.
+/// Version of the tables. Incremented when a column changes its meaning or type or is removed, not
+/// when one is added at the end.
 pub const TABLES_VERSION: u32 = 1;
 
-/// Names, types and descriptions of the columns of the table of decisions.
+/// The columns of the table of decisions.
 pub fn decision_columns() -> Vec<ColumnInfo> {
     decisions::columns()
 }
 
-/// Names, types and descriptions of the columns of the table of expressions.
+/// The columns of the table of expressions.
 pub fn expression_columns() -> Vec<ColumnInfo> {
     expressions::columns()
 }

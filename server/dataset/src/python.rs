@@ -1,4 +1,4 @@
-//! Values as Python's `repr` writes them and `ast.literal_eval` reads them, and names that can be the keys of a dictionary.
+//! Python literals, readable by `ast.literal_eval`, and unique names for dictionary keys.
 
 use std::fmt::Write as _;
 
@@ -15,7 +15,8 @@ pub(super) fn text(value: &str) -> String {
             '\\' => quoted.push_str("\\\\"),
             '\'' => quoted.push_str("\\'"),
             letter if letter.is_control() => {
-                write!(quoted, "\\U{:08x}", u32::from(letter)).expect("a String takes everything");
+                write!(quoted, "\\U{:08x}", u32::from(letter))
+                    .expect("writing to a String succeeds");
             }
             letter => quoted.push(letter),
         }
@@ -24,13 +25,13 @@ pub(super) fn text(value: &str) -> String {
     quoted
 }
 
-/// A list of values that are written already.
+/// A list of literals.
 pub(super) fn list(values: impl IntoIterator<Item: ToString>) -> String {
     let values: Vec<String> = values.into_iter().map(|value| value.to_string()).collect();
     format!("[{}]", values.join(", "))
 }
 
-/// A dictionary from names to values that are written already.
+/// A dictionary from names to literals.
 pub(super) fn dictionary<'a>(
     entries: impl IntoIterator<Item = (&'a str, impl ToString)>,
 ) -> String {
@@ -41,7 +42,7 @@ pub(super) fn dictionary<'a>(
     format!("{{{}}}", entries.join(", "))
 }
 
-/// The names, changed where one is empty, is `taken` or stands twice: then the seat is added to it.
+/// Makes names unique: adds the seat to those that are empty, duplicate or equal to `taken`.
 pub(super) fn unique_names(names: &[&str], taken: &str) -> Vec<String> {
     let mut unique: Vec<String> = Vec::with_capacity(names.len());
     for (seat, name) in names.iter().enumerate() {
@@ -51,7 +52,7 @@ pub(super) fn unique_names(names: &[&str], taken: &str) -> Vec<String> {
         } else {
             (*name).to_owned()
         };
-        // Somebody may bear the very name that was made for another.
+        // Another player may already have the resulting name.
         while unique.contains(&candidate) {
             candidate.push('\'');
         }
@@ -65,7 +66,7 @@ mod tests {
     use crate::python::*;
 
     #[test]
-    fn python_reads_it() {
+    fn literals_are_valid_python() {
         assert_eq!(text("it's a \\ and\n"), r"'it\'s a \\ and\U0000000a'");
         assert_eq!(list([1, 2]), "[1, 2]");
         assert_eq!(list([text("a")]), "['a']");
@@ -73,7 +74,7 @@ mod tests {
     }
 
     #[test]
-    fn every_player_has_a_name_of_its_own() {
+    fn names_are_unique() {
         let table: &[(&[&str], &[&str])] = &[
             (&["a", "b"], &["a", "b"]),
             (&["a", "a", "b"], &["a (seat 0)", "a (seat 1)", "b"]),

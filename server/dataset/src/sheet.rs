@@ -1,16 +1,15 @@
-//! The file of a game in the columns of the reference implementation. What stands in its rows is decided in `chefshatgym`.
+//! The CSV file of a game in the columns of the reference implementation.
 
 use std::io;
 
 use super::files::{FileSummary, SummedFile};
 
-/// Name of the file of a game.
+/// Name of the file.
 pub(super) const FILE_NAME: &str = "Dataset.pkl.csv";
 
-/// A cell of a row.
 type Cell = fn(&Row) -> &str;
 
-/// The columns in order, and where each stands in a row.
+/// The columns in order.
 const COLUMNS: [(&str, Cell); 15] = [
     ("Match", |row| &row.shift),
     ("Round", |row| &row.pizza),
@@ -29,7 +28,7 @@ const COLUMNS: [(&str, Cell); 15] = [
     ("Game_Performance_Score", |row| &row.performance),
 ];
 
-/// A row as cells of text; an empty cell is the reference's NaN.
+/// A row; an empty cell is the reference's NaN.
 #[derive(Default)]
 pub(super) struct Row {
     pub(super) shift: String,
@@ -52,12 +51,12 @@ pub(super) struct Row {
 /// The rows of one game.
 pub(super) struct Sheet {
     pub(super) rows: Vec<Row>,
-    /// Decisions in the game, of every kind.
+    /// The number of decisions in the game, of all kinds.
     pub(super) decisions: u64,
 }
 
 impl Sheet {
-    /// Writes the sheet as a CSV file.
+    /// Writes the file.
     pub(super) fn write(&self, file: SummedFile) -> io::Result<FileSummary> {
         let mut csv = csv::Writer::from_writer(file);
         csv.write_record(COLUMNS.map(|(name, _)| name))?;

@@ -1,5 +1,5 @@
-//! What a scene shows beyond the game itself: who sits at the table and what happened last. Fed with the events of a record, or of a
-//! room being watched.
+//! The participants and the last events of a game, which scenes show beside its state. Built from
+//! the events of a record or of a room.
 
 use std::collections::VecDeque;
 
@@ -9,52 +9,52 @@ use chefshat_proto::v1::{self, game_event::Kind};
 use super::scene::{self, Card};
 use chefshat_record::convert::{cards_from_numbers, seat_from_number};
 
-/// Most happenings that are kept.
+/// The most log entries.
 const LOG_LENGTH: usize = 9;
 
-/// Who sits on a seat.
+/// A participant.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Participant {
-    /// The name; empty while the seat is free.
+    /// Displayed name; empty while the seat is free.
     pub name: String,
-    /// What it is.
-    pub sort: Sort,
-    /// What has become of its connection.
+    /// Its kind.
+    pub kind: ParticipantKind,
+    /// Its connection.
     pub presence: Presence,
 }
 
-/// What a participant is.
+/// A kind of participant.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub enum Sort {
-    /// Not said.
+pub enum ParticipantKind {
+    /// Unknown.
     #[default]
-    Unsaid,
+    Unspecified,
     /// A person.
     Person,
     /// A robot.
     Robot,
     /// A program.
     Agent,
-    /// The server's own agent of this name.
+    /// The built-in agent of this name.
     BuiltIn(String),
 }
 
-/// Whether a participant decides for itself.
+/// Whether a participant is connected.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub enum Presence {
-    /// It does.
+    /// Connected.
     #[default]
     Here,
-    /// Its connection is lost.
+    /// Disconnected.
     Away,
-    /// The built-in agent of this name plays for it.
+    /// Substituted by the built-in agent of this name.
     Substituted(String),
 }
 
-/// One thing that happened, as the viewer may see it.
+/// An event, redacted for the viewer.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Happening {
-    /// Cards were dealt for this Shift.
+pub enum LogEntry {
+    /// This Shift was dealt.
     Dealt(u32),
     /// A seat played.
     Played {
@@ -62,56 +62,56 @@ pub enum Happening {
         seat: Seat,
         /// The cards.
         cards: Vec<Card>,
-        /// Why it was not the seat's own agent that decided, if so.
+        /// The reason if the participant did not decide.
         cause: Option<&'static str>,
     },
     /// A seat passed.
     Passed {
         /// The seat.
         seat: Seat,
-        /// Why it was not the seat's own agent that decided, if so.
+        /// The reason if the participant did not decide.
         cause: Option<&'static str>,
     },
-    /// A seat got rid of its last card.
+    /// A seat finished.
     Finished {
         /// The seat.
         seat: Seat,
         /// Its place, from 1.
         place: u32,
     },
-    /// A pizza was done.
+    /// A pizza ended.
     PizzaDone {
         /// Its number in the Shift, from 1.
         pizza: u32,
-        /// Who leads the next one.
+        /// The leader of the next one.
         next: Seat,
     },
     /// A seat declared a special action.
     Declared {
         /// The seat.
         seat: Seat,
-        /// Which.
+        /// The special action.
         special: SpecialAction,
     },
     /// Cards were given.
     Gave {
-        /// By whom.
+        /// The giver.
         giver: Seat,
-        /// To whom.
+        /// The receiver.
         receiver: Seat,
-        /// How many.
+        /// The number of cards.
         count: u32,
-        /// Which, where the viewer may know.
+        /// The cards, if the viewer may see them.
         cards: Option<Vec<Card>>,
     },
     /// A Shift ended.
     ShiftOver {
         /// Its number, from 1.
         shift: u32,
-        /// Who finished first.
+        /// The seat that finished first.
         winner: Seat,
     },
-    /// A seat showed an expression of this label.
+    /// A seat showed an expression.
     Expressed {
         /// The seat.
         seat: Seat,
@@ -120,7 +120,7 @@ pub enum Happening {
     },
 }
 
-/// Who sits at the table and what happened last.
+/// The participants and the last events of a game.
 #[derive(Debug, Clone)]
 pub struct Chronicle {
     caption: String,
@@ -128,14 +128,14 @@ pub struct Chronicle {
     faces: u8,
     golden_opening: bool,
     participants: Vec<Participant>,
-    log: VecDeque<Happening>,
+    log: VecDeque<LogEntry>,
     last_to_play: Option<Seat>,
-    /// No turn has been taken in this Shift.
+    /// Whether the Shift awaits its first turn.
     opening: bool,
 }
 
 impl Chronicle {
-    /// Of a game that begins: its name, its seats, its rules, and who looks at it.
+    /// The chronicle of a game at its start, for one viewer.
     pub fn new(
         caption: &str,
         seats: &[v1::Participant],
@@ -156,12 +156,12 @@ impl Chronicle {
         chronicle
     }
 
-    /// Name of the game.
+    /// Name of the room or record.
     pub fn caption(&self) -> &str {
         &self.caption
     }
 
-    /// Who sits on a seat.
+    /// A participant.
     pub fn participant(&self, seat: Seat) -> Participant {
         self.participants
             .get(seat.index())
@@ -169,33 +169,32 @@ impl Chronicle {
             .unwrap_or_default()
     }
 
-    /// Who played last in this pizza.
+    /// The last seat to play in this pizza.
     pub fn last_to_play(&self) -> Option<Seat> {
         self.last_to_play
     }
 
-    /// What happened last, the newest at the end.
-    pub fn log(&self) -> impl Iterator<Item = &Happening> {
+    /// The last events, newest last.
+    pub fn log(&self) -> impl Iterator<Item = &LogEntry> {
         self.log.iter()
     }
 
-    /// Takes note of an event. One that names no seat of the game is passed over.
+    /// Applies an event. Events with an invalid seat are ignored.
     pub fn note(&mut self, kind: &Kind) {
-        let happening = self.happening(kind);
-        if let Some(happening) = happening {
+        if let Some(entry) = self.apply(kind) {
             if self.log.len() == LOG_LENGTH {
                 self.log.pop_front();
             }
-            self.log.push_back(happening);
+            self.log.push_back(entry);
         }
     }
 
-    fn happening(&mut self, kind: &Kind) -> Option<Happening> {
+    fn apply(&mut self, kind: &Kind) -> Option<LogEntry> {
         match kind {
             Kind::Seated(seated) => {
                 let participant = self.participant_mut(seated.seat)?;
                 participant.name.clone_from(&seated.name);
-                participant.sort = sort(seated.kind(), "");
+                participant.kind = participant_kind(seated.kind(), "");
                 None
             }
             Kind::GameStarted(started) => {
@@ -211,9 +210,9 @@ impl Chronicle {
             Kind::ShiftStarted(started) => {
                 self.last_to_play = None;
                 self.opening = true;
-                Some(Happening::Dealt(started.shift))
+                Some(LogEntry::Dealt(started.shift))
             }
-            Kind::SpecialActionDeclared(declared) => Some(Happening::Declared {
+            Kind::SpecialActionDeclared(declared) => Some(LogEntry::Declared {
                 seat: self.seat(declared.seat)?,
                 special: match declared.action() {
                     v1::SpecialAction::FoodFight => SpecialAction::FoodFight,
@@ -226,7 +225,7 @@ impl Chronicle {
                 let seat = self.seat(play.seat)?;
                 self.last_to_play = Some(seat);
                 let golden = std::mem::take(&mut self.opening) && self.golden_opening;
-                Some(Happening::Played {
+                Some(LogEntry::Played {
                     seat,
                     cards: play_cards(play, golden),
                     cause: cause(play.source()),
@@ -234,27 +233,27 @@ impl Chronicle {
             }
             Kind::Pass(pass) => {
                 self.opening = false;
-                Some(Happening::Passed {
+                Some(LogEntry::Passed {
                     seat: self.seat(pass.seat)?,
                     cause: cause(pass.source()),
                 })
             }
             Kind::PizzaDone(done) => {
                 self.last_to_play = None;
-                Some(Happening::PizzaDone {
+                Some(LogEntry::PizzaDone {
                     pizza: done.pizza,
                     next: self.seat(done.next_leader)?,
                 })
             }
-            Kind::SeatFinished(finished) => Some(Happening::Finished {
+            Kind::SeatFinished(finished) => Some(LogEntry::Finished {
                 seat: self.seat(finished.seat)?,
                 place: finished.place,
             }),
-            Kind::ShiftEnded(ended) => Some(Happening::ShiftOver {
+            Kind::ShiftEnded(ended) => Some(LogEntry::ShiftOver {
                 shift: ended.shift,
                 winner: self.seat(*ended.order.first()?)?,
             }),
-            Kind::ExpressionShown(shown) => Some(Happening::Expressed {
+            Kind::ExpressionShown(shown) => Some(LogEntry::Expressed {
                 seat: self.seat(shown.seat)?,
                 label: shown.expression.as_ref()?.label.clone(),
             }),
@@ -262,8 +261,8 @@ impl Chronicle {
         }
     }
 
-    /// What the viewer may see of an exchange, by the one rule there is for it.
-    fn exchange(&self, exchanged: &v1::CardsExchanged) -> Option<Happening> {
+    /// An exchange, redacted.
+    fn exchange(&self, exchanged: &v1::CardsExchanged) -> Option<LogEntry> {
         let (giver, receiver) = (self.seat(exchanged.giver)?, self.seat(exchanged.receiver)?);
         let event = Event::CardsExchanged {
             giver,
@@ -275,7 +274,7 @@ impl Chronicle {
         let Event::CardsExchanged { cards, .. } = event.seen_by(self.viewer) else {
             return None;
         };
-        Some(Happening::Gave {
+        Some(LogEntry::Gave {
             giver,
             receiver,
             count: exchanged.count,
@@ -292,7 +291,7 @@ impl Chronicle {
         self.participants.get_mut(seat.index())
     }
 
-    fn set_presence(&mut self, number: u32, presence: Presence) -> Option<Happening> {
+    fn set_presence(&mut self, number: u32, presence: Presence) -> Option<LogEntry> {
         self.participant_mut(number)?.presence = presence;
         None
     }
@@ -301,13 +300,13 @@ impl Chronicle {
         for seat in seats {
             if let Some(participant) = self.participant_mut(seat.seat) {
                 participant.name.clone_from(&seat.name);
-                participant.sort = sort(seat.kind(), &seat.built_in_agent);
+                participant.kind = participant_kind(seat.kind(), &seat.built_in_agent);
             }
         }
     }
 }
 
-/// The cards of a play, in the order in which they are laid down.
+/// The cards of a play, jokers last.
 pub(super) fn play_cards(play: &v1::Play, golden: bool) -> Vec<Card> {
     let count = |number: u32| u8::try_from(number).unwrap_or(0);
     scene::played(
@@ -318,24 +317,24 @@ pub(super) fn play_cards(play: &v1::Play, golden: bool) -> Vec<Card> {
     )
 }
 
-fn sort(kind: v1::ParticipantKind, built_in: &str) -> Sort {
+fn participant_kind(kind: v1::ParticipantKind, built_in: &str) -> ParticipantKind {
     if !built_in.is_empty() {
-        return Sort::BuiltIn(built_in.to_owned());
+        return ParticipantKind::BuiltIn(built_in.to_owned());
     }
     match kind {
-        v1::ParticipantKind::Unspecified => Sort::Unsaid,
-        v1::ParticipantKind::Agent => Sort::Agent,
-        v1::ParticipantKind::Human => Sort::Person,
-        v1::ParticipantKind::Robot => Sort::Robot,
+        v1::ParticipantKind::Unspecified => ParticipantKind::Unspecified,
+        v1::ParticipantKind::Agent => ParticipantKind::Agent,
+        v1::ParticipantKind::Human => ParticipantKind::Person,
+        v1::ParticipantKind::Robot => ParticipantKind::Robot,
     }
 }
 
-/// Why a decision was not the seat's own, in words.
+/// Why the participant did not decide, as text.
 fn cause(source: v1::DecisionSource) -> Option<&'static str> {
     match source {
         v1::DecisionSource::Timeout => Some("out of time"),
         v1::DecisionSource::Invalid => Some("invalid answers"),
-        v1::DecisionSource::Disconnected => Some("not connected"),
+        v1::DecisionSource::Disconnected => Some("disconnected"),
         v1::DecisionSource::Substitute => Some("substitute"),
         v1::DecisionSource::Unspecified
         | v1::DecisionSource::Agent

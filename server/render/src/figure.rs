@@ -1,5 +1,5 @@
-//! The look-up table of a decision, as in the paper's figure of possible actions: every action of a turn by face, quantity and jokers,
-//! and what is to be said of it for one hand at one moment. A value; how it is drawn is in `figure_svg`.
+//! The action table of a decision, after the paper's figure of possible actions: every action by
+//! face, quantity and jokers, with its state for one hand. Drawn in `figure_svg`.
 
 use chefshat_engine::{
     Action, ActionSpace, BySeat, Cards, DecisionKind, Face, Game, Mask, Requirement, Seat, Viewer,
@@ -8,28 +8,28 @@ use chefshat_engine::{
 use super::chronicle::{Chronicle, Participant};
 use super::scene::{Card, Scene};
 
-/// What is to be said of an action: whether the rules allow it now, whatever the hand is, and whether the hand holds its cards, whatever
-/// lies on the board.
+/// The state of an action: whether the rules allow it now for some hand, and whether this hand has
+/// its cards.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum State {
     /// Neither.
     Impossible,
-    /// The hand holds the cards, but the rules do not allow the action now.
+    /// The hand has the cards, but the rules do not allow the action now.
     NotAllowed,
-    /// The rules allow the action now, but the hand does not hold the cards.
+    /// The rules allow the action now, but the hand does not have the cards.
     NotInHand,
-    /// Both: it may be taken.
+    /// Both.
     Legal,
 }
 
-/// The look-up table of an open decision.
+/// The action table of an open decision.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Figure {
     /// Name of the room or of the record.
     pub caption: String,
-    /// Whose decision it is.
+    /// The seat that decides.
     pub seat: Seat,
-    /// Who sits there.
+    /// Its participant.
     pub participant: Participant,
     /// Number of the Shift, from 1.
     pub shift: u32,
@@ -45,22 +45,23 @@ pub struct Figure {
     pub board: Vec<Card>,
     /// What the rules require of the decision.
     pub requirement: Requirement,
-    /// The plays of each face, from face 1: of each quantity, from 1 to the face: without a joker, with one, and so on.
+    /// The plays by face, quantity (both from 1) and jokers (from 0).
     pub plays: Vec<Vec<Vec<State>>>,
-    /// A joker alone, where the deck has jokers.
+    /// A lone joker, if the deck has jokers.
     pub lone_joker: Option<State>,
     /// Passing.
     pub pass: State,
-    /// Giving a card of each face, from face 1, then a joker where the deck has them; empty unless a card is to be given.
+    /// Gifts by face from 1, then a joker if the deck has any; empty except in an exchange.
     pub gives: Vec<State>,
-    /// Declaring and declining a special action; empty unless that is to be decided.
+    /// Declaring and declining; empty except for a special action.
     pub special: Vec<State>,
-    /// How many actions are legal.
+    /// The number of legal actions.
     pub legal: usize,
 }
 
 impl Figure {
-    /// The table of the decision that is open; `None` if the game has ended. It shows the hand of the seat that decides.
+    /// The action table of the open decision, showing the hand of its seat; `None` if the game is
+    /// over.
     pub fn of(game: &Game, chronicle: &Chronicle) -> Option<Figure> {
         let decision = game.decision()?;
         let seat = decision.seat;
@@ -68,7 +69,7 @@ impl Figure {
         let (faces, jokers) = (rules.faces(), rules.jokers());
         let known = BySeat::filled(rules.players(), true);
         let scene = Scene::of(game, chronicle, Viewer::Seat(seat), &known);
-        let table = LookUp {
+        let table = Inputs {
             space: rules.actions(),
             hand: game.hands()[seat],
             legal: game.legal_actions(),
@@ -127,15 +128,15 @@ impl Figure {
     }
 }
 
-/// What the states follow from.
-struct LookUp {
+/// The inputs of the states.
+struct Inputs {
     space: ActionSpace,
     hand: Cards,
     legal: Mask,
     requirement: Requirement,
 }
 
-impl LookUp {
+impl Inputs {
     fn state(&self, action: Action) -> State {
         let legal = self
             .space
@@ -149,7 +150,7 @@ impl LookUp {
         }
     }
 
-    /// Whether the rules allow an action now to a hand that holds its cards.
+    /// Whether the rules allow the action now to a hand that has its cards.
     fn allows(&self, action: Action) -> bool {
         match (self.requirement, action) {
             (Requirement::Play(play), _) => play.allows(action),

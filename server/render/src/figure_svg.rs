@@ -1,31 +1,31 @@
-//! Where everything of a look-up table stands on its picture, and in which words. What it looks like there is in `templates/figure.svg`.
+//! The layout and text of the action table, rendered by `templates/figure.svg`.
 
 use std::collections::BTreeSet;
 
 use chefshat_engine::Requirement;
 use serde::Serialize;
 
-use super::chronicle::Sort;
+use super::chronicle::ParticipantKind;
 use super::figure::{Figure, State};
 use super::paint::Painter;
 use super::scene::Hand;
-use super::table::hand::{Drawing, Drawn, Label, Placed, lay_out};
+use super::table::hand::{Label, Placed, Sprite, SpriteDefinition, lay_out};
 
-/// Width of the picture in its own units.
+/// Width of the picture, SVG units.
 const WIDTH: f32 = 1280.0;
-/// Space at the edges.
+/// Margin.
 const GAP: f32 = 24.0;
-/// Width of the column that names the faces.
+/// Width of the column of faces.
 const HEAD: f32 = 92.0;
 /// Top of the first row.
 const TOP: f32 = 262.0;
-/// Height of all rows together; a row is no higher than `ROW`.
+/// Height of all rows together.
 const ROWS: f32 = 500.0;
-/// Most height of a row.
+/// The largest height of a row.
 const ROW: f32 = 46.0;
-/// Space for what stands below the table.
+/// Height below the table.
 const BELOW: f32 = 148.0;
-/// Width of the space for the cards on the board.
+/// Width of the board.
 const BOARD: f32 = 400.0;
 
 #[derive(Serialize)]
@@ -34,7 +34,7 @@ struct Page {
     height: f32,
     title: String,
     subtitle: String,
-    cards: Vec<Drawing>,
+    cards: Vec<SpriteDefinition>,
     hand: Vec<Placed>,
     counts: Vec<Label>,
     board: Vec<Placed>,
@@ -68,7 +68,7 @@ struct Other {
 }
 
 impl Painter {
-    /// The picture of a look-up table as SVG. Its text is text: to be looked at elsewhere than here it needs [`Painter::outlined`].
+    /// Draws an action table as SVG. Its text needs the embedded font; see [`Painter::outlined`].
     pub fn figure(&self, figure: &Figure) -> String {
         let faces = f32::from(figure.faces);
         let row = (ROWS / faces).min(ROW).floor();
@@ -78,13 +78,13 @@ impl Painter {
         let hand = Hand::Open(figure.hand.clone());
         let (hand, counts) = lay_out(&hand, WIDTH - BOARD - 4.0 * GAP);
         let (board, board_counts) = lay_out(&Hand::Open(figure.board.clone()), BOARD);
-        let cards: BTreeSet<Drawn> = hand.iter().chain(&board).map(|card| card.drawn).collect();
+        let cards: BTreeSet<Sprite> = hand.iter().chain(&board).map(|card| card.sprite).collect();
         let page = Page {
             width: WIDTH,
             height: bottom + BELOW,
             title: self.title(figure),
             subtitle: subtitle(figure),
-            cards: cards.into_iter().map(Drawn::drawing).collect(),
+            cards: cards.into_iter().map(Sprite::definition).collect(),
             hand,
             counts,
             board,
@@ -110,17 +110,17 @@ impl Painter {
             name => name.to_owned(),
         };
         let name = self.fit(&name, 26.0, true, 520.0);
-        let what = match &figure.participant.sort {
-            Sort::Unsaid => "player",
-            Sort::Person => "person",
-            Sort::Robot => "robot",
-            Sort::Agent => "agent",
-            Sort::BuiltIn(_) => "built-in agent",
+        let what = match &figure.participant.kind {
+            ParticipantKind::Unspecified => "player",
+            ParticipantKind::Person => "person",
+            ParticipantKind::Robot => "robot",
+            ParticipantKind::Agent => "agent",
+            ParticipantKind::BuiltIn(_) => "built-in agent",
         };
-        format!("What {name} can do ({what} on seat {})", figure.seat)
+        format!("Actions of {name} ({what}, seat {})", figure.seat)
     }
 
-    /// The actions that are no cells of the table, side by side.
+    /// The actions outside the table, side by side.
     fn others(&self, figure: &Figure) -> Vec<Other> {
         const SPACE: f32 = 10.0;
         let item = |text: &str, state| (text.to_owned(), Some(state));
@@ -198,13 +198,13 @@ fn subtitle(figure: &Figure) -> String {
         format!("Shift {}, pizza {}", figure.shift, figure.pizza)
     };
     let required = match figure.requirement {
-        Requirement::Gift(_) => "one card is to be given".to_owned(),
+        Requirement::Gift(_) => "one card must be given".to_owned(),
         Requirement::SpecialAction(_) => "a special action may be declared".to_owned(),
         Requirement::Play(play) => match play.highest_face {
             _ if play.lone_joker => "the board is empty, any play opens the pizza".to_owned(),
             face if play.golden_card => format!("face {face} with the Golden card opens the Shift"),
             face if play.is_opening() => format!("face {face} opens the Shift"),
-            0 => "nothing is rarer than what lies there".to_owned(),
+            0 => "nothing beats the board".to_owned(),
             face => format!(
                 "face {face} or rarer beats the board, {} or more cards",
                 play.fewest_cards

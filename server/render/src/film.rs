@@ -1,6 +1,5 @@
-//! A record as a row of scenes: one for each decision while it is open, one for the end of each Shift, one for the end of the game.
-//! Decisions that the viewer may not know of have none.
-//! Replaying is `chefshat_record::replay`'s affair, drawing that of the modules beside this one.
+//! A record as frames: one per open decision, one for the end of each Shift and one for the end of
+//! the game. Decisions hidden from the viewer have no frame.
 
 mod cut;
 
@@ -16,10 +15,10 @@ use chefshat_record::convert::{rules_from_proto, seat_from_number};
 use chefshat_record::replay::{ReplayError, walk};
 use cut::{Cut, chronicle_of};
 
-/// Which moment of a game a scene shows.
+/// A moment of a game.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum When {
-    /// This decision is open; counted over the whole game, from 1.
+    /// This decision is open, counted over the game from 1.
     Decision(u64),
     /// This Shift has just ended.
     ShiftEnd(u32),
@@ -27,18 +26,18 @@ pub enum When {
     End,
 }
 
-/// A scene, and how long it lasted.
+/// A scene and its duration.
 #[derive(Debug, Clone)]
 pub struct Frame {
-    /// Which moment it is.
+    /// The moment.
     pub when: When,
-    /// What is to be seen.
+    /// The scene.
     pub scene: Scene,
-    /// How long the decision that is open took; nothing for built-in agents and at the ends of Shifts and games.
+    /// Decision time; zero for built-in agents and at the ends of Shifts and games.
     pub decision_time: Duration,
 }
 
-/// A recorded game as one viewer saw it.
+/// A recorded game as frames for one viewer.
 #[derive(Debug, Clone)]
 pub struct Film {
     frames: Vec<Frame>,
@@ -46,88 +45,86 @@ pub struct Film {
     shifts: u32,
 }
 
-/// Why a film cannot be made.
+/// A failure to make a film or figure.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum FilmError {
-    /// The record does not replay.
+    /// The record does not verify.
     #[error(transparent)]
     Replay(#[from] ReplayError),
     /// There is no such seat.
-    #[error("there is no seat {seat}: the game has the seats 0 to {last}")]
+    #[error("there is no seat {seat}: the game has seats 0 to {last}")]
     NoSeat {
-        /// The seat asked for.
+        /// The seat requested.
         seat: u32,
-        /// The last seat there is.
+        /// The last seat.
         last: usize,
     },
     /// The game was aborted before cards were dealt.
-    #[error("the game ended before cards were dealt: there is nothing to draw")]
+    #[error("nothing to draw: the game was aborted before the first deal")]
     Empty,
     /// There is no such decision.
-    #[error("there is no decision {decision}: the game has the decisions 1 to {last}")]
+    #[error("there is no decision {decision}: the game has decisions 1 to {last}")]
     NoDecision {
-        /// The decision asked for.
+        /// The decision requested.
         decision: u64,
-        /// The last one there is.
+        /// The last one.
         last: u64,
     },
     /// There is no such Shift.
-    #[error("there is no Shift {shift}: the game has the Shifts 1 to {last}")]
+    #[error("there is no Shift {shift}: the game has Shifts 1 to {last}")]
     NoShift {
-        /// The Shift asked for.
+        /// The Shift requested.
         shift: u32,
-        /// The last one there is.
+        /// The last one.
         last: u32,
     },
-    /// The Shift was never played to its end.
-    #[error("Shift {shift} was not played to its end")]
+    /// The Shift was aborted.
+    #[error("Shift {shift} did not end")]
     NoShiftEnd {
-        /// The Shift asked for.
+        /// The Shift requested.
         shift: u32,
     },
-    /// No decision is open at the moment asked for.
-    #[error("no decision is open then: name one of the decisions 1 to {last}")]
+    /// No decision is open at the moment requested.
+    #[error("no decision is open then: choose one of the decisions 1 to {last}")]
     NothingOpen {
-        /// The last decision there is.
+        /// The last decision.
         last: u64,
     },
-    /// The hand of the seat that decides was not written down.
-    #[error("decision {decision} is seat {seat}'s, whose hand is not known")]
+    /// The hand of the seat is missing from an imported record.
+    #[error("decision {decision} is of seat {seat}, whose hand is unknown")]
     HandNotKnown {
         /// The decision.
         decision: u64,
         /// The seat.
         seat: Seat,
     },
-    /// The decision is another seat's; it is not said whose, for that may be hidden too.
-    #[error(
-        "decision {decision} is another seat's: no other viewer knows what is possible with its hand"
-    )]
+    /// The decision is another seat's. Which one may be hidden too.
+    #[error("decision {decision} is another seat's: this viewer does not see its hand")]
     HandNotSeen {
         /// The decision.
         decision: u64,
     },
 }
 
-/// Who is to look at a recorded game.
+/// The point of view of a film.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Eyes {
-    /// Those of nobody at the table: all hands are open.
+pub enum Perspective {
+    /// All hands open.
     All,
-    /// Those of a seat, by its number.
+    /// A seat, by number.
     Seat(u32),
-    /// Those of a spectator: no hand is open.
+    /// A spectator: no hand open.
     Spectator,
 }
 
 impl Film {
-    /// Replays a record and makes a scene of each of its moments. A decision that the viewer may not know of (another seat may declare a
-    /// special action) makes none.
+    /// Makes the film of a record. Decisions hidden from the viewer (special actions of other
+    /// seats) get no frame.
     ///
     /// # Errors
-    /// If the record does not replay, has no such seat, or ended before cards were dealt.
-    pub fn new(lines: &[v1::RecordLine], eyes: Eyes) -> Result<Film, FilmError> {
-        let viewer = viewer(lines, eyes)?;
+    /// The record does not verify, has no such seat, or ended before the first deal.
+    pub fn new(lines: &[v1::RecordLine], perspective: Perspective) -> Result<Film, FilmError> {
+        let viewer = viewer(lines, perspective)?;
         let mut cut = Cut::new(viewer);
         walk(lines, |moment| cut.take(&moment))?;
         if cut.frames.is_empty() {
@@ -145,16 +142,16 @@ impl Film {
         &self.frames
     }
 
-    /// How many decisions the game had.
+    /// The number of decisions of the game.
     pub fn decisions(&self) -> u64 {
         self.decisions
     }
 
-    /// The frame of a moment. Of a decision that the viewer may not know of, it is the frame before: for that viewer the moment before
+    /// The frame of a moment. For a hidden decision, the frame before: to the viewer, that moment
     /// lasts until the next decision.
     ///
     /// # Errors
-    /// If there is no such moment.
+    /// There is no such moment.
     pub fn at(&self, when: When) -> Result<&Frame, FilmError> {
         let (index, missing) = match when {
             When::Decision(decision) => (Some(self.index(decision)?), FilmError::Empty),
@@ -169,10 +166,11 @@ impl Film {
             .ok_or(missing)
     }
 
-    /// The frames of a Shift, its end included. Of a Shift that was given up before its first decision it is the end of the game.
+    /// The frames of a Shift including its end. For a Shift aborted before its first decision, the
+    /// end of the game.
     ///
     /// # Errors
-    /// If there is no such Shift.
+    /// There is no such Shift.
     pub fn shift(&self, shift: u32) -> Result<Vec<&Frame>, FilmError> {
         let of_it = || {
             self.frames
@@ -189,12 +187,12 @@ impl Film {
         Ok(frames)
     }
 
-    /// The frames from one decision to another, both included, with the ends of Shifts between them; to the end of the game if the last
-    /// decision is the game's last. For a decision that the viewer may not know of stands the frame before it, as in [`Film::at`]: there is
-    /// always something to show.
+    /// The frames of an inclusive range of decisions, with the ends of Shifts between them, and
+    /// the end of the game after its last decision. Hidden decisions are replaced as in
+    /// [`Film::at`], so the result is never empty.
     ///
     /// # Errors
-    /// If one of the decisions does not exist.
+    /// One of the decisions does not exist.
     pub fn range(&self, decisions: RangeInclusive<u64>) -> Result<Vec<&Frame>, FilmError> {
         let (from, to) = (*decisions.start(), *decisions.end());
         let first = self.index(from)?;
@@ -214,7 +212,7 @@ impl Film {
         self.frames.iter().position(|frame| frame.when == when)
     }
 
-    /// Where a decision's frame is, or the one before it if it has none.
+    /// The index of a decision's frame, or of the one before it.
     fn index(&self, decision: u64) -> Result<usize, FilmError> {
         let last = self.decisions;
         if !(1..=last).contains(&decision) {
@@ -228,7 +226,7 @@ impl Film {
             When::ShiftEnd(_) => false,
             When::End => true,
         };
-        // A game may begin with such a decision; the viewer's first moment is then the one after it.
+        // If the game begins with a hidden decision, use the first frame.
         let after = self.frames.iter().position(later);
         Ok(after.unwrap_or(self.frames.len()).saturating_sub(1))
     }
@@ -241,12 +239,16 @@ impl Film {
     }
 }
 
-/// The look-up table of a decision: what the seat's hand could do, and what is legal.
+/// The action table of a decision.
 ///
 /// # Errors
-/// If the record does not replay, there is no such decision, or the hand is not the viewer's to see or not known.
-pub fn figure_at(lines: &[v1::RecordLine], eyes: Eyes, decision: u64) -> Result<Figure, FilmError> {
-    let viewer = viewer(lines, eyes)?;
+/// The record does not verify, there is no such decision, or the hand is hidden or unknown.
+pub fn figure_at(
+    lines: &[v1::RecordLine],
+    perspective: Perspective,
+    decision: u64,
+) -> Result<Figure, FilmError> {
+    let viewer = viewer(lines, perspective)?;
     let mut chronicle = None;
     let (mut count, mut figure) = (0, None);
     walk(lines, |moment| match (moment.entry, moment.game) {
@@ -296,15 +298,15 @@ fn header(lines: &[v1::RecordLine]) -> Option<&v1::RecordHeader> {
     }
 }
 
-/// The eyes as the engine names them. A record without a header is left to the replay to refuse.
-fn viewer(lines: &[v1::RecordLine], eyes: Eyes) -> Result<Viewer, FilmError> {
+/// The viewer of a perspective. Records without a header are rejected by the replay.
+fn viewer(lines: &[v1::RecordLine], perspective: Perspective) -> Result<Viewer, FilmError> {
     let players = header(lines)
         .and_then(|header| rules_from_proto(header.rules.as_ref()?).ok())
         .map_or(chefshat_engine::MAX_SEATS, |rules| rules.players());
-    match eyes {
-        Eyes::All => Ok(Viewer::Everything),
-        Eyes::Spectator => Ok(Viewer::Spectator),
-        Eyes::Seat(number) => {
+    match perspective {
+        Perspective::All => Ok(Viewer::Everything),
+        Perspective::Spectator => Ok(Viewer::Spectator),
+        Perspective::Seat(number) => {
             seat_from_number(number, players)
                 .map(Viewer::Seat)
                 .ok_or(FilmError::NoSeat {

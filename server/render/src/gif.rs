@@ -1,5 +1,4 @@
-//! Pictures in a row as an animated GIF with one palette for all of them, in which a frame holds only what has changed. When which picture
-//! is shown is decided elsewhere.
+//! Animated GIFs with one palette, in which a frame contains only what has changed.
 
 use std::collections::HashMap;
 use std::io::Write;
@@ -7,39 +6,39 @@ use std::io::Write;
 use gif::{DisposalMethod, Encoder, EncodingError, Frame, Repeat};
 use resvg::tiny_skia::Pixmap;
 
-/// Most colours of a palette: one of GIF's 256 says "as before".
+/// The most colours of a palette; one of GIF's 256 indices means transparent.
 const MAX_COLOURS: usize = 255;
-/// Number of the colour that says "as before".
-const AS_BEFORE: u8 = 255;
-/// How far apart two colours of a palette are at least, in the first attempt to fill it: the square of the distance.
+/// The index that leaves a pixel unchanged.
+const UNCHANGED: u8 = 255;
+/// Squared distance between palette colours in the first attempt to fill it.
 const FAR_APART: u32 = 900;
 
-/// Why a GIF cannot be written.
+/// A failure to write a GIF.
 #[derive(Debug, thiserror::Error)]
 pub enum GifError {
-    /// GIF has 16 bits for each side of a picture.
-    #[error("a GIF is at most 65535 pixels wide and high")]
+    /// GIF has 16 bits for each side.
+    #[error("a GIF can be at most 65535 pixels wide and high")]
     TooLarge,
-    /// A picture has another size than the first.
-    #[error("the pictures of a GIF are all of one size")]
+    /// A picture differs in size.
+    #[error("all pictures of a GIF must have the same size")]
     OtherSize,
-    /// Writing failed.
+    /// The output failed.
     #[error("{0}")]
     Write(#[from] EncodingError),
 }
 
 type Colour = [u8; 3];
 
-/// The colours of a film. Made from some of its pictures: drawings have few colours, and what lies between them at edges is close to one
-/// of these.
+/// The colours of a film, from a sample of its pictures. Drawings have few colours, and blends at
+/// edges are close to one of them.
 #[derive(Debug, Clone)]
 pub struct Palette {
     colours: Vec<Colour>,
 }
 
 impl Palette {
-    /// The colours that best stand for those of these pictures: the most frequent ones, but none close to a more frequent one as long as
-    /// there is room.
+    /// The most frequent colours of the pictures, skipping those close to a more frequent one
+    /// while there is room. Unlike a quantizer that averages, this keeps flat colours exact.
     pub fn of<'a>(pictures: impl IntoIterator<Item = &'a Pixmap>) -> Palette {
         let mut counts: HashMap<Colour, u64> = HashMap::new();
         for picture in pictures {
@@ -72,7 +71,7 @@ impl Palette {
 
     fn bytes(&self) -> Vec<u8> {
         let mut bytes = self.colours.concat();
-        // The number that says "as before" needs a colour, which is never seen.
+        // The transparent index needs a colour too.
         bytes.resize(3 * (MAX_COLOURS + 1), 0);
         bytes
     }
@@ -92,15 +91,15 @@ fn distance(one: Colour, other: Colour) -> u32 {
         .sum()
 }
 
-/// Writes a GIF, picture by picture.
+/// Writes a GIF picture by picture.
 pub struct GifWriter<W: Write> {
     encoder: Encoder<W>,
     palette: Palette,
     size: (u16, u16),
-    numbers: HashMap<Colour, u8>,
-    /// The picture before, as numbers of colours.
+    indices: HashMap<Colour, u8>,
+    /// The previous picture, as palette indices.
     before: Vec<u8>,
-    /// The frame that has not been written yet: it may last longer.
+    /// The last frame, unwritten because it may last longer.
     pending: Option<Frame<'static>>,
 }
 
@@ -113,10 +112,10 @@ impl<W: Write> std::fmt::Debug for GifWriter<W> {
 }
 
 impl<W: Write> GifWriter<W> {
-    /// A GIF of pictures of this size, which repeats without end.
+    /// Starts a GIF that repeats forever.
     ///
     /// # Errors
-    /// If it is too large, or cannot be written to `out`.
+    /// The size is too large, or the output fails.
     pub fn new(out: W, width: u32, height: u32, palette: Palette) -> Result<Self, GifError> {
         let side = |pixels| u16::try_from(pixels).map_err(|_| GifError::TooLarge);
         let size = (side(width)?, side(height)?);
@@ -126,22 +125,22 @@ impl<W: Write> GifWriter<W> {
             encoder,
             palette,
             size,
-            numbers: HashMap::new(),
+            indices: HashMap::new(),
             before: Vec::new(),
             pending: None,
         })
     }
 
-    /// Adds a picture that is shown for so many hundredths of a second.
+    /// Adds a picture, shown for a number of hundredths of a second.
     ///
     /// # Errors
-    /// If it is of another size than the others, or cannot be written.
+    /// The size differs, or the output fails.
     pub fn add(&mut self, picture: &Pixmap, hundredths: u16) -> Result<(), GifError> {
         let (width, height) = (usize::from(self.size.0), usize::from(self.size.1));
         if (picture.width(), picture.height()) != (self.size.0.into(), self.size.1.into()) {
             return Err(GifError::OtherSize);
         }
-        let now = self.numbers_of(picture);
+        let now = self.indices_of(picture);
         let Some(changed) = Rectangle::of_change(&self.before, &now, width, height) else {
             if let Some(pending) = &mut self.pending {
                 pending.delay = pending.delay.saturating_add(hundredths);
@@ -158,18 +157,17 @@ impl<W: Write> GifWriter<W> {
             if !self.before.is_empty() {
                 for (number, before) in row.iter_mut().zip(part(&self.before, y)) {
                     if *number == before {
-                        *number = AS_BEFORE;
+                        *number = UNCHANGED;
                     }
                 }
             }
             buffer.append(&mut row);
         }
-        let side =
-            |pixels: usize| u16::try_from(pixels).expect("a part is no larger than the whole");
+        let side = |pixels: usize| u16::try_from(pixels).expect("a part fits into the picture");
         let frame = Frame {
             delay: hundredths,
             dispose: DisposalMethod::Keep,
-            transparent: Some(AS_BEFORE),
+            transparent: Some(UNCHANGED),
             left: side(changed.left),
             top: side(changed.top),
             width: side(changed.width()),
@@ -184,10 +182,10 @@ impl<W: Write> GifWriter<W> {
         Ok(())
     }
 
-    /// Writes what is left and gives the output back.
+    /// Writes the last frame and returns the output.
     ///
     /// # Errors
-    /// If it cannot be written.
+    /// The output fails.
     pub fn finish(mut self) -> Result<W, GifError> {
         if let Some(last) = self.pending.take() {
             self.encoder.write_frame(&last)?;
@@ -195,14 +193,14 @@ impl<W: Write> GifWriter<W> {
         Ok(self.encoder.into_inner()?)
     }
 
-    fn numbers_of(&mut self, picture: &Pixmap) -> Vec<u8> {
-        let (palette, numbers) = (&self.palette, &mut self.numbers);
+    fn indices_of(&mut self, picture: &Pixmap) -> Vec<u8> {
+        let (palette, indices) = (&self.palette, &mut self.indices);
         picture
             .pixels()
             .iter()
             .map(|pixel| {
                 let colour = [pixel.red(), pixel.green(), pixel.blue()];
-                *numbers
+                *indices
                     .entry(colour)
                     .or_insert_with(|| palette.nearest(colour))
             })
@@ -210,7 +208,7 @@ impl<W: Write> GifWriter<W> {
     }
 }
 
-/// A part of a picture; right and bottom are the first beyond it.
+/// A part of a picture; right and bottom are exclusive.
 struct Rectangle {
     left: usize,
     top: usize,
@@ -227,7 +225,8 @@ impl Rectangle {
         self.bottom - self.top
     }
 
-    /// The smallest part that holds every change; all of the picture if there was none before; `None` if nothing has changed.
+    /// The bounding box of all changes; the complete picture if it is the first; `None` if nothing
+    /// changed.
     fn of_change(before: &[u8], now: &[u8], width: usize, height: usize) -> Option<Rectangle> {
         if before.is_empty() {
             return Some(Rectangle {

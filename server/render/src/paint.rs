@@ -1,5 +1,4 @@
-//! From the templates to SVG and from SVG to pixels: the embedded drawings and fonts, text that is made to fit, PNG. What a picture shows
-//! and where is decided by the modules beside this one.
+//! Templates to SVG, SVG to pixels, pixels to PNG, with embedded sprites and fonts; fits text.
 
 use std::collections::{BTreeSet, HashMap};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -18,21 +17,21 @@ const FONT: &str = "Atkinson Hyperlegible Next";
 const REGULAR: &[u8] = include_bytes!("../../assets/font/AtkinsonHyperlegibleNext-Regular.ttf");
 const BOLD: &[u8] = include_bytes!("../../assets/font/AtkinsonHyperlegibleNext-Bold.ttf");
 
-/// A picture as pixels, row by row, without transparent ones.
+/// A picture as opaque pixels.
 pub type Pixels = Pixmap;
 
-/// Fewest pixels a picture can be wide; below it nothing on it can be read.
+/// The smallest width in pixels that can be read.
 pub const MIN_WIDTH: u32 = 160;
-/// Most pixels a picture can be wide.
+/// The largest width in pixels.
 pub const MAX_WIDTH: u32 = 8000;
 
-/// Most letters of a name that are looked at.
+/// The most characters of a name.
 const MAX_LETTERS: usize = 200;
 
-/// Stands for a letter that the font lacks.
-const LACKING: char = '?';
+/// Replaces characters the font lacks.
+const REPLACEMENT: char = '?';
 
-/// Most widths that are kept.
+/// The most cached widths.
 const MAX_WIDTHS: usize = 4096;
 
 const TEMPLATES: [(&str, &str); 4] = [
@@ -42,7 +41,7 @@ const TEMPLATES: [(&str, &str); 4] = [
     ("card.svg", include_str!("templates/card.svg")),
 ];
 
-/// The drawings, by name. Each file is a picture of its own, so that others can use them too.
+/// The sprites, by name. The web page uses the same files.
 macro_rules! symbols {
     ($($name:literal),+ $(,)?) => {
         &[$(($name, include_str!(concat!("../../assets/symbols/", $name, ".svg")))),+]
@@ -76,24 +75,24 @@ const SYMBOLS: &[(&str, &str)] = symbols![
     "role-waiter",
 ];
 
-/// What a picture could not be made for.
+/// A failure to make a picture.
 #[derive(Debug, thiserror::Error)]
 pub enum PaintError {
     /// The width is out of range.
-    #[error("a picture is {MIN_WIDTH} to {MAX_WIDTH} pixels wide, not {0}")]
+    #[error("the width must be {MIN_WIDTH} to {MAX_WIDTH} pixels, not {0}")]
     Width(u32),
-    /// The PNG could not be written.
-    #[error("the picture cannot be written as PNG: {0}")]
+    /// The PNG encoder failed.
+    #[error("cannot encode the picture as PNG: {0}")]
     Png(String),
 }
 
-/// Draws scenes and figures. Making one loads fonts and templates; it can be used by many threads.
+/// Draws scenes and figures. Expensive to create (fonts, templates); can be shared by threads.
 pub struct Painter {
     environment: Environment<'static>,
     options: usvg::Options<'static>,
-    /// The letters that the font has.
+    /// The characters of the font.
     letters: BTreeSet<char>,
-    /// Widths that have been measured: most words of a film come again.
+    /// A cache of text widths: most words of a film recur.
     widths: Mutex<HashMap<(String, u32, bool), f32>>,
 }
 
@@ -110,13 +109,13 @@ impl Default for Painter {
 }
 
 impl Painter {
-    /// A painter. No font of the system is used, so that it paints the same everywhere.
+    /// A painter that does not use system fonts, so that pictures are the same everywhere.
     pub fn new() -> Self {
         let mut environment = Environment::new();
         environment.set_auto_escape_callback(|_| AutoEscape::Html);
         environment.set_undefined_behavior(UndefinedBehavior::Strict);
         environment.set_formatter(|out, state, value| match f64::try_from(value.clone()) {
-            // Hundredths are finer than anybody sees.
+            // Hundredths are precise enough.
             Ok(number) if !value.is_integer() => {
                 write!(out, "{}", (number * 100.0).round() / 100.0)?;
                 Ok(())
@@ -125,11 +124,7 @@ impl Painter {
         });
         let mut syntax = environment.syntax().to_builder();
         syntax.trim_blocks(true).lstrip_blocks(true);
-        environment.set_syntax(
-            syntax
-                .build()
-                .expect("the standard delimiters are distinct"),
-        );
+        environment.set_syntax(syntax.build().expect("the default delimiters are distinct"));
         for (name, text) in TEMPLATES {
             environment
                 .add_template(name, text)
@@ -153,18 +148,18 @@ impl Painter {
         }
     }
 
-    /// Fills in a template.
+    /// Renders a template.
     pub(super) fn fill(&self, template: &str, values: &impl Serialize) -> String {
         self.environment
             .get_template(template)
             .and_then(|template| template.render(Serde(values)))
-            .expect("the embedded templates name only what they are given")
+            .expect("the embedded templates match their values")
     }
 
-    /// The same picture with all text as outlines, so many units wide: it looks the same wherever it is opened, whatever fonts there are.
+    /// Converts all text of an SVG to outlines, so that it does not depend on installed fonts.
     ///
     /// # Errors
-    /// If the width is below [`MIN_WIDTH`] or above [`MAX_WIDTH`].
+    /// The width is not in [`MIN_WIDTH`]..=[`MAX_WIDTH`].
     pub fn outlined(&self, svg: &str, width: u32) -> Result<String, PaintError> {
         let tree = self.tree(svg, width)?;
         let text = tree.to_string(&usvg::WriteOptions::default());
@@ -181,20 +176,20 @@ impl Painter {
         if !(MIN_WIDTH..=MAX_WIDTH).contains(&width) {
             return Err(PaintError::Width(width));
         }
-        Ok(usvg::Tree::from_str(svg, &self.options).expect("our own SVG is well-formed"))
+        Ok(usvg::Tree::from_str(svg, &self.options).expect("generated SVG is well-formed"))
     }
 
-    /// An SVG picture as pixels, so many wide; as high as its form asks for.
+    /// Rasterizes an SVG, keeping its aspect ratio.
     ///
     /// # Errors
-    /// If the width is below [`MIN_WIDTH`] or above [`MAX_WIDTH`].
+    /// The width is not in [`MIN_WIDTH`]..=[`MAX_WIDTH`].
     pub fn pixels(&self, svg: &str, width: u32) -> Result<Pixels, PaintError> {
         let tree = self.tree(svg, width)?;
         let size = tree.size();
         let scale = width as f32 / size.width();
         let height = ((size.height() * scale).round() as u32).max(1);
         let mut pixmap = Pixmap::new(width, height).expect("a picture has pixels");
-        // A last row that the picture fills in part only is no hole in it.
+        // The last row may be covered only in part.
         pixmap.fill(Color::WHITE);
         resvg::render(
             &tree,
@@ -204,21 +199,22 @@ impl Painter {
         Ok(pixmap)
     }
 
-    /// Pixels as a PNG file.
+    /// Encodes pixels as PNG.
     ///
     /// # Errors
-    /// If they cannot be encoded.
+    /// The encoder failed.
     pub fn png(&self, pixels: &Pixels) -> Result<Vec<u8>, PaintError> {
         pixels
             .encode_png()
             .map_err(|error| PaintError::Png(error.to_string()))
     }
 
-    /// A name or label as it can be shown: no letters but those of the font, and cut with an ellipsis where it is wider than `width`.
+    /// Fits a text: replaces characters the font lacks, and shortens it to `width` with an
+    /// ellipsis.
     pub(super) fn fit(&self, text: &str, size: f32, bold: bool, width: f32) -> String {
         let letters: Vec<char> = text
             .chars()
-            .filter(|&letter| !steers(letter))
+            .filter(|&letter| !is_invisible(letter))
             .flat_map(|letter| self.in_font(letter))
             .take(MAX_LETTERS)
             .collect();
@@ -242,7 +238,8 @@ impl Painter {
         cut(fits)
     }
 
-    /// A letter as the font can show it: itself, or without marks that the font lacks, or what stands for it.
+    /// A character as the font can show it: itself, without marks the font lacks, or the
+    /// replacement.
     fn in_font(&self, letter: char) -> Vec<char> {
         let has = |letter: &char| self.letters.contains(letter);
         if has(&letter) {
@@ -255,12 +252,12 @@ impl Painter {
         let base_lacks = parts.first().is_none_or(|base| !has(base));
         parts.retain(has);
         if base_lacks && !is_combining_mark(letter) {
-            return vec![LACKING];
+            return vec![REPLACEMENT];
         }
         parts
     }
 
-    /// How wide a line of text is.
+    /// The width of a line of text.
     pub(super) fn width(&self, text: &str, size: f32, bold: bool) -> f32 {
         let key = (text.to_owned(), size.to_bits(), bold);
         if let Some(&width) = self.widths().get(&key) {
@@ -276,7 +273,7 @@ impl Painter {
     }
 
     fn widths(&self) -> MutexGuard<'_, HashMap<(String, u32, bool), f32>> {
-        // Whoever panicked while holding it left nothing half done: each entry stands for itself.
+        // A panic leaves the cache consistent: entries are independent.
         self.widths.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -286,12 +283,12 @@ impl Painter {
         let svg = format!(
             r#"<svg xmlns="http://www.w3.org/2000/svg" width="9" height="9"><text font-size="{size}" font-weight="{weight}">{text}</text></svg>"#
         );
-        let tree = usvg::Tree::from_str(&svg, &self.options).expect("our own SVG is well-formed");
+        let tree = usvg::Tree::from_str(&svg, &self.options).expect("generated SVG is well-formed");
         tree.root().bounding_box().width()
     }
 }
 
-/// A drawing without its frame, to be placed in a picture.
+/// The content of a sprite, without its `svg` element.
 fn symbol(name: &str) -> Result<minijinja::Value, minijinja::Error> {
     let (_, file) = SYMBOLS
         .iter()
@@ -301,7 +298,7 @@ fn symbol(name: &str) -> Result<minijinja::Value, minijinja::Error> {
         .ok_or_else(|| {
             minijinja::Error::new(
                 minijinja::ErrorKind::InvalidOperation,
-                format!("there is no drawing {name}"),
+                format!("there is no sprite {name}"),
             )
         })?;
     let inner = file
@@ -311,7 +308,7 @@ fn symbol(name: &str) -> Result<minijinja::Value, minijinja::Error> {
     Ok(minijinja::Value::from_safe_string(inner.to_owned()))
 }
 
-/// The letters of the embedded fonts, which have the same.
+/// The characters of the embedded fonts, which have the same.
 fn letters() -> BTreeSet<char> {
     let font = FontRef::new(REGULAR).expect("the embedded font is well-formed");
     let known = font.charmap();
@@ -321,9 +318,9 @@ fn letters() -> BTreeSet<char> {
         .collect()
 }
 
-/// Control characters, which no SVG may hold, and those that are not seen themselves: they turn the direction of writing, or join or vary
-/// what stands around them.
-fn steers(letter: char) -> bool {
+/// Whether a character is a control character, which SVG forbids, or invisible: direction marks,
+/// joiners, variation selectors.
+fn is_invisible(letter: char) -> bool {
     letter.is_control()
         || matches!(letter, '\u{ad}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}')
         || matches!(letter, '\u{fe00}'..='\u{fe0f}' | '\u{feff}' | '\u{fffe}' | '\u{ffff}' | '\u{e0000}'..='\u{e0fff}')

@@ -1,23 +1,23 @@
-//! A moment of a game as it is to be drawn: who sits where, what each seat shows, the board, what the next decision must be. A value
-//! without geometry, colours or words. What a viewer may not see is not in it, by `Event::seen_by`. How it is drawn is in `table`; how
-//! a record becomes a row of scenes, in `film`.
+//! The content of a picture: seats, hands, board and the open decision, redacted for one viewer
+//! (by `Event::seen_by`). No geometry, colours or text: those are in `table`. Records become
+//! scenes in `film`.
 
 use chefshat_engine::{
     BySeat, Cards, DecisionKind, Event, Game, Opening, PlayRequirement, Requirement, Role, Seat,
     SpecialAction, Standings, Viewer,
 };
 
-use super::chronicle::{Chronicle, Happening, Participant};
+use super::chronicle::{Chronicle, LogEntry, Participant};
 
-/// One moment of a game, as one viewer sees it.
+/// A moment of a game, redacted for one viewer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scene {
     /// Name of the room or of the record.
     pub caption: String,
-    /// Whose eyes it is seen with.
+    /// The viewer.
     pub viewer: Viewer,
-    /// Number of the open decision over the whole game, from 1. Only with all hands open: to others a gap in the numbers would tell that a
-    /// special action was declined.
+    /// Number of the open decision in the game, from 1. Only with all hands open: to other
+    /// viewers, a gap in the numbers would reveal a declined special action.
     pub decision: Option<u64>,
     /// Number of faces F of the deck.
     pub faces: u8,
@@ -25,50 +25,50 @@ pub struct Scene {
     pub shift: u32,
     /// Number of the pizza in its Shift, from 1; 0 before the Shift's first turn is open.
     pub pizza: u32,
-    /// Number of the turn in its Shift that is open, from 1.
+    /// Number of the open turn in its Shift, from 1.
     pub turn: u32,
     /// The seats, index = seat.
     pub seats: Vec<SeatScene>,
     /// The cards on the board.
     pub board: Vec<Card>,
-    /// Who played them, where that is known.
+    /// The seat that played them, if known.
     pub board_by: Option<Seat>,
-    /// How many cards have been played in this Shift, and how many the deck has: of each face from face 1, then jokers where the deck
-    /// has them.
+    /// Cards played in this Shift and cards in the deck, by face from 1, then jokers if the deck
+    /// has any.
     pub played: Vec<(u8, u8)>,
-    /// What the game waits for.
+    /// The open decision or the result.
     pub now: Now,
-    /// What happened last, the newest at the end.
-    pub log: Vec<Happening>,
+    /// The last events, newest last.
+    pub log: Vec<LogEntry>,
 }
 
-/// What one seat shows.
+/// A seat in a scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SeatScene {
-    /// Who sits there.
+    /// The participant.
     pub participant: Participant,
-    /// Its role in this Shift.
+    /// The role in this Shift.
     pub role: Option<Role>,
-    /// Its points in the game so far.
+    /// The points in the game so far.
     pub points: u64,
-    /// Its cards.
+    /// The cards.
     pub hand: Hand,
-    /// Whether it is out of the pizza.
+    /// Whether it has passed in this pizza.
     pub passed: bool,
-    /// Its place in this Shift, from 1, or in the game once that is over; 0 while it holds cards.
+    /// Its place in this Shift, or in the game once that is over, from 1; 0 while it holds cards.
     pub place: u8,
-    /// Whether the open decision is its own, as far as the viewer may know.
+    /// Whether it has the open decision, as far as the viewer may know.
     pub deciding: bool,
 }
 
 /// The cards of a seat.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Hand {
-    /// Seen, ascending.
+    /// Visible, ascending.
     Open(Vec<Card>),
-    /// So many cards that the viewer may not see.
+    /// A number of cards the viewer may not see.
     Hidden(u8),
-    /// So many cards that nobody wrote down.
+    /// A number of cards missing from an imported record.
     Unknown(u8),
 }
 
@@ -92,33 +92,33 @@ impl Card {
         }
     }
 
-    /// The card as one of its face, whether it is the Golden one or not.
+    /// The card without marking it as Golden.
     pub(super) fn plain(self) -> Card {
         self.face().map_or(Card::Joker, Card::Face)
     }
 }
 
-/// What the game waits for.
+/// The open decision, or the result.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Now {
-    /// The cards have been dealt; the viewer may not know what is decided.
+    /// Cards are dealt; the viewer may not know the open decision.
     Dealt,
-    /// This seat may declare this special action.
+    /// A seat may declare a special action.
     Special(Seat, SpecialAction),
-    /// The first seat gives a card to the second.
+    /// A seat gives a card to another.
     Exchange(Seat, Seat),
-    /// This seat plays or passes.
+    /// A seat plays or passes.
     Turn {
         /// The seat.
         seat: Seat,
-        /// What a play must be, and whether passing is legal.
+        /// What the rules require of the play.
         requirement: PlayRequirement,
     },
     /// The Shift has just ended.
     ShiftOver {
         /// Points of this Shift.
         points: BySeat<u32>,
-        /// Whether it reached its limit of turns.
+        /// Whether it reached the turn limit.
         adjudicated: bool,
     },
     /// The game has ended.
@@ -128,7 +128,7 @@ pub enum Now {
 }
 
 impl Scene {
-    /// The scene of a game as it stands. `known` says whose hand is known at all.
+    /// The current scene of a game. `known` tells which hands are known at all.
     pub fn of(game: &Game, chronicle: &Chronicle, viewer: Viewer, known: &BySeat<bool>) -> Scene {
         let view = game.observe(viewer);
         let faces = view.faces;
@@ -156,7 +156,7 @@ impl Scene {
                 deciding: deciding == Some(seat),
             })
             .collect();
-        // The opening is the only play of the top face that no other can follow within the first pizza.
+        // In the first pizza only the opening can leave the top face on the board.
         let golden = game.rules().opening() == Opening::Golden
             && !game.rules().opening_pass()
             && view.pizza == 1
@@ -184,7 +184,7 @@ impl Scene {
         }
     }
 
-    /// Does not show the Golden card in the hands of which nobody knows whether they hold it.
+    /// Unmarks the Golden card in hands that are not known to contain it.
     pub(super) fn hide_golden(&mut self, known: &BySeat<bool>) {
         for (shown, _) in self
             .seats
@@ -227,7 +227,7 @@ pub(super) fn cards(cards: Cards, faces: u8) -> Vec<Card> {
     seen
 }
 
-/// The hands that a viewer may see, by the one rule there is for it.
+/// The hands a viewer may see.
 fn hands_seen(game: &Game, viewer: Viewer) -> BySeat<Option<Cards>> {
     let dealt = Event::ShiftStarted {
         shift: game.shift(),
@@ -239,7 +239,7 @@ fn hands_seen(game: &Game, viewer: Viewer) -> BySeat<Option<Cards>> {
     }
 }
 
-/// Whether what only a seat itself may know is shown.
+/// Whether the viewer sees what only this seat knows.
 fn sees(viewer: Viewer, seat: Seat) -> bool {
     match viewer {
         Viewer::Seat(own) => own == seat,

@@ -1,5 +1,4 @@
-//! Where everything of a scene stands on the picture of the table, and in which words. What it looks like there is in
-//! `templates/table.svg`, which is filled in with the values made here.
+//! The layout and text of the table picture, rendered by `templates/table.svg`.
 
 pub(super) mod hand;
 mod words;
@@ -9,14 +8,14 @@ use std::collections::BTreeSet;
 use chefshat_engine::{Role, Seat};
 use serde::Serialize;
 
-use super::chronicle::{Presence, Sort};
+use super::chronicle::{ParticipantKind, Presence};
 use super::paint::Painter;
 use super::scene::{Now, Scene, SeatScene};
-use hand::{Drawing, Drawn, Label, Placed};
+use hand::{Label, Placed, Sprite, SpriteDefinition};
 
-/// Width of the picture in its own units.
+/// Width of the picture, SVG units.
 const WIDTH: f32 = 1280.0;
-/// Height of the picture in its own units.
+/// Height of the picture, SVG units.
 const HEIGHT: f32 = 800.0;
 /// Space at the edges and between the panels of the seats.
 const GAP: f32 = 14.0;
@@ -26,21 +25,21 @@ const UPPER: f32 = 62.0;
 const PANEL: f32 = 186.0;
 /// Top of the lower row of panels.
 const LOWER: f32 = HEIGHT - GAP - PANEL;
-/// Middle of the board.
+/// Centre of the board.
 const BOARD: (f32, f32) = (WIDTH / 2.0, (UPPER + PANEL + LOWER) / 2.0);
-/// Width that the cards on the board may take.
+/// Width available to the cards on the board.
 const BOARD_WIDTH: f32 = 470.0;
-/// Most cards in a row on the board.
+/// The most cards in a row on the board.
 const BOARD_ROW: usize = 9;
 /// Width of the columns beside the board.
 const COLUMN: f32 = 302.0;
-/// What a panel needs beside a name: number, chip and points.
+/// Width beside a name: number, chip and points.
 const BESIDE_NAME: f32 = 218.0;
-/// What a panel needs beside the line below the name, without the role: the kind's sign before it, the points after it.
+/// Width beside the line below the name, without the role: symbol and points.
 const BESIDE_LABEL: f32 = 76.0 + 66.0;
-/// Width of a space between words; at the edge of a text it is not measured.
+/// Width of a space, which is not measured at the edge of a text.
 const SPACE: f32 = 5.0;
-/// Where the name of the game begins.
+/// Left edge of the caption.
 const CAPTION: f32 = 182.0;
 
 #[derive(Serialize)]
@@ -49,8 +48,8 @@ struct Table {
     height: f32,
     caption: String,
     title: String,
-    eyes: String,
-    cards: Vec<Drawing>,
+    perspective: String,
+    cards: Vec<SpriteDefinition>,
     seats: Vec<Panel>,
     board: Board,
     log: Vec<Line>,
@@ -121,7 +120,7 @@ struct Line {
 }
 
 impl Painter {
-    /// The picture of a scene as SVG. Its text is text: to be looked at elsewhere than here it needs [`Painter::outlined`].
+    /// Draws a scene as SVG. Its text needs the embedded font; see [`Painter::outlined`].
     pub fn table(&self, scene: &Scene) -> String {
         let places = places(scene);
         let seats: Vec<Panel> = scene
@@ -131,11 +130,11 @@ impl Painter {
             .map(|(seat, shown)| panel(self, scene, seat, shown, places[seat]))
             .collect();
         let board = board(self, scene);
-        let cards: BTreeSet<Drawn> = seats
+        let cards: BTreeSet<Sprite> = seats
             .iter()
             .flat_map(|panel| &panel.cards)
             .chain(&board.cards)
-            .map(|placed| placed.drawn)
+            .map(|placed| placed.sprite)
             .collect();
         let title = words::title(scene);
         let beside_title = (WIDTH - self.width(&title, 24.0, true)) / 2.0 - CAPTION - 2.0 * GAP;
@@ -144,8 +143,8 @@ impl Painter {
             height: HEIGHT,
             caption: self.fit(&scene.caption, 18.0, false, beside_title),
             title,
-            eyes: words::eyes(self, scene),
-            cards: cards.into_iter().map(Drawn::drawing).collect(),
+            perspective: words::perspective(self, scene),
+            cards: cards.into_iter().map(Sprite::definition).collect(),
             seats,
             board,
             log: log(self, scene),
@@ -157,7 +156,7 @@ impl Painter {
     }
 }
 
-/// Where each seat's panel stands: left edge, top, width. Play goes clockwise, as at a table where everybody plays to the left.
+/// Left edge, top and width of each seat's panel. Play goes clockwise.
 fn places(scene: &Scene) -> Vec<(f32, f32, f32)> {
     let players = scene.seats.len();
     let lower = (players / 2).max(1);
@@ -167,7 +166,7 @@ fn places(scene: &Scene) -> Vec<(f32, f32, f32)> {
         let width = (WIDTH - GAP * (count as f32 + 1.0)) / count as f32;
         (0..count).map(move |index| (GAP + index as f32 * (width + GAP), y, width))
     };
-    // Clockwise from the lower row's left half: to the left, up, to the right along the upper row, down and back.
+    // Clockwise from the left half of the lower row.
     let lower: Vec<_> = row(lower, LOWER).collect();
     let first = (lower.len() - 1) / 2;
     let mut round: Vec<_> = lower[..=first].iter().rev().copied().collect();
@@ -220,27 +219,29 @@ fn panel(
     }
 }
 
-/// What somebody is and how many cards are held, with the sign of the kind. Where that is too wide, shorter words say what somebody is.
+/// The symbol and label of a participant: kind and number of cards. Shortened if too wide.
 fn label(painter: &Painter, shown: &SeatScene, width: f32) -> (&'static str, String) {
     let participant = &shown.participant;
-    let (symbol, what, short) = match &participant.sort {
-        Sort::Unsaid => ("kind-open", "player".to_owned(), "player"),
-        Sort::Person => ("kind-person", "person".to_owned(), "person"),
-        Sort::Robot => ("kind-robot", "robot".to_owned(), "robot"),
-        Sort::Agent => ("kind-agent", "agent".to_owned(), "agent"),
-        Sort::BuiltIn(agent) => ("kind-built-in", format!("built-in {agent}"), agent.as_str()),
+    let (symbol, what, short) = match &participant.kind {
+        ParticipantKind::Unspecified => ("kind-open", "player".to_owned(), "player"),
+        ParticipantKind::Person => ("kind-person", "person".to_owned(), "person"),
+        ParticipantKind::Robot => ("kind-robot", "robot".to_owned(), "robot"),
+        ParticipantKind::Agent => ("kind-agent", "agent".to_owned(), "agent"),
+        ParticipantKind::BuiltIn(agent) => {
+            ("kind-built-in", format!("built-in {agent}"), agent.as_str())
+        }
     };
     let (symbol, long, short) = match &participant.presence {
         Presence::Here => (symbol, what, short.to_owned()),
         Presence::Away => (
             symbol,
-            format!("{what}, not connected"),
+            format!("{what}, disconnected"),
             format!("{short}, away"),
         ),
         Presence::Substituted(agent) => (
             "kind-built-in",
-            format!("{agent} for a lost {what}"),
-            format!("{agent}, {short} lost"),
+            format!("{agent} for disconnected {what}"),
+            format!("{agent} for {short}"),
         ),
     };
     let held = format!(" · {}", words::held(&shown.hand));
@@ -294,7 +295,7 @@ fn board(painter: &Painter, scene: &Scene) -> Board {
         (cards, Some(by)) => {
             let play = words::play(cards);
             let room = 300.0 - painter.width(&play, 18.0, true);
-            let name = words::told(painter, scene, by, (18.0, true), room);
+            let name = words::short_name(painter, scene, by, (18.0, true), room);
             format!("{play} · {name}")
         }
     };
@@ -314,8 +315,8 @@ fn log(painter: &Painter, scene: &Scene) -> Vec<Line> {
         .log
         .iter()
         .enumerate()
-        .map(|(index, happening)| {
-            let (seat, text) = words::happening(painter, scene, happening);
+        .map(|(index, entry)| {
+            let (seat, text) = words::log_entry(painter, scene, entry);
             let name = seat.map_or_else(String::new, |seat| {
                 painter.fit(&words::name(scene, seat), 16.0, true, 104.0)
             });
@@ -335,7 +336,7 @@ fn log(painter: &Painter, scene: &Scene) -> Vec<Line> {
         .collect()
 }
 
-/// What has been played of each face, in two rows.
+/// The cards played by face, in two rows.
 fn played(scene: &Scene) -> Vec<Played> {
     let per_row = scene.played.len().div_ceil(2).max(1);
     let step = (COLUMN - 24.0) / per_row as f32;
@@ -353,7 +354,7 @@ fn played(scene: &Scene) -> Vec<Played> {
     scene.played.iter().enumerate().map(cell).collect()
 }
 
-/// Whether the picture is of a moment at which nobody decides any more.
+/// Whether no decision is open at this moment.
 fn is_end(now: &Now) -> bool {
     matches!(now, Now::ShiftOver { .. } | Now::GameOver(_) | Now::Aborted)
 }
@@ -365,13 +366,13 @@ mod tests {
     use crate::table::*;
 
     #[test]
-    fn what_a_seat_is_never_runs_into_its_role_or_its_points() {
+    fn labels_do_not_overlap_roles_or_points() {
         let painter = Painter::new();
-        let sorts = [
-            Sort::Unsaid,
-            Sort::Robot,
-            Sort::BuiltIn("random".to_owned()),
-            Sort::BuiltIn("a built-in agent of a long name".to_owned()),
+        let kinds = [
+            ParticipantKind::Unspecified,
+            ParticipantKind::Robot,
+            ParticipantKind::BuiltIn("random".to_owned()),
+            ParticipantKind::BuiltIn("a built-in agent of a long name".to_owned()),
         ];
         let presences = [
             Presence::Here,
@@ -385,13 +386,13 @@ mod tests {
             Some(Role::Dishwasher),
         ];
         // Three, two and one in a row.
-        for (panel, sort, presence, role, cards) in [408.0, 619.0, 1252.0]
+        for (panel, kind, presence, role, cards) in [408.0, 619.0, 1252.0]
             .into_iter()
-            .flat_map(|panel| sorts.iter().map(move |sort| (panel, sort)))
-            .flat_map(|(panel, sort)| presences.iter().map(move |there| (panel, sort, there)))
-            .flat_map(|(panel, sort, there)| roles.map(|role| (panel, sort, there, role)))
-            .flat_map(|(panel, sort, there, role)| {
-                [0, 22].map(|cards| (panel, sort, there, role, cards))
+            .flat_map(|panel| kinds.iter().map(move |kind| (panel, kind)))
+            .flat_map(|(panel, kind)| presences.iter().map(move |there| (panel, kind, there)))
+            .flat_map(|(panel, kind, there)| roles.map(|role| (panel, kind, there, role)))
+            .flat_map(|(panel, kind, there, role)| {
+                [0, 22].map(|cards| (panel, kind, there, role, cards))
             })
         {
             let badge = role.map(|role| role_badge(&painter, role));
@@ -399,7 +400,7 @@ mod tests {
             let shown = SeatScene {
                 participant: Participant {
                     name: String::new(),
-                    sort: sort.clone(),
+                    kind: kind.clone(),
                     presence: presence.clone(),
                 },
                 role,
@@ -415,7 +416,8 @@ mod tests {
             assert!(right <= role_begins, "{panel}: {text} {role:?}");
             let held = words::held(&shown.hand);
             assert!(text.ends_with(&held), "{text}");
-            if *presence == Presence::Here && *sort == Sort::BuiltIn("random".to_owned()) {
+            if *presence == Presence::Here && *kind == ParticipantKind::BuiltIn("random".to_owned())
+            {
                 assert!(!text.contains('…'), "{panel}: {text}");
             }
         }

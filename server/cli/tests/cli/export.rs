@@ -210,9 +210,9 @@ fn only_a_dataset_is_replaced() {
     let ended = stage.export("--force");
     assert_eq!((ended.code, ended.stdout.as_str()), (Some(1), ""));
     assert!(
-        ended
-            .stderr
-            .contains("it is not replaced: notes.txt is in it, which SHA256SUMS does not list"),
+        ended.stderr.contains(
+            "it is not only a dataset: it contains notes.txt, which SHA256SUMS does not list"
+        ),
         "{ended:?}"
     );
     assert_eq!(contents(&stage.path("out")), before);
@@ -251,11 +251,11 @@ fn mistakes_are_explained() {
         ),
         (
             "--force --with human",
-            "of 1 records none is left to export",
+            "none of 1 records is left to export",
         ),
         (
             "--force --room elsewhere",
-            "of 1 records none is left to export",
+            "none of 1 records is left to export",
         ),
         ("missing", "missing: No such file"),
     ];

@@ -271,7 +271,7 @@ fn what_cannot_be_drawn_is_said() {
             "a.png",
             &["--at", "97"],
             1,
-            "there is no decision 97: the game has the decisions 1 to 96",
+            "there is no decision 97: the game has decisions 1 to 96",
         ),
         ("a.png", &["--at", "0"], 1, "there is no decision 0"),
         (
@@ -290,7 +290,7 @@ fn what_cannot_be_drawn_is_said() {
             "a.png",
             &["--seat", "3"],
             1,
-            "there is no seat 3: the game has the seats 0 to 2",
+            "there is no seat 3: the game has seats 0 to 2",
         ),
         (
             "a.png",

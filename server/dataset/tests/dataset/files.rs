@@ -1,10 +1,15 @@
 //! The files of a dataset: the formats against each other, sums, the card.
 
-use chefshat_dataset::{Export, Format, decision_columns, expression_columns, markdown};
-use serde_json::Value;
+use chefshat_dataset::{
+    ColumnInfo, Export, Format, decision_columns, expression_columns, markdown,
+};
+use chefshat_proto::v1::{self, record_line::Line};
+use parquet::file::reader::{FileReader as _, SerializedFileReader};
+use parquet::record::Field;
+use serde_json::{Map, Value};
 use sha2::{Digest as _, Sha256};
 
-use super::{Stage, a_record};
+use super::{Stage, a_record, with_lines};
 
 const DOCS: &str = include_str!("../../../../docs/datasets.md");
 
@@ -112,5 +117,78 @@ fn the_card_is_read_by_hubs_and_people() {
         );
     }
     assert!(card.contains("10.48550/arXiv.2003.05861"));
-    assert!(card.contains("| games | 1 (1 played to the end, 0 aborted) |"));
+    assert!(card.contains("| games | 1 (1 finished, 0 aborted) |"));
+}
+
+/// A Parquet value in the encoding of JSON Lines, with times in microseconds.
+fn json(field: &Field) -> Value {
+    match field {
+        Field::Null => Value::Null,
+        Field::Bool(value) => (*value).into(),
+        Field::UByte(value) => (*value).into(),
+        Field::UShort(value) => (*value).into(),
+        Field::UInt(value) => (*value).into(),
+        Field::ULong(value) => (*value).into(),
+        Field::Float(value) => value.to_string().parse::<f64>().unwrap().into(),
+        Field::Str(value) => value.as_str().into(),
+        Field::Bytes(value) => hex::encode(value.data()).into(),
+        Field::TimestampMicros(value) => (*value).into(),
+        Field::ListInternal(list) => list.elements().iter().map(json).collect(),
+        Field::Group(row) => {
+            let fields = row.get_column_iter();
+            let fields = fields.map(|(name, field)| (name.clone(), json(field)));
+            fields.collect::<Map<_, _>>().into()
+        }
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn parquet_and_json_lines_have_the_same_values() {
+    let expression = v1::PrivateExpression {
+        seat: 2,
+        elapsed_ms: 0,
+        expression: Some(v1::Expression {
+            label: "joy".into(),
+            valence: Some(0.7),
+            record_only: true,
+            ..v1::Expression::default()
+        }),
+    };
+    let lines = with_lines(a_record(1), &[(3, Line::PrivateExpression(expression))]);
+    let stage = Stage::new(&[("a.jsonl", lines)]);
+    stage.run(&stage.export()).unwrap();
+    let tables: [(&str, Vec<ColumnInfo>); 2] = [
+        ("decisions", decision_columns()),
+        ("expressions", expression_columns()),
+    ];
+    for (table, columns) in tables {
+        let path = stage.out().join(format!("{table}.parquet"));
+        let reader = SerializedFileReader::try_from(path.as_path()).unwrap();
+        let mut rows = stage.rows(table);
+        assert!(!rows.is_empty());
+        for row in &mut rows {
+            if let Some(time @ Value::String(_)) = row.get_mut("created_at") {
+                let parsed: chefshat_proto::Timestamp =
+                    serde_json::from_value(time.take()).unwrap();
+                *time = (parsed.seconds * 1_000_000 + i64::from(parsed.nanos / 1000)).into();
+            }
+        }
+        let found: Vec<Value> = reader
+            .get_row_iter(None)
+            .unwrap()
+            .map(|row| json(&Field::Group(row.unwrap())))
+            .collect();
+        assert_eq!(found, rows);
+        let names: Vec<String> = (reader
+            .metadata()
+            .file_metadata()
+            .schema()
+            .get_fields()
+            .iter())
+        .map(|field| field.name().to_owned())
+        .collect();
+        let expected: Vec<&str> = columns.iter().map(|column| column.name).collect();
+        assert_eq!(names, expected);
+    }
 }

@@ -19,7 +19,7 @@ fn only_datasets_are_replaced() {
     let error = stage.run(&stage.export()).unwrap_err().to_string();
     assert!(error.contains("--force"), "{error}");
     let error = stage.run(&replacing).unwrap_err().to_string();
-    assert!(error.contains("something else than a dataset"), "{error}");
+    assert!(error.contains("it is not only a dataset"), "{error}");
     assert_eq!(std::fs::read(&precious).unwrap(), b"kept");
     std::fs::remove_file(&precious).unwrap();
     // An empty folder will do.
@@ -82,7 +82,7 @@ fn a_folder_with_a_foreign_file_is_left_as_it_is() {
         std::fs::write(&path, "precious").unwrap();
         let before = everything(&stage.out());
         let error = stage.run(&replacing).unwrap_err().to_string();
-        let words = format!("{named} is in it, which SHA256SUMS does not list");
+        let words = format!("it contains {named}, which SHA256SUMS does not list");
         assert!(error.contains(&words), "{foreign}: {error}");
         assert_eq!(everything(&stage.out()), before, "{foreign}");
         assert_eq!(stage.left_lying(), ["out"], "{foreign}");
@@ -99,13 +99,17 @@ fn a_folder_with_a_foreign_file_is_left_as_it_is() {
 #[test]
 fn checksums_alone_make_no_dataset() {
     for (file, content, words) in [
-        ("README.md", "# My work\n", "is not a dataset card of ours"),
+        (
+            "README.md",
+            "# My work\n",
+            "was not written by this program",
+        ),
         (
             "README.md",
             "---\npretty_name: Other games\n---\npretty_name: Games of Chef's Hat\n",
-            "is not a dataset card of ours",
+            "was not written by this program",
         ),
-        ("SHA256SUMS", "", "README.md is in it"),
+        ("SHA256SUMS", "", "it contains README.md"),
     ] {
         let (stage, replacing) = a_dataset(Layout::Tables);
         std::fs::write(stage.out().join(file), content).unwrap();
@@ -136,7 +140,7 @@ fn links_are_not_followed_out_of_the_folder() {
     let link = stage.out().join("link");
     std::os::unix::fs::symlink(&elsewhere, &link).unwrap();
     let error = stage.run(&replacing).unwrap_err().to_string();
-    assert!(error.contains("link is in it"), "{error}");
+    assert!(error.contains("it contains link"), "{error}");
     std::fs::remove_file(&link).unwrap();
     // A link to the folder of the dataset stands for that folder.
     let by_link = stage.folder.path().join("by-link");

@@ -270,7 +270,7 @@ impl ImportedGame {
                 _ => None,
             };
             let action = planned.and_then(|action| self.rules.actions().encode(action));
-            if !action.is_some_and(|id| game.apply(id, |event| events.push(event)).is_ok()) {
+            if action.is_none_or(|id| game.apply(id, |event| events.push(event)).is_err()) {
                 return;
             }
         }

@@ -1,4 +1,4 @@
-//! Cutting a film: the lines of a record, as they are replayed, become frames. Which of them are shown is decided by whoever asks.
+//! Turns the lines of a record into frames.
 
 use std::time::Duration;
 
@@ -11,7 +11,7 @@ use super::{Frame, When};
 use chefshat_record::convert::{rules_from_proto, seat_from_number};
 use chefshat_record::replay::Moment;
 
-/// Who sits at the table when a record begins; `None` if its rules make no sense, which the replay refuses.
+/// The chronicle of a record; `None` if its rules are invalid, which the replay rejects.
 pub(super) fn chronicle_of(header: &v1::RecordHeader, viewer: Viewer) -> Option<Chronicle> {
     let rules = rules_from_proto(header.rules.as_ref()?).ok()?;
     Some(Chronicle::new(
@@ -22,21 +22,20 @@ pub(super) fn chronicle_of(header: &v1::RecordHeader, viewer: Viewer) -> Option<
     ))
 }
 
-/// A film being cut.
+/// A film in the making.
 pub(super) struct Cut {
     viewer: Viewer,
     chronicle: Option<Chronicle>,
     pub(super) frames: Vec<Frame>,
     pub(super) decisions: u64,
     pub(super) shifts: u32,
-    /// The play that the last decision brought, if it was one.
+    /// The play of the last decision.
     last_play: Option<v1::Play>,
-    /// Whether a Shift has been dealt that has not ended.
+    /// Whether a Shift is in progress.
     dealt: bool,
 }
 
 impl Cut {
-    /// A film with nothing in it, as this viewer sees it.
     pub(super) fn new(viewer: Viewer) -> Self {
         Self {
             viewer,
@@ -49,7 +48,7 @@ impl Cut {
         }
     }
 
-    /// Takes the next line of the record.
+    /// Processes a line.
     pub(super) fn take(&mut self, moment: &Moment<'_>) {
         match (moment.entry, moment.game) {
             (Line::Header(header), _) => self.chronicle = chronicle_of(header, self.viewer),
@@ -58,7 +57,7 @@ impl Cut {
                 self.last_play = None;
                 let when = When::Decision(self.decisions);
                 let time = Duration::from_micros(decision.decision_time_us);
-                self.shoot(when, game, moment, time);
+                self.add_frame(when, game, moment, time);
             }
             (Line::Event(event), game) => {
                 let Some(kind) = &event.kind else { return };
@@ -84,8 +83,9 @@ impl Cut {
         }
     }
 
-    /// A decision that the viewer may not know of makes no frame, and its number is in none: a gap would tell that somebody declined.
-    fn shoot(&mut self, when: When, game: &Game, moment: &Moment<'_>, decision_time: Duration) {
+    /// Adds a frame, unless its decision is hidden. Only the open perspective gets numbers: a gap
+    /// would reveal a declined special action.
+    fn add_frame(&mut self, when: When, game: &Game, moment: &Moment<'_>, decision_time: Duration) {
         if let Some(chronicle) = &self.chronicle {
             let mut scene = Scene::of(game, chronicle, self.viewer, &moment.hands_known);
             scene.hide_golden(&moment.golden_known);
@@ -103,10 +103,10 @@ impl Cut {
         }
     }
 
-    /// The rules deal the next Shift as soon as one has ended; at a real table nobody may have dealt it.
+    /// Adds the frame of an aborted game. At a real table the next Shift may not have been dealt.
     fn abort(&mut self, game: &Game, moment: &Moment<'_>) {
         if self.dealt {
-            self.shoot(When::End, game, moment, Duration::ZERO);
+            self.add_frame(When::End, game, moment, Duration::ZERO);
         } else if let Some(mut last) = self.frames.last().cloned() {
             last.when = When::End;
             self.frames.push(last);
@@ -119,7 +119,8 @@ impl Cut {
         }
     }
 
-    /// The game goes on to the next Shift at once; the end of the one before is drawn from the scene of its last decision.
+    /// Adds the end of a Shift, from the scene of its last decision: the game is already in the
+    /// next Shift.
     fn end_shift(&mut self, ended: &v1::ShiftEnded, game: &Game) {
         let (Some(last), Some(chronicle)) = (self.frames.last(), &self.chronicle) else {
             return;
@@ -190,12 +191,12 @@ impl Cut {
 }
 
 impl Hand {
-    /// Takes the cards of a play out of the hand.
+    /// Removes the cards of a play.
     fn take(&mut self, play: &[Card]) {
         match self {
             Hand::Open(cards) => {
                 for card in play {
-                    // The Golden card goes last of its face and lies first of it; plays do not tell it apart.
+                    // The Golden card is played last of its face and sorted first.
                     let same = |held: &Card| held.face() == card.face();
                     if let Some(index) = cards.iter().rposition(same) {
                         cards.remove(index);

@@ -1,17 +1,17 @@
-//! What the picture of the table says in words: the title, what the game waits for, what happened.
+//! The text of the table picture: title, open decision, log.
 
 use chefshat_engine::{PlayRequirement, Seat, SpecialAction, Viewer};
 use serde::Serialize;
 
-use super::super::chronicle::Happening;
+use super::super::chronicle::LogEntry;
 use super::super::paint::Painter;
 use super::super::scene::{Card, Hand, Now, Scene};
 use super::{COLUMN, SPACE, is_end};
 
-/// Width of a name within what happened.
+/// Width of a name within a log line.
 const IN_A_LINE: f32 = 92.0;
 
-/// What the game waits for, or how it ended.
+/// The open decision, or the result.
 #[derive(Serialize)]
 pub(super) struct Notice {
     pub(super) heading: String,
@@ -21,7 +21,7 @@ pub(super) struct Notice {
     pub(super) rows: Vec<Row>,
 }
 
-/// One part of what a play must be, to be read from afar.
+/// A part of the requirement of a play, readable from a distance.
 #[derive(Serialize)]
 pub(super) struct Tile {
     pub(super) sign: &'static str,
@@ -29,7 +29,7 @@ pub(super) struct Tile {
     pub(super) text: &'static str,
 }
 
-/// One line of a result.
+/// A line of a result.
 #[derive(Serialize)]
 pub(super) struct Row {
     pub(super) place: String,
@@ -38,7 +38,7 @@ pub(super) struct Row {
     pub(super) points: String,
 }
 
-/// What a seat is called.
+/// The name of a seat's participant.
 pub(super) fn name(scene: &Scene, seat: Seat) -> String {
     match scene.seats.get(seat.index()) {
         Some(shown) if !shown.participant.name.is_empty() => shown.participant.name.clone(),
@@ -46,33 +46,33 @@ pub(super) fn name(scene: &Scene, seat: Seat) -> String {
     }
 }
 
-/// What a seat is called where its number does not stand beside it: with the number if another is called the same.
-pub(super) fn told(
+/// The name of a seat where its number is not shown: with the number if the name is ambiguous.
+pub(super) fn short_name(
     painter: &Painter,
     scene: &Scene,
     seat: Seat,
     (size, bold): (f32, bool),
     width: f32,
 ) -> String {
-    let called = name(scene, seat);
+    let full = name(scene, seat);
     let mut others = (0..scene.seats.len())
         .map(Seat::new)
         .filter(|other| *other != seat);
-    let number = if others.any(|other| name(scene, other) == called) {
+    let number = if others.any(|other| name(scene, other) == full) {
         format!(" ({seat})")
     } else {
         String::new()
     };
     let room = width - painter.width(&number, size, bold) - SPACE;
-    painter.fit(&called, size, bold, room) + &number
+    painter.fit(&full, size, bold, room) + &number
 }
 
-/// Where the game stands.
+/// The state of the game.
 pub(super) fn title(scene: &Scene) -> String {
     let shift = scene.shift;
     match &scene.now {
         Now::GameOver(_) => "The game is over".to_owned(),
-        Now::Aborted => "The game was given up".to_owned(),
+        Now::Aborted => "The game was aborted".to_owned(),
         Now::ShiftOver { .. } => format!("Shift {shift} is over"),
         _ if scene.pizza == 0 => format!("Shift {shift} · before the first pizza"),
         _ => format!(
@@ -82,23 +82,23 @@ pub(super) fn title(scene: &Scene) -> String {
     }
 }
 
-/// With whose eyes the scene is seen, and by which number it is found where that is no secret.
-pub(super) fn eyes(painter: &Painter, scene: &Scene) -> String {
-    let eyes = match scene.viewer {
+/// The viewer, and the number of the decision unless it is hidden.
+pub(super) fn perspective(painter: &Painter, scene: &Scene) -> String {
+    let perspective = match scene.viewer {
         Viewer::Everything => "all hands open".to_owned(),
         Viewer::Spectator => "as spectators see it".to_owned(),
         Viewer::Seat(seat) => {
-            let name = told(painter, scene, seat, (18.0, false), 170.0);
+            let name = short_name(painter, scene, seat, (18.0, false), 170.0);
             format!("as {name} sees it")
         }
     };
     match scene.decision {
-        Some(decision) => format!("decision {decision} · {eyes}"),
-        None => eyes,
+        Some(decision) => format!("decision {decision} · {perspective}"),
+        None => perspective,
     }
 }
 
-/// How many cards are held.
+/// The number of cards in a hand.
 pub(super) fn held(hand: &Hand) -> String {
     let count = match hand {
         Hand::Open(cards) => cards.len(),
@@ -111,7 +111,7 @@ pub(super) fn held(hand: &Hand) -> String {
     }
 }
 
-/// A place.
+/// A place as an ordinal.
 pub(super) fn ordinal(place: u8) -> String {
     let ending = match place {
         1 => "st",
@@ -122,7 +122,7 @@ pub(super) fn ordinal(place: u8) -> String {
     format!("{place}{ending}")
 }
 
-/// What the seat whose decision is open has to do.
+/// The chip of the seat that decides.
 pub(super) fn to_decide(now: &Now) -> &'static str {
     match now {
         Now::Special(..) => "to declare?",
@@ -149,7 +149,7 @@ pub(super) fn play(cards: &[Card]) -> String {
     }
 }
 
-/// Cards that need not be of one face.
+/// Cards of any faces.
 fn gift(cards: &[Card]) -> String {
     let words: Vec<String> = cards
         .iter()
@@ -162,29 +162,29 @@ fn gift(cards: &[Card]) -> String {
     words.join(", ")
 }
 
-/// What happened: who did it, and what.
-pub(super) fn happening(
+/// A log line: seat and text.
+pub(super) fn log_entry(
     painter: &Painter,
     scene: &Scene,
-    happening: &Happening,
+    entry: &LogEntry,
 ) -> (Option<Seat>, String) {
     let because = |cause: &Option<&str>| cause.map_or_else(String::new, |why| format!(" ({why})"));
-    match happening {
-        Happening::Dealt(shift) => (None, format!("Cards are dealt for Shift {shift}")),
-        Happening::Played { seat, cards, cause } => {
+    match entry {
+        LogEntry::Dealt(shift) => (None, format!("Cards are dealt for Shift {shift}")),
+        LogEntry::Played { seat, cards, cause } => {
             (Some(*seat), format!("{}{}", play(cards), because(cause)))
         }
-        Happening::Passed { seat, cause } => (Some(*seat), format!("passes{}", because(cause))),
-        Happening::Finished { seat, place } => {
+        LogEntry::Passed { seat, cause } => (Some(*seat), format!("passes{}", because(cause))),
+        LogEntry::Finished { seat, place } => {
             let place = ordinal(u8::try_from(*place).unwrap_or(u8::MAX));
             (Some(*seat), format!("finishes {place}"))
         }
-        Happening::PizzaDone { pizza, next } => {
-            let next = told(painter, scene, *next, (16.0, false), IN_A_LINE);
+        LogEntry::PizzaDone { pizza, next } => {
+            let next = short_name(painter, scene, *next, (16.0, false), IN_A_LINE);
             (None, format!("Pizza {pizza} done, {next} leads"))
         }
-        Happening::Declared { seat, special } => (Some(*seat), format!("{}!", special.name())),
-        Happening::Gave {
+        LogEntry::Declared { seat, special } => (Some(*seat), format!("{}!", special.name())),
+        LogEntry::Gave {
             giver,
             receiver,
             count,
@@ -195,18 +195,18 @@ pub(super) fn happening(
                 None if *count == 1 => "a card".to_owned(),
                 None => format!("{count} cards"),
             };
-            let receiver = told(painter, scene, *receiver, (16.0, false), IN_A_LINE);
+            let receiver = short_name(painter, scene, *receiver, (16.0, false), IN_A_LINE);
             (Some(*giver), format!("gives {what} to {receiver}"))
         }
-        Happening::ShiftOver { shift, winner } => {
-            let winner = told(painter, scene, *winner, (16.0, false), IN_A_LINE);
+        LogEntry::ShiftOver { shift, winner } => {
+            let winner = short_name(painter, scene, *winner, (16.0, false), IN_A_LINE);
             (None, format!("Shift {shift} over, {winner} first"))
         }
-        Happening::Expressed { seat, label } => (Some(*seat), format!("shows {label}")),
+        LogEntry::Expressed { seat, label } => (Some(*seat), format!("shows {label}")),
     }
 }
 
-/// What the game waits for, or how it ended.
+/// The open decision, or the result.
 pub(super) fn notice(painter: &Painter, scene: &Scene) -> Notice {
     let seat = scene.seats.iter().position(|seat| seat.deciding);
     let who = seat.map_or_else(String::new, |seat| {
@@ -222,7 +222,7 @@ pub(super) fn notice(painter: &Painter, scene: &Scene) -> Notice {
             lines.extend(
                 match special {
                     SpecialAction::FoodFight => {
-                        ["Both jokers: Food Fight", "would turn all roles around."]
+                        ["Both jokers: Food Fight", "would reverse all roles."]
                     }
                     SpecialAction::DinnerIsServed => {
                         ["Both jokers: Dinner is Served", "would skip the exchange."]
@@ -233,7 +233,7 @@ pub(super) fn notice(painter: &Painter, scene: &Scene) -> Notice {
             format!("{who} may declare")
         }
         Now::Exchange(_, receiver) => {
-            let receiver = told(painter, scene, *receiver, (18.0, false), COLUMN - 160.0);
+            let receiver = short_name(painter, scene, *receiver, (18.0, false), COLUMN - 160.0);
             lines.push(format!("The exchange, to {receiver}."));
             format!("{who} gives a card")
         }
@@ -244,14 +244,14 @@ pub(super) fn notice(painter: &Painter, scene: &Scene) -> Notice {
         }
         Now::ShiftOver { adjudicated, .. } => {
             if *adjudicated {
-                lines.push("Ended by the limit of turns.".to_owned());
+                lines.push("Ended by the turn limit.".to_owned());
             }
             "Points of this Shift".to_owned()
         }
-        Now::GameOver(_) => "Final table".to_owned(),
+        Now::GameOver(_) => "Final standings".to_owned(),
         Now::Aborted => {
             lines.push("There is no result.".to_owned());
-            "Given up".to_owned()
+            "Aborted".to_owned()
         }
     };
     Notice {
@@ -290,13 +290,13 @@ fn turn_line(play: &PlayRequirement) -> &'static str {
         true if play.is_opening() => "Opens the Shift.",
         true if play.lone_joker => "The board is empty: any play.",
         false if play.lone_joker => "The board is empty: must play.",
-        _ if play.highest_face == 0 => "Nothing is rarer: only a pass.",
+        _ if play.highest_face == 0 => "Nothing beats this: pass.",
         true => "A rarer face, no fewer cards.",
         false => "May not pass.",
     }
 }
 
-/// The lines of a result, best first.
+/// The lines of the result, best first.
 fn rows(painter: &Painter, scene: &Scene) -> Vec<Row> {
     let row = |place: u8, seat: Seat, points: String| Row {
         place: ordinal(place),

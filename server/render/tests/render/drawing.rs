@@ -5,7 +5,7 @@ use std::path::Path;
 
 use chefshat_engine::{BySeat, Game, Seat, Seed, Viewer};
 use chefshat_proto::v1;
-use chefshat_render::{Eyes, Film, GifWriter, Painter, Palette, Scene, When, figure_at};
+use chefshat_render::{Film, GifWriter, Painter, Palette, Perspective, Scene, When, figure_at};
 use resvg::tiny_skia::Pixmap;
 
 use super::{chronicle, film, rules};
@@ -67,7 +67,7 @@ fn a_letter_that_the_font_lacks_is_drawn_as_near_as_it_has() {
 
 #[test]
 fn a_picture_is_the_same_every_time() {
-    let film = film("committed.jsonl", Eyes::Seat(1));
+    let film = film("committed.jsonl", Perspective::Seat(1));
     let scene = &film.at(When::Decision(120)).unwrap().scene;
     let picture = || {
         let painter = Painter::new();
@@ -90,7 +90,7 @@ fn a_picture_is_the_same_every_time() {
     for width in [0, 159, 8001, u32::MAX] {
         assert_eq!(
             painter.pixels(&outlined, width).unwrap_err().to_string(),
-            format!("a picture is 160 to 8000 pixels wide, not {width}")
+            format!("the width must be 160 to 8000 pixels, not {width}")
         );
     }
 }
@@ -100,9 +100,9 @@ fn a_picture_is_the_same_every_time() {
 fn the_drawings_are_those_that_were_looked_at() {
     let lines = TestGame::dealt(rules(2, 4), 6, 2).record(|_| v1::DecisionSource::Agent);
     let painter = Painter::new();
-    let film = Film::new(&lines, Eyes::Seat(0)).unwrap();
+    let film = Film::new(&lines, Perspective::Seat(0)).unwrap();
     let table = painter.table(&film.at(When::Decision(2)).unwrap().scene);
-    let figure = painter.figure(&figure_at(&lines, Eyes::All, 2).unwrap());
+    let figure = painter.figure(&figure_at(&lines, Perspective::All, 2).unwrap());
     for (name, drawn, expected) in [
         ("picture-table.svg", table, include_str!("table.svg")),
         ("picture-figure.svg", figure, include_str!("figure.svg")),
@@ -117,7 +117,7 @@ fn the_drawings_are_those_that_were_looked_at() {
 
 #[test]
 fn a_gif_has_a_frame_for_every_change_and_keeps_the_colours() {
-    let film = film("fixed.jsonl", Eyes::All);
+    let film = film("fixed.jsonl", Perspective::All);
     let painter = Painter::new();
     let frames = film.range(1..=4).unwrap();
     let mut pictures: Vec<Pixmap> = frames

@@ -11,7 +11,7 @@ use chefshat_record::branch::Branch;
 use chefshat_record::import::import;
 use chefshat_record::replay::walk;
 use chefshat_record::testing::{Observed, TestGame, transcript};
-use chefshat_render::{Card, Eyes, Film, Frame, Hand, Happening, Now, Painter, Scene, When};
+use chefshat_render::{Card, Film, Frame, Hand, LogEntry, Now, Painter, Perspective, Scene, When};
 
 use super::{chronicle, film, fixture, rules, scene};
 
@@ -47,13 +47,17 @@ fn names_of(cards: &[Card]) -> Vec<String> {
 #[test]
 fn nothing_hidden_is_in_a_scene_or_its_picture() {
     let painter = Painter::new();
-    let all = film("committed.jsonl", Eyes::All);
-    for eyes in [Eyes::Seat(0), Eyes::Seat(2), Eyes::Spectator] {
-        let own = match eyes {
-            Eyes::Seat(seat) => usize::try_from(seat).ok(),
+    let all = film("committed.jsonl", Perspective::All);
+    for perspective in [
+        Perspective::Seat(0),
+        Perspective::Seat(2),
+        Perspective::Spectator,
+    ] {
+        let own = match perspective {
+            Perspective::Seat(seat) => usize::try_from(seat).ok(),
             _ => None,
         };
-        let film = film("committed.jsonl", eyes);
+        let film = film("committed.jsonl", perspective);
         let mut gifts = 0;
         for (number, (frame, open)) in film.frames().iter().zip(all.frames()).enumerate() {
             let mut visible = frame.scene.board.clone();
@@ -71,7 +75,7 @@ fn nothing_hidden_is_in_a_scene_or_its_picture() {
                 }
             }
             for happening in &frame.scene.log {
-                if let Happening::Gave {
+                if let LogEntry::Gave {
                     giver,
                     receiver,
                     cards,
@@ -154,7 +158,7 @@ fn with_other_hidden_cards(game: &Game) -> Option<Game> {
     Some(game.with_hands(hands).unwrap())
 }
 
-/// The decisions that only a seat itself and all-seeing eyes know of, and whose they are.
+/// The decisions that only a seat itself and all-seeing perspective know of, and whose they are.
 fn specials(all: &Film) -> Vec<(u64, Seat, SpecialAction)> {
     let special = |frame: &Frame| match (frame.when, &frame.scene.now) {
         (When::Decision(number), Now::Special(seat, special)) => Some((number, *seat, *special)),
@@ -163,14 +167,14 @@ fn specials(all: &Film) -> Vec<(u64, Seat, SpecialAction)> {
     all.frames().iter().filter_map(special).collect()
 }
 
-fn own(seat: Seat) -> Eyes {
-    Eyes::Seat(u32::try_from(seat.index()).unwrap())
+fn own(seat: Seat) -> Perspective {
+    Perspective::Seat(u32::try_from(seat.index()).unwrap())
 }
 
 #[test]
 fn that_a_special_action_may_be_declared_is_for_the_seat_alone() {
     let lines = fixture("fixed.jsonl");
-    let all = Film::new(&lines, Eyes::All).unwrap();
+    let all = Film::new(&lines, Perspective::All).unwrap();
     let [(number, seat, special)] = specials(&all)[..] else {
         panic!("one such decision: {:?}", specials(&all))
     };
@@ -181,8 +185,11 @@ fn that_a_special_action_may_be_declared_is_for_the_seat_alone() {
     assert!(scene.seats[seat.index()].deciding);
     assert_eq!(film.frames().len(), all.frames().len());
 
-    for eyes in [own(Seat::new((seat.index() + 1) % 3)), Eyes::Spectator] {
-        let film = Film::new(&lines, eyes).unwrap();
+    for perspective in [
+        own(Seat::new((seat.index() + 1) % 3)),
+        Perspective::Spectator,
+    ] {
+        let film = Film::new(&lines, perspective).unwrap();
         let whens = |range| -> Vec<When> {
             let frames = film.range(range).unwrap();
             frames.iter().map(|frame| frame.when).collect()
@@ -227,9 +234,9 @@ fn a_film_may_begin_with_what_its_viewer_does_not_know_of() {
         ..TestGame::dealt(rules, 1, 2)
     };
     let lines = making.record(|_| v1::DecisionSource::Agent);
-    let all = Film::new(&lines, Eyes::All).unwrap();
+    let all = Film::new(&lines, Perspective::All).unwrap();
     assert_eq!(specials(&all)[0].0, 1);
-    let film = Film::new(&lines, Eyes::Spectator).unwrap();
+    let film = Film::new(&lines, Perspective::Spectator).unwrap();
     let first = film.at(When::Decision(1)).unwrap();
     assert_eq!(first.when, film.frames()[0].when);
     assert_eq!(film.range(1..=1).unwrap().len(), 1);
@@ -238,13 +245,13 @@ fn a_film_may_begin_with_what_its_viewer_does_not_know_of() {
 #[test]
 fn the_number_of_a_decision_is_for_those_who_see_all() {
     let painter = Painter::new();
-    for (eyes, told) in [
-        (Eyes::All, true),
-        (Eyes::Seat(0), false),
-        (Eyes::Seat(1), false),
-        (Eyes::Spectator, false),
+    for (perspective, told) in [
+        (Perspective::All, true),
+        (Perspective::Seat(0), false),
+        (Perspective::Seat(1), false),
+        (Perspective::Spectator, false),
     ] {
-        let film = film("fixed.jsonl", eyes);
+        let film = film("fixed.jsonl", perspective);
         for frame in film.frames() {
             let number = match frame.when {
                 When::Decision(number) if told => Some(number),
@@ -312,13 +319,16 @@ fn games_that_differ_in_a_silent_decline_give_the_same_film() {
     let mut compared = 0;
     for (players, seed) in [2, 3, 4, 4, 5, 6].into_iter().zip(1..) {
         let [offered, not_offered] = with_and_without_special_actions(players, seed);
-        let declines = specials(&Film::new(&offered, Eyes::All).unwrap());
+        let declines = specials(&Film::new(&offered, Perspective::All).unwrap());
         let seats = (0..usize::from(players)).map(Seat::new);
-        for eyes in seats.map(own).chain([Eyes::Spectator]) {
-            let films = [&offered, &not_offered].map(|lines| Film::new(lines, eyes).unwrap());
+        for perspective in seats.map(own).chain([Perspective::Spectator]) {
+            let films =
+                [&offered, &not_offered].map(|lines| Film::new(lines, perspective).unwrap());
             let [with, without] = films.each_ref().map(shown);
             assert_eq!(with, without);
-            let of_others = declines.iter().filter(|(_, seat, _)| own(*seat) != eyes);
+            let of_others = declines
+                .iter()
+                .filter(|(_, seat, _)| own(*seat) != perspective);
             for &(number, _, _) in of_others {
                 compared += 1;
                 // Whoever asks for the decision gets the moment before, and nothing in its picture says that there was more.
@@ -357,7 +367,7 @@ fn hands_that_nobody_wrote_down_are_drawn_as_unknown() {
 /// The number of times the Golden card is drawn in a hand of a game at a real table.
 fn golden_drawn(rules: &RuleSet, played: &[v1::RecordLine], observed: Observed) -> usize {
     let record = import(transcript(rules, played, observed).as_bytes()).unwrap();
-    let film = Film::new(&record, Eyes::All).unwrap();
+    let film = Film::new(&record, Perspective::All).unwrap();
     let seats = film.frames().iter().flat_map(|frame| &frame.scene.seats);
     seats
         .filter(|seat| {

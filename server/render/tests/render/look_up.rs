@@ -1,7 +1,7 @@
 //! The look-up table of a decision: it agrees with the mask and is for the seat that decides.
 
 use chefshat_engine::{Action, ActionId, DecisionKind, Game, Requirement, Seed, Viewer};
-use chefshat_render::{Eyes, Figure, FilmError, State, figure_at};
+use chefshat_render::{Figure, FilmError, Perspective, State, figure_at};
 
 use super::{chronicle, fixture, rules};
 
@@ -90,26 +90,29 @@ fn check(game: &Game, figure: &Figure) {
 #[test]
 fn the_look_up_table_is_for_the_seat_that_decides() {
     let lines = fixture("committed.jsonl");
-    let seat = figure_at(&lines, Eyes::All, 7).unwrap().seat;
+    let seat = figure_at(&lines, Perspective::All, 7).unwrap().seat;
     let own = u32::try_from(seat.index()).unwrap();
-    assert_eq!(figure_at(&lines, Eyes::Seat(own), 7).unwrap().seat, seat);
-    for (eyes, decision, words) in [
+    assert_eq!(
+        figure_at(&lines, Perspective::Seat(own), 7).unwrap().seat,
+        seat
+    );
+    for (perspective, decision, words) in [
         (
-            Eyes::All,
+            Perspective::All,
             208,
-            "there is no decision 208: the game has the decisions 1 to 207",
+            "there is no decision 208: the game has decisions 1 to 207",
         ),
         (
-            Eyes::Seat(9),
+            Perspective::Seat(9),
             7,
-            "there is no seat 9: the game has the seats 0 to 3",
+            "there is no seat 9: the game has seats 0 to 3",
         ),
     ] {
-        let error = figure_at(&lines, eyes, decision).unwrap_err();
+        let error = figure_at(&lines, perspective, decision).unwrap_err();
         assert_eq!(error.to_string(), words);
     }
-    for eyes in [Eyes::Spectator, Eyes::Seat((own + 1) % 4)] {
-        let error = figure_at(&lines, eyes, 7).unwrap_err();
+    for perspective in [Perspective::Spectator, Perspective::Seat((own + 1) % 4)] {
+        let error = figure_at(&lines, perspective, 7).unwrap_err();
         assert_eq!(error, FilmError::HandNotSeen { decision: 7 });
         assert!(!error.to_string().contains("seat "), "not even whose it is");
     }

@@ -16,7 +16,8 @@ use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 use chefshat_record::import::import;
 use chefshat_record::jsonl;
 use chefshat_render::{
-    Card, Chronicle, Eyes, Film, FilmError, Hand, Happening, Now, Painter, Scene, Sort, When,
+    Card, Chronicle, Film, FilmError, Hand, LogEntry, Now, Painter, ParticipantKind, Perspective,
+    Scene, When,
 };
 
 fn fixture(file: &str) -> Vec<v1::RecordLine> {
@@ -24,8 +25,8 @@ fn fixture(file: &str) -> Vec<v1::RecordLine> {
     jsonl::read(&folder.join(file)).unwrap()
 }
 
-fn film(file: &str, eyes: Eyes) -> Film {
-    Film::new(&fixture(file), eyes).unwrap()
+fn film(file: &str, perspective: Perspective) -> Film {
+    Film::new(&fixture(file), perspective).unwrap()
 }
 
 fn rules(players: u8, faces: u8) -> RuleSet {
@@ -60,7 +61,7 @@ fn scene(game: &Game, viewer: Viewer) -> Scene {
 
 #[test]
 fn a_film_has_a_frame_for_every_moment() {
-    let film = film("fixed.jsonl", Eyes::All);
+    let film = film("fixed.jsonl", Perspective::All);
     let shape: Vec<When> = film.frames().iter().map(|frame| frame.when).collect();
     assert_eq!(film.decisions(), 96);
     assert_eq!(shape.len(), 96 + 2 + 1);
@@ -90,10 +91,10 @@ fn a_film_has_a_frame_for_every_moment() {
     };
     assert_eq!((hand.len(), hand.contains(&Card::Golden(11))), (22, true));
     assert!(hand.is_sorted_by_key(|card| card.face().unwrap_or(12)));
-    assert_eq!(first.log, [Happening::Dealt(1)]);
+    assert_eq!(first.log, [LogEntry::Dealt(1)]);
     assert_eq!(
-        first.seats[0].participant.sort,
-        Sort::BuiltIn("greedy".into())
+        first.seats[0].participant.kind,
+        ParticipantKind::BuiltIn("greedy".into())
     );
 
     // The opening is answered with the Golden card on the board.
@@ -153,7 +154,7 @@ fn a_film_has_a_frame_for_every_moment() {
 
 #[test]
 fn a_part_of_a_film_is_what_was_asked_for() {
-    let film = film("fixed.jsonl", Eyes::All);
+    let film = film("fixed.jsonl", Perspective::All);
     let whens = |frames: Vec<&chefshat_render::Frame>| -> Vec<When> {
         frames.iter().map(|frame| frame.when).collect()
     };
@@ -184,31 +185,31 @@ fn a_part_of_a_film_is_what_was_asked_for() {
     for (problem, words) in [
         (
             film.at(When::Decision(97)).map(drop),
-            "there is no decision 97: the game has the decisions 1 to 96",
+            "there is no decision 97: the game has decisions 1 to 96",
         ),
         (
             film.range(0..=3).map(drop),
-            "there is no decision 0: the game has the decisions 1 to 96",
+            "there is no decision 0: the game has decisions 1 to 96",
         ),
         (
             film.shift(3).map(drop),
-            "there is no Shift 3: the game has the Shifts 1 to 2",
+            "there is no Shift 3: the game has Shifts 1 to 2",
         ),
         (
             film.at(When::ShiftEnd(0)).map(drop),
-            "there is no Shift 0: the game has the Shifts 1 to 2",
+            "there is no Shift 0: the game has Shifts 1 to 2",
         ),
     ] {
         assert_eq!(problem.unwrap_err().to_string(), words);
     }
-    let error = Film::new(&fixture("fixed.jsonl"), Eyes::Seat(3)).unwrap_err();
+    let error = Film::new(&fixture("fixed.jsonl"), Perspective::Seat(3)).unwrap_err();
     assert_eq!(
         error.to_string(),
-        "there is no seat 3: the game has the seats 0 to 2"
+        "there is no seat 3: the game has seats 0 to 2"
     );
     let cut = &fixture("fixed.jsonl")[..20];
     assert!(matches!(
-        Film::new(cut, Eyes::All).unwrap_err(),
+        Film::new(cut, Perspective::All).unwrap_err(),
         FilmError::Replay(_)
     ));
 }
@@ -251,7 +252,7 @@ fn a_game_that_was_given_up_is_drawn_as_far_as_it_went() {
         lines.push(v1::RecordLine { line: Some(line) });
     }
 
-    let film = Film::new(&lines, Eyes::Seat(0)).unwrap();
+    let film = Film::new(&lines, Perspective::Seat(0)).unwrap();
     assert_eq!((film.decisions(), film.frames().len()), (9, 10));
     let scene = &film.at(When::End).unwrap().scene;
     assert_eq!(scene.now, Now::Aborted);
@@ -259,7 +260,7 @@ fn a_game_that_was_given_up_is_drawn_as_far_as_it_went() {
     assert!(Painter::new().table(scene).contains("There is no result."));
     assert_eq!(
         film.at(When::ShiftEnd(1)).unwrap_err().to_string(),
-        "Shift 1 was not played to its end"
+        "Shift 1 did not end"
     );
 }
 
@@ -275,7 +276,7 @@ fn a_real_game_that_was_left_between_two_shifts_ends_as_its_last_shift_did() {
 ";
     let film = |transcript: &str| {
         let lines = import(transcript.as_bytes()).unwrap();
-        Film::new(&lines, Eyes::All).unwrap()
+        Film::new(&lines, Perspective::All).unwrap()
     };
     let left = film(transcript);
     let [.., before, last] = left.frames() else {
