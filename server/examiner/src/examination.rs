@@ -188,6 +188,7 @@ impl Examination {
             Place::Tournament(settings) => {
                 let request = v1::CreateTournamentRequest {
                     settings: Some(settings(&self.patience)),
+                    ..v1::CreateTournamentRequest::default()
                 };
                 let mut service = TournamentServiceClient::new(client.channel());
                 let made = service.create_tournament(request).await;
