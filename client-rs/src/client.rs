@@ -99,7 +99,8 @@ impl Client {
         Ok(service.get_action_table(request).await?.into_inner())
     }
 
-    /// Creates a room. A call whose response is lost is repeated and creates no second room. The response holds the join code for its participants and the token that closes it.
+    /// Creates a room. The response holds the join code for its participants and the token that closes it. A call whose
+    /// response is lost is repeated and creates no second room.
     ///
     /// # Errors
     /// `RULE_SET_REFUSED`, `POLICY_REFUSED`, `SEATS_REFUSED`, `SEED_REFUSED` or `NAME_REFUSED`, with the field at fault in the metadata;
@@ -110,7 +111,11 @@ impl Client {
     ) -> Result<v1::CreateRoomResponse, Error> {
         let service = RoomServiceClient::new(self.channel());
         identify(&mut request.request_id);
-        repeated(async || service.clone().create_room(request.clone()).await).await
+        repeated(|| {
+            let (mut service, request) = (service.clone(), request.clone());
+            async move { service.create_room(request).await }
+        })
+        .await
     }
 
     /// One room.
@@ -152,7 +157,8 @@ impl Client {
         Ok(service.list_rooms(request).await?.into_inner())
     }
 
-    /// Takes a seat. A call whose response is lost is repeated and takes no second seat. The response holds the ticket to play on it.
+    /// Takes a seat. The response holds the ticket to play on it. A call whose response is lost is repeated and takes no
+    /// second seat.
     ///
     /// # Errors
     /// `JOIN_CODE_WRONG`, `ROOM_FULL`, `SEAT_TAKEN`, `KIND_NOT_ADMITTED`, `GAME_STARTED`, `ROOM_UNKNOWN`.
@@ -162,7 +168,11 @@ impl Client {
     ) -> Result<v1::JoinRoomResponse, Error> {
         let service = RoomServiceClient::new(self.channel());
         identify(&mut request.request_id);
-        repeated(async || service.clone().join_room(request.clone()).await).await
+        repeated(|| {
+            let (mut service, request) = (service.clone(), request.clone());
+            async move { service.join_room(request).await }
+        })
+        .await
     }
 
     /// Takes the first free seat of the room with this join code, as an agent.

@@ -28,9 +28,10 @@ pub(crate) fn identify(request_id: &mut Vec<u8>) {
 }
 
 /// Sends a request, and sends it again when the connection is lost before its response has arrived.
-pub(crate) async fn repeated<T>(
-    send: impl AsyncFn() -> Result<Response<T>, Status>,
-) -> Result<T, Error> {
+pub(crate) async fn repeated<T, F>(send: impl Fn() -> F) -> Result<T, Error>
+where
+    F: Future<Output = Result<Response<T>, Status>>,
+{
     let mut attempt = 1;
     loop {
         let error = match send().await {
@@ -52,18 +53,21 @@ mod tests {
 
     use super::*;
 
-    #[tokio::test(start_paused = true)]
+    #[tokio::test]
     async fn a_lost_connection_is_tried_again_and_a_refusal_is_not() {
         let sent = AtomicU32::new(0);
-        let lost_twice = async || match sent.fetch_add(1, Ordering::Relaxed) {
-            0 | 1 => Err(Status::unavailable("connection lost")),
-            number => Ok(Response::new(number)),
+        let lost_twice = || {
+            std::future::ready(match sent.fetch_add(1, Ordering::Relaxed) {
+                0 | 1 => Err(Status::unavailable("connection lost")),
+                number => Ok(Response::new(number)),
+            })
         };
         assert_eq!(repeated(lost_twice).await.expect("the third one"), 2);
         let sent = AtomicU32::new(0);
-        let refused = async || -> Result<Response<()>, Status> {
+        let refused = || {
             sent.fetch_add(1, Ordering::Relaxed);
-            Err(Status::failed_precondition("the room is full"))
+            let refusal = Status::failed_precondition("the room is full");
+            std::future::ready(Err::<Response<()>, _>(refusal))
         };
         repeated(refused).await.expect_err("refused");
         assert_eq!(sent.load(Ordering::Relaxed), 1);

@@ -30,7 +30,11 @@ impl Client {
             ..Default::default()
         };
         identify(&mut request.request_id);
-        repeated(async || service(self).create_tournament(request.clone()).await).await
+        repeated(|| {
+            let (mut service, request) = (service(self), request.clone());
+            async move { service.create_tournament(request).await }
+        })
+        .await
     }
 
     /// One tournament.
@@ -61,7 +65,8 @@ impl Client {
         Ok(response.into_inner())
     }
 
-    /// Joins a tournament. A call whose response is lost is repeated and adds no second participant. Its join code is enough to find it. The response holds the ticket for [`play_tournament`](Self::play_tournament).
+    /// Joins a tournament; its join code is enough to find it. The response holds the ticket for
+    /// [`play_tournament`](Self::play_tournament). A call whose response is lost is repeated and adds no second participant.
     ///
     /// # Errors
     /// `JOIN_CODE_WRONG`, `TOURNAMENT_FULL`, `TOURNAMENT_STARTED`, `NAME_TAKEN`, `NAME_REFUSED`, `KIND_NOT_ADMITTED`, `KIND_REFUSED`,
@@ -71,7 +76,11 @@ impl Client {
         mut request: v1::JoinTournamentRequest,
     ) -> Result<v1::JoinTournamentResponse, Error> {
         identify(&mut request.request_id);
-        repeated(async || service(self).join_tournament(request.clone()).await).await
+        repeated(|| {
+            let (mut service, request) = (service(self), request.clone());
+            async move { service.join_tournament(request).await }
+        })
+        .await
     }
 
     /// Begins a tournament.

@@ -111,6 +111,7 @@ async fn what_cannot_be_is_refused_by_name() {
     for (settings, reason, field) in cases {
         let request = v1::CreateTournamentRequest {
             settings: Some(settings),
+            ..Default::default()
         };
         let refused = service.create_tournament(request).await;
         let refused = refused.expect_err("it is refused");

@@ -22,6 +22,7 @@ pub(crate) async fn create(
     };
     let request = v1::CreateTournamentRequest {
         settings: Some(settings),
+        ..Default::default()
     };
     let created = service.create_tournament(request).await;
     created.expect("the tournament is made").into_inner()

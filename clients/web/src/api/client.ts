@@ -9,8 +9,9 @@ import { RoomService } from "../gen/chefshat/v1/room_service_pb";
 import { ServerService } from "../gen/chefshat/v1/server_service_pb";
 import { SpectatorService } from "../gen/chefshat/v1/spectator_service_pb";
 import { TournamentService } from "../gen/chefshat/v1/tournament_service_pb";
+import { repeat } from "./repeat";
 
-const transport = createGrpcWebTransport({ baseUrl: location.origin });
+const transport = createGrpcWebTransport({ baseUrl: location.origin, interceptors: [repeat] });
 
 /** The server itself: version, limits, built-in agents, texts of actions. */
 export const serverApi = createClient(ServerService, transport);

@@ -1,0 +1,37 @@
+// Repeats a request to create or to join whose response was lost. Its request id tells the server
+// that it is the same request, so that it answers with the same place and the same secrets.
+
+import type { Interceptor } from "@connectrpc/connect";
+import { Code } from "@connectrpc/connect";
+import { faultOf } from "./faults";
+
+/** Bytes of a request id. */
+export const REQUEST_ID_BYTES = 32;
+/** Pauses before each further attempt, milliseconds. */
+const PAUSES_MS = [100, 200, 400];
+/** Codes of a call that ended without an answer. */
+const LOST: Code[] = [Code.Unavailable, Code.Unknown, Code.Internal];
+
+/** Gives requests that can be repeated an id and repeats them when the connection is lost. */
+export const repeat: Interceptor = (next) => async (request) => {
+  const message = request.message as { requestId?: unknown };
+  if (request.stream || !(message.requestId instanceof Uint8Array)) return next(request);
+  if (message.requestId.length === 0) {
+    message.requestId = crypto.getRandomValues(new Uint8Array(REQUEST_ID_BYTES));
+  }
+  for (const pause of PAUSES_MS) {
+    try {
+      return await next(request);
+    } catch (thrown) {
+      if (!isLost(thrown)) throw thrown;
+      await new Promise((resume) => setTimeout(resume, pause));
+    }
+  }
+  return next(request);
+};
+
+/** Whether a call ended without an answer from the server, which gives a reason. */
+function isLost(thrown: unknown): boolean {
+  const fault = faultOf(thrown);
+  return fault.reason === "" && LOST.includes(fault.code);
+}
