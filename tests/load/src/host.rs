@@ -1,10 +1,11 @@
-//! Makes rooms, takes their seats and attaches them to the streams; when a room's game has ended it makes the next.
+//! Creates rooms, joins their seats and attaches them to the streams. Follows each game that ends with the next one.
 
 use std::sync::Arc;
 
 use chefshat_proto::v1::{
     self, room_service_client::RoomServiceClient, rule_set::Stop, seat_command::Command,
 };
+use futures::stream::{self, StreamExt as _, TryStreamExt as _};
 use tokio::sync::{mpsc, oneshot};
 use tonic::transport::Channel;
 
@@ -13,20 +14,36 @@ use crate::options::SEATS;
 use crate::play::Slot;
 use crate::pulse::{Plan, Pulse};
 
-/// Nobody is late here: the clocks run, but never out.
+/// Long enough that nobody is ever late: clocks run, but do not run out.
 const DECISION_TIME_MS: u32 = 3_600_000;
+/// Rooms created at a time.
+const CREATED_AT_A_TIME: usize = 16;
 
 /// The senders of all streams.
 type Senders = Vec<mpsc::Sender<v1::PlayRequest>>;
 
-/// Makes the rooms of a segment.
+/// What the streams report about a room, by its index.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum News {
+    /// The game is over for one of its seats.
+    Over(usize),
+    /// Its open decision stays unanswered, because the segment stops.
+    AtRest(usize),
+}
+
+/// A room that is playing.
+#[derive(Debug, Clone, Default)]
+struct Open {
+    id: String,
+    owner_token: String,
+}
+
+/// Creates the rooms of a segment.
 pub(crate) struct Host {
     rooms: RoomServiceClient<Channel>,
     plan: Plan,
     senders: Senders,
-    /// Rooms of seats whose game has ended, one message for each seat.
-    ended: mpsc::UnboundedReceiver<usize>,
-    games: u64,
+    news: mpsc::UnboundedReceiver<News>,
 }
 
 impl Host {
@@ -35,60 +52,65 @@ impl Host {
         channel: Channel,
         plan: Plan,
         senders: Senders,
-        ended: mpsc::UnboundedReceiver<usize>,
+        news: mpsc::UnboundedReceiver<News>,
     ) -> Self {
         Self {
             rooms: RoomServiceClient::new(channel),
             plan,
             senders,
-            ended,
-            games: 0,
+            news,
         }
     }
 
-    /// Hosts until the segment stops and all games have ended. Gives back how many there were, and the senders.
+    /// Hosts until the segment stops and all games have ended. Returns the number of games, and the senders.
     pub(crate) async fn run(
         mut self,
         pulse: Arc<Pulse>,
         ready: oneshot::Sender<()>,
     ) -> Result<(u64, Senders), LoadError> {
-        for room in 0..self.plan.rooms {
-            self.begin(room).await?;
-        }
-        // If nobody waits any more, the segment has failed and says why.
+        let host = &self;
+        let mut open: Vec<Open> = stream::iter(0..host.plan.rooms)
+            .map(|room| host.begin(room))
+            .buffered(CREATED_AT_A_TIME)
+            .try_collect()
+            .await?;
+        let mut games = open.len() as u64;
+        // A segment that has failed no longer waits; its error is reported there.
         let _ = ready.send(());
-        let mut open = self.plan.rooms;
-        let mut seats_done = vec![0; self.plan.rooms];
-        while open > 0 {
-            let room = self
-                .ended
-                .recv()
-                .await
-                .ok_or(LoadError::Stuck("a game whose streams are gone"))?;
-            seats_done[room] += 1;
-            if seats_done[room] < SEATS {
-                continue;
-            }
-            seats_done[room] = 0;
-            if pulse.is_stopping() {
-                open -= 1;
-            } else {
-                pulse.begin(room);
-                self.begin(room).await?;
+        let mut playing = open.len();
+        let mut seats_over = vec![0; open.len()];
+        while playing > 0 {
+            let news = self.news.recv().await;
+            match news.ok_or(LoadError::Stuck("a game without streams"))? {
+                News::AtRest(room) => self.close(std::mem::take(&mut open[room])).await?,
+                News::Over(room) => {
+                    seats_over[room] += 1;
+                    if seats_over[room] < SEATS {
+                        continue;
+                    }
+                    seats_over[room] = 0;
+                    if pulse.is_stopping() {
+                        playing -= 1;
+                    } else {
+                        pulse.begin(room);
+                        open[room] = self.begin(room).await?;
+                        games += 1;
+                    }
+                }
             }
         }
-        Ok((self.games, self.senders))
+        Ok((games, self.senders))
     }
 
-    /// Makes a room and attaches its seats.
-    async fn begin(&mut self, room: usize) -> Result<(), LoadError> {
+    /// Creates a room and attaches its seats.
+    async fn begin(&self, room: usize) -> Result<Open, LoadError> {
         let rules = v1::RuleSet {
             stop: (self.plan.shifts > 0).then_some(Stop::TargetShifts(self.plan.shifts)),
             ..v1::RuleSet::default()
         };
         let policy = v1::RoomPolicy {
             decision_time_ms: Some(DECISION_TIME_MS),
-            // Left open it is durable, where the server keeps games on disk.
+            // Unspecified means durable on a server with a database.
             durability: match self.plan.durable {
                 true => v1::Durability::Unspecified,
                 false => v1::Durability::Ephemeral,
@@ -96,8 +118,8 @@ impl Host {
             .into(),
             ..v1::RoomPolicy::default()
         };
-        let created = self
-            .rooms
+        let mut rooms = self.rooms.clone();
+        let created = rooms
             .create_room(v1::CreateRoomRequest {
                 name: "load".into(),
                 rules: Some(rules),
@@ -106,10 +128,8 @@ impl Host {
             })
             .await?
             .into_inner();
-        self.games += 1;
         for seat in 0..SEATS {
-            let joined = self
-                .rooms
+            let joined = rooms
                 .join_room(v1::JoinRoomRequest {
                     join_code: created.join_code.clone(),
                     name: "load".into(),
@@ -132,9 +152,22 @@ impl Host {
                     command: Some(Command::Attach(attach)),
                 }],
             };
-            // A stream that is gone has said why.
+            // A stream that is gone reports its own error.
             let _ = self.senders[stream].send(request).await;
         }
+        Ok(Open {
+            id: created.room.map(|room| room.room_id).unwrap_or_default(),
+            owner_token: created.owner_token,
+        })
+    }
+
+    /// Closes a room, which aborts its game.
+    async fn close(&self, open: Open) -> Result<(), LoadError> {
+        let request = v1::CloseRoomRequest {
+            room_id: open.id,
+            owner_token: open.owner_token,
+        };
+        self.rooms.clone().close_room(request).await?;
         Ok(())
     }
 }

@@ -1,5 +1,5 @@
-//! The load program: plays many rooms against a server and against a bare tonic room, in turns, and says what a decision costs. This
-//! file only parses and wires; see the README beside this crate for what is measured and how.
+//! The load program: plays many rooms on a server and on a bare tonic room, in turns, and reports what a decision costs. This file only
+//! parses and wires; the crate's README says what is measured and how.
 
 mod bare;
 mod disk;
@@ -28,7 +28,8 @@ use options::{Load, Options, Place, Role};
 use report::Report;
 
 fn main() -> ExitCode {
-    let options = Options::parse();
+    let mut options = Options::parse();
+    options.load.place.pin |= options.load.scale;
     let result = match &options.role {
         Some(Role::Serve(options)) => runtime(options.place, options.place.core)
             .and_then(|runtime| runtime.block_on(server::serve(options))),
@@ -70,7 +71,7 @@ async fn measure(load: &Load) -> Result<(), LoadError> {
     Ok(())
 }
 
-/// The runtime of one side; bound to a core before any of its threads is started, if it is to be.
+/// The runtime of one side. With `--pin`, binds the process to its core before the first thread starts.
 fn runtime(place: Place, core: usize) -> Result<Runtime, LoadError> {
     let mut builder = if place.pin {
         gauge::bind_to_core(core).map_err(LoadError::io("binding to a core"))?;

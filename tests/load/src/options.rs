@@ -17,7 +17,7 @@ const MAX_SECONDS: f64 = 600.0;
 #[command(
     name = "chefshat-load",
     version,
-    after_help = "Examples:\n  chefshat-load                        the standard scenarios\n  chefshat-load --pin --rounds 7       the same with both sides on one core\n  chefshat-load --rooms 16 --streams 8 one scenario of your own\n  chefshat-load --durability           durable rooms beside ephemeral ones\n  chefshat-load --restart 1000         a restart with so many unfinished games\n  chefshat-load --vector               batches of a client's own games\n  chefshat-load --server http://127.0.0.1:50051 --rooms 16 --streams 64"
+    after_help = "Examples:\n  chefshat-load                        the standard scenarios\n  chefshat-load --pin --rounds 7       the same with both sides on one core\n  chefshat-load --scale                4 to 4,000 connections on one core\n  chefshat-load --rooms 16 --streams 8 one scenario of your own\n  chefshat-load --durability           durable rooms beside ephemeral ones\n  chefshat-load --restart 1000         a restart with so many unfinished games\n  chefshat-load --vector               batches of a client's own games\n  chefshat-load --server http://127.0.0.1:50051 --rooms 16 --streams 64"
 )]
 pub(crate) struct Options {
     #[command(subcommand)]
@@ -94,15 +94,24 @@ pub(crate) struct Load {
     /// Measure the load on a server that runs elsewhere; no bare room, no figures from inside the server.
     #[arg(long, value_name = "URL", conflicts_with = "pin")]
     pub(crate) server: Option<String>,
+    /// Measure 4, 64, 400, 1,000 and 4,000 connections, with both sides on one core as with --pin.
+    #[arg(long, conflicts_with_all = ["rooms", "server", "threads"])]
+    pub(crate) scale: bool,
+    /// Measure the server of another build of this program as well, in turns with this one's.
+    #[arg(long, value_name = "PROGRAM", conflicts_with_all = ["server", "restart"])]
+    pub(crate) against: Option<PathBuf>,
+    /// Start each server with this command, which must replace itself with it: "valgrind --tool=callgrind", for example.
+    #[arg(long, value_name = "COMMAND", conflicts_with = "server")]
+    pub(crate) under: Option<String>,
     /// Measure rooms that outlive the server beside rooms that are kept when they end, both on a server that keeps games on disk: 64
     /// rooms unless --rooms says otherwise.
-    #[arg(long, conflicts_with = "server")]
+    #[arg(long, conflicts_with_all = ["server", "scale"])]
     pub(crate) durability: bool,
     /// Measure how long a server that was killed takes until so many unfinished games can be played again.
-    #[arg(long, value_name = "ROOMS", conflicts_with_all = ["rooms", "server", "durability"], value_parser = clap::value_parser!(u64).range(1..=MAX_ROOMS))]
+    #[arg(long, value_name = "ROOMS", conflicts_with_all = ["rooms", "server", "durability", "scale"], value_parser = clap::value_parser!(u64).range(1..=MAX_ROOMS))]
     pub(crate) restart: Option<u64>,
     /// Measure games of a client's own, stepped in batches of 1, 64 and 1,024 on one, two and four streams.
-    #[arg(long, conflicts_with_all = ["rooms", "server", "durability", "restart"])]
+    #[arg(long, conflicts_with_all = ["rooms", "server", "durability", "restart", "scale"])]
     pub(crate) vector: bool,
     /// Folder for what --durability and --restart keep on disk; it must lie on the disk that is meant. Standard: the temporary folder.
     #[arg(long, value_name = "FOLDER")]

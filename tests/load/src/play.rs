@@ -16,7 +16,7 @@ use tonic::transport::{Channel, Endpoint};
 use tonic::{Request, Streaming};
 
 use crate::error::LoadError;
-use crate::host::Host;
+use crate::host::{Host, News};
 use crate::options::SEATS;
 use crate::pulse::{Latencies, Plan, Pulse, Window, latencies};
 use crate::tally::{Counts, Traffic};
@@ -55,7 +55,7 @@ pub(crate) async fn segment(
 ) -> Result<Played, LoadError> {
     let endpoint = Endpoint::from_shared(url.to_owned())?.tcp_nodelay(true);
     let pulse = Arc::new(Pulse::new(plan.rooms));
-    let (over, ended) = mpsc::unbounded_channel();
+    let (report, news) = mpsc::unbounded_channel();
     let mut senders = Vec::with_capacity(plan.streams);
     let mut streams = JoinSet::new();
     for number in 0..plan.streams {
@@ -63,8 +63,9 @@ pub(crate) async fn segment(
         let inbound = open(endpoint.connect().await?, waiting).await?;
         let stream = Stream {
             requests: requests.downgrade(),
-            over: over.clone(),
+            report: report.clone(),
             pulse: Arc::clone(&pulse),
+            play_to_end: plan.play_to_end,
             slots: Vec::new(),
             random: SmallRng::seed_from_u64(plan.seed.wrapping_add(number as u64)),
             tally: Tally::default(),
@@ -72,8 +73,8 @@ pub(crate) async fn segment(
         senders.push(requests);
         streams.spawn(stream.run(inbound));
     }
-    drop(over);
-    let host = Host::new(endpoint.connect().await?, plan.clone(), senders, ended);
+    drop(report);
+    let host = Host::new(endpoint.connect().await?, plan.clone(), senders, news);
     let (ready, all_rooms_made) = oneshot::channel();
     let mut host = tokio::spawn(host.run(Arc::clone(&pulse), ready));
 
@@ -198,9 +199,10 @@ impl Tally {
 struct Stream {
     /// Weak, so that the stream ends when the segment lets go of its sender.
     requests: mpsc::WeakSender<v1::PlayRequest>,
-    /// Told of each seat whose game is over, by its room.
-    over: mpsc::UnboundedSender<usize>,
+    report: mpsc::UnboundedSender<News>,
     pulse: Arc<Pulse>,
+    /// Whether decisions are answered after the window has closed.
+    play_to_end: bool,
     /// Index = handle.
     slots: Vec<Option<Slot>>,
     random: SmallRng,
@@ -260,6 +262,10 @@ impl Stream {
         let slot = slot
             .ok_or_else(|| LoadError::Protocol(format!("handle {handle} was never announced")))?;
         match update {
+            Some(Update::Decision(_)) if self.rests() => {
+                // A host that is gone has failed already.
+                let _ = self.report.send(News::AtRest(slot.room));
+            }
             Some(Update::Decision(decision)) => return self.decide(slot, &decision).map(Some),
             Some(Update::Result(result)) => self.acknowledge(&result)?,
             Some(Update::Events(batch)) => self.follow(slot, &batch)?,
@@ -272,14 +278,19 @@ impl Stream {
                 }
                 self.slots[handle as usize] = None;
                 self.tally.counts.detached += 1;
-                // The host is gone only when the segment has failed already.
-                let _ = self.over.send(slot.room);
+                // A host that is gone has failed already.
+                let _ = self.report.send(News::Over(slot.room));
             }
             other => {
                 return Err(LoadError::Protocol(format!("nobody asked for {other:?}")));
             }
         }
         Ok(None)
+    }
+
+    /// Whether decisions stay unanswered now, until their rooms are closed.
+    fn rests(&self) -> bool {
+        !self.play_to_end && self.pulse.is_stopping()
     }
 
     fn decide(&mut self, slot: Slot, decision: &DecisionRequest) -> Result<v1::Answer, LoadError> {
@@ -344,6 +355,12 @@ impl Stream {
                     continue;
                 }
                 Some(Kind::GameEnded(_)) => {
+                    self.tally.counts.game_ends += 1;
+                    continue;
+                }
+                Some(Kind::GameAborted(aborted))
+                    if self.rests() && aborted.reason() == v1::AbortReason::Closed =>
+                {
                     self.tally.counts.game_ends += 1;
                     continue;
                 }

@@ -25,6 +25,8 @@ pub(crate) struct Plan {
     pub(crate) shifts: u32,
     /// Whether the games outlive the server.
     pub(crate) durable: bool,
+    /// Whether the last games are played to their end; else their rooms are closed when the window has closed.
+    pub(crate) play_to_end: bool,
     /// Played before the window opens.
     pub(crate) warmup: Duration,
     /// Length of the window.

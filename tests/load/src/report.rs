@@ -1,5 +1,5 @@
-//! What is printed: figures from outcomes, as JSON and as tables. Figures of a scenario are medians of its rounds; ratios are medians of
-//! the ratios of each round's pair. What a restart showed is printed in `restart`.
+//! Output: the figures of the outcomes as JSON and as tables. A scenario's figures are medians of its rounds; its ratios are medians of
+//! each round's ratio. `restart` and `vector` print their own.
 
 use comfy_table::{CellAlignment, Table, presets};
 use serde::Serialize;
@@ -9,15 +9,19 @@ use crate::pulse::{Latencies, Window};
 use crate::scenario::{Outcome, Purpose, Round};
 use crate::tally::{Counts, Traffic};
 
-/// The least of the bare room's throughput the server is to reach.
+/// Least throughput, as a share of the bare room's.
 const GOAL_THROUGHPUT: f64 = 0.90;
-/// The most of the bare room's CPU time for a decision the server may take.
+/// Most CPU time per decision, as a multiple of the bare room's.
 const GOAL_CPU: f64 = 1.15;
-/// How many times the throughput of connections apart a shared connection is to reach.
+/// Least throughput of a shared connection, as a multiple of that of one connection per seat.
 const GOAL_SHARED: f64 = 2.0;
-/// The least of ephemeral rooms' throughput that durable rooms are to reach.
+/// Least throughput of durable rooms, as a share of that of ephemeral ones.
 const GOAL_DURABLE: f64 = 0.5;
-/// The most memory a seat may take, KiB.
+/// Most CPU time per decision in durable rooms, as a multiple of that in ephemeral ones.
+const GOAL_DURABLE_CPU: f64 = 1.35;
+/// Most connections of `--scale` that have goals.
+const GOAL_CONNECTIONS: usize = 1_000;
+/// Most memory per seat, KiB.
 const GOAL_KIB: f64 = 100.0;
 
 /// A whole run.
@@ -25,8 +29,10 @@ const GOAL_KIB: f64 = 100.0;
 pub(crate) struct Report {
     pinned: bool,
     seconds: f64,
+    #[serde(skip)]
+    scale: bool,
     scenarios: Vec<Figures>,
-    /// Small writes, each synced, that the disk takes in a second; only where games are kept on disk.
+    /// Small synced writes the disk takes per second; only for games on disk.
     disk_syncs_per_second: Option<f64>,
     goals: Vec<Goal>,
 }
@@ -40,18 +46,28 @@ struct Figures {
     connections: usize,
     rounds: usize,
     server: Side,
-    /// Decision times as the server measures them: from handing a request to the transport to the arrival of the answer.
+    /// Measured by the server: from handing a request to the transport until the answer has been read.
     decision_time_us: Quantiles,
-    /// What the server is measured beside.
+    /// What the server is compared with.
     beside: &'static str,
     other: Option<Side>,
     throughput_ratio: Option<Spread>,
     server_cpu_ratio: Option<Spread>,
+    /// The server of the other build, if there is one.
+    other_build: Option<OtherBuild>,
     memory_per_seat_kib: Option<f64>,
     bytes_per_decision: PerDecision,
     messages: Traffic,
     checked: Counts,
     other_answers: u64,
+}
+
+/// The other build, compared with the same as this one.
+#[derive(Debug, Serialize)]
+struct OtherBuild {
+    server: Side,
+    throughput_ratio: Option<Spread>,
+    server_cpu_ratio: Option<Spread>,
 }
 
 /// One side of a comparison.
@@ -60,7 +76,7 @@ struct Side {
     decisions_per_second: f64,
     server_cpu_us_per_decision: Option<f64>,
     client_cpu_us_per_decision: f64,
-    /// From sending an answer to the arrival of the room's next decision, at whichever stream.
+    /// From sending an answer until the room's next decision arrives on any stream.
     response_time_us: Quantiles,
     decisions_in_windows: u64,
 }
@@ -86,7 +102,7 @@ struct Spread {
     most: f64,
 }
 
-/// Something aimed at.
+/// A goal, and how the run compares with it.
 #[derive(Debug, Serialize)]
 struct Goal {
     what: String,
@@ -106,6 +122,7 @@ impl Report {
         Self {
             pinned: load.place.pin,
             seconds: load.seconds.as_secs_f64(),
+            scale: load.scale,
             goals: goals(outcomes, &scenarios),
             scenarios,
             disk_syncs_per_second,
@@ -115,9 +132,13 @@ impl Report {
     /// As tables for people.
     pub(crate) fn to_text(&self) -> String {
         let mut text = String::new();
-        for figures in &self.scenarios {
-            text.push_str(&figures.to_text());
-            text.push('\n');
+        if self.scale {
+            text.push_str(&scale_table(&self.scenarios));
+        } else {
+            for figures in &self.scenarios {
+                text.push_str(&figures.to_text());
+                text.push('\n');
+            }
         }
         if !self.goals.is_empty() {
             let mut table = new_table(&["goal", "aim", "reached", ""]);
@@ -133,13 +154,13 @@ impl Report {
             text.push_str(&format!("{table}\n"));
         }
         let kept = match self.disk_syncs_per_second {
-            Some(syncs) => format!(
-                "Games are kept on disk, which takes {syncs:.0} small synced writes a second."
-            ),
-            None => "Games are kept in memory.".to_owned(),
+            Some(syncs) => {
+                format!("Games are on disk, which takes {syncs:.0} small synced writes a second.")
+            }
+            None => "Games are in memory.".to_owned(),
         };
         text.push_str(&format!(
-            "{kept} Times are of this machine; ratios are what compares.\n"
+            "{kept} Compare ratios: times depend on the machine and the moment.\n"
         ));
         text
     }
@@ -152,12 +173,17 @@ impl Figures {
             outcome.rounds.iter().filter_map(of).collect()
         };
         let other = windows(|round| round.other);
-        let ratio = |of: fn(&Window) -> Option<f64>| {
+        let other_build = windows(|round| round.other_build);
+        type Pair = fn(&Round) -> Option<(Window, Window)>;
+        let ratio = |pair: Pair, of: fn(&Window) -> Option<f64>| {
             Spread::of(outcome.rounds.iter().filter_map(|round| {
-                let other = of(round.other.as_ref()?)?;
-                Some(of(&round.server)? / other).filter(|ratio| ratio.is_finite())
+                let (server, other) = pair(round)?;
+                Some(of(&server)? / of(&other)?).filter(|ratio| ratio.is_finite())
             }))
         };
+        let this: Pair = |round| Some((round.server, round.other?));
+        let that: Pair = |round| Some((round.other_build?, round.beside_other_build?));
+        let per_second: fn(&Window) -> Option<f64> = |window| Some(rate(window));
         let decisions = outcome.counts.answers as f64;
         Self {
             name: scenario.name(),
@@ -167,8 +193,13 @@ impl Figures {
             rounds: outcome.rounds.len(),
             server: Side::new(&windows(|round| Some(round.server)), &outcome.client_ns),
             decision_time_us: Quantiles::of(&outcome.server_us, 1.0),
-            throughput_ratio: ratio(|window| Some(rate(window))),
-            server_cpu_ratio: ratio(server_cpu_us),
+            throughput_ratio: ratio(this, per_second),
+            server_cpu_ratio: ratio(this, server_cpu_us),
+            other_build: (!other_build.is_empty()).then(|| OtherBuild {
+                server: Side::new(&other_build, &outcome.other_build_ns),
+                throughput_ratio: ratio(that, per_second),
+                server_cpu_ratio: ratio(that, server_cpu_us),
+            }),
             beside: beside(scenario.purpose),
             other: (!other.is_empty()).then(|| Side::new(&other, &outcome.other_ns)),
             memory_per_seat_kib: median(
@@ -210,11 +241,26 @@ impl Figures {
             ]);
         };
         row("server", &self.server);
+        if let Some(other_build) = &self.other_build {
+            row("other build", &other_build.server);
+        }
         if let Some(other) = &self.other {
             row(self.beside, other);
         }
         if let (Some(throughput), Some(cpu)) = (self.throughput_ratio, self.server_cpu_ratio) {
             table.add_row(["ratio".into(), throughput.to_string(), cpu.to_string()]);
+        }
+        if let Some(OtherBuild {
+            throughput_ratio: Some(throughput),
+            server_cpu_ratio: Some(cpu),
+            ..
+        }) = &self.other_build
+        {
+            table.add_row([
+                "other build's ratio".into(),
+                throughput.to_string(),
+                cpu.to_string(),
+            ]);
         }
         let memory = self.memory_per_seat_kib.map_or_else(String::new, |kib| {
             format!("; {kib:.0} KiB of memory per seat")
@@ -279,7 +325,46 @@ impl std::fmt::Display for Spread {
     }
 }
 
-/// How the scenarios stand to what is aimed at.
+/// One line per number of connections; of two builds, the ratios of both.
+fn scale_table(scenarios: &[Figures]) -> String {
+    let both = (scenarios.iter()).any(|figures| figures.other_build.is_some());
+    let mut header = vec![
+        "connections",
+        "decisions/s",
+        "server CPU µs",
+        "bare CPU µs",
+        "CPU ratio",
+        "throughput ratio",
+    ];
+    if both {
+        header.extend(["other build: CPU ratio", "throughput ratio"]);
+    }
+    let mut table = new_table(&header);
+    let time = |side: Option<&Side>| {
+        side.and_then(|side| side.server_cpu_us_per_decision)
+            .map_or_else(|| "-".to_owned(), |us| format!("{us:.2}"))
+    };
+    let spread = |spread: Option<Spread>| spread.map_or("-".into(), |spread| spread.to_string());
+    for figures in scenarios {
+        let mut row = vec![
+            figures.connections.to_string(),
+            format!("{:.0}", figures.server.decisions_per_second),
+            time(Some(&figures.server)),
+            time(figures.other.as_ref()),
+            spread(figures.server_cpu_ratio),
+            spread(figures.throughput_ratio),
+        ];
+        if both {
+            let other = figures.other_build.as_ref();
+            row.push(spread(other.and_then(|other| other.server_cpu_ratio)));
+            row.push(spread(other.and_then(|other| other.throughput_ratio)));
+        }
+        table.add_row(row);
+    }
+    format!("{table}\n")
+}
+
+/// The goals of the scenarios.
 fn goals(outcomes: &[Outcome], scenarios: &[Figures]) -> Vec<Goal> {
     let mut goals = Vec::new();
     let with = |purpose| {
@@ -289,7 +374,8 @@ fn goals(outcomes: &[Outcome], scenarios: &[Figures]) -> Vec<Goal> {
             .filter(move |(outcome, _)| outcome.scenario.purpose == purpose)
             .map(|(_, figures)| figures)
     };
-    for figures in with(Purpose::Apart) {
+    let scaled = with(Purpose::Scale).filter(|figures| figures.connections <= GOAL_CONNECTIONS);
+    for figures in with(Purpose::Apart).chain(scaled) {
         if let Some(throughput) = figures.throughput_ratio {
             goals.push(Goal {
                 what: format!("throughput to bare, {}", figures.name),
@@ -327,6 +413,14 @@ fn goals(outcomes: &[Outcome], scenarios: &[Figures]) -> Vec<Goal> {
                 met: throughput.median >= GOAL_DURABLE,
             });
         }
+        if let Some(cpu) = figures.server_cpu_ratio {
+            goals.push(Goal {
+                what: format!("server CPU of durable to ephemeral rooms, {}", figures.name),
+                aim: format!("<= {GOAL_DURABLE_CPU:.2}"),
+                reached: cpu.median,
+                met: cpu.median <= GOAL_DURABLE_CPU,
+            });
+        }
     }
     for figures in with(Purpose::Memory) {
         if let Some(kib) = figures.memory_per_seat_kib {
@@ -341,7 +435,7 @@ fn goals(outcomes: &[Outcome], scenarios: &[Figures]) -> Vec<Goal> {
     goals
 }
 
-/// What the server is measured beside.
+/// What the server is compared with.
 fn beside(purpose: Purpose) -> &'static str {
     match purpose {
         Purpose::Durability => "ephemeral rooms",

@@ -21,7 +21,7 @@ use crate::disk;
 use crate::error::LoadError;
 use crate::options::{Load, SEATS};
 use crate::play::{self, Weighed};
-use crate::server::{Kind, ServerProcess};
+use crate::server::{Kind, Launcher, ServerProcess};
 use crate::wire::{DecisionRequest, Update};
 
 /// The longest that is aimed at from the start of a server until all is playable, seconds.
@@ -77,7 +77,7 @@ pub(crate) async fn measure(load: &Load, rooms: u64) -> Result<(), LoadError> {
     } else {
         DECISIONS
     };
-    let start = || ServerProcess::start(Kind::OnDisk(folder.path()), load.place);
+    let start = || Launcher::new(load).start(Kind::OnDisk(folder.path()));
     let mut server = start().await?;
     eprintln!("{rooms} rooms of {enough} decisions ...");
     let tickets = Arc::new(tickets(&server.url(), rooms).await?);

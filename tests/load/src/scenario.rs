@@ -1,39 +1,42 @@
-//! Scenarios: which rooms on which streams, and the order of measurements. What is measured and what it is measured beside take turns
-//! within a scenario, each time in processes of their own, so that what disturbs the machine disturbs both.
+//! Scenarios: rooms on streams, and the order of measurements. The sides of a comparison take turns within a round, each in a fresh
+//! process, so that a disturbance of the machine hits both.
 
 use std::time::Duration;
 
 use crate::disk;
 use crate::error::LoadError;
-use crate::options::{Load, Place, SEATS};
+use crate::options::{Load, SEATS};
 use crate::ping::{self, Sizes};
-use crate::play;
+use crate::play::{self, Played};
 use crate::pulse::{Latencies, Plan, Window, latencies};
-use crate::server::{Kind, ServerProcess};
+use crate::server::{Kind, Launcher};
 use crate::tally::{Counts, Traffic};
 
-/// Rooms in the scenario of durability, unless the options say otherwise.
+/// Rooms in the durability scenario without `--rooms`.
 const DURABLE_ROOMS: usize = 64;
+/// Rooms of the scenarios of `--scale`: 4, 64, 400, 1,000 and 4,000 connections.
+const SCALE_ROOMS: [usize; 5] = [1, 16, 100, 250, 1_000];
 
-/// What a scenario is for, which decides the goals it is held to.
+/// What a scenario is for; this selects its goals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Purpose {
-    /// Each seat on a connection of its own.
+    /// One connection per seat.
     Apart,
     /// All seats on one connection.
     Shared,
-    /// Many seats, for their memory.
+    /// Memory of many seats.
     Memory,
-    /// Rooms that outlive the server, beside rooms that do not.
+    /// One of several numbers of connections.
+    Scale,
+    /// Durable rooms beside ephemeral ones.
     Durability,
-    /// Anything else.
+    /// The user's own.
     Own,
 }
 
 /// Rooms on streams.
 #[derive(Debug, Clone)]
 pub(crate) struct Scenario {
-    /// What it is for.
     pub(crate) purpose: Purpose,
     /// Rooms at a time.
     pub(crate) rooms: usize,
@@ -41,7 +44,7 @@ pub(crate) struct Scenario {
     pub(crate) streams: usize,
     /// Shifts of a game; 0: games to 15 points.
     pub(crate) shifts: u32,
-    /// Measurements.
+    /// Measurements of each side.
     pub(crate) rounds: u16,
 }
 
@@ -66,7 +69,7 @@ impl Scenario {
     }
 }
 
-/// The scenarios that were asked for.
+/// The scenarios the options ask for.
 pub(crate) fn scenarios(load: &Load) -> Vec<Scenario> {
     let count = |number: u64| usize::try_from(number).expect("bounded by the options");
     let scenario = |purpose, rooms: usize, streams: usize| Scenario {
@@ -76,16 +79,21 @@ pub(crate) fn scenarios(load: &Load) -> Vec<Scenario> {
         shifts: load.shifts,
         rounds: load.rounds,
     };
+    let apart = |purpose, rooms: usize| scenario(purpose, rooms, rooms * SEATS);
     if load.smoke {
-        let purpose = match load.durability {
-            true => Purpose::Durability,
-            false => Purpose::Own,
-        };
-        return vec![Scenario {
+        let short = |purpose, rooms| Scenario {
             shifts: 2,
             rounds: 1,
-            ..scenario(purpose, 1, 4)
-        }];
+            ..apart(purpose, rooms)
+        };
+        return match (load.durability, load.scale) {
+            (true, _) => vec![short(Purpose::Durability, 1)],
+            (_, true) => vec![short(Purpose::Scale, 1), short(Purpose::Scale, 2)],
+            _ => vec![short(Purpose::Own, 1)],
+        };
+    }
+    if load.scale {
+        return SCALE_ROOMS.map(|rooms| apart(Purpose::Scale, rooms)).into();
     }
     let rooms = load.rooms.map(count);
     if load.durability {
@@ -98,25 +106,28 @@ pub(crate) fn scenarios(load: &Load) -> Vec<Scenario> {
         return vec![scenario(Purpose::Own, rooms, streams)];
     }
     vec![
-        scenario(Purpose::Apart, 1, 4),
-        scenario(Purpose::Apart, 16, 64),
+        apart(Purpose::Apart, 1),
+        apart(Purpose::Apart, 16),
         scenario(Purpose::Shared, 16, 1),
-        // Games as people play them, so that what a room remembers is what it remembers of such a game.
+        // Games of the usual length, so that a room holds as much as it does for people.
         Scenario {
             shifts: 0,
             rounds: 1,
-            ..scenario(Purpose::Memory, 100, 400)
+            ..apart(Purpose::Memory, 100)
         },
     ]
 }
 
-/// One measurement of the server, and the one of what it is measured beside that followed it.
+/// One measurement of each side.
 #[derive(Debug)]
 pub(crate) struct Round {
-    /// The server.
     pub(crate) server: Window,
-    /// What it is measured beside; none where the server runs elsewhere.
+    /// What the server is compared with; `None` for a server that was not started here.
     pub(crate) other: Option<Window>,
+    /// The server of the other build.
+    pub(crate) other_build: Option<Window>,
+    /// What the other build is compared with.
+    pub(crate) beside_other_build: Option<Window>,
     /// Memory of the server's process per seat, attached and playing, bytes.
     pub(crate) bytes_per_seat: Option<f64>,
 }
@@ -124,26 +135,26 @@ pub(crate) struct Round {
 /// What a scenario showed.
 #[derive(Debug)]
 pub(crate) struct Outcome {
-    /// The scenario.
     pub(crate) scenario: Scenario,
-    /// Its measurements.
     pub(crate) rounds: Vec<Round>,
-    /// Decision times as the server measured them, microseconds.
+    /// Decision times measured by the server, microseconds.
     pub(crate) server_us: Latencies,
-    /// Response times of the server as the client saw them, nanoseconds.
+    /// Response times of the server measured by the client, nanoseconds.
     pub(crate) client_ns: Latencies,
-    /// Response times of what it is measured beside, nanoseconds.
+    /// Response times of what the server is compared with, nanoseconds.
     pub(crate) other_ns: Latencies,
-    /// What was done on the server in the measured segments.
+    /// Response times of the other build, nanoseconds.
+    pub(crate) other_build_ns: Latencies,
+    /// What happened on the server, also outside the windows.
     pub(crate) counts: Counts,
-    /// Answers in the measured segments of what it is measured beside.
+    /// Answers to what the server is compared with.
     pub(crate) other_answers: u64,
-    /// The messages of the segments on the server.
+    /// Messages of the server, also outside the windows.
     pub(crate) traffic: Traffic,
 }
 
 impl Outcome {
-    /// Mean bytes of a decision's messages so far.
+    /// Mean bytes per decision so far.
     fn sizes(&self) -> Sizes {
         let mean = |bytes: u64| {
             usize::try_from(bytes.div_ceil(self.counts.answers.max(1)))
@@ -163,6 +174,8 @@ pub(crate) async fn run(load: &Load, scenario: Scenario) -> Result<Outcome, Load
         streams: scenario.streams,
         shifts: scenario.shifts,
         durable: true,
+        // To the end, a thousand long games take minutes.
+        play_to_end: scenario.purpose != Purpose::Scale || load.smoke,
         warmup: load.warmup,
         window: load.seconds,
         decisions: load.decisions,
@@ -172,69 +185,85 @@ pub(crate) async fn run(load: &Load, scenario: Scenario) -> Result<Outcome, Load
         plan.warmup = Duration::from_millis(50);
         plan.window = Duration::from_millis(200);
     }
+    let purpose = scenario.purpose;
     let mut outcome = Outcome {
         scenario,
         rounds: Vec::new(),
         server_us: latencies(),
         client_ns: latencies(),
         other_ns: latencies(),
+        other_build_ns: latencies(),
         counts: Counts::default(),
         other_answers: 0,
         traffic: Traffic::default(),
     };
+    let this_build = Launcher::new(load);
+    let other_build = Launcher::of_other_build(load);
     for _ in 0..outcome.scenario.rounds {
         plan.seed = plan.seed.wrapping_add(plan.streams as u64);
-        let (played, idle_bytes) = on_server(load, &plan, outcome.scenario.purpose).await?;
+        let ephemeral = Plan {
+            durable: false,
+            ..plan.clone()
+        };
+        let (played, idle_bytes) = match &load.server {
+            Some(url) => (play::segment(url, None, &plan).await?, None),
+            None => on_server(load, this_build, &plan, purpose).await?,
+        };
         outcome.server_us += &played.server_us;
         outcome.client_ns += &played.client_ns;
         outcome.counts.add(&played.counts);
         outcome.traffic.add(&played.traffic);
-        let other = if outcome.scenario.purpose == Purpose::Durability {
-            let ephemeral = Plan {
-                durable: false,
-                ..plan.clone()
+        let mut round =
+            Round {
+                server: played.window,
+                other: None,
+                other_build: None,
+                beside_other_build: None,
+                bytes_per_seat: played.window.playing_bytes.zip(idle_bytes).map(
+                    |(playing, idle)| {
+                        playing.saturating_sub(idle) as f64 / outcome.scenario.seats() as f64
+                    },
+                ),
             };
-            let (played, _) = on_server(load, &ephemeral, outcome.scenario.purpose).await?;
+        if let Some(launcher) = other_build {
+            let (played, _) = on_server(load, launcher, &plan, purpose).await?;
+            outcome.other_build_ns += &played.client_ns;
+            round.other_build = Some(played.window);
+        }
+        if purpose == Purpose::Durability {
+            let (played, _) = on_server(load, this_build, &ephemeral, purpose).await?;
             outcome.other_ns += &played.client_ns;
             outcome.other_answers += played.counts.answers;
-            Some(played.window)
+            round.other = Some(played.window);
+            if let Some(launcher) = other_build {
+                let (played, _) = on_server(load, launcher, &ephemeral, purpose).await?;
+                round.beside_other_build = Some(played.window);
+            }
         } else if load.server.is_none() {
-            let pinged = on_bare_room(load.place, &plan, outcome.sizes()).await?;
+            let pinged = on_bare_room(this_build, &plan, outcome.sizes()).await?;
             outcome.other_ns += &pinged.client_ns;
             outcome.other_answers += pinged.answers;
-            Some(pinged.window)
-        } else {
-            None
-        };
-        let seats = outcome.scenario.seats() as f64;
-        outcome.rounds.push(Round {
-            server: played.window,
-            other,
-            bytes_per_seat: played
-                .window
-                .playing_bytes
-                .zip(idle_bytes)
-                .map(|(playing, idle)| (playing.saturating_sub(idle)) as f64 / seats),
-        });
+            round.other = Some(pinged.window);
+            round.beside_other_build = other_build.map(|_| pinged.window);
+        }
+        outcome.rounds.push(round);
     }
     Ok(outcome)
 }
 
-/// A segment on the game server, with the memory its process had before anybody connected.
+/// Plays on a server; also returns the memory its process had before the first connection.
 async fn on_server(
     load: &Load,
+    launcher: Launcher<'_>,
     plan: &Plan,
     purpose: Purpose,
-) -> Result<(play::Played, Option<u64>), LoadError> {
-    if let Some(url) = &load.server {
-        return Ok((play::segment(url, None, plan).await?, None));
-    }
+) -> Result<(Played, Option<u64>), LoadError> {
     let folder = disk::folder(load)?;
     let kind = match purpose {
         Purpose::Durability => Kind::OnDisk(folder.path()),
         _ => Kind::InMemory,
     };
-    let server = ServerProcess::start(kind, load.place).await?;
+    let server = launcher.start(kind).await?;
     let idle = crate::gauge::resident_bytes(server.pid())
         .map_err(LoadError::io("reading the server's memory"))?;
     let played = play::segment(&server.url(), Some(server.pid()), plan).await?;
@@ -242,8 +271,12 @@ async fn on_server(
     Ok((played, Some(idle)))
 }
 
-async fn on_bare_room(place: Place, plan: &Plan, sizes: Sizes) -> Result<ping::Pinged, LoadError> {
-    let server = ServerProcess::start(Kind::Bare, place).await?;
+async fn on_bare_room(
+    launcher: Launcher<'_>,
+    plan: &Plan,
+    sizes: Sizes,
+) -> Result<ping::Pinged, LoadError> {
+    let server = launcher.start(Kind::Bare).await?;
     let pinged = ping::segment(&server.url(), server.pid(), plan, sizes).await?;
     server.stop().await?;
     Ok(pinged)

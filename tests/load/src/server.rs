@@ -1,5 +1,5 @@
-//! The servers that are measured: this program run again as a process of its own, so that CPU and memory of the two sides are counted
-//! apart. The child says where it listens on its standard output, and ends when its standard input does, so that it never outlives us.
+//! The measured servers: child processes that run this program, or another build of it, so that the CPU time and memory of both sides are
+//! counted separately. A child prints its address on standard output and ends when its standard input closes, so it never outlives the run.
 
 use std::io::Write as _;
 use std::net::SocketAddr;
@@ -16,29 +16,29 @@ use tokio::process::{Child, Command};
 
 use crate::bare;
 use crate::error::LoadError;
-use crate::options::{Place, Serve};
+use crate::options::{Load, Place, Serve};
 
 /// How long a child may take to listen.
 const START_LIMIT: Duration = Duration::from_secs(30);
 
-/// How long a child may take to end by itself.
+/// How long a child may take to end.
 const STOP_LIMIT: Duration = Duration::from_secs(10);
 
-/// Ended rooms are forgotten soon: a run plays more of them than a day of people does.
+/// Rooms are dropped soon after their game: a run plays more games than people play in a day.
 const RETENTION: Duration = Duration::from_secs(1);
 
-/// What a child serves.
+/// What a child process serves.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Kind<'a> {
     /// The bare room.
     Bare,
-    /// The game server, which keeps games in memory.
+    /// The game server, with games in memory.
     InMemory,
-    /// The game server, which keeps games in this folder.
+    /// The game server, with games in this folder.
     OnDisk(&'a Path),
 }
 
-/// The part of the child.
+/// Serves until standard input closes.
 pub(crate) async fn serve(options: &Serve) -> Result<(), LoadError> {
     let failed = |error: &dyn std::error::Error| LoadError::Protocol(error.to_string());
     let store: Arc<dyn Store> = match &options.data_dir {
@@ -57,10 +57,10 @@ pub(crate) async fn serve(options: &Serve) -> Result<(), LoadError> {
     let mut out = std::io::stdout().lock();
     writeln!(out, "{address}")
         .and_then(|()| out.flush())
-        .map_err(LoadError::io("saying where it listens"))?;
+        .map_err(LoadError::io("printing the address"))?;
     drop(out);
     let parent_gone = async {
-        // Whatever comes, an end or an error: nobody is there any more.
+        // The end of the input and an error both mean that the parent is gone.
         let _ = tokio::io::stdin().read_to_end(&mut Vec::new()).await;
     };
     if options.bare {
@@ -78,29 +78,62 @@ pub(crate) async fn serve(options: &Serve) -> Result<(), LoadError> {
         .map_err(|error| failed(&error))
 }
 
-/// A server process. Killed when dropped.
-#[derive(Debug)]
-pub(crate) struct ServerProcess {
-    child: Child,
-    pid: u32,
-    address: SocketAddr,
+/// How the servers of a run are started.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Launcher<'a> {
+    /// The program; this one unless set.
+    program: Option<&'a Path>,
+    /// The command that starts it, with its own arguments.
+    under: Option<&'a str>,
+    place: Place,
 }
 
-impl ServerProcess {
+impl<'a> Launcher<'a> {
+    /// Starts servers of this build.
+    pub(crate) fn new(load: &'a Load) -> Self {
+        Self {
+            program: None,
+            under: load.under.as_deref(),
+            place: load.place,
+        }
+    }
+
+    /// Starts servers of the build to compare with, if there is one.
+    pub(crate) fn of_other_build(load: &'a Load) -> Option<Self> {
+        let program = load.against.as_deref()?;
+        Some(Self {
+            program: Some(program),
+            ..Self::new(load)
+        })
+    }
+
+    fn command(self) -> Result<Command, LoadError> {
+        let program = match self.program {
+            Some(program) => program.to_owned(),
+            None => std::env::current_exe().map_err(LoadError::io("finding this program"))?,
+        };
+        let mut words = self.under.unwrap_or_default().split_whitespace();
+        let Some(wrapper) = words.next() else {
+            return Ok(Command::new(program));
+        };
+        let mut command = Command::new(wrapper);
+        command.args(words).arg(program);
+        Ok(command)
+    }
+
     /// Starts a server and waits until it listens.
-    pub(crate) async fn start(kind: Kind<'_>, place: Place) -> Result<Self, LoadError> {
-        let program = std::env::current_exe().map_err(LoadError::io("finding this program"))?;
-        let mut command = Command::new(program);
+    pub(crate) async fn start(self, kind: Kind<'_>) -> Result<ServerProcess, LoadError> {
+        let mut command = self.command()?;
         command.arg("serve");
         match kind {
             Kind::Bare => drop(command.arg("--bare")),
             Kind::InMemory => {}
             Kind::OnDisk(folder) => drop(command.arg("--data-dir").arg(folder)),
         }
-        if place.pin {
-            command.args(["--pin", "--core", &place.core.to_string()]);
+        if self.place.pin {
+            command.args(["--pin", "--core", &self.place.core.to_string()]);
         } else {
-            command.args(["--threads", &place.threads.to_string()]);
+            command.args(["--threads", &self.place.threads.to_string()]);
         }
         let mut child = command
             .stdin(Stdio::piped())
@@ -114,36 +147,47 @@ impl ServerProcess {
         tokio::time::timeout(START_LIMIT, reader.read_line(&mut line))
             .await
             .map_err(|_| LoadError::Stuck("the start of a server"))?
-            .map_err(LoadError::io("reading where a server listens"))?;
-        let address = line.trim().parse().map_err(|_| {
-            LoadError::Protocol(format!("a server says that it listens at {line:?}"))
-        })?;
+            .map_err(LoadError::io("reading a server's address"))?;
+        let address = line
+            .trim()
+            .parse()
+            .map_err(|_| LoadError::Protocol(format!("{line:?} is not a server's address")))?;
         let pid = child
             .id()
             .expect("a child that listens has not been waited for");
-        Ok(Self {
+        Ok(ServerProcess {
             child,
             pid,
             address,
         })
     }
+}
 
-    /// Its process number.
+/// A server process. Killed when dropped.
+#[derive(Debug)]
+pub(crate) struct ServerProcess {
+    child: Child,
+    pid: u32,
+    address: SocketAddr,
+}
+
+impl ServerProcess {
+    /// The process id.
     pub(crate) fn pid(&self) -> u32 {
         self.pid
     }
 
-    /// Where it listens.
+    /// The URL it serves.
     pub(crate) fn url(&self) -> String {
         format!("http://{}", self.address)
     }
 
-    /// Kills it, as an accident would.
+    /// Kills the process without warning.
     pub(crate) async fn kill(mut self) -> Result<(), LoadError> {
         (self.child.kill().await).map_err(LoadError::io("killing a server"))
     }
 
-    /// Ends it: by the end of its standard input, or else by force.
+    /// Closes its standard input, and kills it if it does not end.
     pub(crate) async fn stop(mut self) -> Result<(), LoadError> {
         drop(self.child.stdin.take());
         match tokio::time::timeout(STOP_LIMIT, self.child.wait()).await {

@@ -12,7 +12,7 @@ use tokio::task::JoinSet;
 use crate::error::LoadError;
 use crate::gauge::cpu_time;
 use crate::options::{Load, SEATS};
-use crate::server::{Kind, ServerProcess};
+use crate::server::{Kind, Launcher, ServerProcess};
 
 /// Games of one stream.
 const GAMES: [u32; 3] = [1, 64, 1_024];
@@ -54,7 +54,7 @@ struct Done {
 
 /// Measures all scenarios, in turns, and prints what they showed.
 pub(crate) async fn measure(load: &Load) -> Result<(), LoadError> {
-    let server = ServerProcess::start(Kind::InMemory, load.place).await?;
+    let server = Launcher::new(load).start(Kind::InMemory).await?;
     let scenarios: Vec<(usize, u32)> = (STREAMS.iter())
         .flat_map(|streams| GAMES.map(|games| (*streams, games)))
         .collect();
