@@ -108,7 +108,7 @@ pub(crate) async fn segment(
         .await
         .map_err(|_| LoadError::Stuck("the streams"))??;
     sum.counts
-        .check(games, pulse.decisions(), window.decisions)?;
+        .check(games, pulse.decisions(), window.decisions, plan.play_to_end)?;
     Ok(Played {
         window,
         server_us: sum.server_us,

@@ -175,7 +175,7 @@ pub(crate) async fn run(load: &Load, scenario: Scenario) -> Result<Outcome, Load
         shifts: scenario.shifts,
         durable: true,
         // To the end, a thousand long games take minutes.
-        play_to_end: scenario.purpose != Purpose::Scale || load.smoke,
+        play_to_end: scenario.purpose != Purpose::Scale,
         warmup: load.warmup,
         window: load.seconds,
         decisions: load.decisions,

@@ -44,6 +44,31 @@ fn a_moment_of_load_is_counted_on_both_sides() {
 }
 
 #[test]
+fn two_builds_are_measured_beside_the_same_bare_room_at_several_scales() {
+    let program = env!("CARGO_BIN_EXE_chefshat-load");
+    let output = run(&["--smoke", "--scale", "--against", program, "--json"]);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{errors}");
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(report["pinned"], true, "{report:#}");
+    let scenarios = report["scenarios"].as_array().unwrap();
+    let connections = scenarios.iter().map(|scenario| &scenario["connections"]);
+    assert!(connections.eq([4, 8].iter()), "{report:#}");
+    for scenario in scenarios {
+        for path in [
+            "/throughput_ratio/median",
+            "/server_cpu_ratio/median",
+            "/other_build/throughput_ratio/median",
+            "/other_build/server_cpu_ratio/median",
+            "/other_build/server/decisions_in_windows",
+        ] {
+            let figure = scenario.pointer(path);
+            assert!(figure.is_some_and(positive), "{path}: {report:#}");
+        }
+    }
+}
+
+#[test]
 fn durable_rooms_are_measured_beside_ephemeral_ones() {
     let output = run(&["--smoke", "--durability", "--json"]);
     let errors = String::from_utf8_lossy(&output.stderr);
