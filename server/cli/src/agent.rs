@@ -11,7 +11,7 @@ use chefshat_client::{Client, Outcome, PlayError, v1};
 use chefshat_record::jsonl;
 use clap::Args;
 
-use super::connect::{Pass, ServerArg, WayIn, free_seats};
+use super::connect::{JoinArgs, Pass, ServerArg, free_seats};
 use super::remote::{MAX_PACE_MS, RemoteAgent, agent_kind, seed_for};
 use super::{CommandError, say};
 use chefshat_server::convert::recorded_player;
@@ -33,7 +33,7 @@ pub(super) struct AgentCommand {
     #[command(flatten)]
     server: ServerArg,
     #[command(flatten)]
-    way_in: WayIn,
+    join_args: JoinArgs,
     /// For replay: the record.
     #[arg(
         long,
@@ -86,7 +86,7 @@ impl AgentArg {
 
 impl AgentCommand {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
-        if self.games > 1 && !self.way_in.goes_on() {
+        if self.games > 1 && !self.join_args.has_code_file() {
             return Err("a code or ticket is valid for one game; to play more --games, give a --code-file that gets new codes".into());
         }
         let agent = self.built_in_agent()?;
@@ -131,7 +131,7 @@ impl AgentCommand {
         client: &Client,
         last_code: &mut Option<String>,
     ) -> Result<String, CommandError> {
-        let code = match self.way_in.pass(last_code.as_deref()).await? {
+        let code = match self.join_args.pass(last_code.as_deref()).await? {
             Pass::Ticket(ticket) => return Ok(ticket),
             Pass::Code(code) => code,
         };

@@ -1,5 +1,4 @@
-//! Reaching a server from the command line: where it is, and waiting for what is about to be there (a server that is starting, a
-//! file with a join code that is being written). What is then said to the server is the commands' own.
+//! Connecting to a server: its address, waiting for a server that is starting or for a file with a join code.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -10,12 +9,12 @@ use tokio::time::{Instant, sleep};
 
 use super::CommandError;
 
-/// How long to wait for a server or a file that is about to be there.
+/// Time to wait for a server or a file.
 pub(super) const PATIENCE: Duration = Duration::from_secs(30);
-/// Time between two looks.
+/// Time between two attempts.
 const PAUSE: Duration = Duration::from_millis(200);
 
-/// Which server.
+/// The server.
 #[derive(Debug, Clone, Args)]
 pub(super) struct ServerArg {
     /// Address of the server.
@@ -34,10 +33,10 @@ impl ServerArg {
         &self.server
     }
 
-    /// Connects at once or not at all.
+    /// Connects without a retry.
     ///
     /// # Errors
-    /// Nobody answers at the address, or it is none.
+    /// The server does not answer, or the address is invalid.
     pub(super) async fn connect(&self) -> Result<Client, CommandError> {
         Client::connect(&self.server).await.map_err(|error| {
             let hint = "start one there with `chefshat serve`, or name another with --server";
@@ -45,7 +44,7 @@ impl ServerArg {
         })
     }
 
-    /// Connects, and tries again for [`PATIENCE`] while nobody answers, as when servers and clients are started together.
+    /// Connects with retries for [`PATIENCE`], for servers and clients that are started together.
     ///
     /// # Errors
     /// The last failure.
@@ -79,39 +78,39 @@ impl ServerArg {
     }
 }
 
-/// How a place is come by.
+/// How to get a seat or place.
 #[derive(Debug, Args)]
 #[group(required = true, multiple = false)]
-pub(super) struct WayIn {
-    /// The join code.
+pub(super) struct JoinArgs {
+    /// Join code.
     #[arg(long)]
     code: Option<String>,
-    /// File with the join code; waited for if it is not there yet.
+    /// File with the join code; waits until it exists.
     #[arg(long, value_name = "FILE")]
     code_file: Option<PathBuf>,
-    /// Ticket for a place that was taken before.
+    /// Ticket of a seat or place to resume.
     #[arg(long, env = "CHEFSHAT_TICKET", hide_env_values = true)]
     ticket: Option<String>,
 }
 
-/// What a place is come by with.
+/// How to get a seat or place.
 pub(super) enum Pass {
-    /// A join code, with which one is to be taken.
+    /// A join code for a new one.
     Code(String),
-    /// The ticket of one that was taken before.
+    /// The ticket of an existing one.
     Ticket(String),
 }
 
-impl WayIn {
-    /// Whether codes for several games can come, one after the other.
-    pub(super) fn goes_on(&self) -> bool {
+impl JoinArgs {
+    /// Whether codes for several games can follow.
+    pub(super) fn has_code_file(&self) -> bool {
         self.code_file.is_some()
     }
 
-    /// The pass; a code in a file is waited for until it is another than `last`.
+    /// The join code or ticket; waits for a code in a file other than `last`.
     ///
     /// # Errors
-    /// There is no code in time, or the file cannot be read.
+    /// There is no code in time, or the file is unreadable.
     pub(super) async fn pass(&self, last: Option<&str>) -> Result<Pass, CommandError> {
         match (&self.ticket, &self.code, &self.code_file) {
             (Some(ticket), ..) => Ok(Pass::Ticket(ticket.clone())),
@@ -122,10 +121,10 @@ impl WayIn {
     }
 }
 
-/// The join code in a file, once there is one other than `last`; waits for it for [`PATIENCE`].
+/// Waits up to [`PATIENCE`] for a join code other than `last` in a file.
 ///
 /// # Errors
-/// There is none in time, or the file cannot be read.
+/// There is none in time, or the file is unreadable.
 async fn code_in(file: &Path, last: Option<&str>) -> Result<String, CommandError> {
     let give_up_at = Instant::now() + PATIENCE;
     let mut told = false;
@@ -160,7 +159,7 @@ async fn code_in(file: &Path, last: Option<&str>) -> Result<String, CommandError
     }
 }
 
-/// How many seats of a room nobody holds yet.
+/// Number of free seats of a room.
 pub(super) fn free_seats(room: &v1::Room) -> usize {
     let free = |seat: &&v1::Participant| seat.name.is_empty();
     room.seats.iter().filter(free).count()

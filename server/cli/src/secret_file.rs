@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use super::CommandError;
 
-/// A file that a secret is going to be left in: whole or not at all, and for its owner alone.
+/// A file for a secret, written atomically and readable only by its owner.
 pub(super) struct SecretFile<'a> {
     what: &'static str,
     file: &'a Path,
@@ -16,7 +16,7 @@ pub(super) struct SecretFile<'a> {
 }
 
 impl<'a> SecretFile<'a> {
-    /// Begins it under another name, beside where it is to be. `flag` named the file, `what` is to be left in it: "a join code".
+    /// Opens a temporary file beside `file`. `flag` named it; `what` is the secret, as in "a join code".
     ///
     /// # Errors
     /// It cannot be written.
@@ -32,7 +32,7 @@ impl<'a> SecretFile<'a> {
             if file.is_dir() {
                 return Err(io::ErrorKind::IsADirectory.into());
             }
-            // One left behind by a process that was stopped may have been made otherwise.
+            // A file left by an interrupted process may have another mode.
             match std::fs::remove_file(&part) {
                 Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
                 _ => {}
@@ -57,10 +57,10 @@ impl<'a> SecretFile<'a> {
         }
     }
 
-    /// Leaves the secret.
+    /// Writes the secret.
     ///
     /// # Errors
-    /// It cannot be written after all.
+    /// The file cannot be written.
     pub(super) fn leave(mut self, secret: &str) -> Result<(), CommandError> {
         writeln!(self.whole, "{secret}")
             .and_then(|()| std::fs::rename(&self.part, self.file))
@@ -77,7 +77,7 @@ impl<'a> SecretFile<'a> {
 
 impl Drop for SecretFile<'_> {
     fn drop(&mut self) {
-        // Nothing is there any more once the secret was left.
+        // After success it no longer exists.
         let _ = std::fs::remove_file(&self.part);
     }
 }

@@ -244,7 +244,7 @@ async fn what_is_refused_says_what_to_do() {
     taken.await.expect("there is a seat");
     let long = "x".repeat(65);
     let table: [(&[&str], &str); 5] = [
-        (&["--code", "ZZZZZZZZ"], "see that it is typed"),
+        (&["--code", "ZZZZZZZZ"], "check the code"),
         (&["--code", &code], "chefshat watch"),
         (&["--code", &code, "--name", &long], "another --name"),
         (&["--ticket", "00"], "join again"),

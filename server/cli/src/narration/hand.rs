@@ -1,27 +1,27 @@
-//! Cards of a hand as a person sorts them: stacks of one face, rarest first, jokers last.
+//! A hand sorted into stacks of one face, rarest first, jokers last.
 
 /// Cards of one hand.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct Hand {
-    /// How many of each: index f-1 counts face f, the last one jokers.
+    /// Counts: index f-1 for face f, the last one for jokers.
     pub(crate) counts: Vec<u8>,
-    /// One of the top face is the Golden card.
+    /// Contains the Golden card.
     pub(crate) golden: bool,
 }
 
-/// Cards of one face in a hand, or its jokers.
+/// The cards of one face, or the jokers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Stack {
     /// The face; F+1 for jokers.
     pub(crate) face: u32,
     pub(crate) count: u8,
     pub(crate) joker: bool,
-    /// One of them is the Golden card.
+    /// Contains the Golden card.
     pub(crate) golden: bool,
 }
 
 impl Hand {
-    /// Cards of a number of faces, ascending, F+1 for a joker; a card that the deck does not have is left out.
+    /// Makes a hand of cards (F+1 for a joker); cards outside the deck are ignored.
     pub(super) fn of(faces: usize, cards: &[u32], golden: bool) -> Self {
         let mut hand = Self {
             counts: vec![0; faces + 1],

@@ -1,14 +1,14 @@
-//! Text that knows how wide it is: styled pieces, wrapped items, names that are safe to show. What is said is not decided here.
+//! Text of known width: styled pieces, wrapped items, names that are safe to print.
 
 use anstyle::{AnsiColor, Color, Style};
 use unicode_width::{UnicodeWidthChar as _, UnicodeWidthStr as _};
 
-/// Columns that no line goes beyond.
+/// Maximum columns of a line.
 pub(super) const WIDTH: usize = 98;
-/// Most columns of a name.
+/// Maximum columns of a name.
 pub(crate) const MAX_NAME: usize = 15;
 
-/// Columns of the label of a line outside of Shifts.
+/// Columns of the label of a line outside Shifts.
 const LABEL: usize = 17;
 
 /// The colours of the seats, by number.
@@ -21,15 +21,15 @@ const SEAT_COLOURS: [AnsiColor; 6] = [
     AnsiColor::Red,
 ];
 
-/// For what matters less.
+/// Secondary text.
 pub(super) const DIM: Style = Style::new().dimmed();
-/// For what matters more.
+/// Emphasised text.
 pub(super) const BOLD: Style = Style::new().bold();
-/// For the Golden card and for special moments.
+/// The Golden card and special actions.
 pub(super) const GOLD: Style = Style::new()
     .fg_color(Some(Color::Ansi(AnsiColor::BrightYellow)))
     .bold();
-/// For nothing in particular.
+/// Plain text.
 pub(super) const PLAIN: Style = Style::new();
 
 /// The colour of a seat.
@@ -38,12 +38,12 @@ pub(super) fn seat_style(seat: u32) -> Style {
     Style::new().fg_color(Some(Color::Ansi(SEAT_COLOURS[index])))
 }
 
-/// Columns that text takes on a terminal.
+/// Columns of a text on a terminal.
 pub(crate) fn columns(text: &str) -> usize {
     text.width()
 }
 
-/// Styled text and the columns it takes; one line at most.
+/// Styled text and its width; a single line.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Piece {
     text: String,
@@ -56,7 +56,7 @@ impl Piece {
         Self::default().and(style, text)
     }
 
-    /// With text in a style after it.
+    /// Appends text in a style.
     #[must_use]
     pub(super) fn and(mut self, style: Style, text: &str) -> Self {
         self.width += columns(text);
@@ -68,7 +68,7 @@ impl Piece {
         self
     }
 
-    /// With another piece after it.
+    /// Appends a piece.
     #[must_use]
     pub(super) fn join(mut self, other: &Self) -> Self {
         self.width += other.width;
@@ -76,21 +76,21 @@ impl Piece {
         self
     }
 
-    /// With spaces after it, until it is this wide.
+    /// Pads on the right to a width.
     #[must_use]
     pub(super) fn padded(self, width: usize) -> Self {
         let missing = width.saturating_sub(self.width);
         self.and(PLAIN, &" ".repeat(missing))
     }
 
-    /// With spaces before it, until it is this wide.
+    /// Pads on the left to a width.
     #[must_use]
     pub(super) fn right(self, width: usize) -> Self {
         let missing = width.saturating_sub(self.width);
         Self::new(PLAIN, &" ".repeat(missing)).join(&self)
     }
 
-    /// Columns it takes.
+    /// Its width in columns.
     pub(super) fn width(&self) -> usize {
         self.width
     }
@@ -101,8 +101,7 @@ impl Piece {
     }
 }
 
-/// Items behind each other with a dot between them, in as many lines as it takes, all but the first behind an indent as wide as
-/// `start`.
+/// Items separated by dots, wrapped, with continuation lines indented by the width of `start`.
 pub(super) fn wrapped(start: &Piece, items: &[Piece]) -> String {
     let mut out = start.as_str().to_owned();
     let mut column = start.width();
@@ -124,7 +123,7 @@ pub(super) fn wrapped(start: &Piece, items: &[Piece]) -> String {
     out
 }
 
-/// A heading: words in a rule across the page.
+/// A heading: text in a rule across the page.
 pub(crate) fn heading(words: &str) -> String {
     let words = clean(words, WIDTH - 10);
     let rest = WIDTH.saturating_sub(columns(&words) + 4);
@@ -135,18 +134,18 @@ pub(crate) fn heading(words: &str) -> String {
     format!("\n{}\n", line.as_str())
 }
 
-/// What begins a line outside of Shifts.
+/// The label of a line outside Shifts.
 pub(super) fn label(words: &str) -> Piece {
     Piece::new(PLAIN, "   ").and(DIM, words).padded(LABEL)
 }
 
-/// A line outside of Shifts: a label and what belongs to it. Not wrapped, for addresses and paths.
+/// A line outside Shifts: a label and text. Not wrapped, so that addresses and paths can be copied.
 pub(crate) fn row(words: &str, text: &str) -> String {
     let line = label(words).and(PLAIN, text);
     format!("{}\n", line.as_str())
 }
 
-/// A name or label from outside as it may be shown: nothing that steers a terminal, at most `width` columns.
+/// Text from outside, made safe to print: without control characters, at most `width` columns.
 pub(crate) fn clean(text: &str, width: usize) -> String {
     let shown = |letter: &char| !steers(*letter);
     let safe: String = text.chars().filter(shown).collect();
@@ -166,7 +165,7 @@ pub(crate) fn clean(text: &str, width: usize) -> String {
     cut
 }
 
-/// Control characters, and those that turn the direction of writing or join what stands around them.
+/// Control characters, and characters that change the direction or joining of text.
 fn steers(letter: char) -> bool {
     letter.is_control()
         || matches!(letter, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}')

@@ -9,7 +9,7 @@ use chefshat_client::{ActionId, Agent, Client, Outcome, v1};
 use clap::Args;
 
 use super::super::agent::{outcome_in_words, outcome_json};
-use super::super::connect::{Pass, ServerArg, WayIn};
+use super::super::connect::{JoinArgs, Pass, ServerArg};
 use super::super::numbers::counted;
 use super::super::remote::{MAX_PACE_MS, RemoteAgent, agent_kind, seed_for};
 use super::super::{CommandError, say};
@@ -30,7 +30,7 @@ pub(super) struct Join {
     #[command(flatten)]
     server: ServerArg,
     #[command(flatten)]
-    way_in: WayIn,
+    join_args: JoinArgs,
     /// Display name, unique in the tournament. Default: the agent's.
     #[arg(long)]
     name: Option<String>,
@@ -60,7 +60,7 @@ struct Place {
 impl Join {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
         let client = self.server.connect_patiently().await?;
-        let (ticket, place) = match self.way_in.pass(None).await? {
+        let (ticket, place) = match self.join_args.pass(None).await? {
             Pass::Ticket(ticket) => (ticket, None),
             Pass::Code(code) => {
                 let (ticket, place) = self.take_place(&client, code).await?;

@@ -1,36 +1,41 @@
-//! Cards drawn with lines and letters: the stacks of a hand side by side, a play as a fan. Which of them may be played is told to this file.
+//! Cards as text: the stacks of a hand side by side, a play as a fan. The caller says which of them may be played.
 
 use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 
-use super::look::Look;
+use super::theme::Theme;
 use crate::narration::hand::Stack;
 use crate::narration::view::OnBoard;
 
-/// Columns of a stack with the space behind it, at most.
+/// Maximum columns of a stack, with the space behind it.
 const STACK_COLUMNS: usize = 6;
-/// Columns of the narrowest stack that can be read.
+/// Minimum columns of a legible stack.
 const MIN_STACK_COLUMNS: usize = 4;
 
-/// Most cards of a kind that are drawn in a fan: more than any deck has.
+/// Maximum number of cards in a fan: more than any deck has.
 const MAX_FAN: usize = 64;
 
 /// How a stack of a hand is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Shown {
     pub(crate) stack: Stack,
-    /// Something legal can be done with it.
+    /// A legal action uses it.
     pub(crate) active: bool,
-    /// How many of it are picked, if the cursor is on it.
+    /// Number of selected cards, if the cursor is on it.
     pub(crate) picked: Option<u8>,
-    /// How many of it go with the stack that is picked (jokers).
+    /// Number of jokers selected with another stack.
     pub(crate) along: u8,
-    /// The key that picks it, where that is not what is written on the card.
+    /// The key that selects it, unless it is the card's own label.
     pub(crate) key: Option<char>,
 }
 
-/// A hand in five lines: cards of four, and what is picked below them.
-pub(crate) fn hand(look: Look, faces: u32, stacks: &[Shown], columns: usize) -> Vec<Line<'static>> {
+/// A hand in five lines: four for the cards, one for the selection.
+pub(crate) fn hand(
+    theme: Theme,
+    faces: u32,
+    stacks: &[Shown],
+    columns: usize,
+) -> Vec<Line<'static>> {
     let width = (columns / stacks.len().max(1)).clamp(MIN_STACK_COLUMNS, STACK_COLUMNS);
     // One column of the six is the space between two cards; narrower ones have none.
     let gap = usize::from(width == STACK_COLUMNS);
@@ -39,7 +44,7 @@ pub(crate) fn hand(look: Look, faces: u32, stacks: &[Shown], columns: usize) -> 
     for shown in stacks {
         let stack = shown.stack;
         let frame = frame_of(shown);
-        let style = style_of(look, faces, shown);
+        let style = style_of(theme, faces, shown);
         let face = if stack.joker {
             "J".to_owned()
         } else if stack.golden {
@@ -54,9 +59,9 @@ pub(crate) fn hand(look: Look, faces: u32, stacks: &[Shown], columns: usize) -> 
             format!("{left}{}{right}{space}", top(line, inner, shown.key)),
             style,
         ));
-        // Faces and counts are to be read in any case: the frame alone is coloured or dimmed.
+        // Faces and counts must stay legible: only the frame is coloured or dimmed.
         let ink = if shown.active || shown.picked.is_some() {
-            look.bold()
+            theme.bold()
         } else {
             Style::new()
         };
@@ -75,12 +80,12 @@ pub(crate) fn hand(look: Look, faces: u32, stacks: &[Shown], columns: usize) -> 
             (None, 0) => String::new(),
             (None, along) => format!("+{along}"),
         };
-        rows[4].push(Span::styled(format!("{mark:^width$}"), look.bold()));
+        rows[4].push(Span::styled(format!("{mark:^width$}"), theme.bold()));
     }
     rows.into_iter().map(Line::from).collect()
 }
 
-/// The upper edge of a card between its corners, with a key in the middle.
+/// The upper edge of a card, with a key in the middle.
 fn top(line: &str, inner: usize, key: Option<char>) -> String {
     let Some(key) = key else {
         return line.repeat(inner);
@@ -90,7 +95,7 @@ fn top(line: &str, inner: usize, key: Option<char>) -> String {
     format!("{}{key}{}", line.repeat(left), line.repeat(right))
 }
 
-/// Corners, line and side of a card: heavy where the cursor is, broken where nothing legal can be done.
+/// Corners and edges of a card: heavy under the cursor, broken if no legal action uses it.
 fn frame_of(shown: &Shown) -> [&'static str; 6] {
     match (shown.picked.is_some(), shown.active) {
         (true, _) => ["┏", "━", "┓", "┃", "┗", "┛"],
@@ -99,17 +104,17 @@ fn frame_of(shown: &Shown) -> [&'static str; 6] {
     }
 }
 
-fn style_of(look: Look, faces: u32, shown: &Shown) -> Style {
-    let style = look.card(shown.stack.face, faces);
+fn style_of(theme: Theme, faces: u32, shown: &Shown) -> Style {
+    let style = theme.card(shown.stack.face, faces);
     match (shown.picked.is_some(), shown.active) {
-        (true, _) => style.patch(look.bold()),
+        (true, _) => style.patch(theme.bold()),
         (false, true) => style,
-        (false, false) => style.patch(look.dim()),
+        (false, false) => style.patch(theme.dim()),
     }
 }
 
-/// A play as a fan of cards, three lines high; one behind the other, so that twelve fit into 37 columns.
-pub(crate) fn fan(look: Look, faces: u32, play: OnBoard) -> [Line<'static>; 3] {
+/// A play as a fan of overlapping cards, three lines high; twelve cards fit in 37 columns.
+pub(crate) fn fan(theme: Theme, faces: u32, play: OnBoard) -> [Line<'static>; 3] {
     let plain = usize::try_from(play.quantity)
         .unwrap_or(MAX_FAN)
         .min(MAX_FAN);
@@ -119,7 +124,7 @@ pub(crate) fn fan(look: Look, faces: u32, play: OnBoard) -> [Line<'static>; 3] {
     let mut last = Style::new();
     for (index, joker) in cards.enumerate() {
         let face = if joker { faces + 1 } else { play.face };
-        let style = look.card(face, faces);
+        let style = theme.card(face, faces);
         let words = match (joker, play.golden && index == 0) {
             (true, _) => " J".to_owned(),
             (false, true) => format!("{face:<2}"),
@@ -127,7 +132,7 @@ pub(crate) fn fan(look: Look, faces: u32, play: OnBoard) -> [Line<'static>; 3] {
         };
         let golden = play.golden && index == 0;
         let (edge, style) = if golden {
-            ("★", look.gold())
+            ("★", theme.gold())
         } else {
             ("│", style)
         };

@@ -1,5 +1,4 @@
-//! What happened, drawn: the newest lines beside the seats, or, when a person scrolls back, earlier ones in the place of seats and pizza. What
-//! the lines say is in `story`.
+//! Draws the story: its newest lines beside the seats or, scrolled back, earlier ones in place of seats and pizza.
 
 use ratatui::Frame;
 use ratatui::crossterm::event::KeyCode;
@@ -7,34 +6,34 @@ use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
-use super::look::Look;
+use super::theme::Theme;
 use super::view::boxed;
 use crate::narration::columns;
 use crate::narration::story;
 use crate::narration::view::GameView;
 
-/// Lines that a key goes back or on, at first and then: less than there is room for in the smallest window.
+/// Lines per key press, for the first and the following ones: less than the smallest window shows.
 const FIRST: usize = 5;
 const PAGE: usize = 10;
-/// What continues a line is moved in by so much.
+/// Indentation of wrapped lines.
 const INDENT: usize = 2;
 
-/// How far back a person looks.
+/// The scroll position of the story.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct Scroll {
-    /// Number of the line behind the last one that is shown, of all that were ever told; none while the newest are shown beside the seats.
+    /// Number of the line after the last shown one, of all lines so far; none while the newest are shown beside the seats.
     end: Option<usize>,
 }
 
 impl Scroll {
-    /// Whether earlier lines are shown in the place of the table.
+    /// Whether earlier lines replace the table.
     pub(crate) fn is_open(self) -> bool {
         self.end.is_some()
     }
 
-    /// Takes a key; says whether it was meant for this: `PgUp` always is, every other one while earlier lines are shown.
+    /// Handles a key; false if it is not for the story. `PgUp` always is, all others only while earlier lines are shown.
     pub(crate) fn key(&mut self, code: KeyCode, table: &GameView) -> bool {
-        // So much is to be seen at least, where so much was told.
+        // At least one page stays visible.
         let first = (table.story_len - table.story.len() + PAGE).min(table.story_len);
         self.end = match (code, self.end) {
             (KeyCode::PageUp, None) => Some(table.story_len.saturating_sub(FIRST).max(first)),
@@ -49,40 +48,40 @@ impl Scroll {
 }
 
 /// Draws the newest lines.
-pub(super) fn draw(frame: &mut Frame<'_>, look: Look, table: &GameView, area: Rect) {
-    let lines = last_lines(look, table, table.story_len, area);
-    let block = boxed(look, " what happened ");
+pub(super) fn draw(frame: &mut Frame<'_>, theme: Theme, table: &GameView, area: Rect) {
+    let lines = last_lines(theme, table, table.story_len, area);
+    let block = boxed(theme, " what happened ");
     frame.render_widget(Paragraph::new(lines).block(block), area);
 }
 
 /// Draws earlier lines.
 pub(super) fn draw_back(
     frame: &mut Frame<'_>,
-    look: Look,
+    theme: Theme,
     table: &GameView,
     scroll: Scroll,
     area: Rect,
 ) {
     let end = scroll.end.unwrap_or(table.story_len).min(table.story_len);
-    let lines = last_lines(look, table, end, area);
+    let lines = last_lines(theme, table, end, area);
     let after = match table.story_len - end {
         0 => "the newest".to_owned(),
         after => format!("{after} more after these"),
     };
-    let block = boxed(look, format!(" what happened · {after} "))
+    let block = boxed(theme, format!(" what happened · {after} "))
         .title_bottom(" PgUp earlier · PgDn later · any other key: the table ");
     frame.render_widget(Paragraph::new(lines).block(block), area);
 }
 
-/// As many lines before line number `end` as a box has room for, long ones wrapped.
-fn last_lines(look: Look, table: &GameView, end: usize, area: Rect) -> Vec<Line<'static>> {
+/// The lines before line number `end` that fit in the area, wrapped.
+fn last_lines(theme: Theme, table: &GameView, end: usize, area: Rect) -> Vec<Line<'static>> {
     let rows = usize::from(area.height.saturating_sub(2));
     let width = usize::from(area.width.saturating_sub(2));
     let told_before = table.story_len - table.story.len();
     let shown = end.saturating_sub(told_before).min(table.story.len());
     let mut lines: Vec<Line<'static>> = Vec::new();
     for line in table.story.range(..shown).rev() {
-        let wrapped = wrap(look, table, line, width);
+        let wrapped = wrap(theme, table, line, width);
         lines.extend(wrapped.into_iter().rev());
         if lines.len() >= rows {
             break;
@@ -93,22 +92,22 @@ fn last_lines(look: Look, table: &GameView, end: usize, area: Rect) -> Vec<Line<
     lines
 }
 
-/// A line of the story in as many rows as it needs, broken between words.
-fn wrap(look: Look, table: &GameView, line: &story::Line, width: usize) -> Vec<Line<'static>> {
+/// A line of the story, wrapped between words.
+fn wrap(theme: Theme, table: &GameView, line: &story::Line, width: usize) -> Vec<Line<'static>> {
     let (lead, words) = match (line.heading, line.seat) {
         (true, _) => (None, format!("─ {}", line.words)),
         (false, Some(seat)) => (Some((table.name(seat), seat)), format!(" {}", line.words)),
         (false, None) => (None, line.words.clone()),
     };
     let style = if line.heading {
-        look.bold()
+        theme.bold()
     } else {
         ratatui::style::Style::new()
     };
     let mut rows = Vec::new();
     let mut used = lead.as_ref().map_or(0, |(name, _)| columns(name));
     let mut spans: Vec<Span<'static>> = lead
-        .map(|(name, seat)| Span::styled(name, look.seat(seat)))
+        .map(|(name, seat)| Span::styled(name, theme.seat(seat)))
         .into_iter()
         .collect();
     let mut text = String::new();

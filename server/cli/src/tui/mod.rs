@@ -3,12 +3,12 @@
 
 pub(crate) mod cards;
 pub(crate) mod log;
-pub(crate) mod look;
 pub(crate) mod play;
 pub(crate) mod screen;
 #[cfg(test)]
 pub(crate) mod testing;
 #[cfg(test)]
 mod tests;
+pub(crate) mod theme;
 pub(crate) mod view;
 pub(crate) mod watch;

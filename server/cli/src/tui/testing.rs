@@ -1,4 +1,4 @@
-//! What the tests of `play` and `watch` share: a screen that is text, games to draw on it, recorded ones and ones played as a test likes.
+//! Shared by the tests of `play` and `watch`: screens as text, recorded games, and games played by the engine.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use ratatui::{Frame, Terminal};
 
 use chefshat_record::convert::{decision_kind, observation_to_proto, put_requirement};
 
-/// What a picture shows on a screen of this size, line by line, without the spaces at the ends.
+/// A screen of this size as text, without trailing spaces.
 pub(crate) fn text(columns: u16, rows: u16, picture: impl FnOnce(&mut Frame<'_>)) -> String {
     let mut terminal = Terminal::new(TestBackend::new(columns, rows)).unwrap();
     terminal.draw(picture).unwrap();
@@ -26,9 +26,8 @@ pub(crate) fn text(columns: u16, rows: u16, picture: impl FnOnce(&mut Frame<'_>)
     text
 }
 
-/// Compares screens with what is kept of them, by name; those that differ are left in the folder for temporary files, for who wants to
-/// keep them instead.
-pub(crate) fn as_kept(screens: &[(&str, String, &str)]) {
+/// Compares screens with the committed ones, by name; screens that differ are written to the directory for temporary files.
+pub(crate) fn assert_screens(screens: &[(&str, String, &str)]) {
     let differ = screens.iter().filter(|(_, screen, kept)| screen != kept);
     let left = differ.map(|(name, screen, _)| {
         let new = std::env::temp_dir().join(format!("chefshat-{name}"));
@@ -43,13 +42,13 @@ pub(crate) fn as_kept(screens: &[(&str, String, &str)]) {
     );
 }
 
-/// The record of a game among the fixtures.
+/// A record of the fixtures.
 pub(crate) fn lines(name: &str) -> Vec<v1::RecordLine> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/fixtures/records");
     chefshat_record::jsonl::read(&folder.join(name)).unwrap()
 }
 
-/// Its events.
+/// The events of a record.
 pub(crate) fn recorded(name: &str) -> Vec<v1::GameEvent> {
     let events = lines(name).into_iter().filter_map(|line| match line.line {
         Some(record_line::Line::Event(event)) => Some(event),
@@ -58,17 +57,17 @@ pub(crate) fn recorded(name: &str) -> Vec<v1::GameEvent> {
     events.collect()
 }
 
-/// A game without a server: the engine's, as the protocol tells it to one seat.
+/// A game of the engine, with events as the server sends them to one seat.
 pub(crate) struct Dealt {
     pub(crate) game: Game,
     viewer: Viewer,
     told: u64,
-    /// How many decisions the seat was asked for.
+    /// Number of decision requests so far.
     asked: u64,
 }
 
 impl Dealt {
-    /// A new game, told from its beginning.
+    /// Starts a game; returns its first events.
     pub(crate) fn new(rules: &RuleSetSpec, seed: u8, viewer: Viewer) -> (Self, Vec<v1::GameEvent>) {
         let rules = rules.validate().unwrap();
         let mut events = Vec::new();
@@ -106,14 +105,14 @@ impl Dealt {
         (dealt, told)
     }
 
-    /// Takes an action; what the seat is told of it.
+    /// Applies an action; returns its events.
     pub(crate) fn apply(&mut self, action: ActionId) -> Vec<v1::GameEvent> {
         let mut events = Vec::new();
         self.game.apply(action, |event| events.push(event)).unwrap();
         self.tell(&events)
     }
 
-    /// The open decision as its seat is asked.
+    /// The request for the open decision.
     pub(crate) fn request(&mut self) -> v1::DecisionRequest {
         self.asked += 1;
         let decision = self.game.decision().unwrap();

@@ -1,5 +1,4 @@
-//! The table drawn into a part of the screen: header, seats, story, pizza, and boxes over them. What lies below (a hand, a reel) is drawn by
-//! `play` and `watch`.
+//! Draws the table: header, seats, story, pizza, and popups. `play` and `watch` draw what is below it.
 
 use chefshat_client::v1;
 use ratatui::Frame;
@@ -10,12 +9,12 @@ use ratatui::widgets::{Block, BorderType, Clear, Paragraph, Wrap};
 use super::super::numbers::{counted, ordinal};
 use super::cards::fan;
 use super::log::{self, Scroll};
-use super::look::{Look, ingredient, kind};
+use super::theme::{Theme, ingredient, kind};
 use crate::narration::view::{End, GameView};
 use crate::narration::{MAX_NAME, aborted, clean, columns, title};
 use crate::output::stop_in_words;
 
-/// The least that a table needs.
+/// Minimum size of the window.
 pub(crate) const MIN_COLUMNS: u16 = 80;
 pub(crate) const MIN_ROWS: u16 = 24;
 
@@ -25,13 +24,13 @@ const SEATS_COLUMNS: u16 = 54;
 const SEATS_TITLE: &str = " at the table ───────────── cards points ";
 /// Rows of the box of the pizza.
 const PIZZA_ROWS: u16 = 5;
-/// Least rows of seats and story.
+/// Minimum rows of seats and story.
 const UPPER_ROWS: u16 = 8;
 
-/// Draws the table; gives the part of the screen below it, `rows` high.
+/// Draws the table; returns the area below it, `rows` high.
 pub(crate) fn draw(
     frame: &mut Frame<'_>,
-    look: Look,
+    theme: Theme,
     table: &GameView,
     me: Option<u32>,
     status: &str,
@@ -49,20 +48,20 @@ pub(crate) fn draw(
         Constraint::Length(rows),
     ])
     .areas(area);
-    draw_header(frame, look, table, status, header);
+    draw_header(frame, theme, table, status, header);
     if scroll.is_open() {
-        log::draw_back(frame, look, table, scroll, upper.union(pizza));
+        log::draw_back(frame, theme, table, scroll, upper.union(pizza));
         return Some(lower);
     }
     let [seats, story] =
         Layout::horizontal([Constraint::Length(SEATS_COLUMNS), Constraint::Min(1)]).areas(upper);
-    draw_seats(frame, look, table, me, seats);
-    log::draw(frame, look, table, story);
-    draw_pizza(frame, look, table, me, pizza);
+    draw_seats(frame, theme, table, me, seats);
+    log::draw(frame, theme, table, story);
+    draw_pizza(frame, theme, table, me, pizza);
     Some(lower)
 }
 
-/// Says that a window is too small for a table, where it is.
+/// Draws a message if the window is too small.
 pub(crate) fn is_too_small(frame: &mut Frame<'_>) -> bool {
     let area = frame.area();
     let small = area.width < MIN_COLUMNS || area.height < MIN_ROWS;
@@ -77,15 +76,15 @@ pub(crate) fn is_too_small(frame: &mut Frame<'_>) -> bool {
 }
 
 /// A box with a title.
-pub(crate) fn boxed<'a>(look: Look, title: impl Into<Line<'a>>) -> Block<'a> {
+pub(crate) fn boxed<'a>(theme: Theme, title: impl Into<Line<'a>>) -> Block<'a> {
     Block::bordered()
         .border_type(BorderType::Rounded)
-        .border_style(look.frame())
+        .border_style(theme.frame())
         .title(title)
 }
 
-/// A box over everything else, in the middle.
-pub(crate) fn popup(frame: &mut Frame<'_>, look: Look, title: &str, lines: Vec<Line<'_>>) {
+/// A popup in the middle of the screen.
+pub(crate) fn popup(frame: &mut Frame<'_>, theme: Theme, title: &str, lines: Vec<Line<'_>>) {
     let area = frame.area();
     let longest = lines.iter().map(Line::width).max().unwrap_or(0);
     let width = u16::try_from(longest + 6).unwrap_or(u16::MAX);
@@ -100,14 +99,14 @@ pub(crate) fn popup(frame: &mut Frame<'_>, look: Look, title: &str, lines: Vec<L
     frame.render_widget(Clear, place);
     let block = Block::bordered()
         .border_type(BorderType::Double)
-        .border_style(look.gold())
+        .border_style(theme.gold())
         .title(format!(" {title} "))
         .padding(ratatui::widgets::Padding::horizontal(2));
     frame.render_widget(Paragraph::new(lines).block(block), place);
 }
 
-/// The end of a game as lines: its standings, or why it has none.
-pub(crate) fn end_lines(look: Look, table: &GameView, end: &End) -> Vec<Line<'static>> {
+/// The end of a game in lines: its standings, or why there are none.
+pub(crate) fn end_lines(theme: Theme, table: &GameView, end: &End) -> Vec<Line<'static>> {
     match end {
         End::Aborted(reason) => vec![Line::from(aborted(*reason))],
         End::Finished(standings) => standings
@@ -118,11 +117,11 @@ pub(crate) fn end_lines(look: Look, table: &GameView, end: &End) -> Vec<Line<'st
                 let points = counted(line.points, "point");
                 let mut spans = vec![
                     Span::raw(words),
-                    Span::styled(name, look.seat(line.seat)),
+                    Span::styled(name, theme.seat(line.seat)),
                     Span::raw(format!("{points:>10}")),
                 ];
                 if line.place == 1 {
-                    spans.push(Span::styled("  ★ wins the game", look.gold()));
+                    spans.push(Span::styled("  ★ wins the game", theme.gold()));
                 }
                 Line::from(spans)
             })
@@ -130,13 +129,13 @@ pub(crate) fn end_lines(look: Look, table: &GameView, end: &End) -> Vec<Line<'st
     }
 }
 
-/// Text with spaces behind it until it is so many columns wide.
+/// Pads text with spaces to a width.
 pub(crate) fn padded(text: &str, width: usize) -> String {
     let missing = width.saturating_sub(columns(text));
     format!("{text}{}", " ".repeat(missing))
 }
 
-fn draw_header(frame: &mut Frame<'_>, look: Look, table: &GameView, status: &str, area: Rect) {
+fn draw_header(frame: &mut Frame<'_>, theme: Theme, table: &GameView, status: &str, area: Rect) {
     let mut progress = String::new();
     if table.shift > 0 {
         progress.push_str(&format!(" · Shift {} · pizza {}", table.shift, table.pizza));
@@ -147,7 +146,7 @@ fn draw_header(frame: &mut Frame<'_>, look: Look, table: &GameView, status: &str
     let width = usize::from(area.width).saturating_sub(columns(status) + 1);
     let space = width.saturating_sub(columns(&progress) + 2);
     let room = &table.room_name;
-    // A long name takes the place of the game's own, and is cut where that is not enough.
+    // A long room name replaces the name of the game, and is cut if necessary.
     let named = match room.is_empty() {
         true => "Chef's Hat".to_owned(),
         false => format!("Chef's Hat · {room}"),
@@ -158,10 +157,10 @@ fn draw_header(frame: &mut Frame<'_>, look: Look, table: &GameView, status: &str
     };
     let words = format!(" {named}{progress}");
     let line = Line::from(format!("{}{status} ", padded(&words, width)));
-    frame.render_widget(Paragraph::new(line).style(look.header()), area);
+    frame.render_widget(Paragraph::new(line).style(theme.header()), area);
 }
 
-fn draw_seats(frame: &mut Frame<'_>, look: Look, table: &GameView, me: Option<u32>, area: Rect) {
+fn draw_seats(frame: &mut Frame<'_>, theme: Theme, table: &GameView, me: Option<u32>, area: Rect) {
     let lines = (0u32..).zip(&table.seats).map(|(seat, place)| {
         let marker = if table.turn == Some(seat) {
             "▶ "
@@ -177,9 +176,9 @@ fn draw_seats(frame: &mut Frame<'_>, look: Look, table: &GameView, me: Option<u3
             place.name.clone()
         };
         let name_style = if table.turn == Some(seat) {
-            look.seat(seat).patch(look.bold())
+            theme.seat(seat).patch(theme.bold())
         } else {
-            look.seat(seat)
+            theme.seat(seat)
         };
         let role = match place.role {
             v1::Role::Unspecified => "",
@@ -187,7 +186,7 @@ fn draw_seats(frame: &mut Frame<'_>, look: Look, table: &GameView, me: Option<u3
         };
         let name = padded(&clean(&name, 16), 17);
         let mut spans = vec![
-            Span::styled(marker, look.bold()),
+            Span::styled(marker, theme.bold()),
             Span::styled(name, name_style),
             Span::raw(format!("{symbol} {word:<6} ")),
         ];
@@ -196,20 +195,20 @@ fn draw_seats(frame: &mut Frame<'_>, look: Look, table: &GameView, me: Option<u3
                 Some(place) => ordinal(place),
                 None => place.cards.to_string(),
             };
-            spans.push(Span::styled(format!("{cards:>5}"), look.bold()));
+            spans.push(Span::styled(format!("{cards:>5}"), theme.bold()));
             spans.push(Span::raw(format!("{:>7} ", place.points)));
             spans.push(match note_of(place) {
-                Some(note) => Span::styled(note, look.dim()),
+                Some(note) => Span::styled(note, theme.dim()),
                 None => Span::raw(role),
             });
         }
         Line::from(spans)
     });
     let lines: Vec<Line<'_>> = lines.collect();
-    frame.render_widget(Paragraph::new(lines).block(boxed(look, SEATS_TITLE)), area);
+    frame.render_widget(Paragraph::new(lines).block(boxed(theme, SEATS_TITLE)), area);
 }
 
-/// What matters more about a seat than its role.
+/// A note about a seat that is shown instead of its role.
 fn note_of(place: &crate::narration::view::SeatView) -> Option<String> {
     if place.substituted {
         return Some("substitute".to_owned());
@@ -220,13 +219,13 @@ fn note_of(place: &crate::narration::view::SeatView) -> Option<String> {
     (place.passed && place.finished.is_none()).then(|| "passed".to_owned())
 }
 
-fn draw_pizza(frame: &mut Frame<'_>, look: Look, table: &GameView, me: Option<u32>, area: Rect) {
-    let block = boxed(look, " the pizza ");
+fn draw_pizza(frame: &mut Frame<'_>, theme: Theme, table: &GameView, me: Option<u32>, area: Rect) {
+    let block = boxed(theme, " the pizza ");
     let inner = block.inner(area);
     frame.render_widget(block, area);
     let Some(play) = table.board else {
         if table.turns == 0 && !table.last_order.is_empty() && table.end.is_none() {
-            let lines = between(look, table, me);
+            let lines = between(theme, table, me);
             frame.render_widget(Paragraph::new(lines).wrap(Wrap { trim: false }), inner);
             return;
         }
@@ -241,7 +240,7 @@ fn draw_pizza(frame: &mut Frame<'_>, look: Look, table: &GameView, me: Option<u3
         return;
     };
     let faces = table.faces();
-    let [first, second, third] = fan(look, faces, play);
+    let [first, second, third] = fan(theme, faces, play);
     let width = u16::try_from(first.width())
         .unwrap_or(u16::MAX)
         .saturating_add(1);
@@ -268,7 +267,7 @@ fn draw_pizza(frame: &mut Frame<'_>, look: Look, table: &GameView, me: Option<u3
     let lines = vec![
         Line::from(vec![
             Span::raw(" "),
-            Span::styled(name, look.seat(play.seat)),
+            Span::styled(name, theme.seat(play.seat)),
             Span::raw(" played"),
         ]),
         Line::from(Span::styled(
@@ -276,21 +275,21 @@ fn draw_pizza(frame: &mut Frame<'_>, look: Look, table: &GameView, me: Option<u3
                 " {}{what}",
                 play_words(play.face, play.quantity, play.jokers, faces)
             ),
-            look.bold(),
+            theme.bold(),
         )),
         Line::from(format!(" {beat}")),
     ];
     frame.render_widget(Paragraph::new(lines), right);
 }
 
-/// What matters between two Shifts: how the last one ended, and what that makes of the person.
-fn between(look: Look, table: &GameView, me: Option<u32>) -> Vec<Line<'static>> {
+/// Between two Shifts: how the last one ended, and the person's new role.
+fn between(theme: Theme, table: &GameView, me: Option<u32>) -> Vec<Line<'static>> {
     let last = table.shift.saturating_sub(1);
     let mut spans = vec![Span::raw(format!("  Shift {last} ended: "))];
     for (place, seat) in (1u32..).zip(&table.last_order) {
         let dot = if place > 1 { " · " } else { "" };
         spans.push(Span::raw(format!("{dot}{} ", ordinal(place))));
-        spans.push(Span::styled(table.name(*seat), look.seat(*seat)));
+        spans.push(Span::styled(table.name(*seat), theme.seat(*seat)));
     }
     let mine = me.and_then(|me| table.seat(me)).map(|place| place.role);
     let role = match mine {

@@ -1,5 +1,5 @@
-//! What `chefshat play` knows and does: keys and messages of the server go in, what is to be done comes out. No terminal, no connection, no
-//! clock of its own, so that a whole game can be played by data.
+//! The state of one game in `chefshat play`: takes keys and server messages, returns actions for the server. It has no terminal, connection
+//! or clock, so that tests play whole games with data.
 
 use chefshat_client::v1::{self, game_event::Kind, seat_update::Update};
 use ratatui::crossterm::event::KeyCode;
@@ -10,7 +10,7 @@ use crate::narration::view::GameView;
 use crate::tui::log::Scroll;
 use crate::tui::screen::Key;
 
-/// What a person can show with one key: a label, valence and arousal, as the page for browsers has them.
+/// Expressions by key: label, valence and arousal, the same as in the page.
 pub(super) const EXPRESSIONS: [(&str, f32, f32); 6] = [
     ("joy", 0.8, 0.5),
     ("amusement", 0.6, 0.7),
@@ -20,38 +20,38 @@ pub(super) const EXPRESSIONS: [(&str, f32, f32); 6] = [
     ("sadness", -0.7, -0.4),
 ];
 
-/// What a person is told whose decision was taken otherwise.
+/// Notice after the server decided for the person.
 const TOO_LATE: &str = "too late: this decision was taken without you";
 
-/// What happens to a game at the terminal.
+/// Input of a game.
 #[derive(Debug)]
 pub(super) enum Input {
     Key(Key),
-    /// The server said something to the seat.
+    /// An update from the server.
     Update(Box<Update>),
-    /// The connection is lost, and why; it is being made again.
+    /// The connection was lost, with the reason; it is being restored.
     Lost(String),
-    /// Nothing more will come from the server; why, if that is not the end of the game.
+    /// The connection ended for good; with the reason if the game has not ended.
     Over(Option<String>),
 }
 
-/// What is to be done.
+/// Output of a game.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Do {
-    /// Answer a decision; how long it was before the person's eyes.
+    /// Answer a decision that was on screen for `took_ms`.
     Answer {
         decision_id: u64,
         action: u32,
         took_ms: u64,
     },
     Express(usize),
-    /// Play itself again after a substitute has.
+    /// Take the seat back from a substitute.
     Resume,
-    /// Leave the table and end.
+    /// Leave the table and quit.
     Leave,
 }
 
-/// What stands over the table.
+/// A dialog over the table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Dialog {
     Help,
@@ -59,26 +59,26 @@ pub(super) enum Dialog {
     Express,
 }
 
-/// The connection, as it is shown.
+/// State of the connection.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Link {
     Connecting,
     Live,
     Lost(String),
-    /// Nothing more comes; why, if the game has not ended.
+    /// Ended; with the reason if the game has not ended.
     Over(Option<String>),
 }
 
-/// A decision and when it came, by the caller's clock.
+/// An open decision and when it arrived.
 #[derive(Debug, Clone)]
 pub(super) struct Open {
     pub(super) decision: Decision,
     pub(super) since_ms: u64,
-    /// An answer is on its way.
+    /// The answer has been sent.
     pub(super) sent: bool,
 }
 
-/// A game at the terminal.
+/// A game in the terminal.
 #[derive(Debug)]
 pub(super) struct App {
     pub(super) table: GameView,
@@ -86,23 +86,23 @@ pub(super) struct App {
     pub(super) open: Option<Open>,
     pub(super) dialog: Option<Dialog>,
     pub(super) link: Link,
-    /// What the person should know: an objection, the server's word.
+    /// A notice for the person: why a key was refused, or a message of the server.
     pub(super) notice: String,
-    /// How far back the person looks at what happened.
+    /// Scroll position of the story.
     pub(super) scroll: Scroll,
-    /// What Enter does when the game is over.
+    /// What Enter does after the end of the game.
     pub(super) then: &'static str,
-    /// How the person stands in the tournament, to be shown with the result.
+    /// The person's standing in the tournament, shown with the result.
     pub(super) standing: Option<String>,
-    /// What the person should know of other games that go on beside this one.
+    /// Notice about other games in progress.
     pub(super) others: Option<String>,
-    /// The answer not yet acknowledged.
+    /// The answer that is not acknowledged yet.
     unacknowledged: Option<(u64, u32)>,
     pub(super) left: bool,
 }
 
 impl Link {
-    /// The state of the connection in a symbol and words.
+    /// Symbol and words for the state.
     pub(super) fn words(&self) -> &'static str {
         match self {
             Self::Connecting => "○ connecting",
@@ -114,7 +114,7 @@ impl Link {
 }
 
 impl App {
-    /// At this table, before anything has come.
+    /// A game before its first input.
     pub(super) fn new(table: GameView, me: Option<u32>) -> Self {
         Self {
             table,
@@ -132,7 +132,7 @@ impl App {
         }
     }
 
-    /// Takes what happened at `now_ms` of any clock that goes on.
+    /// Handles an input at `now_ms` of a monotonic clock.
     pub(super) fn take(&mut self, input: Input, now_ms: u64) -> Option<Do> {
         match input {
             Input::Key(key) => self.key(key, now_ms),
@@ -150,7 +150,7 @@ impl App {
         }
     }
 
-    /// Milliseconds left for the open decision, and then in the bank.
+    /// Milliseconds left for the open decision, and then in the time bank.
     pub(super) fn clock(&self, now_ms: u64) -> Option<(u64, u64)> {
         let open = self.open.as_ref()?;
         let gone = now_ms.saturating_sub(open.since_ms);
@@ -163,12 +163,12 @@ impl App {
         Some((time.saturating_sub(gone), bank.saturating_sub(beyond)))
     }
 
-    /// Whether a key means what it means at the table: nothing stands over that.
+    /// Whether keys act on the table, not on a dialog or the story.
     pub(super) fn takes_keys(&self) -> bool {
         self.dialog.is_none() && !self.scroll.is_open()
     }
 
-    /// Since when the person is asked; `None` while others decide, or the server has the answer.
+    /// When the open decision arrived; `None` if there is none or its answer has been sent.
     pub(super) fn asks_since(&self) -> Option<u64> {
         let open = self.open.as_ref().filter(|open| !open.sent)?;
         Some(open.since_ms)
@@ -204,7 +204,7 @@ impl App {
         None
     }
 
-    /// Closes the open decision when the game has gone on: time ran out, or a substitute decided.
+    /// Closes the open decision after an event that shows it was decided: by a timeout or a substitute.
     fn close_by(&mut self, event: &v1::GameEvent) {
         let moved = matches!(
             event.kind,
@@ -226,7 +226,7 @@ impl App {
     }
 
     fn asked(&mut self, request: v1::DecisionRequest, now_ms: u64) -> Option<Do> {
-        // The answer may have been lost with the connection: it is given again.
+        // The answer may have been lost with the connection: send it again.
         if let Some((decision_id, action)) = self.unacknowledged
             && decision_id == request.decision_id
         {
@@ -326,7 +326,7 @@ impl App {
         Some(Do::Leave)
     }
 
-    /// A key about the open decision.
+    /// Handles a key for the open decision.
     fn decide(&mut self, code: KeyCode, now_ms: u64) -> Option<Do> {
         let open = self.open.as_mut().filter(|open| !open.sent)?;
         let decision = &mut open.decision;
@@ -383,7 +383,7 @@ impl App {
     }
 }
 
-/// Does something that asks for nothing further.
+/// Runs a key's effect that sends nothing.
 fn done(act: impl FnOnce()) -> Option<Do> {
     act();
     None

@@ -1,4 +1,4 @@
-//! What is said of a part when the screen is gone: how it ended, where more is to be found, and how one comes back.
+//! The last lines of `chefshat play`: how the game or tournament ended, where to find more, and how to resume.
 
 use std::process::ExitCode;
 
@@ -14,20 +14,20 @@ use crate::tournament::tables::{NO_GAME_COUNTED, place_in_words};
 use crate::tui::view::padded;
 use crate::{CommandError, say};
 
-/// Where more is to be found.
+/// Commands to suggest.
 pub(super) struct Hints {
-    /// The command that gets the record of the game with an id.
+    /// Downloads the record of a game.
     pub(super) record: Box<dyn Fn(&str) -> String + Send>,
-    /// The command that shows a tournament's results, but for its id.
+    /// Shows a tournament's results; its ID is added.
     pub(super) results: String,
-    /// The command that goes on where the person stood, if one can.
+    /// Resumes, if that is possible.
     pub(super) back: Option<String>,
 }
 
-/// The end in a few lines; the exit code of the command.
+/// Prints the end; returns the exit code.
 ///
 /// # Errors
-/// The seat, or the place in the tournament, is lost.
+/// The seat, or the place in the tournament, was lost.
 pub(super) fn told(part: &Part, hints: &Hints) -> Result<ExitCode, CommandError> {
     if let Some(lobby) = &part.lobby {
         return of_tournament(part, lobby, hints);
@@ -114,7 +114,7 @@ fn of_tournament(part: &Part, lobby: &Lobby, hints: &Hints) -> Result<ExitCode, 
     Ok(code)
 }
 
-/// How the person stands, after other words.
+/// A sentence with the person's standing.
 fn standing(lobby: &Lobby, what: &str) -> String {
     let told = lobby.report.as_ref().and_then(|report| {
         let line = report.standing(lobby.me)?;
@@ -129,7 +129,7 @@ fn standing(lobby: &Lobby, what: &str) -> String {
 
 fn back(hints: &Hints) -> Result<(), CommandError> {
     match &hints.back {
-        Some(back) => say(format_args!("to go on where you stood: {back}")),
+        Some(back) => say(format_args!("to resume: {back}")),
         None => Ok(()),
     }
 }
@@ -139,7 +139,7 @@ mod tests {
     use crate::tui::play::ending::*;
     use crate::tui::play::lobby::Report;
 
-    /// A tournament that was closed tells no place that nobody has.
+    /// A closed tournament reports no place before a game has counted.
     #[test]
     fn a_tournament_that_is_over_says_how_one_stands() {
         let standing = |participant, place, games| v1::TournamentStanding {

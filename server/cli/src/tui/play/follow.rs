@@ -1,5 +1,4 @@
-//! How a tournament stands, heard from the server while the person takes part in it, with the person's next game where the server does not
-//! tell it by itself. What is made of it is in `lobby`.
+//! Follows a tournament while the person plays in it, and finds the person's next game if the server's report lacks it.
 
 use chefshat_client::{Client, Error, v1};
 use tokio::sync::mpsc;
@@ -7,14 +6,14 @@ use tokio::sync::mpsc;
 use super::lobby::{Report, sits};
 use super::part::Heard;
 
-/// Games asked for at a time, and how often at most: more of them no person plays.
+/// Page size and maximum number of pages of games.
 const GAMES_PAGE: u32 = 500;
 const MAX_PAGES: usize = 20;
 
-/// Passes on each report until the tournament is over or nobody listens any more.
+/// Passes on each report until the tournament is over.
 pub(super) async fn follow(client: Client, entered: v1::Entered, heard: mpsc::Sender<Heard>) {
     let mut follower = client.follow_tournament(&*entered.tournament_id);
-    // The next game as it was found last.
+    // The next game as found last.
     let mut found: Option<v1::TournamentGame> = None;
     loop {
         let mut report = match follower.next().await {
@@ -24,18 +23,18 @@ pub(super) async fn follow(client: Client, entered: v1::Entered, heard: mpsc::Se
             },
             Ok(None) => return,
             Err(error) => {
-                // Whoever does not listen any more need not know.
+                // The receiver may be gone.
                 let _ = heard
                     .send(Heard::Unfollowed(error.message().to_owned()))
                     .await;
                 return;
             }
         };
-        // Of a round robin only the games that are being played are told.
+        // Reports of a round robin have only the games in progress.
         let round_robin = report.format() == v1::TournamentFormat::RoundRobin;
         let playing = report.tournament.state() == v1::TournamentState::Playing;
         if round_robin && playing && report.own_game(entered.participant).is_none() {
-            // Without an answer the one that was found before is as good as can be.
+            // If the request fails, the last result is still valid.
             if let Ok(next) = next_game(&client, &entered).await {
                 found = next;
             }
@@ -47,7 +46,7 @@ pub(super) async fn follow(client: Client, entered: v1::Entered, heard: mpsc::Se
     }
 }
 
-/// The participant's first game that is not over.
+/// The participant's first game that is due or in progress.
 async fn next_game(
     client: &Client,
     entered: &v1::Entered,

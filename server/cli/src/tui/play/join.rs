@@ -1,5 +1,4 @@
-//! How a person gets a ticket: of a seat in a room, of a place in a tournament, or of a table made for this game. What is refused is said
-//! together with what can be done about it.
+//! Gets a ticket: for a seat of a room, a place in a tournament, or a table created for this game. Refusals come with advice.
 
 use chefshat_client::{Client, Error, v1};
 
@@ -8,13 +7,13 @@ use super::run::Taken;
 use crate::CommandError;
 use crate::narration::view::GameView;
 
-/// Time for a decision at a table of one's own: nobody waits but built-in agents.
+/// Decision time at a local table: only built-in agents wait.
 const OWN_DECISION_MS: u32 = 3_600_000;
 
-/// Takes a seat of the room, or a place in the tournament, with this join code: only the server knows which of the two it opens.
+/// Joins the room or tournament with this code: only the server knows which it opens.
 ///
 /// # Errors
-/// What the server refuses.
+/// The server's refusal.
 pub(super) async fn by_code(client: Client, code: &str, name: &str) -> Result<Taken, CommandError> {
     match join_room(client.clone(), code, name).await {
         Ok(taken) => Ok(taken),
@@ -39,10 +38,10 @@ pub(super) async fn by_code(client: Client, code: &str, name: &str) -> Result<Ta
     }
 }
 
-/// Makes a room of this person and built-in agents, and takes its seat.
+/// Creates a room for this person and built-in agents, and takes its seat.
 ///
 /// # Errors
-/// What the server refuses.
+/// The server's refusal.
 pub(super) async fn own_table(
     client: Client,
     rules: v1::RuleSet,
@@ -84,7 +83,7 @@ async fn join_room(client: Client, code: &str, name: &str) -> Result<Taken, Erro
     })
 }
 
-/// What was refused, and what to do.
+/// A refusal with advice.
 fn refused(error: &Error) -> CommandError {
     let what = error.message();
     let Some(todo) = error.reason().and_then(remedy) else {
@@ -97,24 +96,20 @@ fn refused(error: &Error) -> CommandError {
     format!("{what}; {todo}").into()
 }
 
-/// What a person can do about a refusal.
+/// Advice for a refusal.
 fn remedy(reason: &str) -> Option<&'static str> {
     Some(match reason {
-        "JOIN_CODE_WRONG" => {
-            "see that it is typed as it was given, and that --server names the right server"
-        }
+        "JOIN_CODE_WRONG" => "check the code, and that --server is the right server",
         "ROOM_FULL" | "SEAT_TAKEN" => {
             "ask for the code of another room, or watch with `chefshat watch`"
         }
-        "GAME_STARTED" => {
-            "who has a seat in it goes on with --ticket; all others watch with `chefshat watch`"
-        }
+        "GAME_STARTED" => "resume your seat with --ticket, or watch with `chefshat watch`",
         "KIND_NOT_ADMITTED" => "people cannot join here: ask its host for a seat for a person",
         "TOURNAMENT_FULL" => "ask its host for another one",
         "TOURNAMENT_STARTED" => {
-            "who takes part in it goes on with --ticket; all others follow it with `chefshat tournament follow`"
+            "resume your place with --ticket, or follow it with `chefshat tournament follow`"
         }
-        "NAME_TAKEN" => "choose another --name, or go on in your own place with --ticket",
+        "NAME_TAKEN" => "choose another --name, or resume your place with --ticket",
         "NOT_STATELESS" => "people cannot take part in it: ask its host for other --deals",
         "NAME_REFUSED" => "choose another --name",
         _ => return None,
@@ -125,7 +120,7 @@ fn remedy(reason: &str) -> Option<&'static str> {
 mod tests {
     use crate::tui::play::join::remedy;
 
-    /// Every refusal that the protocol knows of joining, but for those that no command line can cause.
+    /// All refusals of the protocol that a command line can cause.
     #[test]
     fn every_refusal_says_what_to_do() {
         let reasons = [

@@ -1,15 +1,15 @@
-//! Which key names which cards of a hand. What becomes of a key is decided in `app`.
+//! The keys of cards. `app` handles all others.
 
 use crate::narration::hand::Stack;
 
-/// Keys of the faces from 1 on. Those that a digit cannot name have a letter that means nothing else; it is drawn on the card.
+/// Keys of the faces, from 1. Faces above 10 have letters without another meaning, which are drawn on the card.
 const FACE_KEYS: [char; 15] = [
     '1', '2', '3', '4', '5', '6', '7', '8', '9', '0', 'a', 'b', 'c', 'f', 'g',
 ];
-/// The key of the jokers; `j` adds one to the cards that are picked.
+/// Selects the jokers; `j` adds a joker to the selected cards.
 const JOKERS_KEY: char = 'J';
 
-/// The key that picks a stack.
+/// The key that selects a stack.
 pub(super) fn key_of(stack: Stack) -> Option<char> {
     if stack.joker {
         return Some(JOKERS_KEY);
@@ -23,7 +23,7 @@ pub(super) fn names_cards(key: char) -> bool {
     key == JOKERS_KEY || FACE_KEYS.contains(&key)
 }
 
-/// What a person is told whose key names cards that are not in the hand.
+/// Notice for the key of cards that are not in the hand.
 pub(super) fn not_held(key: char) -> String {
     let face = FACE_KEYS.iter().position(|other| *other == key);
     match face {

@@ -1,7 +1,6 @@
-//! The connection of a person's ticket: opened, opened again when it breaks, given up in the end. The ticket is of a seat, or of a place in a
-//! tournament, whose games then bring seats of their own. An agent of the SDK decides on the task that serves its connection, which suits
-//! programs; a person thinks for long and meanwhile wants to see what happens, so that here messages and answers each go their way. What
-//! the messages mean is in `part` and `app`.
+//! The connection of a ticket: opened, restored after failures, given up in the end. A ticket is for a seat, or for a place in a tournament,
+//! whose games bring more seats. The agents of the SDK decide on the task of the connection; a person thinks longer and sees events
+//! meanwhile, so that messages and answers are independent here. `part` and `app` handle the messages.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -17,53 +16,53 @@ use tonic::{Code, Status};
 
 use super::part::Heard;
 
-/// Commands that may wait for the transport.
+/// Commands that may wait to be sent.
 const COMMANDS: usize = 16;
-/// The largest message that is taken: a game's whole history.
+/// Maximum size of a message: the history of a game.
 const MAX_RESPONSE_BYTES: usize = 16 << 20;
-/// Time for the server to accept a stream, to describe a room, and to end a stream in good order.
+/// Timeouts for opening a stream, describing a room, and closing a stream.
 const OPEN_TIMEOUT: Duration = Duration::from_secs(10);
 const ROOM_TIMEOUT: Duration = Duration::from_secs(2);
 const LEAVE_TIMEOUT: Duration = Duration::from_secs(1);
-/// Number of the ticket's own attachment of a stream; those of games of a tournament come after it.
+/// Request id of the ticket's own attachment; those of tournament games follow.
 const ATTACHMENT: u32 = 1;
 
-/// Something a person does in a game.
+/// A command for a game.
 pub(super) type Order = (String, Command);
 
 /// How a stream ended.
 enum Stopped {
     /// The person has left.
     Left,
-    /// The game or the tournament is over, or the ticket is another's; why, if it has not ended.
+    /// The game or tournament is over, or the ticket is in use elsewhere; with the reason if it has not ended.
     Over(Option<String>),
-    /// It broke; whether the ticket had been attached through it, and for long.
+    /// It failed; whether the ticket had been attached for a while.
     Broken { status: Status, held: bool },
 }
 
-/// A game that the ticket has a seat in.
+/// A game with a seat of this ticket.
 struct Game {
     /// The ticket of that seat.
     ticket: String,
-    /// Number of the first event not yet seen.
+    /// Sequence number of the next new event.
     next_event: u64,
     ended: bool,
 }
 
 /// One stream.
 struct Stream {
-    /// The games that were attached with it, by id, in order.
+    /// IDs of the games attached when the stream was opened, in order.
     asked: Vec<String>,
-    /// The game behind each handle.
+    /// Games by handle.
     games: BTreeMap<u32, String>,
-    /// The handle of the place in a tournament.
+    /// Handle of the place in a tournament.
     place: Option<u32>,
-    /// Since when the ticket is attached.
+    /// When the ticket was attached.
     attached: Option<Instant>,
 }
 
 impl Stream {
-    /// The game that an attachment was for.
+    /// The game of an attachment request.
     fn asked_for(&self, request_id: u32) -> Option<String> {
         let nth = usize::try_from(request_id.checked_sub(ATTACHMENT + 1)?).ok()?;
         self.asked.get(nth).cloned()
@@ -79,11 +78,11 @@ impl Stream {
 pub(super) struct Connection {
     client: Client,
     ticket: String,
-    /// The person's part of the game seed.
+    /// The person's contribution to the game seed.
     entropy: Vec<u8>,
-    /// Games by id, as long as something of them is to come.
+    /// Games by ID, until their last message.
     games: BTreeMap<String, Game>,
-    /// Whether anything new has come since the last outage.
+    /// Whether anything new has arrived since the last outage.
     progress: bool,
 }
 
@@ -98,7 +97,7 @@ impl Connection {
         }
     }
 
-    /// Serves the connection until there is nothing more to hear or `orders` is closed.
+    /// Runs the connection until it ends for good or `orders` is closed.
     pub(super) async fn serve(
         mut self,
         mut orders: mpsc::Receiver<Order>,
@@ -116,7 +115,7 @@ impl Connection {
                     Some(Some(status.message().to_owned()))
                 }
                 Stopped::Broken { status, held } => {
-                    // A long wait for others brings no events, and is no outage either.
+                    // A long wait without events is not an outage.
                     if held || self.progress {
                         (outage, delay) = (None, FIRST_DELAY);
                     }
@@ -132,7 +131,7 @@ impl Connection {
                 }
             };
             if let Some(why) = why {
-                // Whoever does not listen any more need not know.
+                // The receiver may be gone.
                 let _ = heard.send(Heard::Over(why)).await;
                 return;
             }
@@ -144,14 +143,14 @@ impl Connection {
         }
     }
 
-    /// Whether the ticket is a seat's, and its game is over.
+    /// Whether the ticket is a seat's and its game has ended.
     fn own_game_ended(&self) -> bool {
         let mut games = self.games.values();
         games.any(|game| game.ended && game.ticket == self.ticket)
     }
 
-    /// What to say first: the seats in games of a tournament come before the place in it, each with its own ticket. So only what has not
-    /// been seen is told of them, and how a game ended meanwhile.
+    /// The first commands of a stream. Tournament games come before the place, each with its own ticket, so that only new events are
+    /// sent, and the end of a game that ended meanwhile.
     fn attachments(&self, stream: &mut Stream) -> Vec<Command> {
         let attach = |ticket: &str, request_id, from_sequence| {
             Command::Attach(v1::Attach {
@@ -176,7 +175,7 @@ impl Connection {
         all
     }
 
-    /// One stream, until it ends.
+    /// Runs one stream until it ends.
     async fn converse(
         &mut self,
         orders: &mut mpsc::Receiver<Order>,
@@ -219,7 +218,7 @@ impl Connection {
                 },
                 order = orders.recv() => {
                     let Some((game, command)) = order else {
-                        // Half-closing leaves; what the server still says does not matter.
+                        // Half-closing leaves the game; further messages do not matter.
                         drop(requests);
                         let end = async { while let Ok(Some(_)) = responses.message().await {} };
                         let _ = timeout(LEAVE_TIMEOUT, end).await;
@@ -228,7 +227,7 @@ impl Connection {
                     let handle = stream.games.iter().find(|(_, id)| **id == game);
                     if let Some((&handle, _)) = handle {
                         let commands = vec![seat_command(handle, command)];
-                        // A transport that takes no more says why where it is read.
+                        // A failed send shows as an error of the responses.
                         let _ = requests.send(v1::PlayRequest { commands }).await;
                     }
                 }
@@ -236,7 +235,7 @@ impl Connection {
         }
     }
 
-    /// Passes on one update; says when it was the last.
+    /// Passes on one update; returns how the stream ended if it was the last.
     async fn hear(
         &mut self,
         stream: &mut Stream,
@@ -281,7 +280,7 @@ impl Connection {
                 return Some(Stopped::Over(Some(refused.message.clone())));
             }
             Update::Refused(refused) if refused.request_id > ATTACHMENT => {
-                // Its room went while there was no connection.
+                // Its room was removed during the outage.
                 let id = stream.asked_for(refused.request_id)?;
                 self.games.remove(&id);
                 Heard::Gone(id, refused.message.clone())
@@ -300,10 +299,10 @@ impl Connection {
         }
     }
 
-    /// A seat is attached, of a game that may be new: then its room is asked for, which says who sits there before the game begins.
+    /// A seat was attached. For a new game, requests its room, which lists the participants before the game starts.
     async fn seated(&mut self, stream: &mut Stream, handle: u32, attached: &v1::Attached) -> Heard {
         let id = attached.game_id.clone();
-        // The newest handle of a seat is its only one.
+        // A new handle replaces the old one.
         stream.games.retain(|_, other| *other != id);
         stream.games.insert(handle, id.clone());
         let mut room = None;
@@ -326,7 +325,7 @@ impl Connection {
 }
 
 impl Game {
-    /// Leaves only what is new of some events; whether there was anything.
+    /// Removes events that were received before; whether any are left.
     fn events(&mut self, batch: &mut v1::EventBatch) -> bool {
         use v1::game_event::Kind::{GameAborted, GameEnded};
         let next = self.next_event;
@@ -348,7 +347,7 @@ fn why_detached(reason: v1::DetachReason) -> &'static str {
     }
 }
 
-/// Waits until nobody can send commands any more. Those that come while there is no connection are dropped: the server puts the decision anew.
+/// Waits until no commands can come. Commands during an outage are dropped: the server sends the decision again.
 async fn closed(orders: &mut mpsc::Receiver<Order>) {
     while orders.recv().await.is_some() {}
 }
@@ -360,7 +359,7 @@ fn seat_command(handle: u32, command: Command) -> v1::SeatCommand {
     }
 }
 
-/// Whether the same may succeed later.
+/// Whether a retry may succeed.
 fn may_retry(code: Code) -> bool {
     matches!(
         code,

@@ -1,5 +1,4 @@
-//! How a tournament stands for one who takes part in it: the own line of the standings, the next game, who is awaited. Values and words; how they
-//! are drawn is in `lobby_view`, which games there are is the server's word.
+//! The lobby of a tournament, as values and words: the person's standing, the next game and what it waits for. `lobby_view` draws it.
 
 use chefshat_client::v1::{self, TournamentGameState as GameState};
 use ratatui::crossterm::event::KeyCode;
@@ -11,18 +10,18 @@ use crate::numbers::{counted, ordinal};
 use crate::tournament::tables::{Field, place_in_words};
 use crate::tournament::words::is_over;
 
-/// Lines of the standings that a key goes up or down.
+/// Lines per page of the standings.
 const PAGE: usize = 5;
 
-/// What the server says of a tournament.
+/// A tournament as last reported by the server.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Report {
     pub(super) tournament: v1::Tournament,
     /// Best first.
     pub(super) standings: Vec<v1::TournamentStanding>,
-    /// Those of the round, or those that are being played.
+    /// The games of the round, or those in progress.
     pub(super) games: Vec<v1::TournamentGame>,
-    /// The person's next game, where it is not among those.
+    /// The person's next game, if not among those.
     pub(super) next: Option<v1::TournamentGame>,
 }
 
@@ -30,18 +29,18 @@ pub(super) struct Report {
 #[derive(Debug)]
 pub(super) struct Lobby {
     pub(super) tournament_id: String,
-    /// The person's number.
+    /// The person's participant number.
     pub(super) me: u32,
     pub(super) report: Option<Report>,
-    /// How the last game ended, in words.
+    /// The result of the last game, in words.
     pub(super) last: Option<String>,
     pub(super) notice: String,
-    /// The first line of the standings that is shown, once the person has chosen it.
+    /// First visible line of the standings, if the person has scrolled.
     pub(super) first: Option<usize>,
 }
 
 impl Report {
-    /// A report as a follower gets it; nothing of a heartbeat.
+    /// Reads a report; `None` for a heartbeat.
     pub(super) fn of(response: v1::FollowTournamentResponse) -> Option<Self> {
         Some(Self {
             tournament: response.tournament?,
@@ -56,7 +55,7 @@ impl Report {
         settings.map_or(v1::TournamentFormat::Unspecified, |it| it.format())
     }
 
-    /// A participant's game that is being played, else the first that is due.
+    /// A participant's game in progress, or else the first that is due.
     pub(super) fn own_game(&self, me: u32) -> Option<&v1::TournamentGame> {
         let own = |state| {
             let mut games = self.games.iter().chain(&self.next);
@@ -74,7 +73,7 @@ impl Report {
         is_over(&self.tournament)
     }
 
-    /// Whether a participant of a knockout does not play in it any more.
+    /// Whether a participant has been eliminated from a knockout.
     fn is_out(&self, me: u32) -> bool {
         let last = self.standing(me).map_or(0, |it| it.last_round);
         self.format() == v1::TournamentFormat::Knockout && self.tournament.round > last.max(1)
@@ -102,7 +101,7 @@ impl Lobby {
         self.report.as_ref().is_some_and(Report::is_over)
     }
 
-    /// Whether leaving now may lose games; while nothing is known, it may.
+    /// Whether leaving now may lose games; true if unknown.
     pub(super) fn has_games_to_come(&self) -> bool {
         let Some(report) = &self.report else {
             return true;
@@ -118,7 +117,7 @@ impl Lobby {
         !report.is_over() && (open || drawn || report.own_game(self.me).is_some())
     }
 
-    /// Notes how a game ended.
+    /// Notes the result of a game.
     pub(super) fn played(&mut self, game: &App) {
         self.last = Some(match &game.table.end {
             Some(End::Finished(standings)) => {
@@ -135,7 +134,7 @@ impl Lobby {
         });
     }
 
-    /// A key about the standings.
+    /// Scrolls the standings.
     pub(super) fn key(&mut self, code: KeyCode) {
         let lines = self.report.as_ref().map_or(0, |it| it.standings.len());
         let first = self.first.unwrap_or(0);
@@ -150,7 +149,7 @@ impl Lobby {
         };
     }
 
-    /// What the person should know, best first; `ended` if no game comes any more, whatever was told last of the tournament.
+    /// The sentences of the lobby, most important first; `ended`: no more games, whatever the last report says.
     pub(super) fn words(&self, ended: bool) -> Vec<String> {
         let Some(report) = &self.report else {
             return vec!["Waiting for the server to say how the tournament stands.".to_owned()];
@@ -165,7 +164,7 @@ impl Lobby {
         lines
     }
 
-    /// How the person stands, in a line; nothing before the first game that counts.
+    /// The person's standing in one line; `None` before a game has counted.
     pub(super) fn in_short(&self) -> Option<String> {
         let report = self.report.as_ref()?;
         let standing = report.standing(self.me).filter(|it| it.games > 0)?;
@@ -183,7 +182,7 @@ impl Lobby {
         }
     }
 
-    /// The next game and who is awaited, or why there is none.
+    /// The next game and what it waits for, or why there is none.
     fn what_comes(&self, report: &Report) -> Vec<String> {
         let tournament = &report.tournament;
         match tournament.state() {
@@ -217,10 +216,10 @@ impl Lobby {
         lines
     }
 
-    /// Whom a game waits for, and why.
+    /// The participants a game waits for, with reasons.
     fn awaited(&self, report: &Report, game: &v1::TournamentGame) -> Option<String> {
         let field = Field::new(&report.tournament);
-        // Where somebody plays already who can play no more games at a time.
+        // The game that keeps a participant busy at the limit of games.
         let busy = |who: &v1::TournamentParticipant| {
             let mut playing = report.games.iter().filter(|other| {
                 other.game != game.game
@@ -244,7 +243,7 @@ impl Lobby {
         (!whom.is_empty()).then(|| format!("It waits for {}.", listed(&whom)))
     }
 
-    /// Who plays while the person does not.
+    /// The games in progress while the person waits.
     fn still_playing(&self, report: &Report) -> Option<String> {
         let playing = |game: &&v1::TournamentGame| game.state() == GameState::Playing;
         let games: Vec<_> = report.games.iter().filter(playing).collect();
@@ -260,7 +259,7 @@ impl Lobby {
         }
     }
 
-    /// Why no game of the person's is known.
+    /// Why the person has no next game.
     fn why_none(&self, report: &Report) -> String {
         let tournament = &report.tournament;
         let (round, rounds) = (tournament.round, tournament.rounds);

@@ -1,4 +1,4 @@
-//! The screen between the games of a tournament: what comes for the person, and the standings.
+//! Draws the lobby, between the games of a tournament: the person's standing and next game, and the standings.
 
 use chefshat_client::v1;
 use ratatui::Frame;
@@ -12,10 +12,10 @@ use super::part::{Over, Part};
 use crate::narration::{clean, columns};
 use crate::tournament::tables::{Field, mean_score};
 use crate::tournament::words::format_name;
-use crate::tui::look::{Look, symbol};
+use crate::tui::theme::{Theme, symbol};
 use crate::tui::view::{boxed, is_too_small, padded, popup};
 
-/// Rows of the box of the person, its frame included.
+/// Rows of the person's box, with its frame.
 const OWN_ROWS: u16 = 7;
 /// Columns of a name.
 const NAME: usize = 24;
@@ -33,7 +33,7 @@ const HELP: [&str; 9] = [
 ];
 
 /// Draws the lobby.
-pub(super) fn draw(frame: &mut Frame<'_>, look: Look, part: &Part, lobby: &Lobby) {
+pub(super) fn draw(frame: &mut Frame<'_>, theme: Theme, part: &Part, lobby: &Lobby) {
     let area = frame.area();
     if is_too_small(frame) {
         return;
@@ -46,51 +46,51 @@ pub(super) fn draw(frame: &mut Frame<'_>, look: Look, part: &Part, lobby: &Lobby
         Constraint::Length(1),
     ])
     .areas(area);
-    draw_header(frame, look, part, lobby, header);
-    draw_own(frame, look, part, lobby, own);
-    draw_standings(frame, look, lobby, standings);
+    draw_header(frame, theme, part, lobby, header);
+    draw_own(frame, theme, part, lobby, own);
+    draw_standings(frame, theme, lobby, standings);
     let (words, style) = match &part.link {
         Link::Over(Some(why)) if !lobby.is_over() => (
             format!(" ! Your place is lost: {why}. Enter ends."),
-            look.warning(),
+            theme.warning(),
         ),
-        _ if part.is_over() && !part.peek => (" Enter ends.".to_owned(), look.bold()),
+        _ if part.is_over() && !part.peek => (" Enter ends.".to_owned(), theme.bold()),
         Link::Lost(why) => (
             format!(" The connection is lost and being made again: {why}"),
-            look.warning(),
+            theme.warning(),
         ),
-        _ if !lobby.notice.is_empty() => (format!(" ! {}", lobby.notice), look.warning()),
+        _ if !lobby.notice.is_empty() => (format!(" ! {}", lobby.notice), theme.warning()),
         _ if part.peek => (
             " Your game goes on. Any key goes back to it.".to_owned(),
-            look.bold(),
+            theme.bold(),
         ),
         _ if lobby.has_games_to_come() => (
             " Your next game begins here by itself.".to_owned(),
-            look.bold(),
+            theme.bold(),
         ),
         _ => (
             " No game of yours is to come. Stay to see the end, or leave with q.".to_owned(),
-            look.bold(),
+            theme.bold(),
         ),
     };
     frame.render_widget(Paragraph::new(words).style(style), said);
     let words = " ↑↓ PgUp PgDn standings  ? help  q leave";
-    frame.render_widget(Paragraph::new(words).style(look.dim()), keys);
+    frame.render_widget(Paragraph::new(words).style(theme.dim()), keys);
 }
 
-/// Draws what stands over lobby and games alike.
-pub(super) fn draw_over(frame: &mut Frame<'_>, look: Look, part: &Part) {
+/// Draws the dialogs over lobby and games.
+pub(super) fn draw_over(frame: &mut Frame<'_>, theme: Theme, part: &Part) {
     match part.over {
         Some(Over::Help) => {
             let lines = HELP.iter().map(|line| Line::from(*line)).collect();
-            popup(frame, look, "help", lines);
+            popup(frame, theme, "help", lines);
         }
-        Some(Over::Leave) => popup(frame, look, "leave", leaving(part)),
+        Some(Over::Leave) => popup(frame, theme, "leave", leaving(part)),
         None => {}
     }
 }
 
-/// What leaving means.
+/// Explains the consequences of leaving.
 fn leaving(part: &Part) -> Vec<Line<'static>> {
     let report = part.lobby.as_ref().and_then(|it| it.report.as_ref());
     let settings = report.and_then(|it| it.tournament.settings.as_ref());
@@ -108,7 +108,7 @@ fn leaving(part: &Part) -> Vec<Line<'static>> {
     lines.into_iter().map(Line::from).collect()
 }
 
-fn draw_header(frame: &mut Frame<'_>, look: Look, part: &Part, lobby: &Lobby, area: Rect) {
+fn draw_header(frame: &mut Frame<'_>, theme: Theme, part: &Part, lobby: &Lobby, area: Rect) {
     let mut words = " Chef's Hat".to_owned();
     if let Some(report) = &lobby.report {
         let tournament = &report.tournament;
@@ -128,24 +128,24 @@ fn draw_header(frame: &mut Frame<'_>, look: Look, part: &Part, lobby: &Lobby, ar
     let status = part.link.words();
     let width = usize::from(area.width).saturating_sub(columns(status) + 1);
     let line = Line::from(format!("{}{status} ", padded(&words, width)));
-    frame.render_widget(Paragraph::new(line).style(look.header()), area);
+    frame.render_widget(Paragraph::new(line).style(theme.header()), area);
 }
 
-fn draw_own(frame: &mut Frame<'_>, look: Look, part: &Part, lobby: &Lobby, area: Rect) {
+fn draw_own(frame: &mut Frame<'_>, theme: Theme, part: &Part, lobby: &Lobby, area: Rect) {
     let ended = matches!(part.link, Link::Over(None));
     let words = lobby.words(ended).into_iter();
     let mut lines: Vec<Line<'_>> = words.map(|words| Line::from(format!(" {words}"))).collect();
     if let Some(first) = lines.first_mut() {
-        *first = first.clone().patch_style(look.bold());
+        *first = first.clone().patch_style(theme.bold());
     }
-    let block = boxed(look, " your tournament ");
+    let block = boxed(theme, " your tournament ");
     let own = Paragraph::new(lines).wrap(Wrap { trim: false });
     frame.render_widget(own.block(block), area);
 }
 
-fn draw_standings(frame: &mut Frame<'_>, look: Look, lobby: &Lobby, area: Rect) {
+fn draw_standings(frame: &mut Frame<'_>, theme: Theme, lobby: &Lobby, area: Rect) {
     let Some(report) = &lobby.report else {
-        frame.render_widget(boxed(look, " standings "), area);
+        frame.render_widget(boxed(theme, " standings "), area);
         return;
     };
     let tournament = &report.tournament;
@@ -165,7 +165,7 @@ fn draw_standings(frame: &mut Frame<'_>, look: Look, lobby: &Lobby, area: Rect) 
         .standings
         .iter()
         .position(|it| it.participant == lobby.me);
-    // The own line is in the middle until the person goes elsewhere.
+    // The person's line is centred until they scroll.
     let first = lobby
         .first
         .unwrap_or_else(|| mine.unwrap_or(0).saturating_sub(rows / 2));
@@ -176,10 +176,10 @@ fn draw_standings(frame: &mut Frame<'_>, look: Look, lobby: &Lobby, area: Rect) 
         "       {} what      games  a game  won  {last}",
         padded("name", NAME)
     );
-    let mut lines = vec![Line::from(Span::styled(heading, look.dim()))];
+    let mut lines = vec![Line::from(Span::styled(heading, theme.dim()))];
     let shown = report.standings.iter().skip(first).take(rows);
-    lines.extend(shown.map(|standing| line(look, lobby, report, standing)));
-    let mut block = boxed(look, title);
+    lines.extend(shown.map(|standing| line(theme, lobby, report, standing)));
+    let mut block = boxed(theme, title);
     if most > 0 {
         let to = (first + rows).min(count);
         block = block.title_bottom(format!(" {}–{to} of {count} ", first + 1));
@@ -188,7 +188,7 @@ fn draw_standings(frame: &mut Frame<'_>, look: Look, lobby: &Lobby, area: Rect) 
 }
 
 fn line(
-    look: Look,
+    theme: Theme,
     lobby: &Lobby,
     report: &Report,
     standing: &v1::TournamentStanding,
@@ -231,7 +231,7 @@ fn line(
         },
     );
     let style = if mine {
-        look.bold()
+        theme.bold()
     } else {
         ratatui::style::Style::new()
     };

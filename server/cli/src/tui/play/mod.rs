@@ -1,11 +1,9 @@
-//! `chefshat play`: a person at a terminal takes a seat of a server, or of one started for this game, or a place in a tournament. This file
-//! understands the command line; `join` gets the ticket, `run` plays, `ending` says what came of it.
+//! `chefshat play`: a person plays in a terminal: a seat of a server, a local game, or a tournament. This file has the arguments; `join`
+//! gets the ticket, `run` plays, `ending` prints the result.
 
 mod app;
 mod ending;
 mod follow;
-#[cfg(test)]
-mod friday;
 mod join;
 #[cfg(test)]
 mod key_tests;
@@ -20,6 +18,8 @@ mod run;
 mod several_tests;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod tournament_session;
 #[cfg(test)]
 mod tournament_tests;
 mod view;
@@ -43,24 +43,24 @@ use chefshat_server::host::Host;
 use ending::{Hints, told};
 use run::{Taken, play};
 
-/// Longest wait of built-in agents before they decide, milliseconds.
+/// Maximum wait of built-in agents before a decision, in milliseconds.
 const MAX_PACE_MS: i64 = 60_000;
 
-/// Play as a person at this terminal.
+/// Play in this terminal.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  chefshat play --local\n  \
                   chefshat play --server http://127.0.0.1:50051 --code BCDF2345 --name Ada\n  \
                   chefshat play --local --agents trained,trained,trained --target-shifts 3\n\n\
-                  A code that is no room's is tried as a tournament's: then every game of yours begins by itself, with the standings \
-                  between them, until the tournament is over.\n\n\
-                  Press ? for the keys. Who leaves is told a ticket; with it, --ticket goes on.\n\n\
+                  The code of a tournament works, too: your games start by themselves, with the standings between them, until the \
+                  tournament is over.\n\n\
+                  Press ? for the keys. If you leave, a ticket is printed; resume with --ticket.\n\n\
                   Exit code: 0 when the game or tournament finished, 1 when it was aborted, closed, left or lost, 2 without a terminal.")]
 pub(crate) struct Play {
     #[command(flatten)]
     server: ServerArg,
     #[command(flatten)]
     seat: SeatArgs,
-    /// Name to show.
+    /// Display name.
     #[arg(
         long,
         env = "CHEFSHAT_NAME",
@@ -68,48 +68,49 @@ pub(crate) struct Play {
         conflicts_with = "ticket"
     )]
     name: String,
-    /// With --local: the built-in agents at the table, in turn: random, random_unmasked, greedy, trained.
+    /// With --local: the built-in agents, in turn: random, random_unmasked, greedy, trained.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = agent_kind,
           default_values = ["trained", "greedy", "random"])]
     agents: Vec<AgentKind>,
-    /// With --local: milliseconds that each of them waits before it decides.
+    /// With --local: milliseconds that each agent waits before a decision.
     #[arg(long, default_value_t = 900, value_parser = clap::value_parser!(u32).range(0..=MAX_PACE_MS))]
     pace_ms: u32,
-    /// With --local: folder for the record (records/GAME-ID.jsonl). Standard: chefshat in the user's data folder.
+    /// With --local: data directory for the record (records/GAME-ID.jsonl). Default: chefshat in the user's data directory.
     #[arg(long, env = "CHEFSHAT_DATA_DIR")]
     data_dir: Option<PathBuf>,
-    /// Record with each decision how long it was before your eyes, as the annotation person_decision_time_ms.
+    /// Record with each decision how long it was on screen, as the annotation person_decision_time_ms.
     #[arg(long)]
     times: bool,
     #[command(flatten)]
     rules: RulesArgs,
 }
 
-/// How a seat is come by.
+/// How to get a seat.
 #[derive(Debug, Args)]
 #[group(required = true, multiple = false)]
 struct SeatArgs {
-    /// The join code of a room or of a tournament.
+    /// Join code of a room or tournament.
     #[arg(long)]
     code: Option<String>,
-    /// Ticket of a seat, or of a place in a tournament, that was taken before.
+    /// Ticket of a seat or place to resume.
     #[arg(long, env = "CHEFSHAT_TICKET", hide_env_values = true)]
     ticket: Option<String>,
-    /// Start a server in this process and play against built-in agents.
+    /// Run a server in this process and play against built-in agents.
     #[arg(long)]
     local: bool,
 }
 
 impl Play {
     pub(crate) async fn run(self) -> Result<ExitCode, CommandError> {
-        if let Some(code) =
-            missing("`chefshat agent` plays without one, `chefshat demo` shows a game")
-        {
+        if let Some(code) = missing(
+            "use `chefshat agent` to play with a built-in agent, `chefshat demo` to see a game",
+        ) {
             return Ok(code);
         }
         if !self.seat.local && !self.rules.are_standard() {
             return Err(
-                "a room or tournament has its rules from who made it; flags for rules go with --local".into(),
+                "the creator of a room or tournament sets its rules; flags for rules need --local"
+                    .into(),
             );
         }
         let Some(data_dir) = (self.seat.local)
@@ -132,10 +133,10 @@ impl Play {
         };
         let host = Host::in_memory(Some(data_dir.clone())).await?;
         let played = async { play(self.take_local(&host).await?, self.times).await }.await;
-        // The record is written when the server has ended.
+        // The record is complete when the server has stopped.
         host.stop().await?;
         let hints = Hints {
-            // The server has gone with the game.
+            // The server has stopped.
             back: None,
             results: String::new(),
             record: Box::new(move |game| {
@@ -160,7 +161,7 @@ impl Play {
         }
     }
 
-    /// A room of this person and built-in agents.
+    /// A seat in a new room with built-in agents.
     async fn take_local(&self, host: &Host) -> Result<Taken, CommandError> {
         let rules = self.rules.message();
         let players = rules_of(&rules)?.players();

@@ -1,6 +1,6 @@
-//! The part that a person takes: one game, or those of a tournament one after the other, with its lobby between them. Where a ticket has more games
-//! at a time, one is on the screen, and one that asks comes to it as soon as that does not. Keys, messages and the time go in, what is to be
-//! done comes out; what happens in a game is in `app`, how a tournament stands in `lobby`. No terminal and no connection.
+//! The state of `chefshat play`: one game, or the games of a tournament with the lobby between them. If a ticket has several games at a time,
+//! one is on screen; another with an open decision replaces it once it has none. Takes keys, messages and the time, returns actions;
+//! `app` has one game, `lobby` the tournament. No terminal and no connection.
 
 use std::collections::VecDeque;
 
@@ -13,54 +13,54 @@ use crate::narration::view::GameView;
 use crate::numbers::counted;
 use crate::tui::screen::Key;
 
-/// How long the result of a game stays before the lobby or the next game takes its place.
+/// How long a result is shown before the lobby or the next game.
 const RESULT_MS: u64 = 12_000;
-/// And if the person is asked in the next game already, whose clock runs.
+/// The same if the next game already waits for a decision.
 const SHORT_RESULT_MS: u64 = 3_000;
 
-/// What happens to a part.
+/// Input of a part.
 #[derive(Debug)]
 pub(super) enum Heard {
     Key(Key),
     /// Time has passed.
     Tick,
-    /// The place in a tournament is attached.
+    /// The place in a tournament was attached.
     Entered(v1::Entered),
-    /// How the tournament stands.
+    /// A report of the tournament.
     Report(Box<Report>),
-    /// That will not be told any more, and why.
+    /// No more reports follow, with the reason.
     Unfollowed(String),
-    /// A seat is attached; of a game not heard of before, its room, where the server told it.
+    /// A seat was attached; for a new game with its room, if known.
     Seated(v1::Attached, Option<Box<v1::Room>>),
-    /// The server said something to the seat of a game.
+    /// An update for the seat of a game.
     Told(String, Box<Update>),
-    /// No more comes of a game that is not over, and why.
+    /// A game is lost before its end, with the reason.
     Gone(String, String),
-    /// The connection is lost, and why; it is being made again.
+    /// The connection was lost, with the reason; it is being restored.
     Lost(String),
-    /// Nothing more will come from the server; why, if that is not the end.
+    /// The connection ended for good; with the reason if the game has not ended.
     Over(Option<String>),
 }
 
-/// What stands over everything.
+/// A dialog over everything.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Over {
     Help,
     Leave,
 }
 
-/// A part.
+/// What a person plays.
 #[derive(Debug)]
 pub(super) struct Part {
-    /// Of a tournament.
+    /// The tournament, if it is one.
     pub(super) lobby: Option<Lobby>,
-    /// The game on the screen.
+    /// The game on screen.
     pub(super) game: Option<App>,
-    /// Those that wait for the screen, in the order in which they came to wait: while the result of another is shown, or another goes on.
+    /// The games that wait for the screen, in order of arrival.
     waiting: VecDeque<App>,
     /// When the game on the screen ended.
     ended_ms: Option<u64>,
-    /// The lobby is shown although a game goes on.
+    /// The lobby is shown during a game.
     pub(super) peek: bool,
     pub(super) over: Option<Over>,
     pub(super) link: Link,
@@ -68,7 +68,7 @@ pub(super) struct Part {
 }
 
 impl Part {
-    /// A part before anything was heard; of a room the table may be known.
+    /// Before the first input; `game` is the room, if known.
     pub(super) fn new(game: Option<App>) -> Self {
         Self {
             lobby: None,
@@ -82,7 +82,7 @@ impl Part {
         }
     }
 
-    /// Takes what happened at `now_ms` of any clock that goes on; what is to be done, and in which game.
+    /// Handles an input at `now_ms` of a monotonic clock; returns an action and its game.
     pub(super) fn take(&mut self, heard: Heard, now_ms: u64) -> Option<(String, Do)> {
         let act = match heard {
             Heard::Key(key) => self.key(key, now_ms),
@@ -133,7 +133,7 @@ impl Part {
                 for app in self.apps() {
                     app.take(Input::Over(why.clone()), now_ms);
                 }
-                // Where nothing was ever shown, a box over nothing would not help.
+                // Without a game or lobby a popup would hang over an empty screen.
                 self.left |= self.game.is_none() && self.lobby.is_none();
                 self.link = Link::Over(why);
             }
@@ -178,8 +178,8 @@ impl Part {
         }
     }
 
-    /// Lets the next game, or the lobby, take the place of a game that is over, when its result was to be seen long enough; and one that asks
-    /// that of one that does not.
+    /// Replaces a finished game by the next game or the lobby after its result was shown, and a game without a decision by one that has
+    /// one.
     fn show(&mut self, now_ms: u64) {
         let Some(game) = &self.game else {
             self.game = self.take_next();
@@ -220,20 +220,20 @@ impl Part {
         }
     }
 
-    /// Which of the waiting games has asked for the longest time.
+    /// The waiting game whose decision is open longest.
     fn first_to_ask(&self) -> Option<usize> {
         let asking = self.waiting.iter().enumerate();
         let asking = asking.filter_map(|(at, app)| Some((app.asks_since()?, at)));
         asking.min().map(|(_, at)| at)
     }
 
-    /// The game that comes to the screen next: that which asks, else that which has waited longest.
+    /// Takes the next game: one with an open decision, or else the one that has waited longest.
     fn take_next(&mut self) -> Option<App> {
         let at = self.first_to_ask().unwrap_or(0);
         self.waiting.remove(at)
     }
 
-    /// What the waiting games are to the person who looks at another.
+    /// Notice about the waiting games.
     fn others(&self) -> Option<String> {
         let going = || self.waiting.iter().filter(|app| !is_over(app));
         let asking = going().filter(|app| app.asks_since().is_some()).count();
@@ -317,7 +317,7 @@ impl Part {
         }
     }
 
-    /// Leaves at once where that loses nothing.
+    /// Leaves without a question if no game is lost by it.
     fn ask_to_leave(&mut self) {
         let playing = self.apps().any(|app| !is_over(app));
         let to_come = self.lobby.as_ref().is_none_or(Lobby::has_games_to_come);

@@ -14,8 +14,8 @@ use super::link::{Connection, Order};
 use super::part::{Heard, Part};
 use super::view;
 use crate::CommandError;
-use crate::tui::look::Look;
 use crate::tui::screen::{Screen, Wake};
+use crate::tui::theme::Theme;
 
 /// Messages that may wait to be handled.
 const HEARD: usize = 64;
@@ -49,14 +49,14 @@ pub(super) async fn play(taken: Taken, times: bool) -> Result<Part, CommandError
     let connection = Connection::new(client.clone(), ticket, entropy);
     let mut serving = tokio::spawn(connection.serve(for_server, sender.clone()));
 
-    let look = Look::of_environment();
+    let theme = Theme::of_environment();
     let mut part = Part::new(game);
     let mut following = None;
     let mut served = false;
     let mut screen = Screen::open(TICK)?;
     while !part.left {
         let now_ms = screen.now_ms();
-        screen.draw(|frame| view::draw(frame, look, &part, now_ms))?;
+        screen.draw(|frame| view::draw(frame, theme, &part, now_ms))?;
         let what = tokio::select! {
             wake = screen.next() => match wake {
                 Wake::Key(key) => Heard::Key(key),

@@ -8,30 +8,30 @@ use super::app::{App, Do, Input, Link};
 use super::run::command;
 use super::view;
 use crate::narration::view::GameView;
-use crate::tui::look::Look;
 use crate::tui::screen::Key;
-use crate::tui::testing::{Dealt, as_kept, text};
+use crate::tui::testing::{Dealt, assert_screens, text};
+use crate::tui::theme::Theme;
 
 const ME: Viewer = Viewer::Seat(Seat::new(0));
 
 /// A game and the person who plays seat 0 of it.
-pub(super) struct Evening {
+pub(super) struct GameSession {
     pub(super) dealt: Dealt,
     pub(super) app: App,
     pub(super) now_ms: u64,
 }
 
-impl Evening {
+impl GameSession {
     pub(super) fn new(rules: &RuleSetSpec, seed: u8) -> Self {
         let (dealt, events) = Dealt::new(rules, seed, ME);
-        let mut evening = Self {
+        let mut session = Self {
             dealt,
             app: App::new(GameView::default(), Some(0)),
             now_ms: 0,
         };
-        evening.tell(Update::Attached(v1::Attached::default()));
-        evening.tell(Update::Events(v1::EventBatch { events }));
-        evening
+        session.tell(Update::Attached(v1::Attached::default()));
+        session.tell(Update::Events(v1::EventBatch { events }));
+        session
     }
 
     pub(super) fn tell(&mut self, update: Update) -> Option<Do> {
@@ -90,7 +90,7 @@ impl Evening {
 
     pub(super) fn screen(&self) -> String {
         text(80, 24, |frame| {
-            view::draw_game(frame, Look::new(false), &self.app, self.now_ms);
+            view::draw_game(frame, Theme::new(false), &self.app, self.now_ms);
         })
     }
 }
@@ -107,32 +107,32 @@ pub(super) fn shifts(shifts: u32) -> RuleSetSpec {
 fn whole_games_are_played_by_keys() {
     let (mut kinds, mut objections) = ([0; 3], 0);
     for seed in 0..6 {
-        let mut evening = Evening::new(&shifts(4), seed);
-        while evening.until_asked() {
-            let decision = evening.dealt.game.decision().unwrap();
+        let mut session = GameSession::new(&shifts(4), seed);
+        while session.until_asked() {
+            let decision = session.dealt.game.decision().unwrap();
             kinds[decision.kind as usize] += 1;
-            let legal = evening.dealt.game.legal_actions();
-            let (reached, refused) = everything_picked(&mut evening);
+            let legal = session.dealt.game.legal_actions();
+            let (reached, refused) = everything_picked(&mut session);
             objections += refused;
             let mut missing = legal.iter().filter(|action| !reached.contains(action));
-            let pass = evening.app.open.as_ref().unwrap().decision.pass();
+            let pass = session.app.open.as_ref().unwrap().decision.pass();
             assert_eq!(missing.find(|action| *action != pass), None);
 
-            let passes = evening.press(KeyCode::Char('p'));
+            let passes = session.press(KeyCode::Char('p'));
             assert_eq!(passes.is_some(), legal.contains(pass));
-            evening.app.open.as_mut().unwrap().sent = false;
+            session.app.open.as_mut().unwrap().sent = false;
             // What is picked to begin with is legal, unless there is nothing to play.
-            let request = evening.dealt.request();
-            evening.tell(Update::Decision(request));
-            let what = evening.act();
-            evening.answered(what);
-            assert!(evening.app.open.is_none());
+            let request = session.dealt.request();
+            session.tell(Update::Decision(request));
+            let what = session.act();
+            session.answered(what);
+            assert!(session.app.open.is_none());
         }
-        assert!(evening.app.table.end.is_some());
-        let end = evening.screen();
+        assert!(session.app.table.end.is_some());
+        let end = session.screen();
         assert!(end.contains("wins the game"), "{end}");
-        assert!(end.contains(&evening.app.table.game_id), "{end}");
-        assert_eq!(evening.press(KeyCode::Enter), Some(Do::Leave));
+        assert!(end.contains(&session.app.table.game_id), "{end}");
+        assert_eq!(session.press(KeyCode::Enter), Some(Do::Leave));
     }
     let [turns, exchanges, _specials] = kinds;
     assert!(
@@ -142,18 +142,18 @@ fn whole_games_are_played_by_keys() {
 }
 
 /// All that can be picked: the legal actions, and how many others, each with its reason.
-fn everything_picked(evening: &mut Evening) -> (Vec<ActionId>, usize) {
-    let legal = evening.dealt.game.legal_actions();
+fn everything_picked(session: &mut GameSession) -> (Vec<ActionId>, usize) {
+    let legal = session.dealt.game.legal_actions();
     let (mut reached, mut refused) = (Vec::new(), 0);
-    let stacks = evening.app.open.as_ref().unwrap().decision.stacks.len();
+    let stacks = session.app.open.as_ref().unwrap().decision.stacks.len();
     for _ in 0..stacks.max(2) {
-        evening.press(KeyCode::Right);
+        session.press(KeyCode::Right);
         for _ in 0..20 {
-            evening.press(KeyCode::Down);
+            session.press(KeyCode::Down);
         }
         for _ in 0..12 {
             for _ in 0..3 {
-                let decision = &evening.app.open.as_ref().unwrap().decision;
+                let decision = &session.app.open.as_ref().unwrap().decision;
                 let picked = decision.picked().unwrap();
                 let objection = decision.objection();
                 assert_eq!(objection.is_none(), legal.contains(picked), "{objection:?}");
@@ -162,16 +162,16 @@ fn everything_picked(evening: &mut Evening) -> (Vec<ActionId>, usize) {
                     Some(why) => {
                         refused += 1;
                         // A refused key does nothing but say why.
-                        assert_eq!(evening.press(KeyCode::Enter), None);
-                        assert_eq!(evening.app.notice, why);
+                        assert_eq!(session.press(KeyCode::Enter), None);
+                        assert_eq!(session.app.notice, why);
                     }
                 }
                 // In an exchange it is the key of the jokers, which would begin anew.
-                if evening.app.open.as_ref().unwrap().decision.kind() == v1::DecisionKind::Turn {
-                    evening.press(KeyCode::Char('j'));
+                if session.app.open.as_ref().unwrap().decision.kind() == v1::DecisionKind::Turn {
+                    session.press(KeyCode::Char('j'));
                 }
             }
-            evening.press(KeyCode::Up);
+            session.press(KeyCode::Up);
         }
     }
     (reached, refused)
@@ -181,23 +181,23 @@ fn everything_picked(evening: &mut Evening) -> (Vec<ActionId>, usize) {
 fn a_special_action_is_declared_or_declined_by_a_key() {
     let mut offered = 0;
     for seed in 0..60 {
-        let mut evening = Evening::new(&shifts(3), seed);
-        while evening.until_asked() {
-            let decision = evening.dealt.game.decision().unwrap();
+        let mut session = GameSession::new(&shifts(3), seed);
+        while session.until_asked() {
+            let decision = session.dealt.game.decision().unwrap();
             let what = match decision.kind {
                 DecisionKind::SpecialAction => {
                     offered += 1;
                     assert!(
-                        evening.screen().contains("Two jokers!"),
+                        session.screen().contains("Two jokers!"),
                         "{}",
-                        evening.screen()
+                        session.screen()
                     );
                     let key = ['d', 'n'][offered % 2];
-                    evening.press(KeyCode::Char(key)).unwrap()
+                    session.press(KeyCode::Char(key)).unwrap()
                 }
-                _ => evening.act(),
+                _ => session.act(),
             };
-            evening.answered(what);
+            session.answered(what);
         }
     }
     assert!(offered > 1, "{offered} were offered");
@@ -205,24 +205,24 @@ fn a_special_action_is_declared_or_declined_by_a_key() {
 
 #[test]
 fn the_screen_says_what_is_asked() {
-    let mut evening = Evening::new(&shifts(2), 3);
-    assert!(evening.until_asked());
-    evening.now_ms += 12_500;
-    let first = evening.screen();
+    let mut session = GameSession::new(&shifts(2), 3);
+    assert!(session.until_asked());
+    session.now_ms += 12_500;
+    let first = session.screen();
     for _ in 0..5 {
-        let what = evening.act();
-        evening.answered(what);
-        assert!(evening.until_asked());
+        let what = session.act();
+        session.answered(what);
+        assert!(session.until_asked());
     }
-    evening.press(KeyCode::Left);
-    let later = evening.screen();
-    evening.press(KeyCode::Char('?'));
-    as_kept(&[
+    session.press(KeyCode::Left);
+    let later = session.screen();
+    session.press(KeyCode::Char('?'));
+    assert_screens(&[
         ("first.txt", first, include_str!("screens/first.txt")),
         ("later.txt", later, include_str!("screens/later.txt")),
         (
             "help.txt",
-            evening.screen(),
+            session.screen(),
             include_str!("screens/help.txt"),
         ),
     ]);
@@ -235,8 +235,8 @@ fn windows_of_any_size_are_drawn() {
         faces: 15,
         ..shifts(1)
     };
-    let mut evening = Evening::new(&spec, 1);
-    assert!(evening.until_asked());
+    let mut session = GameSession::new(&spec, 1);
+    assert!(session.until_asked());
     for (columns, rows) in [
         (1, 1),
         (20, 5),
@@ -247,7 +247,7 @@ fn windows_of_any_size_are_drawn() {
         (250, 90),
     ] {
         let screen = text(columns, rows, |frame| {
-            view::draw_game(frame, Look::new(true), &evening.app, 0);
+            view::draw_game(frame, Theme::new(true), &session.app, 0);
         });
         let drawn = screen.contains("your hand");
         assert_eq!(drawn, columns >= 80 && rows >= 24, "{screen}");
@@ -256,10 +256,10 @@ fn windows_of_any_size_are_drawn() {
 
 #[test]
 fn an_answer_that_was_lost_is_given_again() {
-    let mut evening = Evening::new(&shifts(1), 3);
-    assert!(evening.until_asked());
-    evening.now_ms = 4_000;
-    let first = evening.press(KeyCode::Enter).unwrap();
+    let mut session = GameSession::new(&shifts(1), 3);
+    assert!(session.until_asked());
+    session.now_ms = 4_000;
+    let first = session.press(KeyCode::Enter).unwrap();
     let Do::Answer {
         decision_id,
         action,
@@ -270,18 +270,18 @@ fn an_answer_that_was_lost_is_given_again() {
     };
     assert_eq!(took_ms, 4_000);
     // Nothing is sent twice by a person who is impatient.
-    assert_eq!(evening.press(KeyCode::Enter), None);
-    evening.app.take(Input::Lost("gone".into()), 5_000);
-    assert!(evening.screen().contains("connection is lost"));
-    assert_eq!(evening.press(KeyCode::Enter), None);
-    evening.tell(Update::Attached(v1::Attached::default()));
-    assert_eq!(evening.app.link, Link::Live);
-    let again = evening.dealt.request();
+    assert_eq!(session.press(KeyCode::Enter), None);
+    session.app.take(Input::Lost("gone".into()), 5_000);
+    assert!(session.screen().contains("connection is lost"));
+    assert_eq!(session.press(KeyCode::Enter), None);
+    session.tell(Update::Attached(v1::Attached::default()));
+    assert_eq!(session.app.link, Link::Live);
+    let again = session.dealt.request();
     let again = v1::DecisionRequest {
         decision_id,
         ..again
     };
-    let answer = evening.tell(Update::Decision(again));
+    let answer = session.tell(Update::Decision(again));
     assert!(
         matches!(answer, Some(Do::Answer { decision_id: id, action: same, .. }) if (id, same) == (decision_id, action))
     );
@@ -315,47 +315,47 @@ fn the_servers_word_on_an_answer_is_shown() {
         (v1::AnswerStatus::Accepted, "", false),
     ];
     for (status, words, stays) in table {
-        let mut evening = Evening::new(&shifts(1), 3);
-        assert!(evening.until_asked());
+        let mut session = GameSession::new(&shifts(1), 3);
+        assert!(session.until_asked());
         let Some(Do::Answer {
             decision_id,
             action,
             ..
-        }) = evening.press(KeyCode::Enter)
+        }) = session.press(KeyCode::Enter)
         else {
             panic!("an answer");
         };
-        evening.tell(Update::Result(v1::AnswerResult {
+        session.tell(Update::Result(v1::AnswerResult {
             decision_id,
             action,
             status: status.into(),
             detail: words.into(),
             ..v1::AnswerResult::default()
         }));
-        assert!(evening.app.notice.contains(words), "{status:?}");
-        let open = evening.app.open.as_ref().filter(|open| !open.sent);
+        assert!(session.app.notice.contains(words), "{status:?}");
+        let open = session.app.open.as_ref().filter(|open| !open.sent);
         assert_eq!(open.is_some(), stays, "{status:?}");
     }
 }
 
 #[test]
 fn a_decision_taken_without_the_person_is_closed() {
-    let mut evening = Evening::new(&shifts(1), 3);
-    assert!(evening.until_asked());
-    let default = evening.dealt.game.default_action().unwrap();
-    evening.apply(default);
-    assert!(evening.app.open.is_none());
-    assert!(evening.screen().contains("too late"));
-    assert_eq!(evening.press(KeyCode::Enter), None);
+    let mut session = GameSession::new(&shifts(1), 3);
+    assert!(session.until_asked());
+    let default = session.dealt.game.default_action().unwrap();
+    session.apply(default);
+    assert!(session.app.open.is_none());
+    assert!(session.screen().contains("too late"));
+    assert_eq!(session.press(KeyCode::Enter), None);
     // The next question takes the words away.
-    assert!(evening.until_asked());
-    assert!(!evening.screen().contains("too late"));
+    assert!(session.until_asked());
+    assert!(!session.screen().contains("too late"));
 }
 
 #[test]
 fn the_clock_runs_into_the_bank() {
-    let mut evening = Evening::new(&shifts(1), 3);
-    assert!(evening.until_asked());
+    let mut session = GameSession::new(&shifts(1), 3);
+    assert!(session.until_asked());
     let table = [
         (0, 30_000, 60_000),
         (29_999, 1, 60_000),
@@ -363,6 +363,6 @@ fn the_clock_runs_into_the_bank() {
         (600_000, 0, 0),
     ];
     for (now, time, bank) in table {
-        assert_eq!(evening.app.clock(now), Some((time, bank)));
+        assert_eq!(session.app.clock(now), Some((time, bank)));
     }
 }

@@ -5,10 +5,10 @@ use chefshat_client::v1;
 use ratatui::crossterm::event::KeyCode;
 
 use super::app::Link;
-use super::friday::{Friday, ME, game, report};
 use super::lobby::Report;
 use super::part::{Heard, Over, Part};
-use crate::tui::testing::as_kept;
+use super::tournament_session::{ME, TournamentSession, game, report};
+use crate::tui::testing::assert_screens;
 
 use v1::TournamentFormat::{Knockout, RoundRobin, Swiss};
 use v1::TournamentGameState::{Counted, Due, Playing as Called};
@@ -16,57 +16,61 @@ use v1::TournamentState::{Closed, Finished, Open, Playing};
 
 #[test]
 fn games_follow_each_other_with_result_and_standings_between() {
-    let mut friday = Friday::new();
-    assert!(friday.screen().contains("Waiting for the server"));
-    friday.report(report(Swiss, Playing, vec![game(3, Due, [0, 1, ME, 5])]));
-    let lobby = friday.screen();
-    friday.seated("game one");
-    assert!(friday.screen().contains("your hand"));
-    assert!(friday.play() > 3);
+    let mut session = TournamentSession::new();
+    assert!(session.screen().contains("Waiting for the server"));
+    session.report(report(Swiss, Playing, vec![game(3, Due, [0, 1, ME, 5])]));
+    let lobby = session.screen();
+    session.seated("game one");
+    assert!(session.screen().contains("your hand"));
+    assert!(session.play() > 3);
 
     // The result stays for a while, with how the person stands.
-    let result = friday.screen();
+    let result = session.screen();
     assert!(result.contains("3rd of 8, score 2.00"), "{result}");
-    friday.now_ms += 11_000;
-    friday.hear(Heard::Tick);
-    assert!(friday.screen().contains("the game is over"));
-    friday.now_ms += 1_000;
-    friday.hear(Heard::Tick);
+    session.now_ms += 11_000;
+    session.hear(Heard::Tick);
+    assert!(session.screen().contains("the game is over"));
+    session.now_ms += 1_000;
+    session.hear(Heard::Tick);
     assert!(
-        friday.screen().contains("Your last game: "),
+        session.screen().contains("Your last game: "),
         "{}",
-        friday.screen()
+        session.screen()
     );
 
     // The next game begins by itself; one that begins while a result is shown waits a little, and less once it asks.
-    friday.seated("game two");
-    assert!(friday.play() > 3);
-    friday.seated("game three");
-    let result = friday.screen();
+    session.seated("game two");
+    assert!(session.play() > 3);
+    session.seated("game three");
+    let result = session.screen();
     assert!(
         result.contains("Another game of yours has begun"),
         "{result}"
     );
-    assert!(friday.until_asked());
-    friday.hear(Heard::Tick);
-    assert!(friday.screen().contains("the game is over"));
-    friday.now_ms += 3_000;
-    friday.hear(Heard::Tick);
-    assert!(friday.screen().contains("Your turn"), "{}", friday.screen());
-    assert!(friday.play() > 3);
-    friday.press(KeyCode::Enter);
-    assert!(friday.part.game.is_none());
+    assert!(session.until_asked());
+    session.hear(Heard::Tick);
+    assert!(session.screen().contains("the game is over"));
+    session.now_ms += 3_000;
+    session.hear(Heard::Tick);
+    assert!(
+        session.screen().contains("Your turn"),
+        "{}",
+        session.screen()
+    );
+    assert!(session.play() > 3);
+    session.press(KeyCode::Enter);
+    assert!(session.part.game.is_none());
 
-    friday.report(report(Swiss, Finished, Vec::new()));
-    friday.hear(Heard::Over(None));
-    let end = friday.screen();
+    session.report(report(Swiss, Finished, Vec::new()));
+    session.hear(Heard::Over(None));
+    let end = session.screen();
     assert!(
         end.contains("final standings") && end.contains("Enter ends"),
         "{end}"
     );
-    as_kept(&[("lobby.txt", lobby, include_str!("screens/lobby.txt"))]);
-    friday.press(KeyCode::Enter);
-    assert!(friday.part.left);
+    assert_screens(&[("lobby.txt", lobby, include_str!("screens/lobby.txt"))]);
+    session.press(KeyCode::Enter);
+    assert!(session.part.left);
 }
 
 #[test]
@@ -122,9 +126,9 @@ fn the_lobby_says_what_comes() {
         (report(Swiss, Finished, vec![]), "The tournament is over"),
     ];
     for (told, words) in table {
-        let mut friday = Friday::new();
-        friday.report(told);
-        let screen = friday.screen();
+        let mut session = TournamentSession::new();
+        session.report(told);
+        let screen = session.screen();
         assert!(screen.contains(words), "{words}: {screen}");
     }
 }
@@ -143,73 +147,73 @@ fn leaving_asks_while_games_are_to_come() {
     ];
     for (told, asks) in table {
         let words = format!("{:?} {:?}", told.format(), told.tournament.state());
-        let mut friday = Friday::new();
-        friday.report(told);
-        friday.press(KeyCode::Char('q'));
-        assert_eq!(friday.part.over.is_some(), asks, "{words}");
-        assert_eq!(friday.part.left, !asks, "{words}");
+        let mut session = TournamentSession::new();
+        session.report(told);
+        session.press(KeyCode::Char('q'));
+        assert_eq!(session.part.over.is_some(), asks, "{words}");
+        assert_eq!(session.part.left, !asks, "{words}");
     }
-    let mut friday = Friday::new();
-    friday.seated("game one");
-    friday.press(KeyCode::Char('q'));
-    assert_eq!(friday.part.over, Some(Over::Leave));
-    assert!(friday.screen().contains("Leave the tournament?"));
-    friday.press(KeyCode::Char('n'));
-    assert!(friday.part.over.is_none() && !friday.part.left);
-    friday.press(KeyCode::Esc);
-    friday.press(KeyCode::Char('y'));
-    assert!(friday.part.left);
+    let mut session = TournamentSession::new();
+    session.seated("game one");
+    session.press(KeyCode::Char('q'));
+    assert_eq!(session.part.over, Some(Over::Leave));
+    assert!(session.screen().contains("Leave the tournament?"));
+    session.press(KeyCode::Char('n'));
+    assert!(session.part.over.is_none() && !session.part.left);
+    session.press(KeyCode::Esc);
+    session.press(KeyCode::Char('y'));
+    assert!(session.part.left);
 }
 
 #[test]
 fn standings_are_looked_at_while_a_game_goes_on() {
-    let mut friday = Friday::new();
-    friday.report(report(Swiss, Playing, vec![]));
-    friday.seated("game one");
-    friday.press(KeyCode::Char('s'));
+    let mut session = TournamentSession::new();
+    session.report(report(Swiss, Playing, vec![]));
+    session.seated("game one");
+    session.press(KeyCode::Char('s'));
     assert!(
-        friday.screen().contains("Any key goes back"),
+        session.screen().contains("Any key goes back"),
         "{}",
-        friday.screen()
+        session.screen()
     );
-    friday.press(KeyCode::Enter);
-    assert!(friday.screen().contains("your hand"));
-    friday.press(KeyCode::Char('s'));
+    session.press(KeyCode::Enter);
+    assert!(session.screen().contains("your hand"));
+    session.press(KeyCode::Char('s'));
     // Being asked ends it.
-    assert!(friday.until_asked());
-    assert!(friday.screen().contains("Your turn"));
+    assert!(session.until_asked());
+    assert!(session.screen().contains("Your turn"));
 }
 
 #[test]
 fn a_connection_or_a_game_that_is_lost_is_shown() {
-    let mut friday = Friday::new();
-    friday.report(report(Swiss, Playing, vec![]));
-    friday.hear(Heard::Lost("gone".into()));
-    assert!(friday.screen().contains("being made again: gone"));
-    friday.seated("game one");
-    assert_eq!(friday.part.link, Link::Live);
-    friday.hear(Heard::Gone("game one".into(), "the room is gone".into()));
-    assert!(friday.screen().contains("the room is gone"));
-    friday.press(KeyCode::Enter);
+    let mut session = TournamentSession::new();
+    session.report(report(Swiss, Playing, vec![]));
+    session.hear(Heard::Lost("gone".into()));
+    assert!(session.screen().contains("being made again: gone"));
+    session.seated("game one");
+    assert_eq!(session.part.link, Link::Live);
+    session.hear(Heard::Gone("game one".into(), "the room is gone".into()));
+    assert!(session.screen().contains("the room is gone"));
+    session.press(KeyCode::Enter);
     assert!(
-        friday.screen().contains("out of reach"),
+        session.screen().contains("out of reach"),
         "{}",
-        friday.screen()
+        session.screen()
     );
-    friday.hear(Heard::Over(Some("another has it".into())));
+    session.hear(Heard::Over(Some("another has it".into())));
     assert!(
-        friday
+        session
             .screen()
             .contains("Your place is lost: another has it")
     );
-    friday.press(KeyCode::Enter);
-    assert!(friday.part.left);
+    session.press(KeyCode::Enter);
+    assert!(session.part.left);
     // The end may be told before the last report is.
-    let mut friday = Friday::new();
-    friday.report(report(Swiss, Playing, vec![game(3, Due, [0, 1, ME, 5])]));
-    friday.hear(Heard::Unfollowed("unknown".into()));
-    friday.hear(Heard::Over(None));
-    let screen = friday.screen();
+    let mut session = TournamentSession::new();
+    session.report(report(Swiss, Playing, vec![game(3, Due, [0, 1, ME, 5])]));
+    session.hear(Heard::Unfollowed("unknown".into()));
+    session.hear(Heard::Over(None));
+    let screen = session.screen();
     assert!(
         screen.contains("The tournament is over.") && screen.contains("Enter ends."),
         "{screen}"

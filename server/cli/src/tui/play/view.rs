@@ -1,5 +1,4 @@
-//! The screen of `chefshat play` at a table: the table, below it the person's hand, what is asked of it, and the keys. Between the games of a
-//! tournament the screen is that of `lobby_view`.
+//! Draws a game of `chefshat play`: the table, the hand, the request and the keys. `lobby_view` draws the screen between tournament games.
 
 use chefshat_client::v1;
 use ratatui::Frame;
@@ -14,17 +13,17 @@ use super::part::Part;
 use crate::narration::view::End;
 use crate::tui::cards;
 use crate::tui::cards::Shown;
-use crate::tui::look::{Look, ingredient};
+use crate::tui::theme::{Theme, ingredient};
 use crate::tui::view::{boxed, draw as draw_table, end_lines, popup};
 
-/// Rows below the table: the hand (7), what is asked (2), the keys (1).
+/// Rows below the table: hand (7), request (2), keys (1).
 const ROWS: u16 = 10;
 /// Columns of the bar of the clock.
 const BAR: u64 = 10;
-/// Below this the clock warns.
+/// Milliseconds below which the clock is a warning.
 const SHORT_MS: u64 = 5_000;
 
-/// The keys that matter in a turn, in an exchange, when a special action is offered, and while others decide.
+/// Key hints for a turn, an exchange, a special action, and while others decide.
 const TURN_KEYS: &str =
     " 1-9 ←→ card  ↑↓ number  j joker  Enter play  p pass  e feeling  ? keys  q leave";
 const EXCHANGE_KEYS: &str = " 1-9 ←→ card  J joker  Enter give  e feeling  ? keys  q leave";
@@ -53,10 +52,10 @@ const HELP: [&str; 18] = [
 ];
 
 /// Draws everything.
-pub(super) fn draw(frame: &mut Frame<'_>, look: Look, part: &Part, now_ms: u64) {
+pub(super) fn draw(frame: &mut Frame<'_>, theme: Theme, part: &Part, now_ms: u64) {
     match (&part.game, &part.lobby) {
-        (Some(game), _) if !part.peek => draw_game(frame, look, game, now_ms),
-        (_, Some(lobby)) => lobby_view::draw(frame, look, part, lobby),
+        (Some(game), _) if !part.peek => draw_game(frame, theme, game, now_ms),
+        (_, Some(lobby)) => lobby_view::draw(frame, theme, part, lobby),
         (_, None) => {
             let words = match &part.link {
                 Link::Lost(why) => format!(" Connecting, again and again: {why}"),
@@ -65,16 +64,16 @@ pub(super) fn draw(frame: &mut Frame<'_>, look: Look, part: &Part, now_ms: u64) 
             frame.render_widget(Paragraph::new(words), frame.area());
         }
     }
-    lobby_view::draw_over(frame, look, part);
+    lobby_view::draw_over(frame, theme, part);
 }
 
 /// Draws a game.
-pub(super) fn draw_game(frame: &mut Frame<'_>, look: Look, app: &App, now_ms: u64) {
+pub(super) fn draw_game(frame: &mut Frame<'_>, theme: Theme, app: &App, now_ms: u64) {
     let mut status = app.link.words().to_owned();
     if let Some(others) = &app.others {
         status = format!("{others} · {status}");
     }
-    let Some(area) = draw_table(frame, look, &app.table, app.me, &status, app.scroll, ROWS) else {
+    let Some(area) = draw_table(frame, theme, &app.table, app.me, &status, app.scroll, ROWS) else {
         return;
     };
     let [hand, asked, keys] = Layout::vertical([
@@ -83,19 +82,19 @@ pub(super) fn draw_game(frame: &mut Frame<'_>, look: Look, app: &App, now_ms: u6
         Constraint::Length(1),
     ])
     .areas(area);
-    draw_hand(frame, look, app, hand);
-    draw_asked(frame, look, app, now_ms, asked);
+    draw_hand(frame, theme, app, hand);
+    draw_asked(frame, theme, app, now_ms, asked);
     let words = match app.open.as_ref().map(|open| open.decision.kind()) {
         Some(v1::DecisionKind::SpecialAction) => SPECIAL_KEYS,
         Some(v1::DecisionKind::Exchange) => EXCHANGE_KEYS,
         Some(_) => TURN_KEYS,
         None => WAITING_KEYS,
     };
-    frame.render_widget(Paragraph::new(words).style(look.dim()), keys);
-    draw_over(frame, look, app);
+    frame.render_widget(Paragraph::new(words).style(theme.dim()), keys);
+    draw_over(frame, theme, app);
 }
 
-fn draw_hand(frame: &mut Frame<'_>, look: Look, app: &App, area: Rect) {
+fn draw_hand(frame: &mut Frame<'_>, theme: Theme, app: &App, area: Rect) {
     let faces = app.table.faces();
     let place = app.me.and_then(|me| app.table.seat(me));
     let open = app
@@ -125,7 +124,7 @@ fn draw_hand(frame: &mut Frame<'_>, look: Look, app: &App, area: Rect) {
             crate::numbers::counted(count.into(), "card")
         ),
     };
-    let block = boxed(look, title);
+    let block = boxed(theme, title);
     let inner = block.inner(area);
     frame.render_widget(block, area);
     if shown.is_empty() {
@@ -138,14 +137,14 @@ fn draw_hand(frame: &mut Frame<'_>, look: Look, app: &App, area: Rect) {
         return;
     }
     let columns = usize::from(inner.width).saturating_sub(1);
-    let mut lines = cards::hand(look, faces, &shown, columns);
+    let mut lines = cards::hand(theme, faces, &shown, columns);
     for line in &mut lines {
         line.spans.insert(0, Span::raw(" "));
     }
     frame.render_widget(Paragraph::new(lines), inner);
 }
 
-/// The stacks of an open decision, with what is picked.
+/// The stacks of an open decision, with the selection.
 fn shown(open: &Open) -> Vec<Shown> {
     let decision = &open.decision;
     let stacks = decision.stacks.iter().enumerate();
@@ -159,31 +158,31 @@ fn shown(open: &Open) -> Vec<Shown> {
             } else {
                 0
             },
-            // A face's own number, and J, are read off the card.
+            // The labels of low faces and jokers are their keys.
             key: key_of(*stack)
                 .filter(|key| !stack.joker && stack.face.to_string() != key.to_string()),
         })
         .collect()
 }
 
-fn draw_asked(frame: &mut Frame<'_>, look: Look, app: &App, now_ms: u64, area: Rect) {
-    let mut first = vec![Span::styled(format!(" {}", asked(app)), look.bold())];
+fn draw_asked(frame: &mut Frame<'_>, theme: Theme, app: &App, now_ms: u64, area: Rect) {
+    let mut first = vec![Span::styled(format!(" {}", asked(app)), theme.bold())];
     if let (Some((time, bank)), Some(open)) = (app.clock(now_ms), &app.open) {
         let line: usize = first.iter().map(Span::width).sum();
         let clock = clock(open, time, bank);
         let space = usize::from(area.width).saturating_sub(line + Span::raw(&*clock).width() + 1);
         first.push(Span::raw(" ".repeat(space)));
         let style = if time < SHORT_MS {
-            look.warning()
+            theme.warning()
         } else {
-            look.bold()
+            theme.bold()
         };
         first.push(Span::styled(clock, style));
     }
     let second = match &app.open {
-        _ if !app.notice.is_empty() => Span::styled(format!(" ! {}", app.notice), look.warning()),
+        _ if !app.notice.is_empty() => Span::styled(format!(" ! {}", app.notice), theme.warning()),
         Some(open) if !open.sent => match open.decision.objection() {
-            Some(why) => Span::styled(format!(" ✕ {why}"), look.dim()),
+            Some(why) => Span::styled(format!(" ✕ {why}"), theme.dim()),
             None => Span::raw(hint(open, app.table.faces())),
         },
         _ => Span::raw(""),
@@ -194,7 +193,7 @@ fn draw_asked(frame: &mut Frame<'_>, look: Look, app: &App, now_ms: u64, area: R
     );
 }
 
-/// What the person is asked, or who is.
+/// The request to the person, or whose turn it is.
 fn asked(app: &App) -> String {
     if let Link::Lost(why) = &app.link {
         return format!("The connection is lost and being made again: {why}");
@@ -226,7 +225,7 @@ fn asked(app: &App) -> String {
     }
 }
 
-/// What is waited for.
+/// What the game waits for.
 fn waiting(app: &App) -> String {
     let table = &app.table;
     let first = table.turns == 0 && table.shift > 0;
@@ -242,7 +241,7 @@ fn waiting(app: &App) -> String {
     }
 }
 
-/// What Enter would do.
+/// What Enter does.
 fn hint(open: &Open, faces: u32) -> String {
     let decision = &open.decision;
     if decision.kind() == v1::DecisionKind::SpecialAction {
@@ -283,8 +282,8 @@ fn time(ms: u64) -> String {
     }
 }
 
-/// What stands over the table: the end, or a dialog.
-fn draw_over(frame: &mut Frame<'_>, look: Look, app: &App) {
+/// Draws the end of the game or a dialog over the table.
+fn draw_over(frame: &mut Frame<'_>, theme: Theme, app: &App) {
     let plain = |words: &str| Line::from(words.to_owned());
     if app.scroll.is_open() {
         return;
@@ -292,7 +291,7 @@ fn draw_over(frame: &mut Frame<'_>, look: Look, app: &App) {
     match (&app.table.end, &app.link, app.dialog) {
         (Some(end), ..) => {
             let mut lines = vec![plain("")];
-            lines.extend(end_lines(look, &app.table, end));
+            lines.extend(end_lines(theme, &app.table, end));
             lines.push(plain(""));
             if let Some(standing) = &app.standing {
                 lines.push(plain(standing));
@@ -300,12 +299,12 @@ fn draw_over(frame: &mut Frame<'_>, look: Look, app: &App) {
                 lines.push(plain(&format!("game {}", app.table.game_id)));
             }
             lines.push(plain(""));
-            lines.push(Line::from(Span::styled(app.then, look.dim())));
+            lines.push(Line::from(Span::styled(app.then, theme.dim())));
             let title = match end {
                 End::Finished(_) => "the game is over",
                 End::Aborted(_) => "no result",
             };
-            popup(frame, look, title, lines);
+            popup(frame, theme, title, lines);
         }
         (None, Link::Over(why), _) => {
             let why = why
@@ -313,19 +312,19 @@ fn draw_over(frame: &mut Frame<'_>, look: Look, app: &App) {
                 .unwrap_or_else(|| "the seat has left the table".to_owned());
             popup(
                 frame,
-                look,
+                theme,
                 "the seat is lost",
                 vec![plain(&why), plain(""), plain(app.then)],
             );
         }
         (None, _, Some(Dialog::Help)) => {
             let mut lines: Vec<Line<'_>> = HELP.iter().map(|line| plain(line)).collect();
-            lines.push(Line::from(Span::styled("any key goes back", look.dim())));
-            popup(frame, look, "help", lines);
+            lines.push(Line::from(Span::styled("any key goes back", theme.dim())));
+            popup(frame, theme, "help", lines);
         }
         (None, _, Some(Dialog::Leave)) => popup(
             frame,
-            look,
+            theme,
             "leave",
             vec![
                 plain("Leave the table? The room's rules say who plays on."),
@@ -337,7 +336,7 @@ fn draw_over(frame: &mut Frame<'_>, look: Look, app: &App) {
             let lines = (1..)
                 .zip(EXPRESSIONS)
                 .map(|(key, (label, ..))| plain(&format!("{key}  {label}")));
-            popup(frame, look, "show the table", lines.collect());
+            popup(frame, theme, "show the table", lines.collect());
         }
         (None, _, None) => {}
     }

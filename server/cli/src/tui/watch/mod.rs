@@ -20,8 +20,8 @@ use tokio::sync::mpsc;
 use crate::CommandError;
 use crate::connect::{PATIENCE, ServerArg};
 use crate::narration::view::GameView;
-use crate::tui::look::Look;
 use crate::tui::screen::{Screen, Wake, missing};
+use crate::tui::theme::Theme;
 use reel::Reel;
 
 /// Events that may wait to be shown.
@@ -128,13 +128,13 @@ fn of_record(lines: Vec<v1::RecordLine>) -> Result<Reel, ReplayError> {
 
 /// Shows the reel until the person quits.
 async fn show(mut reel: Reel, live: Option<Spectator>) -> Result<ExitCode, CommandError> {
-    let look = Look::of_environment();
+    let theme = Theme::of_environment();
     let mut following = live.map(follow);
     let mut screen = Screen::open(TICK)?;
     let mut dirty = true;
     while !reel.left {
         if std::mem::take(&mut dirty) {
-            screen.draw(|frame| view::draw(frame, look, &reel))?;
+            screen.draw(|frame| view::draw(frame, theme, &reel))?;
         }
         tokio::select! {
             wake = screen.next() => match wake {

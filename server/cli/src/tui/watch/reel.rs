@@ -1,5 +1,4 @@
-//! The events of a game as a reel that is wound to and fro: where it stands, how fast it runs, whether hands are shown. Events, keys and the
-//! time go in; how it looks is in `view`.
+//! Steps through the events of a game, forwards and back: position, speed, visible hands. Takes events, keys and the time; `view` draws it.
 
 use chefshat_client::v1::{self, game_event::Kind};
 use ratatui::crossterm::event::KeyCode;
@@ -8,37 +7,37 @@ use crate::narration::view::GameView;
 use crate::tui::log::Scroll;
 use crate::tui::screen::Key;
 
-/// Milliseconds for an event at each speed, slowest first.
+/// Milliseconds per event at each speed, slowest first.
 const PACES_MS: [u64; 7] = [4000, 2000, 1000, 500, 250, 100, 25];
-/// The standard speed.
+/// The default speed.
 const STANDARD_PACE: usize = 2;
 
-/// A reel.
+/// A game to step through.
 #[derive(Debug)]
 pub(super) struct Reel {
-    /// The table before the first event.
+    /// The state before the first event.
     start: GameView,
     events: Vec<v1::GameEvent>,
-    /// How many events the table has taken.
+    /// Number of events applied.
     pub(super) at: usize,
     pub(super) table: GameView,
     pub(super) running: bool,
     pace: usize,
-    /// When it last moved by itself.
+    /// When it last advanced on its own.
     moved_ms: u64,
     /// More events may come.
     pub(super) live: bool,
-    /// Why no more come although the game has not ended.
+    /// Why no more events come although the game has not ended.
     pub(super) lost: Option<String>,
     pub(super) hands: bool,
     pub(super) help: bool,
-    /// How far back the person looks at what happened.
+    /// Scroll position of the story.
     pub(super) scroll: Scroll,
     pub(super) left: bool,
 }
 
 impl Reel {
-    /// Of a game that is over: from its first deal, running.
+    /// A finished game, running from its first deal.
     pub(super) fn recorded(start: GameView, events: Vec<v1::GameEvent>) -> Self {
         let first = events.iter().position(is_deal).map_or(0, |at| at + 1);
         let mut reel = Self::new(start, events, false);
@@ -46,7 +45,7 @@ impl Reel {
         reel
     }
 
-    /// Of a game that is being played: at its newest event.
+    /// A live game, at its newest event.
     pub(super) fn live(start: GameView) -> Self {
         Self::new(start, Vec::new(), true)
     }
@@ -69,18 +68,18 @@ impl Reel {
         }
     }
 
-    /// How many events there are.
+    /// Number of events.
     pub(super) fn len(&self) -> usize {
         self.events.len()
     }
 
-    /// Events a second.
+    /// Events per second.
     pub(super) fn per_second(&self) -> f64 {
         // At most 4000: exact.
         1000.0 / f64::from(u32::try_from(PACES_MS[self.pace]).unwrap_or(u32::MAX))
     }
 
-    /// An event of a game that is being played: shown at once by a reel that stands at its end and runs.
+    /// Adds a live event; shown at once if the newest was shown.
     pub(super) fn push(&mut self, event: v1::GameEvent) {
         let follows = self.running && self.at == self.events.len();
         self.events.push(event);
@@ -89,13 +88,13 @@ impl Reel {
         }
     }
 
-    /// No more events will come; why, if the game has not ended.
+    /// Ends a live game; with the reason if it has not ended.
     pub(super) fn close(&mut self, why: Option<String>) {
         self.live = false;
         self.lost = why;
     }
 
-    /// Lets it run; says whether it moved.
+    /// Advances if it is time; whether it did.
     pub(super) fn tick(&mut self, now_ms: u64) -> bool {
         let due = now_ms.saturating_sub(self.moved_ms) >= PACES_MS[self.pace];
         if !self.running || !due || self.at == self.events.len() {
@@ -120,7 +119,7 @@ impl Reel {
             return;
         }
         if self.scroll.key(code, &self.table) {
-            // What is read does not run away.
+            // Stop while the person reads the story.
             self.running &= !self.scroll.is_open();
             return;
         }
@@ -141,7 +140,7 @@ impl Reel {
             KeyCode::Home => self.stop_at(0),
             KeyCode::End => {
                 self.wind_to(self.events.len());
-                // A live game is followed from here on.
+                // Follow a live game from here on.
                 self.running = self.live;
             }
             _ => {}
@@ -153,19 +152,19 @@ impl Reel {
         self.wind_to(at);
     }
 
-    /// Where the last deal before the present event was.
+    /// The last deal before the current event.
     fn shift_before(&self) -> usize {
         let before = &self.events[..self.at.saturating_sub(1)];
         before.iter().rposition(is_deal).map_or(0, |at| at + 1)
     }
 
-    /// Where the next deal is.
+    /// The next deal.
     fn shift_after(&self) -> usize {
         let after = self.events[self.at..].iter().position(is_deal);
         after.map_or(self.events.len(), |at| self.at + at + 1)
     }
 
-    /// Makes the table what it was after so many events.
+    /// Moves to the state after `at` events.
     fn wind_to(&mut self, at: usize) {
         let at = at.min(self.events.len());
         if at < self.at {

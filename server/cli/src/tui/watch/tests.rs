@@ -6,9 +6,9 @@ use ratatui::crossterm::event::KeyCode;
 use super::reel::Reel;
 use super::{of_record, view};
 use crate::narration::view::GameView;
-use crate::tui::look::Look;
 use crate::tui::screen::Key;
-use crate::tui::testing::{as_kept, lines, recorded, text};
+use crate::tui::testing::{assert_screens, lines, recorded, text};
+use crate::tui::theme::Theme;
 
 fn reel() -> Reel {
     Reel::recorded(GameView::default(), recorded("fixed.jsonl"))
@@ -19,7 +19,7 @@ fn press(reel: &mut Reel, code: KeyCode) {
 }
 
 fn screen(reel: &Reel) -> String {
-    text(80, 24, |frame| view::draw(frame, Look::new(false), reel))
+    text(80, 24, |frame| view::draw(frame, Theme::new(false), reel))
 }
 
 #[test]
@@ -136,7 +136,7 @@ fn the_screens_are_as_kept() {
     }
     let hands = screen(&reel);
     press(&mut reel, KeyCode::End);
-    as_kept(&[
+    assert_screens(&[
         ("hands.txt", hands, include_str!("screens/hands.txt")),
         ("end.txt", screen(&reel), include_str!("screens/end.txt")),
     ]);

@@ -1,4 +1,4 @@
-//! The screen of `chefshat watch`: the table, below it the hands where they are known, and the reel.
+//! Draws `chefshat watch`: the table, the known hands, and the position.
 
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
@@ -9,7 +9,7 @@ use super::reel::Reel;
 use crate::narration::MAX_NAME;
 use crate::narration::hand::Hand;
 use crate::narration::view::GameView;
-use crate::tui::look::Look;
+use crate::tui::theme::Theme;
 use crate::tui::view::{boxed, draw as draw_table, end_lines, padded, popup};
 
 const KEYS: &str = " space stop  ←→ step  ↑↓ speed  s S Shift  PgUp story  h hands  ? keys  q end";
@@ -28,7 +28,7 @@ const HELP: [&str; 10] = [
 ];
 
 /// Draws everything.
-pub(super) fn draw(frame: &mut Frame<'_>, look: Look, reel: &Reel) {
+pub(super) fn draw(frame: &mut Frame<'_>, theme: Theme, reel: &Reel) {
     let table = &reel.table;
     let seats = u16::try_from(table.seats.len()).unwrap_or(0);
     let hands = if reel.hands {
@@ -36,7 +36,7 @@ pub(super) fn draw(frame: &mut Frame<'_>, look: Look, reel: &Reel) {
     } else {
         0
     };
-    // The pizza and the story need the rest; six hands at the least height leave the keys out, which ? tells too.
+    // With six hands at the minimum height the key hints are cut; ? shows them too.
     let rows = hands.saturating_add(2);
     let status = match (reel.live, reel.running) {
         (true, _) if reel.at < reel.len() => "● live, behind",
@@ -45,7 +45,7 @@ pub(super) fn draw(frame: &mut Frame<'_>, look: Look, reel: &Reel) {
         (false, true) if reel.at == reel.len() => "■ the end",
         (false, true) => "▶ running",
     };
-    let Some(area) = draw_table(frame, look, table, None, status, reel.scroll, rows) else {
+    let Some(area) = draw_table(frame, theme, table, None, status, reel.scroll, rows) else {
         return;
     };
     let [hands, bar, keys] = Layout::vertical([
@@ -55,43 +55,43 @@ pub(super) fn draw(frame: &mut Frame<'_>, look: Look, reel: &Reel) {
     ])
     .areas(area);
     if reel.hands {
-        draw_hands(frame, look, table, hands);
+        draw_hands(frame, theme, table, hands);
     }
-    draw_bar(frame, look, reel, bar);
-    frame.render_widget(Paragraph::new(KEYS).style(look.dim()), keys);
+    draw_bar(frame, theme, reel, bar);
+    frame.render_widget(Paragraph::new(KEYS).style(theme.dim()), keys);
     if reel.help {
         let lines = HELP.iter().map(|line| Line::from(*line)).collect();
-        popup(frame, look, "help", lines);
+        popup(frame, theme, "help", lines);
     } else if let (Some(end), true, false) =
         (&table.end, reel.at == reel.len(), reel.scroll.is_open())
     {
-        let mut lines = end_lines(look, table, end);
+        let mut lines = end_lines(theme, table, end);
         lines.push(Line::default());
         lines.push(Line::from(format!("game {}", table.game_id)));
-        popup(frame, look, "the game is over", lines);
+        popup(frame, theme, "the game is over", lines);
     }
 }
 
-fn draw_hands(frame: &mut Frame<'_>, look: Look, table: &GameView, area: Rect) {
+fn draw_hands(frame: &mut Frame<'_>, theme: Theme, table: &GameView, area: Rect) {
     let lines = (0u32..).zip(&table.seats).map(|(seat, place)| {
-        let name = Span::styled(padded(&table.name(seat), MAX_NAME + 1), look.seat(seat));
+        let name = Span::styled(padded(&table.name(seat), MAX_NAME + 1), theme.seat(seat));
         let mut spans = vec![Span::raw(" "), name];
         match &place.hand {
-            Some(hand) => spans.extend(cards(look, table.faces(), hand)),
+            Some(hand) => spans.extend(cards(theme, table.faces(), hand)),
             None if table.started => spans.push(Span::styled(
                 "not shown while the game is played",
-                look.dim(),
+                theme.dim(),
             )),
             None => {}
         }
         Line::from(spans)
     });
     let lines: Vec<Line<'_>> = lines.collect();
-    frame.render_widget(Paragraph::new(lines).block(boxed(look, " hands ")), area);
+    frame.render_widget(Paragraph::new(lines).block(boxed(theme, " hands ")), area);
 }
 
 /// A hand in a line: `2 5×3 11×2★ J`.
-fn cards(look: Look, faces: u32, hand: &Hand) -> Vec<Span<'static>> {
+fn cards(theme: Theme, faces: u32, hand: &Hand) -> Vec<Span<'static>> {
     let stacks = hand.stacks().into_iter();
     stacks
         .map(|stack| {
@@ -105,22 +105,22 @@ fn cards(look: Look, faces: u32, hand: &Hand) -> Vec<Span<'static>> {
                 count => format!("×{count}"),
             };
             let star = if stack.golden { "★" } else { "" };
-            let style = look.card(stack.face, faces);
+            let style = theme.card(stack.face, faces);
             Span::styled(format!("{face}{count}{star} "), style)
         })
         .collect()
 }
 
-fn draw_bar(frame: &mut Frame<'_>, look: Look, reel: &Reel, area: Rect) {
+fn draw_bar(frame: &mut Frame<'_>, theme: Theme, reel: &Reel, area: Rect) {
     if let Some(why) = &reel.lost {
         let words = format!(" ! nothing more comes: {why}");
-        frame.render_widget(Paragraph::new(words).style(look.warning()), area);
+        frame.render_widget(Paragraph::new(words).style(theme.warning()), area);
         return;
     }
     let words = format!(" {}/{} · {}/s ", reel.at, reel.len(), reel.per_second());
     let room = usize::from(area.width).saturating_sub(words.chars().count() + 2);
     let filled = (room * reel.at).checked_div(reel.len()).unwrap_or(0);
     let bar = format!(" {}{}", "━".repeat(filled), "─".repeat(room - filled));
-    let line = Line::from(vec![Span::styled(bar, look.frame()), Span::raw(words)]);
+    let line = Line::from(vec![Span::styled(bar, theme.frame()), Span::raw(words)]);
     frame.render_widget(Paragraph::new(line), area);
 }

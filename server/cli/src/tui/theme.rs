@@ -1,5 +1,4 @@
-//! Colours and symbols. Nothing is said by colour alone: every colour stands beside a number, a symbol or a word, and `NO_COLOR` takes the
-//! colours away.
+//! Colours and symbols. Every colour stands beside a number, a symbol or a word, so that none is needed; `NO_COLOR` turns them off.
 
 use chefshat_client::v1;
 use ratatui::style::{Color, Modifier, Style};
@@ -21,10 +20,10 @@ const INGREDIENTS: [&str; 11] = [
     "mozzarella",
 ];
 
-/// Colours of the ingredients, of the 256 that terminals have: bright enough on black, dark enough on white.
+/// Colours of the ingredients, of the 256-colour palette: legible on black and on white.
 const FACE_COLOURS: [u8; 11] = [130, 209, 67, 107, 160, 34, 100, 172, 137, 167, 179];
 
-/// The colours of the seats, as `chefshat demo` has them.
+/// Colours of the seats, as in `chefshat demo`.
 const SEAT_COLOURS: [Color; 6] = [
     Color::Cyan,
     Color::Yellow,
@@ -34,19 +33,19 @@ const SEAT_COLOURS: [Color; 6] = [
     Color::Red,
 ];
 
-/// How things look.
+/// The styles of the terminal client.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Look {
+pub(crate) struct Theme {
     colours: bool,
 }
 
-impl Look {
+impl Theme {
     /// With colours or without.
     pub(crate) fn new(colours: bool) -> Self {
         Self { colours }
     }
 
-    /// As the environment wants it.
+    /// With colours unless `NO_COLOR` is set.
     pub(crate) fn of_environment() -> Self {
         Self::new(std::env::var_os("NO_COLOR").is_none_or(|set| set.is_empty()))
     }
@@ -65,7 +64,7 @@ impl Look {
         self.fg(SEAT_COLOURS[index])
     }
 
-    /// The frame of a card: of a face of the deck, else of a joker.
+    /// The frame of a card, or of a joker for faces above `faces`.
     pub(crate) fn card(self, face: u32, faces: u32) -> Style {
         let index = usize::try_from(face).ok().and_then(|it| it.checked_sub(1));
         match index.and_then(|index| FACE_COLOURS.get(index)) {
@@ -75,12 +74,12 @@ impl Look {
         }
     }
 
-    /// What matters more.
+    /// Emphasised text.
     pub(crate) fn bold(self) -> Style {
         Style::new().add_modifier(Modifier::BOLD)
     }
 
-    /// What matters less.
+    /// Secondary text.
     pub(crate) fn dim(self) -> Style {
         Style::new().add_modifier(Modifier::DIM)
     }
@@ -90,12 +89,12 @@ impl Look {
         self.fg(Color::Yellow).add_modifier(Modifier::BOLD)
     }
 
-    /// What a person should read.
+    /// Warnings.
     pub(crate) fn warning(self) -> Style {
         self.fg(Color::Red).add_modifier(Modifier::BOLD)
     }
 
-    /// The line at the top.
+    /// The header line.
     pub(crate) fn header(self) -> Style {
         if self.colours {
             Style::new()
@@ -113,13 +112,13 @@ impl Look {
     }
 }
 
-/// The ingredient of a face; decks larger than the standard one have faces without.
+/// The ingredient of a face; only the faces of the standard deck have one.
 pub(crate) fn ingredient(face: u32, faces: u32) -> Option<&'static str> {
     let index = usize::try_from(face).ok()?.checked_sub(1)?;
     INGREDIENTS.get(index).filter(|_| face <= faces).copied()
 }
 
-/// What sits there, as a symbol and a word.
+/// Symbol and word for a seat.
 pub(crate) fn kind(place: &SeatView) -> (&'static str, &'static str) {
     match place.name.is_empty() {
         true => ("·", "free"),
@@ -127,7 +126,7 @@ pub(crate) fn kind(place: &SeatView) -> (&'static str, &'static str) {
     }
 }
 
-/// A kind of participants, as a symbol and a word.
+/// Symbol and word for a kind of participant.
 pub(crate) fn symbol(kind: v1::ParticipantKind) -> (&'static str, &'static str) {
     match kind {
         v1::ParticipantKind::Human => ("☺", "person"),

@@ -11,14 +11,14 @@ use super::lobby::Report;
 use super::part::{Heard, Part};
 use super::tests::shifts;
 use super::view;
-use crate::tui::look::Look;
 use crate::tui::screen::Key;
 use crate::tui::testing::{Dealt, text};
+use crate::tui::theme::Theme;
 
 pub(super) const ME: u32 = 2;
 
 /// A tournament of eight, in which the person is number 2.
-pub(super) struct Friday {
+pub(super) struct TournamentSession {
     pub(super) part: Part,
     dealt: BTreeMap<String, Dealt>,
     /// The game that is told of.
@@ -26,20 +26,20 @@ pub(super) struct Friday {
     pub(super) now_ms: u64,
 }
 
-impl Friday {
+impl TournamentSession {
     pub(super) fn new() -> Self {
-        let mut friday = Self {
+        let mut session = Self {
             part: Part::new(None),
             dealt: BTreeMap::new(),
             game: String::new(),
             now_ms: 0,
         };
-        friday.hear(Heard::Entered(v1::Entered {
+        session.hear(Heard::Entered(v1::Entered {
             tournament_id: "7ea82e54d878816e4e9bde8b21aa7dce".into(),
             participant: ME,
             ..v1::Entered::default()
         }));
-        friday
+        session
     }
 
     pub(super) fn hear(&mut self, heard: Heard) -> Option<(String, Do)> {
@@ -124,7 +124,7 @@ impl Friday {
 
     pub(super) fn screen(&self) -> String {
         text(80, 24, |frame| {
-            view::draw(frame, Look::new(false), &self.part, self.now_ms);
+            view::draw(frame, Theme::new(false), &self.part, self.now_ms);
         })
     }
 }
