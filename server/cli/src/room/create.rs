@@ -141,6 +141,7 @@ impl Create {
             }),
             game_seed: self.game_seed.map_or_else(Vec::new, |seed| seed.to_vec()),
             start,
+            ..v1::CreateRoomRequest::default()
         })
     }
 }
