@@ -236,7 +236,9 @@ mod tests {
         // Nobody answers before as many are asked.
         let barrier = Barrier::new(ROOMS_ASKED);
         let barrier = &barrier;
-        let describe = |()| async move { drop(barrier.wait().await) };
+        let describe = |()| async move {
+            barrier.wait().await;
+        };
         let numbers: Vec<u64> = (described(rooms, describe).map(|(number, ())| number))
             .collect()
             .await;

@@ -21,6 +21,7 @@ const ILLEGAL: u32 = 0;
 
 /// Something that happens.
 #[derive(Clone)]
+#[expect(clippy::large_enum_variant, reason = "a test holds a few")]
 enum Step {
     /// The agent takes its seat.
     Join,
