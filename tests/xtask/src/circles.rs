@@ -56,24 +56,6 @@ const REMAINING: &[&[&str]] = &[
         "server/record/src/replay/game.rs",
         "server/record/src/replay/mod.rs",
     ],
-    &[
-        "server/record/src/replay/decision.rs",
-        "server/record/src/replay/header.rs",
-        "server/record/src/replay/seed.rs",
-        "server/record/src/table/complete.rs",
-        "server/record/src/table/facts.rs",
-        "server/record/src/table/gifts.rs",
-        "server/record/src/table/golden.rs",
-        "server/record/src/table/known.rs",
-        "server/record/src/table/offers.rs",
-        "server/record/src/table/play.rs",
-        "server/record/src/table/puzzle.rs",
-    ],
-    &[
-        "server/record/src/table/transcript/cells.rs",
-        "server/record/src/table/transcript/mod.rs",
-        "server/record/src/table/transcript/row.rs",
-    ],
     &["server/room/src/answers.rs", "server/room/src/lib.rs"],
     &["server/room/src/journal.rs", "server/room/src/policy.rs"],
     &[
@@ -173,6 +155,19 @@ const REMAINING: &[&[&str]] = &[
         "server/render/src/table/words.rs",
     ],
     &["tests/load/src/host.rs", "tests/load/src/play.rs"],
+    &[
+        "server/record/src/import/complete.rs",
+        "server/record/src/import/facts.rs",
+        "server/record/src/import/game.rs",
+        "server/record/src/import/gifts.rs",
+        "server/record/src/import/known.rs",
+        "server/record/src/import/notation.rs",
+        "server/record/src/import/puzzle.rs",
+        "server/record/src/import/transcript.rs",
+        "server/record/src/replay/decision.rs",
+        "server/record/src/replay/header.rs",
+        "server/record/src/replay/seed.rs",
+    ],
 ];
 
 /// Re-exports that are followed from one name before giving up. Far more than any path has.
