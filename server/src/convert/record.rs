@@ -14,7 +14,7 @@ use super::event::{event_to_proto, standings};
 use super::policy::policy_of;
 use super::room::{aborted_because, participants, series_id, state_to_proto, tournament_id};
 use super::start::{origin, start_to_proto};
-use crate::store::KeptGame;
+use crate::store::StoredGame;
 use chefshat_record::convert::decision_kind;
 use chefshat_room::Core;
 use chefshat_room::journal::{Change, Decided, Entry, GameHeader};
@@ -114,10 +114,10 @@ pub fn summary(core: &Core) -> v1::RecordSummary {
 }
 
 /// Every line of the record of a stored game.
-pub fn lines_of(kept: &KeptGame) -> Cow<'_, [v1::RecordLine]> {
+pub fn lines_of(kept: &StoredGame) -> Cow<'_, [v1::RecordLine]> {
     match kept {
-        KeptGame::Hosted(header, journal) => Cow::Owned(record_lines(header, journal)),
-        KeptGame::Imported(lines) => Cow::Borrowed(lines),
+        StoredGame::Hosted(header, journal) => Cow::Owned(record_lines(header, journal)),
+        StoredGame::Imported(lines) => Cow::Borrowed(lines),
     }
 }
 

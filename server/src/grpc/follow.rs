@@ -9,7 +9,7 @@ use tonic::{Code, Status};
 
 use super::status::{self, status};
 use crate::config::{FOLLOW_INTERVAL, FOLLOW_SEND_TIMEOUT, HEARTBEAT};
-use crate::tournaments::{Hosted, NotWorkedOut};
+use crate::tournaments::{NotWorkedOut, TournamentHandle};
 
 type Sender = mpsc::Sender<Result<FollowTournamentResponse, Status>>;
 
@@ -18,14 +18,14 @@ type Sender = mpsc::Sender<Result<FollowTournamentResponse, Status>>;
 /// # Errors
 /// The follower has gone away, or does not take in what it is told, or there is nothing to tell.
 pub(super) async fn follow(
-    hosted: &Arc<Hosted>,
-    turns: &Arc<Semaphore>,
+    hosted: &Arc<TournamentHandle>,
+    permits: &Arc<Semaphore>,
     sender: &Sender,
 ) -> Result<(), Status> {
     let mut changes = hosted.changes();
     loop {
         changes.mark_unchanged();
-        let told = hosted.told(turns).await.map_err(not_worked_out)?;
+        let told = hosted.told(permits).await.map_err(not_worked_out)?;
         let message = told.message.clone();
         drop(told);
         let over = is_over(&message);
@@ -84,11 +84,11 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn a_follower_that_takes_nothing_in_is_given_up() {
-        let hosted = Hosted::for_tests(4);
+        let hosted = TournamentHandle::for_tests(4);
         let (sender, mut receiver) = mpsc::channel(1);
-        let turns = Arc::new(Semaphore::new(1));
+        let permits = Arc::new(Semaphore::new(1));
         // The first message goes into the channel, the heartbeat does not.
-        let ended = follow(&hosted, &turns, &sender).await;
+        let ended = follow(&hosted, &permits, &sender).await;
         let ended = ended.expect_err("it was not taken in");
         let info = ended.get_details_error_info().expect("it says why");
         assert_eq!(info.reason, "FOLLOWER_TOO_SLOW");

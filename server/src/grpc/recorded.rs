@@ -22,7 +22,7 @@ pub(super) const SERIES_OPEN: &str = "SERIES_OPEN";
 pub struct Recorded {
     rooms: Arc<Rooms>,
     /// Records are large while they are put together: only so many at a time.
-    turns: Arc<Semaphore>,
+    permits: Arc<Semaphore>,
 }
 
 impl Recorded {
@@ -30,7 +30,7 @@ impl Recorded {
     pub fn new(rooms: Arc<Rooms>) -> Self {
         Self {
             rooms,
-            turns: Arc::new(Semaphore::new(MAX_RECORDS_IN_HAND)),
+            permits: Arc::new(Semaphore::new(MAX_RECORDS_IN_HAND)),
         }
     }
 
@@ -64,7 +64,7 @@ impl Recorded {
                 [("field", "game_id")],
             ));
         }
-        let turn = turn(&self.turns).await;
+        let permit = permit(&self.permits).await;
         let kept = (self.rooms.store().finished(game).await)
             .map_err(not_read)?
             .ok_or_else(unknown)?;
@@ -76,7 +76,7 @@ impl Recorded {
                 [("field", "game_id")],
             ));
         }
-        in_background(turn, move || work(lines_of(&kept).into_owned())).await
+        in_background(permit, move || work(lines_of(&kept).into_owned())).await
     }
 
     /// What `work` makes of something that is as large as a record.
@@ -84,14 +84,14 @@ impl Recorded {
         &self,
         work: impl FnOnce() -> T + Send + 'static,
     ) -> Result<T, Status> {
-        in_background(turn(&self.turns).await, work).await
+        in_background(permit(&self.permits).await, work).await
     }
 }
 
 /// Waits for a turn; what is returned holds it.
-pub(super) async fn turn(turns: &Arc<Semaphore>) -> Option<OwnedSemaphorePermit> {
+pub(super) async fn permit(permits: &Arc<Semaphore>) -> Option<OwnedSemaphorePermit> {
     // Nobody closes it; if somebody did, the request would merely not wait.
-    Arc::clone(turns).acquire_owned().await.ok()
+    Arc::clone(permits).acquire_owned().await.ok()
 }
 
 /// What a client is told when the store cannot be read.
@@ -102,11 +102,11 @@ pub(super) fn not_read(error: StoreError) -> Status {
 
 /// Does work that takes milliseconds on a thread that serves nobody. The turn ends with the work.
 async fn in_background<T: Send + 'static>(
-    turn: Option<OwnedSemaphorePermit>,
+    permit: Option<OwnedSemaphorePermit>,
     work: impl FnOnce() -> T + Send + 'static,
 ) -> Result<T, Status> {
     let working = tokio::task::spawn_blocking(move || {
-        let _turn = turn;
+        let _permit = permit;
         work()
     });
     working.await.map_err(|error| {

@@ -17,7 +17,7 @@ use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Code, Request, Response, Status, Streaming};
 
 use super::pages;
-use super::recorded::{Recorded, SERIES_OPEN, not_read, turn};
+use super::recorded::{Recorded, SERIES_OPEN, not_read, permit};
 use super::status::{disk_nearly_full, field, has_reason, status};
 use crate::config::{
     IMPORT_TIMEOUT, MAX_IMPORT_BYTES, MAX_IMPORT_LINES, MAX_IMPORTS, MAX_RECORDS_SENT,
@@ -80,7 +80,7 @@ impl Records {
             };
             after = *last;
             for (_, summary) in page {
-                let _turn = turn(&self.sending).await;
+                let _permit = permit(&self.sending).await;
                 let lines = self.recorded.of_game(&summary.game_id, |lines| lines).await;
                 let lines = match lines {
                     // It can be had when the games with the same deals have ended.
@@ -131,14 +131,14 @@ impl RecordService for Records {
         &self,
         request: Request<v1::GetRecordRequest>,
     ) -> Result<Response<Self::GetRecordStream>, Status> {
-        let turn = turn(&self.sending).await;
+        let permit = permit(&self.sending).await;
         let game_id = request.into_inner().game_id;
         let lines = self.recorded.of_game(&game_id, |lines| lines).await?;
         let (sender, responses) = channel();
         tokio::spawn(async move {
             let response = |lines| v1::GetRecordResponse { lines };
             let sent = send(&sender, lines, response).await;
-            drop(turn);
+            drop(permit);
             end(&sender, sent).await;
         });
         Ok(Response::new(responses))
@@ -173,7 +173,7 @@ impl RecordService for Records {
         if !self.recorded.rooms().store().has_space() {
             return Err(disk_nearly_full("the server's disk is nearly full"));
         }
-        let _turn = turn(&self.receiving).await;
+        let _permit = permit(&self.receiving).await;
         let lines = timeout(IMPORT_TIMEOUT, received(request.into_inner()))
             .await
             .map_err(|_| import_too_slow())??;
@@ -199,7 +199,7 @@ impl RecordService for Records {
                 [("field", "game_id")],
             ));
         }
-        rooms.filing().file(game);
+        rooms.record_writer().write_record(game);
         Ok(Response::new(v1::ImportRecordResponse {
             record: Some(summary),
         }))

@@ -23,7 +23,7 @@ use super::status::{
 use crate::config::{MAX_FOLLOWERS, MAX_GAMES_PAGE, MAX_LEADERBOARD_LINES, MAX_RESULTS_IN_HAND};
 use crate::convert;
 use crate::tournaments::{
-    CreateProblem, Entry, Hosted, JoinRefusal, Leaderboard, Stopped, Tournaments,
+    CreateProblem, Entry, JoinRefusal, Leaderboard, Stopped, TournamentHandle, Tournaments,
 };
 use chefshat_room::ids::{Id, RequestKey, random_bytes};
 use chefshat_room::journal::ParticipantKind;
@@ -64,12 +64,12 @@ impl TournamentCalls {
         }
     }
 
-    fn find(&self, id: &str) -> Result<Arc<Hosted>, Status> {
+    fn find(&self, id: &str) -> Result<Arc<TournamentHandle>, Status> {
         (Id::parse(id).and_then(|id| self.tournaments.get(id))).ok_or_else(unknown)
     }
 
     /// The tournament of a join code; where an id is given too, it must be this tournament's.
-    fn find_by_code(&self, id: &str, join_code: &str) -> Result<Arc<Hosted>, Status> {
+    fn find_by_code(&self, id: &str, join_code: &str) -> Result<Arc<TournamentHandle>, Status> {
         let hosted = match id {
             "" => self.tournaments.by_code(join_code),
             id => Some(self.find(id)?)
@@ -85,7 +85,7 @@ impl TournamentCalls {
         })
     }
 
-    fn find_own(&self, id: &str, owner_token: &str) -> Result<Arc<Hosted>, Status> {
+    fn find_own(&self, id: &str, owner_token: &str) -> Result<Arc<TournamentHandle>, Status> {
         let hosted = self.find(id)?;
         if hosted.is_owner(owner_token) {
             return Ok(hosted);
@@ -255,9 +255,9 @@ impl TournamentService for TournamentCalls {
             )
         })?;
         let (sender, responses) = mpsc::channel(1);
-        let (closing, turns) = (self.closing.clone(), Arc::clone(&self.telling));
+        let (closing, permits) = (self.closing.clone(), Arc::clone(&self.telling));
         let following = async move {
-            let followed = follow(&hosted, &turns, &sender).await;
+            let followed = follow(&hosted, &permits, &sender).await;
             // One that takes nothing in keeps nobody from following.
             drop(place);
             end(&sender, followed).await;

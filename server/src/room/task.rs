@@ -23,8 +23,8 @@ use super::subscriber::{MAX_SPECTATORS, PublicEvents, SeatConnection, Subscriber
 use crate::clock::RoomClock;
 use crate::config::ROOM_MAILBOX;
 use crate::convert;
-use crate::filing::Filing;
 use crate::outbox::{HandStamp, OnSpace, StreamEnd};
+use crate::record_writer::RecordWriter;
 use crate::store::{Journal, Store, StoreError};
 
 /// Inputs that are applied before the store is asked once for all of them.
@@ -36,7 +36,7 @@ pub struct TaskContext {
     /// Where games are kept.
     pub store: Arc<dyn Store>,
     /// Writes records to files.
-    pub filing: Filing,
+    pub record_writer: RecordWriter,
     /// How long an ended room is still shown.
     pub retention: Duration,
     /// Numbers for connections.
@@ -527,7 +527,7 @@ impl Task {
             "the game has ended"
         );
         if has_record {
-            self.context.filing.file(header.game_id);
+            self.context.record_writer.write_record(header.game_id);
         }
         true
     }

@@ -20,9 +20,9 @@ use super::{
     spawn_room,
 };
 use crate::clock::RoomClock;
-use crate::filing::Filing;
 use crate::outbox::StreamEnd;
 use crate::outbox::{Outbox, OutboxStream};
+use crate::record_writer::RecordWriter;
 use crate::store::{Journal, MemoryStore, Store as _, StoreError};
 use chefshat_room::ids::{Id, SecretHash, Token};
 use chefshat_room::journal::{Entry, Fill, GameHeader, GameStart, ParticipantKind};
@@ -79,7 +79,7 @@ async fn room_with(
         None,
         change(journal),
         TaskContext {
-            filing: Filing::new(store.clone(), None, TaskTracker::new()),
+            record_writer: RecordWriter::new(store.clone(), None, TaskTracker::new()),
             store,
             retention: Duration::from_secs(1_000_000),
             connections: Arc::new(AtomicU64::new(1)),

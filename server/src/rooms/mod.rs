@@ -19,7 +19,7 @@ use tokio_util::task::TaskTracker;
 
 use crate::clock::{RoomClock, since_epoch_ms};
 use crate::config::ServerConfig;
-use crate::filing::Filing;
+use crate::record_writer::RecordWriter;
 use crate::room::{Handle, RoomWatcher, TaskContext, spawn_room};
 use crate::store::{Store, StoreError};
 use chefshat_room::Core;
@@ -124,7 +124,11 @@ impl Rooms {
             created: Notify::new(),
             ended: AtomicU64::new(0),
             context: TaskContext {
-                filing: Filing::new(Arc::clone(&store), config.data_dir.clone(), tracker.clone()),
+                record_writer: RecordWriter::new(
+                    Arc::clone(&store),
+                    config.data_dir.clone(),
+                    tracker.clone(),
+                ),
                 store,
                 retention: config.retention,
                 connections: Arc::new(AtomicU64::new(1)),
@@ -272,8 +276,8 @@ impl Rooms {
     }
 
     /// Writes records to files.
-    pub fn filing(&self) -> &Filing {
-        &self.context.filing
+    pub fn record_writer(&self) -> &RecordWriter {
+        &self.context.record_writer
     }
 
     fn is_durable(&self, header: &GameHeader) -> bool {

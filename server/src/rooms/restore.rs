@@ -14,7 +14,7 @@ use super::{Entry, Rooms};
 use crate::clock::{RoomClock, since_epoch_ms};
 use crate::convert;
 use crate::room::spawn_room;
-use crate::store::{LeftGame, Store, StoreError};
+use crate::store::{ResumableGame, Store, StoreError};
 use chefshat_room::Core;
 use chefshat_room::ids::Id;
 use chefshat_room::journal::Fill;
@@ -32,7 +32,7 @@ impl Rooms {
         let unfiled = self.context.store.unfiled().await?;
         let mut players = Players::default();
         let mut restored = 0;
-        for game in self.context.store.left(ended_since_ms).await? {
+        for game in self.context.store.resumable_games(ended_since_ms).await? {
             let id = game.header.game_id;
             let goes_on = !game.concluded;
             match self.go_on_with(game, &mut players).await {
@@ -46,12 +46,12 @@ impl Rooms {
             info!(games = restored, "games go on where they stood");
         }
         for game in unfiled {
-            self.context.filing.file(game);
+            self.context.record_writer.write_record(game);
         }
         Ok(restored)
     }
 
-    async fn go_on_with(&self, game: LeftGame, players: &mut Players) -> Result<(), String> {
+    async fn go_on_with(&self, game: ResumableGame, players: &mut Players) -> Result<(), String> {
         let mut header = game.header;
         if header.rules_version != RULES_VERSION {
             return Err(format!(

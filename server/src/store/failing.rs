@@ -8,8 +8,8 @@ use futures::FutureExt as _;
 use futures::future::{BoxFuture, ready};
 use tokio::sync::{Semaphore, watch};
 
-use super::tournaments::{KeptTournament, TournamentEntry, TournamentHeader};
-use super::{Journal, KeptGame, LeftGame, MemoryStore, Part, Store, StoreError};
+use super::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
+use super::{Journal, MemoryStore, Part, ResumableGame, Store, StoreError, StoredGame};
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Entry, GameHeader};
 
@@ -63,11 +63,14 @@ impl Store for FailingStore {
         .boxed()
     }
 
-    fn left(&self, ended_since_ms: u64) -> BoxFuture<'_, Result<Vec<LeftGame>, StoreError>> {
-        self.inner.left(ended_since_ms)
+    fn resumable_games(
+        &self,
+        ended_since_ms: u64,
+    ) -> BoxFuture<'_, Result<Vec<ResumableGame>, StoreError>> {
+        self.inner.resumable_games(ended_since_ms)
     }
 
-    fn finished(&self, game: Id) -> BoxFuture<'_, Result<Option<KeptGame>, StoreError>> {
+    fn finished(&self, game: Id) -> BoxFuture<'_, Result<Option<StoredGame>, StoreError>> {
         self.inner.finished(game)
     }
 
@@ -123,7 +126,7 @@ impl Store for FailingStore {
     fn tournaments(
         &self,
         newest_over: usize,
-    ) -> BoxFuture<'_, Result<Vec<KeptTournament>, StoreError>> {
+    ) -> BoxFuture<'_, Result<Vec<StoredTournament>, StoreError>> {
         self.inner.tournaments(newest_over)
     }
 

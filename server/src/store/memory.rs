@@ -7,8 +7,8 @@ use chefshat_proto::v1;
 use futures::FutureExt as _;
 use futures::future::{BoxFuture, pending, ready};
 
-use super::tournaments::{KeptTournament, TournamentEntry, TournamentHeader};
-use super::{Journal, KeptGame, LeftGame, Part, Store, StoreError, lets_through};
+use super::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
+use super::{Journal, Part, ResumableGame, Store, StoreError, StoredGame, lets_through};
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Entry, GameHeader};
 
@@ -37,14 +37,14 @@ struct Finished {
 struct FinishedGame {
     id: Id,
     summary: v1::RecordSummary,
-    kept: KeptGame,
+    kept: StoredGame,
 }
 
 impl FinishedGame {
     fn entries(&self) -> usize {
         match &self.kept {
-            KeptGame::Hosted(_, entries) => entries.len(),
-            KeptGame::Imported(lines) => lines.len(),
+            StoredGame::Hosted(_, entries) => entries.len(),
+            StoredGame::Imported(lines) => lines.len(),
         }
     }
 }
@@ -64,7 +64,7 @@ impl Finished {
         }
     }
 
-    fn get(&self, game: Id) -> Option<&KeptGame> {
+    fn get(&self, game: Id) -> Option<&StoredGame> {
         let number = self.numbers.get(&game)?;
         self.games.get(number).map(|game| &game.kept)
     }
@@ -91,11 +91,14 @@ impl Store for MemoryStore {
         ready(Ok(Box::new(journal) as Box<dyn Journal>)).boxed()
     }
 
-    fn left(&self, _ended_since_ms: u64) -> BoxFuture<'_, Result<Vec<LeftGame>, StoreError>> {
+    fn resumable_games(
+        &self,
+        _ended_since_ms: u64,
+    ) -> BoxFuture<'_, Result<Vec<ResumableGame>, StoreError>> {
         ready(Ok(Vec::new())).boxed()
     }
 
-    fn finished(&self, game: Id) -> BoxFuture<'_, Result<Option<KeptGame>, StoreError>> {
+    fn finished(&self, game: Id) -> BoxFuture<'_, Result<Option<StoredGame>, StoreError>> {
         ready(Ok(lock(&self.finished).get(game).cloned())).boxed()
     }
 
@@ -127,7 +130,7 @@ impl Store for MemoryStore {
             finished.keep(FinishedGame {
                 id: game,
                 summary,
-                kept: KeptGame::Imported(lines),
+                kept: StoredGame::Imported(lines),
             });
         }
         ready(Ok(new)).boxed()
@@ -161,7 +164,7 @@ impl Store for MemoryStore {
     fn tournaments(
         &self,
         _newest_over: usize,
-    ) -> BoxFuture<'_, Result<Vec<KeptTournament>, StoreError>> {
+    ) -> BoxFuture<'_, Result<Vec<StoredTournament>, StoreError>> {
         ready(Ok(Vec::new())).boxed()
     }
 
@@ -198,7 +201,7 @@ impl Journal for MemoryJournal {
             lock(&self.finished).keep(FinishedGame {
                 id: self.header.game_id,
                 summary: *summary,
-                kept: KeptGame::Hosted(Arc::clone(&self.header), entries),
+                kept: StoredGame::Hosted(Arc::clone(&self.header), entries),
             });
         }
         ready(Ok(())).boxed()

@@ -19,7 +19,7 @@ pub use sqlite::{ForgetError, Forgetting, Forgotten, OpenError, SqliteStore};
 
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Entry, GameHeader, TournamentGame};
-use tournaments::{KeptTournament, TournamentEntry, TournamentHeader};
+use tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
 
 /// Why a store could not do what it was asked, and what to do about it.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -34,14 +34,14 @@ pub enum StoreError {
 
 /// A finished game as it was kept.
 #[derive(Debug, Clone)]
-pub enum KeptGame {
+pub enum StoredGame {
     /// A game that was hosted: its header and its journal.
     Hosted(Arc<GameHeader>, Arc<[Entry]>),
     /// A game that was imported: the lines of its record.
     Imported(Arc<[v1::RecordLine]>),
 }
 
-impl KeptGame {
+impl StoredGame {
     /// The tournament it belongs to, if it is one of this server's.
     pub fn tournament(&self) -> Option<TournamentGame> {
         match self {
@@ -68,7 +68,7 @@ impl Part {
 }
 
 /// A game whose room is to be there again after the server ended.
-pub struct LeftGame {
+pub struct ResumableGame {
     /// Its header; the recorded players of its seats are left for the caller to fill in.
     pub header: GameHeader,
     /// Everything that was kept of it.
@@ -95,9 +95,12 @@ pub trait Store: Send + Sync + 'static {
     ) -> BoxFuture<'_, Result<Box<dyn Journal>, StoreError>>;
     /// The games that were going on when the server ended, and those that had ended since a time (milliseconds since the Unix epoch), of
     /// which somebody may not have heard; oldest first. One that cannot be read is left as it is, and logged.
-    fn left(&self, ended_since_ms: u64) -> BoxFuture<'_, Result<Vec<LeftGame>, StoreError>>;
+    fn resumable_games(
+        &self,
+        ended_since_ms: u64,
+    ) -> BoxFuture<'_, Result<Vec<ResumableGame>, StoreError>>;
     /// A finished game, or `None`.
-    fn finished(&self, game: Id) -> BoxFuture<'_, Result<Option<KeptGame>, StoreError>>;
+    fn finished(&self, game: Id) -> BoxFuture<'_, Result<Option<StoredGame>, StoreError>>;
     /// At most `count` finished games that a filter lets through, of a part of the list and in its order, with their numbers.
     fn list<'a>(
         &'a self,
@@ -134,7 +137,7 @@ pub trait Store: Send + Sync + 'static {
     fn tournaments(
         &self,
         newest_over: usize,
-    ) -> BoxFuture<'_, Result<Vec<KeptTournament>, StoreError>>;
+    ) -> BoxFuture<'_, Result<Vec<StoredTournament>, StoreError>>;
     /// Returns when the store can keep nothing any more; until then it waits.
     fn failed(&self) -> BoxFuture<'static, StoreError>;
     /// Ends in good order; nothing is asked of it afterwards.

@@ -55,7 +55,7 @@ impl TournamentEntry {
 
 /// A tournament as it was kept.
 #[derive(Debug, Clone)]
-pub struct KeptTournament {
+pub struct StoredTournament {
     /// Its header.
     pub header: TournamentHeader,
     /// Everything that moved it, in order.

@@ -17,7 +17,7 @@ use crate::config::{MAX_NAME_CHARS, TOURNAMENT_RETRY};
 use crate::convert;
 use crate::rooms::{CreateError, NewRoom, Seating};
 use crate::store::tournaments::TournamentEntry;
-use crate::store::{KeptGame, StoreError};
+use crate::store::{StoreError, StoredGame};
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Fill, GameStart, SeatedParticipant, TournamentGame};
 
@@ -69,7 +69,7 @@ impl Task {
     /// What came of a game whose room is over or gone; `None` if nothing did, and that was nobody's fault.
     async fn ended(&self, game: usize, room: Id, game_id: Id) -> Result<Option<Ended>, StoreError> {
         // A record with this id that was imported is not the tournament's game.
-        let is_ours = |game: &KeptGame| {
+        let is_ours = |game: &StoredGame| {
             (game.tournament()).is_some_and(|game| game.tournament == self.hosted.id())
         };
         if let Some(kept) = self.rooms.store().finished(game_id).await?.filter(is_ours) {

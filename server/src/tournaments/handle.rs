@@ -182,7 +182,7 @@ impl TournamentState {
 
 /// A tournament of this server.
 #[derive(Debug)]
-pub struct Hosted {
+pub struct TournamentHandle {
     pub(super) header: TournamentHeader,
     pub(super) plan: TournamentPlan,
     /// With committed changes alone.
@@ -193,7 +193,7 @@ pub struct Hosted {
     pub(super) shown: Shown,
 }
 
-impl Hosted {
+impl TournamentHandle {
     /// Which tournament.
     pub fn id(&self) -> Id {
         self.header.id

@@ -20,7 +20,7 @@ use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 use tracing::{error, info};
 
-pub use handle::{Call, Connection, Entry, Hosted, JoinRefusal, Stopped};
+pub use handle::{Call, Connection, Entry, JoinRefusal, Stopped, TournamentHandle};
 pub use leaderboard::Leaderboard;
 pub use shared::NotWorkedOut;
 
@@ -29,7 +29,7 @@ use crate::config::{MAX_TOURNAMENTS, TOURNAMENT_MAILBOX};
 use crate::convert::{self, TournamentPlan};
 use crate::rooms::Rooms;
 use crate::store::StoreError;
-use crate::store::tournaments::{KeptTournament, TournamentEntry, TournamentHeader};
+use crate::store::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
 use chefshat_room::ids::{Id, RequestKey, Token, join_code, normal_code, random_bytes};
 use handle::TournamentState;
 use shown::Shown;
@@ -100,7 +100,7 @@ impl Tournaments {
         name: &str,
         plan: TournamentPlan,
         request: Option<RequestKey>,
-    ) -> Result<(Arc<Hosted>, Token), CreateProblem> {
+    ) -> Result<(Arc<TournamentHandle>, Token), CreateProblem> {
         let core = Tournament::new(plan.core.clone())?;
         if self.stop.no_more_games.is_cancelled() || self.rooms.is_shutting_down() {
             return Err(CreateProblem::ShuttingDown);
@@ -169,12 +169,12 @@ impl Tournaments {
     }
 
     /// A tournament by its id.
-    pub fn get(&self, id: Id) -> Option<Arc<Hosted>> {
+    pub fn get(&self, id: Id) -> Option<Arc<TournamentHandle>> {
         self.lock().get(id).cloned()
     }
 
     /// A tournament by its join code.
-    pub fn by_code(&self, code: &str) -> Option<Arc<Hosted>> {
+    pub fn by_code(&self, code: &str) -> Option<Arc<TournamentHandle>> {
         self.lock().by_code(&normal_code(code)).cloned()
     }
 
@@ -183,7 +183,7 @@ impl Tournaments {
         let all: Vec<_> = (self.lock().earlier(None))
             .map(|(_, hosted)| Arc::clone(hosted))
             .collect();
-        let announces = |hosted: &Arc<Hosted>| {
+        let announces = |hosted: &Arc<TournamentHandle>| {
             (hosted.committed().placed.values()).any(|(_, announced)| *announced == game)
         };
         all.iter().any(announces)
@@ -196,9 +196,10 @@ impl Tournaments {
         before: Option<u64>,
         state: Option<State>,
         count: usize,
-    ) -> Vec<(u64, Arc<Hosted>)> {
-        let is_wanted =
-            |hosted: &Hosted| state.is_none_or(|state| hosted.look(Tournament::state) == state);
+    ) -> Vec<(u64, Arc<TournamentHandle>)> {
+        let is_wanted = |hosted: &TournamentHandle| {
+            state.is_none_or(|state| hosted.look(Tournament::state) == state)
+        };
         // Looked at when the table is free again: each may be busy for a moment.
         let earlier: Vec<_> = (self.lock().earlier(before))
             .map(|(number, hosted)| (number, Arc::clone(hosted)))
@@ -214,9 +215,9 @@ impl Tournaments {
         rows: u64,
         plan: TournamentPlan,
         state: TournamentState,
-    ) -> Arc<Hosted> {
+    ) -> Arc<TournamentHandle> {
         let (mailbox, inbox) = mpsc::channel(TOURNAMENT_MAILBOX);
-        let hosted = Arc::new(Hosted {
+        let hosted = Arc::new(TournamentHandle {
             header,
             plan,
             committed: Mutex::new(state),
@@ -268,7 +269,7 @@ impl Reservation {
         name: String,
         plan: TournamentPlan,
         core: Tournament,
-    ) -> Result<(Arc<Hosted>, Token), CreateProblem> {
+    ) -> Result<(Arc<TournamentHandle>, Token), CreateProblem> {
         let tournaments = &self.tournaments;
         let owner = self.owner;
         let header = TournamentHeader {
@@ -321,7 +322,7 @@ fn built_in(plan: &TournamentPlan) -> Vec<Entrant> {
 }
 
 /// A tournament as it stood, from what was kept of it.
-fn folded(kept: &KeptTournament) -> Result<(TournamentPlan, TournamentState), String> {
+fn folded(kept: &StoredTournament) -> Result<(TournamentPlan, TournamentState), String> {
     let plan = convert::tournament_plan(&kept.header.settings, [0; 32])
         .map_err(|problem: FieldProblem| problem.to_string())?;
     let core = Tournament::new(plan.core.clone()).map_err(|problem| problem.to_string())?;

@@ -8,7 +8,7 @@ use chefshat_tournament::ratings::Ratings;
 use chefshat_tournament::{Format, Game, GameState, State, Tournament};
 use tokio::sync::Semaphore;
 
-use super::handle::Hosted;
+use super::handle::TournamentHandle;
 use super::shared::{NotWorkedOut, Shared};
 use crate::config::MAX_GAMES_FOLLOWED;
 use crate::convert;
@@ -39,16 +39,16 @@ pub(super) struct Shown {
     results: Shared<AsOf<v1::GetTournamentResultsResponse>>,
 }
 
-impl Hosted {
+impl TournamentHandle {
     /// What followers are told now. It is worked out when one of the `turns` is free.
     ///
     /// # Errors
     /// It could not be worked out.
     pub async fn told(
         self: &Arc<Self>,
-        turns: &Arc<Semaphore>,
+        permits: &Arc<Semaphore>,
     ) -> Result<Arc<AsOf<v1::FollowTournamentResponse>>, NotWorkedOut> {
-        let work = self.as_of_now(turns, Self::tell);
+        let work = self.as_of_now(permits, Self::tell);
         let serves = |told: &AsOf<_>| told.mark == self.mark();
         self.shown.told.get(serves, work).await
     }
@@ -59,9 +59,9 @@ impl Hosted {
     /// They could not be worked out.
     pub async fn results(
         self: &Arc<Self>,
-        turns: &Arc<Semaphore>,
+        permits: &Arc<Semaphore>,
     ) -> Result<Arc<AsOf<v1::GetTournamentResultsResponse>>, NotWorkedOut> {
-        let work = self.as_of_now(turns, Self::sum_up);
+        let work = self.as_of_now(permits, Self::sum_up);
         let serves = |results: &AsOf<_>| results.mark == self.mark();
         self.shown.results.get(serves, work).await
     }
@@ -80,15 +80,15 @@ impl Hosted {
     /// What `work` makes of the tournament, on a thread that serves nobody.
     fn as_of_now<M: Send + 'static>(
         self: &Arc<Self>,
-        turns: &Arc<Semaphore>,
+        permits: &Arc<Semaphore>,
         work: fn(&Self) -> M,
     ) -> impl Future<Output = Result<AsOf<M>, NotWorkedOut>> + Send + use<M> {
-        let (hosted, turns) = (Arc::clone(self), Arc::clone(turns));
+        let (hosted, permits) = (Arc::clone(self), Arc::clone(permits));
         async move {
             // Nobody closes them; if somebody did, the work would merely not wait.
-            let turn = turns.acquire_owned().await.ok();
+            let permit = permits.acquire_owned().await.ok();
             let working = tokio::task::spawn_blocking(move || {
-                let _turn = turn;
+                let _permit = permit;
                 // The message may show more than the mark says, but not less.
                 let mark = hosted.mark();
                 let message = work(&hosted);

@@ -4,7 +4,7 @@
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
 
-use super::handle::Hosted;
+use super::handle::TournamentHandle;
 use crate::config::MAX_TOURNAMENTS;
 use chefshat_room::ids::Id;
 
@@ -12,7 +12,7 @@ use chefshat_room::ids::Id;
 pub(super) struct Table {
     next_number: u64,
     /// In the order in which they were made.
-    by_number: BTreeMap<u64, Arc<Hosted>>,
+    by_number: BTreeMap<u64, Arc<TournamentHandle>>,
     numbers: HashMap<Id, u64>,
     codes: HashMap<String, u64>,
     /// Tournaments that are being created, for which space is reserved.
@@ -21,12 +21,12 @@ pub(super) struct Table {
 
 impl Table {
     /// A tournament by its id.
-    pub(super) fn get(&self, id: Id) -> Option<&Arc<Hosted>> {
+    pub(super) fn get(&self, id: Id) -> Option<&Arc<TournamentHandle>> {
         self.by_number.get(self.numbers.get(&id)?)
     }
 
     /// A tournament by its join code in capitals, without spaces and dashes.
-    pub(super) fn by_code(&self, code: &str) -> Option<&Arc<Hosted>> {
+    pub(super) fn by_code(&self, code: &str) -> Option<&Arc<TournamentHandle>> {
         self.by_number.get(self.codes.get(code)?)
     }
 
@@ -34,7 +34,7 @@ impl Table {
     pub(super) fn earlier(
         &self,
         before: Option<u64>,
-    ) -> impl Iterator<Item = (u64, &Arc<Hosted>)> + '_ {
+    ) -> impl Iterator<Item = (u64, &Arc<TournamentHandle>)> + '_ {
         let earlier = self.by_number.range(..before.unwrap_or(u64::MAX)).rev();
         earlier.map(|(number, hosted)| (*number, hosted))
     }
@@ -60,7 +60,7 @@ impl Table {
     }
 
     /// Adds a tournament. Those that are over are shown only as long as there is space for them.
-    pub(super) fn enter(&mut self, hosted: Arc<Hosted>) {
+    pub(super) fn enter(&mut self, hosted: Arc<TournamentHandle>) {
         while self.by_number.len() >= MAX_TOURNAMENTS
             && let Some(number) = (self.by_number.iter())
                 .find(|(_, hosted)| hosted.is_over())

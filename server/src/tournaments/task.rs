@@ -12,7 +12,9 @@ use tracing::{error, info};
 
 use super::Stop;
 use super::games::plays_itself;
-use super::handle::{Call, Connection, Entry, Hosted, JoinRefusal, Message, TournamentState};
+use super::handle::{
+    Call, Connection, Entry, JoinRefusal, Message, TournamentHandle, TournamentState,
+};
 use crate::config::TOURNAMENT_OPEN_TIME;
 use crate::rooms::Rooms;
 use crate::store::StoreError;
@@ -24,7 +26,7 @@ const MESSAGES_AT_A_TIME: usize = 64;
 
 /// Moves a tournament until the server ends.
 pub(super) struct Task {
-    pub(super) hosted: Arc<Hosted>,
+    pub(super) hosted: Arc<TournamentHandle>,
     pub(super) rooms: Arc<Rooms>,
     /// With pending changes; the handle's copy follows when they are committed.
     pub(super) state: TournamentState,
@@ -53,7 +55,7 @@ pub(super) struct Task {
 
 impl Task {
     /// The task of a tournament of which so many rows have been kept.
-    pub(super) fn new(hosted: Arc<Hosted>, rooms: Arc<Rooms>, rows: u64) -> Self {
+    pub(super) fn new(hosted: Arc<TournamentHandle>, rooms: Arc<Rooms>, rows: u64) -> Self {
         let state = hosted.committed().clone();
         Self {
             state,

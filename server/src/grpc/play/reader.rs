@@ -22,7 +22,7 @@ use crate::outbox::{Outbox, StreamEnd};
 use crate::room::subscriber::DeliveryOptions;
 use crate::room::{AttachRequest, Handle, RoomGone, SeatAction};
 use crate::rooms::Rooms;
-use crate::tournaments::{Call, Connection, Hosted, Tournaments};
+use crate::tournaments::{Call, Connection, TournamentHandle, Tournaments};
 use crate::wire::Updates;
 use chefshat_room::ids::{Id, Token};
 use chefshat_room::{Answer, ConnectionId};
@@ -322,7 +322,7 @@ static CONNECTIONS: AtomicU64 = AtomicU64::new(1);
 
 /// A participant of a tournament that is attached to a stream.
 pub(super) struct BoundParticipant {
-    tournament: Arc<Hosted>,
+    tournament: Arc<TournamentHandle>,
     participant: usize,
     connection: u64,
     /// The request that attached it. Its options hold for its seats too.
@@ -341,7 +341,7 @@ impl Reader {
     /// Attaches a participant of a tournament, which then calls it to its games.
     pub(super) async fn enter(
         &mut self,
-        tournament: Arc<Hosted>,
+        tournament: Arc<TournamentHandle>,
         token: Token,
         attach: v1::Attach,
         handle: u32,

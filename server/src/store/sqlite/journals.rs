@@ -11,19 +11,19 @@ use tracing::error;
 
 use super::codec::Codec;
 use super::form;
-use super::writer::{Order, Pending, Row};
+use super::writer::{Pending, Row, WriteCommand};
 use crate::store::{Journal, StoreError};
 use chefshat_room::journal::{Entry, GameHeader};
 
 /// The way to the writer.
 #[derive(Clone)]
-pub(super) struct Orders {
+pub(super) struct WriteQueue {
     pub(super) queue: mpsc::Sender<Pending>,
     /// The number of the next row of the journal.
     pub(super) next_row: Arc<AtomicI64>,
 }
 
-impl Orders {
+impl WriteQueue {
     /// A number for a row of the journal.
     fn new_row(&self) -> i64 {
         self.next_row.fetch_add(1, Ordering::Relaxed)
@@ -35,7 +35,7 @@ impl Orders {
     }
 
     /// Gives an order and waits until it is kept.
-    pub(super) async fn give(&self, order: Order) -> Result<(), StoreError> {
+    pub(super) async fn give(&self, order: WriteCommand) -> Result<(), StoreError> {
         let gone = || StoreError::Failed("the database is closed".into());
         let (reply, kept) = oneshot::channel();
         let order = self.queue.send((order, reply));
@@ -50,7 +50,7 @@ pub(super) struct DurableJournal {
     pub(super) position: i64,
     /// Its last row so far.
     pub(super) last_row: Option<i64>,
-    pub(super) orders: Orders,
+    pub(super) orders: WriteQueue,
 }
 
 impl DurableJournal {
@@ -62,7 +62,7 @@ impl DurableJournal {
     ) -> Result<(), StoreError> {
         let first_row = self.orders.first_row();
         let first = (!entries.is_empty()).then(|| self.next_row(entries));
-        let create = Order::Create {
+        let create = WriteCommand::Create {
             number: self.number,
             game_id: header.game_id,
             header: form::header_to_bytes(header),
@@ -94,7 +94,7 @@ impl Journal for DurableJournal {
         entries: &'a mut Vec<Entry>,
     ) -> BoxFuture<'a, Result<(), StoreError>> {
         let row = self.next_row(entries);
-        self.orders.give(Order::Append(row)).boxed()
+        self.orders.give(WriteCommand::Append(row)).boxed()
     }
 
     fn finish(
@@ -102,7 +102,7 @@ impl Journal for DurableJournal {
         summary: Option<Box<v1::RecordSummary>>,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
         self.orders
-            .give(Order::Finish {
+            .give(WriteCommand::Finish {
                 number: self.number,
                 // Only an aborted game can end before anything was dealt.
                 state: v1::RoomState::Aborted.into(),
@@ -118,7 +118,7 @@ pub(super) struct EphemeralJournal {
     pub(super) number: i64,
     pub(super) header: Arc<GameHeader>,
     pub(super) entries: Vec<Entry>,
-    pub(super) orders: Orders,
+    pub(super) orders: WriteQueue,
     pub(super) codec: Codec,
 }
 
@@ -145,7 +145,7 @@ impl Journal for EphemeralJournal {
         async move {
             let (header, entries) = self.codec.run(count, encoding).await?;
             let game_id = self.header.game_id;
-            let game = Order::Whole {
+            let game = WriteCommand::Whole {
                 number: self.number,
                 game_id,
                 header,

@@ -27,16 +27,16 @@ use tracing::error;
 pub use forget::{ForgetError, Forgetting, Forgotten};
 pub use open::OpenError;
 
-use super::tournaments::{KeptTournament, TournamentEntry, TournamentHeader};
-use super::{Journal, KeptGame, LeftGame, Part, Store, StoreError};
+use super::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
+use super::{Journal, Part, ResumableGame, Store, StoreError, StoredGame};
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Entry, GameHeader};
 use chefshat_room::policy::Durability;
 use codec::Codec;
 use errors::explain;
-use journals::{DurableJournal, EphemeralJournal, Orders};
+use journals::{DurableJournal, EphemeralJournal, WriteQueue};
 use reader::Reader;
-use writer::{Order, TournamentRow};
+use writer::{TournamentRow, WriteCommand};
 
 /// Space on the disk that is left to games that go on: new ones are refused before it is used. Of a small disk this is a share.
 const MAX_RESERVE_BYTES: u64 = 64 * 1024 * 1024;
@@ -47,7 +47,7 @@ pub struct SqliteStore {
     data_dir: PathBuf,
     reader: Reader,
     codec: Codec,
-    orders: Orders,
+    orders: WriteQueue,
     failed: watch::Receiver<Option<StoreError>>,
     numbers: Arc<AtomicI64>,
     writing: Mutex<Option<JoinHandle<()>>>,
@@ -82,7 +82,7 @@ impl SqliteStore {
                 codec: codec.clone(),
             },
             codec,
-            orders: Orders {
+            orders: WriteQueue {
                 queue: orders,
                 next_row: Arc::new(AtomicI64::new(last_row + 1)),
             },
@@ -141,11 +141,16 @@ impl Store for SqliteStore {
         .boxed()
     }
 
-    fn left(&self, ended_since_ms: u64) -> BoxFuture<'_, Result<Vec<LeftGame>, StoreError>> {
-        self.reader.left(ended_since_ms, &self.orders).boxed()
+    fn resumable_games(
+        &self,
+        ended_since_ms: u64,
+    ) -> BoxFuture<'_, Result<Vec<ResumableGame>, StoreError>> {
+        self.reader
+            .resumable_games(ended_since_ms, &self.orders)
+            .boxed()
     }
 
-    fn finished(&self, game: Id) -> BoxFuture<'_, Result<Option<KeptGame>, StoreError>> {
+    fn finished(&self, game: Id) -> BoxFuture<'_, Result<Option<StoredGame>, StoreError>> {
         self.reader.finished(game).boxed()
     }
 
@@ -170,7 +175,7 @@ impl Store for SqliteStore {
             let count = lines.len();
             let encoding = self.codec.run(count, move || form::lines_to_bytes(&lines));
             let record = encoding.await?;
-            let import = Order::Import {
+            let import = WriteCommand::Import {
                 number,
                 game_id: game,
                 record,
@@ -190,7 +195,7 @@ impl Store for SqliteStore {
     }
 
     fn note_filed(&self, game_id: Id) -> BoxFuture<'_, Result<(), StoreError>> {
-        self.orders.give(Order::Filed { game_id }).boxed()
+        self.orders.give(WriteCommand::Filed { game_id }).boxed()
     }
 
     fn create_tournament(
@@ -198,7 +203,7 @@ impl Store for SqliteStore {
         header: Arc<TournamentHeader>,
         entries: Vec<TournamentEntry>,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
-        let order = Order::Tournament {
+        let order = WriteCommand::Tournament {
             header: form::tournament_to_bytes(&header),
             first: TournamentRow::new(header.id, 0, &entries),
         };
@@ -212,13 +217,15 @@ impl Store for SqliteStore {
         entries: Vec<TournamentEntry>,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
         let row = TournamentRow::new(tournament, row, &entries);
-        self.orders.give(Order::TournamentEntries(row)).boxed()
+        self.orders
+            .give(WriteCommand::TournamentEntries(row))
+            .boxed()
     }
 
     fn tournaments(
         &self,
         newest_over: usize,
-    ) -> BoxFuture<'_, Result<Vec<KeptTournament>, StoreError>> {
+    ) -> BoxFuture<'_, Result<Vec<StoredTournament>, StoreError>> {
         self.reader.tournaments(newest_over).boxed()
     }
 
@@ -246,7 +253,7 @@ impl Store for SqliteStore {
             self.closed.store(true, Ordering::Release);
             self.reader.pool.close().await;
             // A writer that has failed says so elsewhere; here it is only waited for.
-            let _ = self.orders.give(Order::Close).await;
+            let _ = self.orders.give(WriteCommand::Close).await;
             let writing = self
                 .writing
                 .lock()

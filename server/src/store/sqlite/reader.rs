@@ -13,9 +13,9 @@ use tracing::error;
 use super::codec::Codec;
 use super::errors::explain;
 use super::form::{self, FORM, Unreadable};
-use super::journals::{DurableJournal, Orders};
-use crate::store::tournaments::{KeptTournament, TournamentEntry};
-use crate::store::{KeptGame, LeftGame, Part, StoreError};
+use super::journals::{DurableJournal, WriteQueue};
+use crate::store::tournaments::{StoredTournament, TournamentEntry};
+use crate::store::{Part, ResumableGame, StoreError, StoredGame};
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Entry, GameHeader};
 
@@ -49,11 +49,11 @@ pub(super) struct Reader {
 
 impl Reader {
     /// See `Store::left`.
-    pub(super) async fn left(
+    pub(super) async fn resumable_games(
         &self,
         ended_since_ms: u64,
-        orders: &Orders,
-    ) -> Result<Vec<LeftGame>, StoreError> {
+        orders: &WriteQueue,
+    ) -> Result<Vec<ResumableGame>, StoreError> {
         let games = sqlx::query(
             "SELECT number, form, header, state, last_row FROM games WHERE number IN (
                  SELECT number FROM games WHERE state = 0
@@ -79,7 +79,7 @@ impl Reader {
                 false => going_on.remove(&number).unwrap_or(Ok(Read::default())),
             };
             match header.and_then(|header| Ok((header, read?))) {
-                Ok((header, read)) => left.push(LeftGame {
+                Ok((header, read)) => left.push(ResumableGame {
                     journal: Box::new(DurableJournal {
                         number,
                         position: read.rows,
@@ -99,7 +99,7 @@ impl Reader {
     }
 
     /// See `Store::finished`.
-    pub(super) async fn finished(&self, game: Id) -> Result<Option<KeptGame>, StoreError> {
+    pub(super) async fn finished(&self, game: Id) -> Result<Option<StoredGame>, StoreError> {
         let row = sqlx::query(
             "SELECT number, form, header, record, last_row
              FROM games LEFT JOIN added_records ON game = number
@@ -120,12 +120,12 @@ impl Reader {
                 .codec
                 .run(record.len() / 64, move || form::lines_from_bytes(&record));
             let lines = decoding.await?.map_err(unreadable)?;
-            return Ok(Some(KeptGame::Imported(lines.into())));
+            return Ok(Some(StoredGame::Imported(lines.into())));
         }
         let header = header_of(&row).map_err(unreadable)?;
         let journal = self.journal(row.get(0), row.get(4)).await?;
         let journal = journal.map_err(unreadable)?;
-        Ok(Some(KeptGame::Hosted(
+        Ok(Some(StoredGame::Hosted(
             Arc::new(header),
             journal.entries.into(),
         )))
@@ -135,7 +135,7 @@ impl Reader {
     pub(super) async fn tournaments(
         &self,
         newest_over: usize,
-    ) -> Result<Vec<KeptTournament>, StoreError> {
+    ) -> Result<Vec<StoredTournament>, StoreError> {
         let tournaments = sqlx::query(
             "SELECT number, form, header FROM tournaments WHERE number IN (
                  SELECT number FROM tournaments WHERE over = 0
@@ -171,7 +171,7 @@ impl Reader {
                 });
             }
             match header.and_then(|header| Ok((header, entries?))) {
-                Ok((header, entries)) => kept.push(KeptTournament {
+                Ok((header, entries)) => kept.push(StoredTournament {
                     header,
                     entries,
                     rows: u64::try_from(parts.len()).unwrap_or(u64::MAX),

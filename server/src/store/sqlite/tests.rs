@@ -19,7 +19,7 @@ use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
 use sqlx::{Connection as _, Executor as _};
 
 use super::{OpenError, SqliteStore, form, open};
-use crate::store::{KeptGame, Part, Store};
+use crate::store::{Part, Store, StoredGame};
 use chefshat_room::ids::{Id, SecretHash};
 use chefshat_room::journal::{
     AbortReason, Branch, Change, Decided, Entry, Fill, GameHeader, GameStart, ParticipantKind,
@@ -184,7 +184,7 @@ async fn a_game_that_goes_on_is_found_as_it_was_left() {
     drop(journal);
     drop(store);
     let store = opened(folder.path()).await;
-    let mut unfinished = store.left(u64::MAX).await.expect("readable");
+    let mut unfinished = store.resumable_games(u64::MAX).await.expect("readable");
     assert_eq!(unfinished.len(), 1);
     let mut game = unfinished.pop().expect("one");
     assert_eq!(shown(&game.header), shown(&*header));
@@ -207,15 +207,21 @@ async fn a_game_that_goes_on_is_found_as_it_was_left() {
     store.close().await;
     drop(store);
     let store = opened(folder.path()).await;
-    assert!(store.left(u64::MAX).await.expect("readable").is_empty());
+    assert!(
+        store
+            .resumable_games(u64::MAX)
+            .await
+            .expect("readable")
+            .is_empty()
+    );
     let kept = store.finished(header.game_id).await.expect("readable");
-    let Some(KeptGame::Hosted(kept, journal)) = kept else {
+    let Some(StoredGame::Hosted(kept, journal)) = kept else {
         panic!("not kept: {kept:?}");
     };
     assert_eq!(shown(&*kept), shown(&*header));
     assert_eq!(shown(&journal.to_vec()), shown(&[entries, more].concat()));
     let ended_at_ms = summary(&header).ended_at_ms;
-    let left = store.left(ended_at_ms).await.expect("readable");
+    let left = store.resumable_games(ended_at_ms).await.expect("readable");
     assert_eq!(left.len(), 1, "it is still shown for a while");
     assert!(left[0].concluded);
     assert_eq!(store.unfiled().await.expect("readable"), [header.game_id]);
@@ -235,14 +241,14 @@ async fn a_game_begins_with_its_first_entries() {
         let mut journal = begun.expect("kept");
         if durability == Durability::Durable {
             // The process might die here: no game is there without them.
-            let left = store.left(u64::MAX).await.expect("readable");
+            let left = store.resumable_games(u64::MAX).await.expect("readable");
             assert_eq!(left.len(), 1);
             assert_eq!(shown(&left[0].entries), shown(&first.to_vec()));
         }
         journal.append(&mut rest.to_vec()).await.expect("kept");
         journal.finish(Some(summary(&header))).await.expect("kept");
         let kept = store.finished(header.game_id).await.expect("readable");
-        let Some(KeptGame::Hosted(_, journal)) = kept else {
+        let Some(StoredGame::Hosted(_, journal)) = kept else {
             panic!("not kept: {kept:?}");
         };
         assert_eq!(shown(&journal.to_vec()), shown(&entries));
@@ -259,10 +265,16 @@ async fn an_ephemeral_game_is_kept_when_it_ends_and_not_before() {
         .await
         .expect("begun");
     journal.append(&mut entries()).await.expect("in memory");
-    assert!(store.left(u64::MAX).await.expect("readable").is_empty());
+    assert!(
+        store
+            .resumable_games(u64::MAX)
+            .await
+            .expect("readable")
+            .is_empty()
+    );
     journal.finish(Some(summary(&header))).await.expect("kept");
     let kept = store.finished(header.game_id).await.expect("readable");
-    let Some(KeptGame::Hosted(_, journal)) = kept else {
+    let Some(StoredGame::Hosted(_, journal)) = kept else {
         panic!("not kept: {kept:?}");
     };
     assert_eq!(shown(&journal.to_vec()), shown(&entries()));
@@ -287,7 +299,7 @@ async fn many_rooms_share_the_writer() {
     for room in playing.collect::<Vec<_>>() {
         room.await.expect("no panic");
     }
-    let unfinished = store.left(u64::MAX).await.expect("readable");
+    let unfinished = store.resumable_games(u64::MAX).await.expect("readable");
     assert_eq!(unfinished.len(), usize::from(ROOMS));
     for game in unfinished {
         assert_eq!(shown(&game.entries), shown(&entries()));
@@ -330,11 +342,17 @@ async fn an_imported_game_is_kept_once() {
     let listed = listed.expect("readable");
     assert!(listed.is_empty());
     let kept = store.finished(header.game_id).await.expect("readable");
-    let Some(KeptGame::Imported(kept)) = kept else {
+    let Some(StoredGame::Imported(kept)) = kept else {
         panic!("not kept: {kept:?}");
     };
     assert_eq!(kept, lines);
-    assert!(store.left(u64::MAX).await.expect("readable").is_empty());
+    assert!(
+        store
+            .resumable_games(u64::MAX)
+            .await
+            .expect("readable")
+            .is_empty()
+    );
 }
 
 #[tokio::test]
@@ -366,7 +384,7 @@ async fn a_game_that_cannot_be_read_is_left_and_hinders_no_other() {
     }
     connection.close().await.expect("it closes");
     let store = opened(folder.path()).await;
-    let unfinished = store.left(u64::MAX).await.expect("readable");
+    let unfinished = store.resumable_games(u64::MAX).await.expect("readable");
     let games: Vec<Id> = unfinished.iter().map(|game| game.header.game_id).collect();
     assert_eq!(games, [Id([3; 16])]);
 }
@@ -413,7 +431,7 @@ async fn a_part_that_is_missing_of_a_finished_game_is_noticed() {
         let error = store.finished(headers[0].game_id).await.expect_err("a gap");
         assert!(error.to_string().contains("missing"), "{error}");
         let kept = store.finished(headers[1].game_id).await.expect("readable");
-        let Some(KeptGame::Hosted(_, journal)) = kept else {
+        let Some(StoredGame::Hosted(_, journal)) = kept else {
             panic!("not kept: {kept:?}");
         };
         assert_eq!(shown(&journal.to_vec()), shown(&entries()));

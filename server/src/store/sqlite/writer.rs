@@ -19,15 +19,15 @@ use crate::store::StoreError;
 use crate::store::tournaments::TournamentEntry;
 use chefshat_room::ids::Id;
 
-/// Orders that wait for the writer.
+/// WriteQueue that wait for the writer.
 pub(super) const QUEUE: usize = 1_024;
-/// Orders in one transaction.
+/// WriteQueue in one transaction.
 const MOST_IN_ONE: usize = 1_024;
 /// Rows of the journal that one statement takes at most. There are only these, so that few statements need to be known.
 const ROWS: [usize; 5] = [1, 4, 16, 32, 64];
 
 /// Something to be kept.
-pub(super) enum Order {
+pub(super) enum WriteCommand {
     /// A game begins.
     Create {
         number: i64,
@@ -110,7 +110,7 @@ impl TournamentRow {
 }
 
 /// An order and whom to tell when it is kept.
-pub(super) type Pending = (Order, oneshot::Sender<Result<(), StoreError>>);
+pub(super) type Pending = (WriteCommand, oneshot::Sender<Result<(), StoreError>>);
 
 /// Keeps what is ordered until nobody can order any more. After the first failure it keeps nothing: what became of the transaction that
 /// failed is not known.
@@ -127,7 +127,7 @@ pub(super) async fn run(
     while open && orders.recv_many(&mut pending, MOST_IN_ONE).await > 0 {
         open = !pending
             .iter()
-            .any(|(order, _)| matches!(order, Order::Close));
+            .any(|(order, _)| matches!(order, WriteCommand::Close));
         let failure = failed.borrow().clone();
         let kept = match failure {
             Some(failure) => Err(failure),
@@ -179,16 +179,16 @@ async fn write(
 ) -> sqlx::Result<BTreeMap<usize, Id>> {
     let mut taken = BTreeMap::new();
     let mut rows = Vec::with_capacity(pending.len());
-    let rows_alone = (pending.iter()).all(|(order, _)| matches!(order, Order::Append(_)));
+    let rows_alone = (pending.iter()).all(|(order, _)| matches!(order, WriteCommand::Append(_)));
     if !rows_alone {
         connection.execute("BEGIN IMMEDIATE").await?;
     }
     // A game has one order at a time, so that those of different kinds may go in any order.
     for (index, (order, _)) in pending.iter_mut().enumerate() {
         match order {
-            Order::Append(row) => rows.push(row),
-            Order::Close => {}
-            Order::Create {
+            WriteCommand::Append(row) => rows.push(row),
+            WriteCommand::Close => {}
+            WriteCommand::Create {
                 number,
                 game_id,
                 header,
@@ -201,7 +201,7 @@ async fn write(
                     taken.insert(index, *game_id);
                 }
             }
-            Order::Finish {
+            WriteCommand::Finish {
                 number,
                 state,
                 last_row,
@@ -220,7 +220,7 @@ async fn write(
                     summarise(connection, *number, last_listed, summary).await?;
                 }
             }
-            Order::Whole {
+            WriteCommand::Whole {
                 number,
                 game_id,
                 header,
@@ -247,7 +247,7 @@ async fn write(
                 .await?;
                 summarise(connection, *number, last_listed, summary).await?;
             }
-            Order::Import {
+            WriteCommand::Import {
                 number,
                 game_id,
                 record,
@@ -273,7 +273,7 @@ async fn write(
                     taken.insert(index, *game_id);
                 }
             }
-            Order::Tournament { header, first } => {
+            WriteCommand::Tournament { header, first } => {
                 let added = sqlx::query(
                     "INSERT INTO tournaments (tournament_id, form, header) VALUES ($1, $2, $3)
                      ON CONFLICT (tournament_id) DO NOTHING",
@@ -289,8 +289,8 @@ async fn write(
                     taken.insert(index, first.id);
                 }
             }
-            Order::TournamentEntries(row) => move_tournament(connection, row).await?,
-            Order::Filed { game_id } => {
+            WriteCommand::TournamentEntries(row) => move_tournament(connection, row).await?,
+            WriteCommand::Filed { game_id } => {
                 sqlx::query("UPDATE games SET filed = 1 WHERE game_id = $1")
                     .bind(game_id.0.as_slice())
                     .execute(&mut *connection)

@@ -19,7 +19,7 @@ use chefshat_room::ids::{Id, Token};
 /// What standard gRPC clients take, bytes.
 const STANDARD_LIMIT: usize = 4 * 1024 * 1024;
 
-impl Hosted {
+impl TournamentHandle {
     /// A tournament with so many built-in agents that nobody moves.
     pub(crate) fn for_tests(participants: usize) -> Arc<Self> {
         Self::with_settings(
@@ -120,31 +120,31 @@ fn turns() -> Arc<Semaphore> {
 
 #[tokio::test]
 async fn what_is_shown_is_worked_out_once_for_each_change() {
-    let (hosted, turns) = (Hosted::for_tests(8), turns());
-    let told = hosted.told(&turns).await.expect("it is worked out");
-    let results = hosted.results(&turns).await.expect("they are worked out");
-    let same = hosted.told(&turns).await.expect("it is worked out");
+    let (hosted, permits) = (TournamentHandle::for_tests(8), turns());
+    let told = hosted.told(&permits).await.expect("it is worked out");
+    let results = hosted.results(&permits).await.expect("they are worked out");
+    let same = hosted.told(&permits).await.expect("it is worked out");
     assert!(Arc::ptr_eq(&told, &same));
-    let same = hosted.results(&turns).await.expect("they are worked out");
+    let same = hosted.results(&permits).await.expect("they are worked out");
     assert!(Arc::ptr_eq(&results, &same));
     hosted.changes.send_modify(|count| *count += 1);
-    let other = hosted.told(&turns).await.expect("it is worked out");
+    let other = hosted.told(&permits).await.expect("it is worked out");
     assert!(!Arc::ptr_eq(&told, &other));
     // Who was told that it has begun before the change was counted is shown no less.
     let hosted = hosted.begun();
-    let begun = hosted.results(&turns).await.expect("they are worked out");
+    let begun = hosted.results(&permits).await.expect("they are worked out");
     let state = begun.message.tournament.as_ref().map(|it| it.state());
     assert_eq!(state, Some(v1::TournamentState::Playing));
 }
 
 #[tokio::test]
 async fn who_asks_waits_for_a_turn_and_holds_no_lock() {
-    let (hosted, turns) = (Hosted::for_tests(8), turns());
-    let taken = Arc::clone(&turns)
+    let (hosted, permits) = (TournamentHandle::for_tests(8), turns());
+    let taken = Arc::clone(&permits)
         .acquire_owned()
         .await
         .expect("it is open");
-    let mut asking = Box::pin(hosted.results(&turns));
+    let mut asking = Box::pin(hosted.results(&permits));
     assert!(futures::poll!(&mut asking).is_pending());
     assert_eq!(hosted.describe().participants.len(), 8);
     drop(taken);
@@ -154,7 +154,7 @@ async fn who_asks_waits_for_a_turn_and_holds_no_lock() {
 
 #[test]
 fn followers_are_told_of_the_games_being_played_and_of_the_last_ones() {
-    let hosted = Hosted::with_settings(
+    let hosted = TournamentHandle::with_settings(
         64,
         v1::TournamentSettings {
             format: v1::TournamentFormat::Swiss.into(),
@@ -205,7 +205,7 @@ fn followers_are_told_of_the_games_being_played_and_of_the_last_ones() {
 
 #[test]
 fn of_a_round_robin_followers_are_told_what_is_being_played() {
-    let hosted = Hosted::with_settings(
+    let hosted = TournamentHandle::with_settings(
         8,
         v1::TournamentSettings {
             format: v1::TournamentFormat::RoundRobin.into(),
@@ -225,7 +225,7 @@ fn of_a_round_robin_followers_are_told_what_is_being_played() {
 
 #[test]
 fn no_message_outgrows_what_standard_clients_take() {
-    let hosted = Hosted::for_tests(MAX_PARTICIPANTS);
+    let hosted = TournamentHandle::for_tests(MAX_PARTICIPANTS);
     let mut results = hosted.sum_up();
     for standing in &mut results.standings {
         *standing = v1::TournamentStanding {

@@ -14,37 +14,37 @@ use chefshat_room::ids::Id;
 
 /// Writes records to the folder of records of a data directory.
 #[derive(Clone)]
-pub struct Filing {
+pub struct RecordWriter {
     store: Arc<dyn Store>,
     /// `None`: records are not written.
     data_dir: Option<PathBuf>,
     tracker: TaskTracker,
-    turns: Arc<Semaphore>,
+    permits: Arc<Semaphore>,
 }
 
-impl Filing {
+impl RecordWriter {
     /// Writes what `store` holds under `data_dir`; a shutdown waits for `tracker`.
     pub fn new(store: Arc<dyn Store>, data_dir: Option<PathBuf>, tracker: TaskTracker) -> Self {
         Self {
             store,
             data_dir,
             tracker,
-            turns: Arc::new(Semaphore::new(MAX_RECORDS_IN_HAND)),
+            permits: Arc::new(Semaphore::new(MAX_RECORDS_IN_HAND)),
         }
     }
 
     /// Writes the record of a finished game when its turn comes, and has the store note it. What fails is tried again when the server next
     /// starts.
-    pub fn file(&self, game: Id) {
+    pub fn write_record(&self, game: Id) {
         if let Some(data_dir) = self.data_dir.clone() {
-            let filing = self.clone();
-            self.tracker.spawn(filing.write(game, data_dir));
+            let writer = self.clone();
+            self.tracker.spawn(writer.write(game, data_dir));
         }
     }
 
     async fn write(self, game: Id, data_dir: PathBuf) {
         // Nobody closes it; if somebody did, the record would merely not wait.
-        let _turn = self.turns.acquire().await.ok();
+        let _permit = self.permits.acquire().await.ok();
         let kept = match self.store.finished(game).await {
             Ok(Some(kept)) => kept,
             Ok(None) => return,
