@@ -133,8 +133,8 @@ fn a_recorded_game_is_branched_and_its_players_play_again() {
     let shown = told(&url, &["room", "show", room_id]);
     for words in [
         format!("as game {first} until after decision 25"),
-        format!("played by the server as seat 1 of game {first} played"),
-        "free for anybody".to_owned(),
+        format!("imitates seat 1 of game {first}"),
+        "free for anyone".to_owned(),
     ] {
         assert!(shown.contains(&words), "{words} is not in {shown}");
     }

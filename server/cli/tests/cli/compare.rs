@@ -7,11 +7,11 @@ use super::run::{Ended, typed};
 /// Networks of chance weights.
 const TABLE: &str = concat!(
     env!("CARGO_MANIFEST_DIR"),
-    "/../tests/fixtures/network/table-actions.safetensors"
+    "/../../tests/fixtures/network/table-actions.safetensors"
 );
 const SMALL: &str = concat!(
     env!("CARGO_MANIFEST_DIR"),
-    "/../tests/fixtures/network/small-table.safetensors"
+    "/../../tests/fixtures/network/small-table.safetensors"
 );
 
 fn compare(a: &str, b: &str, flags: &str) -> Ended {

@@ -278,13 +278,13 @@ fn what_cannot_be_drawn_is_said() {
             "a.png",
             &["--at", "soon"],
             2,
-            "write the number of a decision, from 1, or end",
+            "use the number of a decision, from 1, or end",
         ),
         (
             "a.png",
             &["--shift", "3"],
             1,
-            "there is no shift 3: the game has the shifts 1 to 2",
+            "there is no shift 3: the game has shifts 1 to 2",
         ),
         (
             "a.png",
@@ -340,7 +340,7 @@ fn what_cannot_be_drawn_is_said() {
             "a.png",
             &["--figure", "actions", "--at", "3", "--spectator"],
             1,
-            "no other viewer knows",
+            "this viewer does not see its hand",
         ),
         (
             "a.mp4",

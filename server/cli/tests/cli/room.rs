@@ -99,8 +99,8 @@ fn rooms_are_listed_shown_and_closed() {
         "quiet",
         "waiting",
         "greedy, played by the server",
-        "free for human",
-        "free for anybody",
+        "free for humans",
+        "free for anyone",
     ] {
         assert!(shown.contains(words), "{words} is not in {shown}");
     }
