@@ -1,6 +1,6 @@
 //! Writing the records of finished games to files, in the background, a few at a time.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use tokio::sync::Semaphore;
@@ -31,6 +31,11 @@ impl RecordWriter {
             tracker,
             permits: Arc::new(Semaphore::new(MAX_RECORDS_IN_HAND)),
         }
+    }
+
+    /// The data directory, if records are written.
+    pub fn data_dir(&self) -> Option<&Path> {
+        self.data_dir.as_deref()
     }
 
     /// Writes the record of a finished game when its turn comes, and has the store note it. What fails is tried again when the server next

@@ -91,6 +91,25 @@ pub fn path_of(data_dir: &Path, game_id: &str) -> PathBuf {
     data_dir.join("records").join(format!("{game_id}.jsonl"))
 }
 
+/// Removes what killed writers left in the `records` folder of a data directory: files that end in
+/// `.part`. The caller holds the data directory, so that no writer is at work.
+///
+/// # Errors
+/// The first error of the file system. A folder that does not exist is none.
+pub fn remove_unfinished(data_dir: &Path) -> io::Result<()> {
+    let entries = match std::fs::read_dir(data_dir.join("records")) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+        entries => entries?,
+    };
+    for entry in entries {
+        let path = entry?.path();
+        if path.extension().is_some_and(|ending| ending == "part") {
+            std::fs::remove_file(path)?;
+        }
+    }
+    Ok(())
+}
+
 /// Writes a record atomically, creating parent folders.
 ///
 /// # Errors

@@ -8,6 +8,7 @@ use std::time::Duration;
 use chefshat_agents::RecordedPlayer;
 use chefshat_engine::RULES_VERSION;
 use chefshat_record::convert::seat_number;
+use chefshat_record::jsonl;
 use tracing::{error, info, warn};
 
 use super::{Entry, Rooms};
@@ -28,7 +29,13 @@ impl Rooms {
     pub async fn restore(&self) -> Result<usize, StoreError> {
         let retention = u64::try_from(self.context.retention.as_millis()).unwrap_or(u64::MAX);
         let ended_since_ms = since_epoch_ms().saturating_sub(retention);
-        // Asked before any room is there that could write its record at the same time.
+        // Before any room exists that could write its record at the same time. Other servers that only write records may share the folder.
+        if self.context.store.outlives_server()
+            && let Some(data_dir) = self.context.record_writer.data_dir()
+            && let Err(error) = jsonl::remove_unfinished(data_dir)
+        {
+            error!(%error, "unfinished files of records were not removed");
+        }
         let unfiled = self.context.store.unfiled().await?;
         let mut players = Players::default();
         let mut restored = 0;

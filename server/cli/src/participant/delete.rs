@@ -61,6 +61,8 @@ impl Delete {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
         let data_dir = self.who.data_dir()?;
         let mut database = Forgetting::open(&data_dir).await?;
+        // A server that was killed may have left a copy of the name in a file it was writing.
+        jsonl::remove_unfinished(&data_dir)?;
         self.ask()?;
         let who = Pseudonym {
             name: self.who.name.clone(),

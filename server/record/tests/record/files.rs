@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use chefshat_record::atomic_file::AtomicFile;
 use chefshat_record::files::{FindError, find_records};
+use chefshat_record::jsonl;
 
 fn names(folder: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(folder).unwrap();
@@ -105,4 +106,17 @@ fn writers_of_one_file_do_not_disturb_each_other() {
     second.finish().unwrap();
     assert_eq!(std::fs::read(&path).unwrap(), b"second");
     assert_eq!(names(folder.path()), ["file"]);
+}
+
+#[test]
+fn files_that_killed_writers_left_are_removed() {
+    let folder = tempfile::tempdir().unwrap();
+    jsonl::remove_unfinished(folder.path()).unwrap();
+    let records = folder.path().join("records");
+    std::fs::create_dir(&records).unwrap();
+    for name in ["1.jsonl", "2.jsonl.part", "3.jsonl.a1b2c3.part"] {
+        std::fs::write(records.join(name), "Ada").unwrap();
+    }
+    jsonl::remove_unfinished(folder.path()).unwrap();
+    assert_eq!(names(&records), ["1.jsonl"]);
 }
