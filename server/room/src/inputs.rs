@@ -307,13 +307,8 @@ impl Core {
 
     /// Why an action is illegal now; `None` if it is legal.
     fn refusal(&self, action: u32) -> Option<ActionError> {
-        let action = Self::action_from(action);
-        if self.legal_actions().contains(action) {
-            return None;
-        }
-        // The engine says why when it is asked to do it; the copy is thrown away.
-        self.game()
-            .and_then(|game| game.clone().apply(action, |_| {}).err())
+        let game = self.game().expect("a decision is open");
+        game.check(Self::action_from(action)).err()
     }
 
     fn returned(&mut self, now: Duration, seat: Seat) {

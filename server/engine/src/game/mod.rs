@@ -207,6 +207,32 @@ impl Game {
         Ok(())
     }
 
+    /// Checks an action without applying it: succeeds exactly when [`Game::apply`] does.
+    ///
+    /// # Errors
+    /// If the action is not legal.
+    pub fn check(&self, id: ActionId) -> Result<(), ActionError> {
+        let decision = self.decision().ok_or(ActionError::GameOver)?;
+        let space = self.rules.actions();
+        let action = space.decode(id).ok_or(ActionError::OutOfRange {
+            action: id,
+            size: space.size(),
+        })?;
+        match (self.stage, action) {
+            (Stage::Turn(seat), Action::Play { .. } | Action::LoneJoker | Action::Pass) => {
+                self.check_turn(seat, action)
+            }
+            (Stage::Exchange { giver, .. }, Action::Give(_) | Action::GiveJoker) => {
+                self.check_gift(giver, action)
+            }
+            (Stage::Special(_), Action::Decline | Action::Declare) => Ok(()),
+            _ => Err(ActionError::WrongKind {
+                attempted: action,
+                kind: decision.kind,
+            }),
+        }
+    }
+
     /// Deals all later Shifts from this seed, so that a branch can differ from the game it came
     /// from. The current Shift stays as it was dealt.
     pub fn reseed(&mut self, seed: Seed) {

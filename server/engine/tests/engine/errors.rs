@@ -29,6 +29,7 @@ fn refusal(game: &Game, text: &str) -> String {
         .apply(action, |event| panic!("{event:?}"))
         .unwrap_err();
     assert!(tried == *game);
+    assert_eq!(game.check(action), Err(error));
     error.to_string()
 }
 

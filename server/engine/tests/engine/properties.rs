@@ -105,7 +105,9 @@ proptest! {
                 let action = ActionId::new(index);
                 let mut tried = game.clone();
                 let mut events = 0;
-                match tried.apply(action, |_| events += 1) {
+                let applied = tried.apply(action, |_| events += 1);
+                prop_assert_eq!(game.check(action), applied);
+                match applied {
                     Ok(()) => {
                         prop_assert!(mask.contains(action), "{} was taken", index);
                         prop_assert!(tried != game);
