@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use chefshat_agents::BuiltInAgent;
-use chefshat_engine::{Game, Seat, Viewer};
+use chefshat_engine::{ActionId, Game, Seat, Viewer};
 
 use super::{
     BUILT_IN_BUDGET, Core, JOIN_HOLD, LOOK_AGAIN, MAX_HANDOVER, RECALL_TIME, REPLAY_COST, State,
@@ -23,6 +23,9 @@ impl Core {
             }
             State::Playing => {
                 let open = self.open.as_ref()?;
+                if self.next_taken_over().is_some() {
+                    return Some(open.released);
+                }
                 let seat = open.decision.seat;
                 Some(if self.is_automatic(seat) {
                     open.released + self.pace()
@@ -51,23 +54,47 @@ impl Core {
         }
     }
 
-    /// Lets built-in agents and substitutes take the decisions that are due.
+    /// Takes the decisions that need nobody's answer and are due: those taken over from a record, then those of built-in agents and
+    /// substitutes. At most [`BUILT_IN_BUDGET`] at a time; [`Core::deadline`] then asks for the rest.
     pub(super) fn advance(&mut self, now: Duration) {
         let mut budget = BUILT_IN_BUDGET;
         while budget > 0 {
             if self.state == State::Playing && self.is_too_long() {
                 self.abort(now, AbortReason::TooLong);
             }
-            let due = self.state == State::Playing
-                && self.open.as_ref().is_some_and(|open| {
-                    self.is_automatic(open.decision.seat) && open.released + self.pace() <= now
-                });
-            if !due {
+            let Some(open) = (self.open.as_ref()).filter(|_| self.state == State::Playing) else {
+                return;
+            };
+            if let Some(action) = self.next_taken_over() {
+                self.take_over(now, open.decision.seat, action);
+                budget -= 1;
+                continue;
+            }
+            if !self.is_automatic(open.decision.seat) || open.released + self.pace() > now {
                 return;
             }
             budget = budget.saturating_sub(self.cost_of_open());
             self.decide_automatically(now);
         }
+    }
+
+    /// The next decision of the record that the game branches from; `None` when all are taken over.
+    pub(super) fn next_taken_over(&self) -> Option<ActionId> {
+        let branch = self.header.start.branch.as_ref()?;
+        let mut index = usize::try_from(self.decisions).ok()?;
+        for part in &branch.taken_over {
+            if let Some(action) = part.actions.get(index) {
+                return Some(*action);
+            }
+            index -= part.actions.len();
+        }
+        None
+    }
+
+    fn take_over(&mut self, now: Duration, seat: Seat, action: ActionId) {
+        let bank_left = self.seats[seat.index()].bank_left;
+        let decided = self.decided(seat, action, Source::Recorded, Duration::ZERO, bank_left);
+        self.commit(now, Change::Decided(decided));
     }
 
     /// How long a built-in agent or substitute waits before it decides.
@@ -195,6 +222,9 @@ impl Core {
     }
 
     fn tick_playing(&mut self, now: Duration, handed: Option<Duration>) {
+        if self.next_taken_over().is_some() {
+            return self.advance(now);
+        }
         self.settle_start(now, handed);
         if let Some(open) = &self.open {
             let seat = open.decision.seat;

@@ -1,7 +1,6 @@
 //! What participants do: join, attach, leave, answer, express, return. Each input is checked against the state; an invalid one is refused
 //! and changes nothing.
 
-use std::sync::Arc;
 use std::time::Duration;
 
 use chefshat_engine::{ActionError, Seat};
@@ -335,23 +334,6 @@ impl Core {
                 .map(|seat| std::mem::take(&mut seat.entropy))
                 .collect();
             self.commit(now, Change::Started { entropy });
-            self.take_over(now);
-        }
-    }
-
-    /// Takes the decisions of the record that the game branches from.
-    fn take_over(&mut self, now: Duration) {
-        let header = Arc::clone(&self.header);
-        let parts = header.start.branch.iter().flat_map(|b| &b.taken_over);
-        for action in parts.flat_map(|part| &part.actions) {
-            let seat = self
-                .open
-                .as_ref()
-                .map(|open| open.decision.seat)
-                .expect("a record is replayed before a room branches from it");
-            let bank_left = self.seats[seat.index()].bank_left;
-            let decided = self.decided(seat, *action, Source::Recorded, Duration::ZERO, bank_left);
-            self.commit(now, Change::Decided(decided));
         }
     }
 

@@ -278,9 +278,9 @@ impl Core {
 
     /// The open decision, if the seat's own agent takes it and not a built-in agent or substitute.
     pub fn awaited(&self) -> Option<&OpenDecision> {
-        self.open
-            .as_ref()
-            .filter(|open| !self.is_automatic(open.decision.seat))
+        self.open.as_ref().filter(|open| {
+            !self.is_automatic(open.decision.seat) && self.next_taken_over().is_none()
+        })
     }
 
     fn awaited_from(&self, seat: Seat) -> Option<&OpenDecision> {

@@ -5,13 +5,14 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use chefshat_agents::AgentKind;
-use chefshat_engine::{ActionId, Seat};
+use chefshat_engine::{ActionId, Game, RuleSetSpec, Seat, Seed, Stop, TakenOver};
 
 use super::{Answer, Core, OPEN, Table, Verdict, ms, one_shift};
-use crate::journal::{Change, Fill, ParticipantKind, Source};
+use crate::ids::Id;
+use crate::journal::{Branch, Change, Fill, GameHeader, ParticipantKind, Source};
 use crate::log::RoomEvent;
 use crate::policy::Policy;
-use crate::{BadJournal, ConnectionId, JOIN_HOLD, RECALL_TIME, State};
+use crate::{BUILT_IN_BUDGET, BadJournal, ConnectionId, JOIN_HOLD, RECALL_TIME, State};
 
 impl Table {
     /// The server dies, and is back after `downtime`.
@@ -336,4 +337,64 @@ fn a_journal_that_does_not_fit_is_refused() {
         assert_eq!(entry, last + 1);
         assert!(problem.contains(words), "{problem}");
     }
+}
+
+#[test]
+fn a_long_branch_is_taken_over_in_pieces_and_across_a_restart() {
+    // A recorded game of six Shifts, by first legal actions.
+    let rules = RuleSetSpec {
+        stop: Stop::Shifts(6),
+        ..RuleSetSpec::default()
+    };
+    let seed = Seed([5; 32]);
+    let mut game = Game::new(
+        rules.clone().validate().expect("it makes sense"),
+        seed,
+        |_| {},
+    );
+    let mut actions = Vec::new();
+    while !game.is_over() {
+        let action = game.legal_actions().nth(0).expect("something is legal");
+        game.apply(action, |_| {}).expect("it is legal");
+        actions.push(action);
+    }
+    actions.truncate(actions.len() - 3);
+    let count = u64::try_from(actions.len()).expect("small");
+    assert!(actions.len() > 3 * BUILT_IN_BUDGET, "{count}");
+    let mut table = Table::with_rules(Policy::default(), vec![OPEN; 4], rules);
+    let mut header = GameHeader::clone(table.core.header());
+    header.start.branch = Some(Branch {
+        game: Id([9; 16]),
+        same_deals: true,
+        taken_over: vec![TakenOver { seed, actions }],
+    });
+    table.core = Core::new(Arc::new(header));
+    let seats: Vec<Seat> = table.core.all_seats().collect();
+    for _ in &seats {
+        table.join(ParticipantKind::Agent).expect("there is a seat");
+    }
+    for seat in seats {
+        table.attach(seat);
+    }
+    let mut ticks = 0;
+    while table.core.decisions() < count {
+        assert!(table.core.awaited().is_none(), "nobody is asked");
+        let deadline = table.core.deadline().expect("there is more to do");
+        assert!(deadline <= table.now, "at once");
+        table.core.tick(table.now, None);
+        assert!(table.core.pending().len() <= BUILT_IN_BUDGET);
+        table.commit();
+        ticks += 1;
+        if ticks == 2 {
+            table.restart(ms(1_000));
+        }
+    }
+    assert!(ticks >= 3);
+    assert_eq!(table.core.decisions(), count);
+    assert!(table.core.awaited().is_some(), "a seat is asked");
+    let recorded = (table.journal.iter()).filter(|entry| {
+        matches!(&entry.change, Change::Decided(decided) if decided.source == Source::Recorded)
+    });
+    assert_eq!(recorded.count() as u64, count);
+    table.assert_replays();
 }
