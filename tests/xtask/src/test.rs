@@ -65,7 +65,7 @@ pub(crate) fn run(
         if let Err(failure) = setup::tmux() {
             steps.skip("commands at a terminal", &failure.to_string());
         }
-        let test = ["test", "--workspace"];
+        let test = ["test", "--workspace", "--no-fail-fast"];
         steps.program("cargo test", cargo_command(places).args(test))?;
     }
     if wants(Language::Python) {
