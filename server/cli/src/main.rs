@@ -8,6 +8,7 @@ mod conformance;
 mod connect;
 mod data_dir;
 mod demo;
+mod error;
 mod experiment;
 mod export;
 mod import;
@@ -32,16 +33,14 @@ mod tournament;
 mod tui;
 mod verify;
 
-use std::fmt::Display;
-use std::io::{self, IsTerminal as _, Write as _};
+use std::io::{self, IsTerminal as _};
 use std::process::ExitCode;
 
 use clap::builder::FalseyValueParser;
 use clap::{Parser, Subcommand};
 use tracing_subscriber::EnvFilter;
 
-/// Why a command failed, as a message for the user.
-type CommandError = Box<dyn std::error::Error + Send + Sync>;
+use error::{CommandError, say};
 
 /// Chef's Hat: a game server for agents, robots and people.
 #[derive(Debug, Parser)]
@@ -141,11 +140,6 @@ fn is_broken_pipe(error: &CommandError) -> bool {
     error
         .downcast_ref::<io::Error>()
         .is_some_and(|error| error.kind() == io::ErrorKind::BrokenPipe)
-}
-
-/// Writes a line to standard output.
-fn say(line: impl Display) -> Result<(), CommandError> {
-    Ok(writeln!(io::stdout().lock(), "{line}")?)
 }
 
 fn in_runtime(

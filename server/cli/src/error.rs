@@ -1,0 +1,12 @@
+//! What every command shares: its error, and a line of output.
+
+use std::fmt::Display;
+use std::io::{self, Write as _};
+
+/// Why a command failed, as a message for the user.
+pub(crate) type CommandError = Box<dyn std::error::Error + Send + Sync>;
+
+/// Writes a line to standard output.
+pub(crate) fn say(line: impl Display) -> Result<(), CommandError> {
+    Ok(writeln!(io::stdout().lock(), "{line}")?)
+}
