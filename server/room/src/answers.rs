@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use super::{MAX_EXPRESSIONS_PER_SEAT, MAX_SEATINGS};
 use crate::journal::{Fill, SeatedParticipant};
+use crate::limits::{MAX_EXPRESSIONS_PER_SEAT, MAX_SEATINGS};
 
 /// The public state of a seat.
 #[derive(Debug, Clone, Copy)]

@@ -11,6 +11,7 @@ pub use chefshat_engine::TakenOver;
 use chefshat_engine::{ActionId, RuleSet, Script, Seat};
 
 use crate::ids::{Id, SecretHash};
+pub use crate::participant::ParticipantKind;
 use crate::policy::Policy;
 
 /// What fills a seat.
@@ -61,17 +62,6 @@ pub struct Branch {
     pub same_deals: bool,
     /// The decisions taken over, in order. Not empty, so that the seed of the first Shift is known.
     pub taken_over: Vec<TakenOver>,
-}
-
-/// The kind of a participant.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ParticipantKind {
-    /// A program.
-    Agent,
-    /// A person.
-    Human,
-    /// A robot.
-    Robot,
 }
 
 /// The tournament a game belongs to.

@@ -10,7 +10,9 @@ mod fold;
 pub mod ids;
 mod inputs;
 pub mod journal;
+mod limits;
 pub mod log;
+mod participant;
 pub mod policy;
 mod revive;
 #[cfg(any(test, feature = "testing"))]
@@ -28,42 +30,18 @@ use chefshat_engine::{
 
 pub use answers::{Answer, Answered, ExpressError, JoinError, LeaveError, SeatStanding, Verdict};
 
+pub use limits::{
+    BUILT_IN_BUDGET, JOIN_HOLD, MAX_ANNOTATION_BYTES, MAX_ANNOTATION_BYTES_PER_GAME, MAX_ATTEMPTS,
+    MAX_CONNECTION_EVENTS, MAX_EXPRESSIONS_PER_SEAT, MAX_GAME_CHANGES, MAX_HANDOVER, MAX_SEATINGS,
+    RECALL_TIME,
+};
 pub use revive::BadJournal;
+
+use limits::{LOOK_AGAIN, REPLAY_COST, SLOW_STORE};
 
 use crate::ids::SecretHash;
 use crate::journal::{AbortReason, Change, Entry, Fill, GameHeader, SeatedParticipant};
 use crate::log::Log;
-
-/// Before the game begins, a seat whose ticket is not attached within this time becomes free again.
-pub const JOIN_HOLD: Duration = Duration::from_secs(120);
-/// The clock of a decision starts at most this long after its release, even if the transport has not taken it.
-pub const MAX_HANDOVER: Duration = Duration::from_secs(5);
-/// After a restart of the server the clock of a decision waits this long for its seat to be attached again.
-pub const RECALL_TIME: Duration = Duration::from_secs(60);
-/// A seat that has waited this long for the store gets the time back. Shorter waits are part of every answer; if they were given back too,
-/// invalid answers would buy time.
-const SLOW_STORE: Duration = Duration::from_millis(100);
-/// How often the room checks whether the transport has taken a request whose deadline would have passed.
-const LOOK_AGAIN: Duration = Duration::from_millis(20);
-/// Most annotations recorded per seat and game, bytes.
-pub const MAX_ANNOTATION_BYTES_PER_GAME: usize = 256 * 1024;
-/// Most annotations recorded per decision, bytes.
-pub const MAX_ANNOTATION_BYTES: usize = 4 * 1024;
-/// Most expressions of one seat in one game.
-pub const MAX_EXPRESSIONS_PER_SEAT: u32 = 10_000;
-/// Most events of lost and new connections of one seat in one game. Later ones are not published.
-pub const MAX_CONNECTION_EVENTS: u32 = 1_000;
-
-/// Most times that seats are taken in a room, including seats given back: each stays in its log.
-pub const MAX_SEATINGS: usize = 1_000;
-/// Invalid attempts at one decision after which the default is taken even where attempts are unlimited, so that a record can hold them.
-pub const MAX_ATTEMPTS: u32 = 10_000;
-/// Most changes of one game. The game is aborted when it reaches them.
-pub const MAX_GAME_CHANGES: u64 = 2_000_000;
-/// Most decisions that built-in agents take before the room reads its mailbox again.
-pub const BUILT_IN_BUDGET: usize = 256;
-/// Cost of one decision of a recorded player, in decisions of other agents: it compares its observation with all recorded ones.
-const REPLAY_COST: usize = 32;
 
 /// The state of a room.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

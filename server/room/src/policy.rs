@@ -5,7 +5,7 @@ use std::time::Duration;
 use chefshat_agents::AgentKind;
 use chefshat_engine::RewardScheme;
 
-use crate::journal::ParticipantKind;
+use crate::participant::ParticipantKind;
 
 /// When a game is aborted because participants are lost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

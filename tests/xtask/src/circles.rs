@@ -56,8 +56,6 @@ const REMAINING: &[&[&str]] = &[
         "server/record/src/replay/game.rs",
         "server/record/src/replay/mod.rs",
     ],
-    &["server/room/src/answers.rs", "server/room/src/lib.rs"],
-    &["server/room/src/journal.rs", "server/room/src/policy.rs"],
     &[
         "server/cli/src/narration/story.rs",
         "server/cli/src/narration/view.rs",

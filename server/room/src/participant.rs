@@ -1,0 +1,12 @@
+//! Kinds of participants.
+
+/// The kind of a participant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ParticipantKind {
+    /// A program.
+    Agent,
+    /// A person.
+    Human,
+    /// A robot.
+    Robot,
+}
