@@ -26,6 +26,7 @@ use chefshat_room::Core;
 use chefshat_room::ids::{Id, RequestKey, Token, join_code, normal_code, random_bytes};
 use chefshat_room::journal::{Fill, GameHeader, GameStart, SeatedParticipant, TournamentGame};
 use chefshat_room::policy::{Durability, Policy};
+pub use table::CreateError;
 use table::{Entry, Table};
 
 /// What a new room is to be.
@@ -77,26 +78,6 @@ pub struct Created {
     pub join_code: String,
     /// The owner's token.
     pub owner: Token,
-}
-
-/// Why no room was made.
-#[derive(Debug, thiserror::Error)]
-pub enum CreateError {
-    /// The limit of rooms is reached.
-    #[error("the server holds {0} rooms already; close one or try later")]
-    TooMany(usize),
-    /// The request id was used for a room with other content.
-    #[error("this request id was used to create another room; draw a new one")]
-    RequestIdUsed,
-    /// The server takes no new rooms.
-    #[error("the server is shutting down and takes no new rooms")]
-    ShuttingDown,
-    /// There is no space for more games.
-    #[error("the server's disk is nearly full; what is left is kept for games that go on")]
-    DiskNearlyFull,
-    /// The store refused.
-    #[error(transparent)]
-    Store(#[from] StoreError),
 }
 
 /// The rooms of a server.

@@ -3,9 +3,29 @@
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
-use super::CreateError;
 use crate::room::Handle;
+use crate::store::StoreError;
 use chefshat_room::ids::{Id, SecretHash};
+
+/// Why no room was created.
+#[derive(Debug, thiserror::Error)]
+pub enum CreateError {
+    /// The limit of rooms is reached.
+    #[error("the server holds {0} rooms already; close one or try later")]
+    TooMany(usize),
+    /// The request id was used for a room with other content.
+    #[error("this request id was used to create another room; draw a new one")]
+    RequestIdUsed,
+    /// The server takes no new rooms.
+    #[error("the server is shutting down and takes no new rooms")]
+    ShuttingDown,
+    /// There is no space for more games.
+    #[error("the server's disk is nearly full; the rest is reserved for running games")]
+    DiskNearlyFull,
+    /// The store refused.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+}
 
 #[derive(Default)]
 pub(super) struct Table {

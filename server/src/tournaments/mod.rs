@@ -16,7 +16,6 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use chefshat_record::convert::FieldProblem;
 use chefshat_tournament::{Change, Entrant, EntrantKind, SettingsProblem, State, Tournament};
 use tokio::sync::{Notify, mpsc, watch};
-use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 use tracing::{error, info};
 
@@ -34,7 +33,7 @@ use chefshat_room::ids::{Id, RequestKey, Token, join_code, normal_code, random_b
 use handle::TournamentState;
 use shown::Shown;
 use table::Table;
-use task::Task;
+use task::{Stop, Task};
 
 /// Why no tournament was made.
 #[derive(Debug, thiserror::Error)]
@@ -68,15 +67,6 @@ pub struct Tournaments {
     table: Mutex<Table>,
     /// Notified when the creation of a tournament has ended.
     created: Notify,
-}
-
-/// How the tournaments of a server are stopped.
-#[derive(Debug, Clone, Default)]
-struct Stop {
-    /// No game is called or counted any more; participants are still seated in those that go on.
-    no_more_games: CancellationToken,
-    /// No tournament does anything any more.
-    end: CancellationToken,
 }
 
 impl Tournaments {

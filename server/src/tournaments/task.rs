@@ -8,9 +8,9 @@ use std::time::Duration;
 use chefshat_tournament::{Change, State, Tournament};
 use tokio::sync::mpsc;
 use tokio::time::{Instant, sleep_until};
+use tokio_util::sync::CancellationToken;
 use tracing::{error, info};
 
-use super::Stop;
 use super::games::plays_itself;
 use super::handle::{
     Call, Connection, Entry, JoinRefusal, Message, TournamentHandle, TournamentState,
@@ -23,6 +23,15 @@ use chefshat_room::ids::{Id, Token};
 
 /// Messages that are taken before what follows from them is worked out.
 const MESSAGES_AT_A_TIME: usize = 64;
+
+/// How the tournaments of a server are stopped.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Stop {
+    /// Cancelled when no more games are called or counted. Participants are still seated in running games.
+    pub(super) no_more_games: CancellationToken,
+    /// Cancelled when the tasks of tournaments end.
+    pub(super) end: CancellationToken,
+}
 
 /// Moves a tournament until the server ends.
 pub(super) struct Task {

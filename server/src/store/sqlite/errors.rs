@@ -1,6 +1,11 @@
 //! What SQLite's errors mean for the person who runs the server, and what there is to do.
 
-use super::open::{BUSY_LIMIT, FILE};
+use std::time::Duration;
+
+/// Name of the database in the data directory.
+pub(super) const FILE: &str = "games.sqlite3";
+/// How long a database that another program has locked is waited for.
+pub(super) const BUSY_LIMIT: Duration = Duration::from_secs(10);
 
 /// SQLite's primary result codes that are told apart.
 const BUSY: i32 = 5;

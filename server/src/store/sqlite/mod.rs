@@ -70,7 +70,7 @@ impl SqliteStore {
         )
         .fetch_one(&opened.readers)
         .await
-        .map_err(|error| OpenError::Other(data_dir.join(open::FILE), explain(&error)))?;
+        .map_err(|error| OpenError::Other(data_dir.join(errors::FILE), explain(&error)))?;
         let (orders, queue) = mpsc::channel(writer::QUEUE);
         let (has_failed, failed) = watch::channel(None);
         let codec = Codec::new();

@@ -4,7 +4,6 @@
 use std::fs::File;
 use std::os::unix::fs::OpenOptionsExt as _;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 use sqlx::migrate::{MigrateError, Migration, MigrationType, Migrator};
 use sqlx::sqlite::{
@@ -13,17 +12,13 @@ use sqlx::sqlite::{
 };
 use sqlx::{Connection as _, SqlSafeStr as _};
 
-use super::errors::{explain, has_code};
+use super::errors::{BUSY_LIMIT, FILE, explain, has_code};
 use crate::store::StoreError;
 
-/// Name of the database in the data directory.
-pub(super) const FILE: &str = "games.sqlite3";
 /// Name of the file that is locked while a server has the data directory.
 const LOCK_FILE: &str = "games.lock";
 /// What tells our databases from those of other programs: `PRAGMA application_id` of the first migration.
 const APPLICATION_ID: i64 = 0x4368_4874;
-/// How long a database that another program has locked is waited for.
-pub(super) const BUSY_LIMIT: Duration = Duration::from_secs(10);
 /// Connections that read.
 const READERS: u32 = 4;
 /// Statements that a connection keeps prepared.

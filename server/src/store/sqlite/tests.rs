@@ -18,7 +18,7 @@ use futures::FutureExt as _;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
 use sqlx::{Connection as _, Executor as _};
 
-use super::{OpenError, SqliteStore, form, open};
+use super::{OpenError, SqliteStore, form};
 use crate::store::{Part, Store, StoredGame};
 use chefshat_room::ids::{Id, SecretHash};
 use chefshat_room::journal::{
@@ -370,7 +370,7 @@ async fn a_game_that_cannot_be_read_is_left_and_hinders_no_other() {
     }
     store.close().await;
     drop(store);
-    let options = SqliteConnectOptions::new().filename(folder.path().join(open::FILE));
+    let options = SqliteConnectOptions::new().filename(folder.path().join(super::errors::FILE));
     let mut connection = SqliteConnection::connect_with(&options)
         .await
         .expect("it opens");
@@ -417,7 +417,7 @@ async fn a_part_that_is_missing_of_a_finished_game_is_noticed() {
         }
         store.close().await;
         drop(store);
-        let options = SqliteConnectOptions::new().filename(folder.path().join(open::FILE));
+        let options = SqliteConnectOptions::new().filename(folder.path().join(super::errors::FILE));
         let mut connection = SqliteConnection::connect_with(&options)
             .await
             .expect("it opens");

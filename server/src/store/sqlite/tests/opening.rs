@@ -5,7 +5,7 @@ use super::*;
 #[tokio::test]
 async fn what_cannot_be_used_is_refused_and_left_as_it_is() {
     let folder = tempfile::tempdir().expect("a folder");
-    let file = folder.path().join(open::FILE);
+    let file = folder.path().join(super::super::errors::FILE);
     let refusal = async |what: &str| {
         let before = std::fs::read(&file).expect("it is there");
         let refused = SqliteStore::open(folder.path()).await;
@@ -75,7 +75,7 @@ async fn a_database_of_which_only_the_log_is_left_is_not_begun_anew() {
     for name in ["games.sqlite3", "games.sqlite3-wal"] {
         std::fs::copy(folder.path().join(name), copy.path().join(name)).expect("copied");
     }
-    std::fs::write(copy.path().join(open::FILE), "").expect("cut off");
+    std::fs::write(copy.path().join(super::super::errors::FILE), "").expect("cut off");
     let log = std::fs::read(copy.path().join("games.sqlite3-wal")).expect("there");
     assert!(!log.is_empty());
     let refused = SqliteStore::open(copy.path()).await;
@@ -100,7 +100,8 @@ async fn what_was_given_up_before_a_deal_leaves_nothing_behind() {
     store.close().await;
     drop(store);
     opened(folder.path()).await.close().await;
-    let options = SqliteConnectOptions::new().filename(folder.path().join(open::FILE));
+    let options =
+        SqliteConnectOptions::new().filename(folder.path().join(super::super::errors::FILE));
     let mut connection = SqliteConnection::connect_with(&options)
         .await
         .expect("ours");
