@@ -121,7 +121,7 @@ impl Terminal {
             if screen.contains(until) {
                 return decisions;
             }
-            let key = if screen.contains("nothing can be played") {
+            let key = if screen.contains("you cannot play") {
                 Some("p")
             } else if screen.contains("Your turn: play") || screen.contains("Give a card") {
                 Some("Enter")
