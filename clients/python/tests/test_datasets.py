@@ -80,7 +80,7 @@ def polars_type(documented: str) -> Any:
 def documented_columns(table: str) -> list[tuple[str, str]]:
     """Names and types of a table's columns, as the documentation has them."""
     section = DOCS.read_text(encoding="utf-8").split(f"\n## {table.capitalize()}\n")[1]
-    text = section.split("| column | type | what it holds |\n")[1].split("\n\n")[0]
+    text = section.split("| column | type | content |\n")[1].split("\n\n")[0]
     return re.findall(r"^\| `(\w+)` \| `([^`]+)` \|", text, re.MULTILINE)
 
 

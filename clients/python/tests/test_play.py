@@ -333,6 +333,9 @@ def test_how_a_game_begins_reaches_the_server(fake: FakeServer) -> None:
 
     asyncio.run(run())
     branched, scripted, slow_ephemeral, plain, branched_too = fake.created
+    assert len(branched.request_id) == 32
+    assert branched.request_id != branched_too.request_id, "each call draws its own"
+    branched_too.request_id = branched.request_id
     assert branched == branched_too
     assert branched.branch == POINT
     assert not branched.HasField("rules")
