@@ -73,7 +73,7 @@ use v1::DecisionKind::{Exchange, SpecialAction, Turn};
 pub static CASES: [Case; 11] = [
     Case {
         name: "game",
-        about: "a whole game to 15 points: legal answers of all kinds, a good end",
+        about: "a complete game to 15 points: legal answers of all kinds, clean exit",
         interferences: &[],
         kinds: &[Turn, Exchange],
         hurried: false,
@@ -113,7 +113,7 @@ pub static CASES: [Case; 11] = [
     },
     Case {
         name: "refusal",
-        about: "an answer comes back as INVALID: it is answered again",
+        about: "an answer is refused as INVALID: the agent answers again",
         interferences: &[
             Interference::Refuse,
             Interference::Refuse,
@@ -125,7 +125,7 @@ pub static CASES: [Case; 11] = [
     },
     Case {
         name: "disconnect",
-        about: "the connection is lost at a decision: it comes back with its ticket",
+        about: "the connection is lost at a decision: the agent attaches again",
         interferences: &[
             Interference::CutBeforeAnswer,
             Interference::CutBeforeRequest,
@@ -137,7 +137,7 @@ pub static CASES: [Case; 11] = [
     },
     Case {
         name: "stale",
-        about: "an answer arrives too late: it lets it go and plays on",
+        about: "an answer arrives too late: the agent plays on",
         interferences: &[Interference::HoldAnswer],
         kinds: &[Turn],
         hurried: true,
@@ -145,7 +145,7 @@ pub static CASES: [Case; 11] = [
     },
     Case {
         name: "substitution",
-        about: "a substitute plays in its place: it takes over again",
+        about: "a substitute plays for the agent: the agent takes over again",
         interferences: &[Interference::DropAnswers],
         kinds: &[Turn],
         hurried: true,

@@ -1,5 +1,4 @@
-//! Every fault the examiner knows: its code, which programs and documents may rely on, and what to do about it. When a fault is found is
-//! decided in `exam`.
+//! The faults the examiner can find: stable codes and advice. `exam` finds them.
 
 use std::fmt;
 
@@ -12,72 +11,72 @@ pub enum Fault {
     NeverJoined,
     /// It asked for a seat and was refused.
     JoinRefused,
-    /// It took a seat and did not attach to it.
+    /// It took a seat but did not attach to it.
     NeverAttached,
     /// Its attachment was refused.
     AttachRefused,
-    /// It asked for another seat although it had one.
+    /// It asked for a second seat.
     JoinedAgain,
     /// It plays without the stream that can be examined.
     NoPlayStream,
-    /// It let a decision run out of time.
+    /// It let a decision time out.
     NotAnswered,
     /// Its answers came too late.
     TooSlow,
-    /// It answered an action that was not legal.
+    /// It answered with an illegal action.
     IllegalAction,
-    /// It answered an action that the game does not have.
+    /// It answered with an action that does not exist in the game.
     ActionOutOfSpace,
-    /// It answered a decision again although it had not been refused.
+    /// It answered a decision twice without a refusal in between.
     AnsweredTwice,
-    /// It answered a decision that was never put to it.
+    /// It answered a decision that was never requested.
     AnsweredUnasked,
-    /// It answered a decision again after it had been told that it is closed.
+    /// It answered a decision again after the result CLOSED.
     RepeatedAfterClosed,
-    /// It spoke for a handle that was never announced.
+    /// It used a handle that was never announced.
     HandleUnknown,
-    /// It said far more than it was asked for.
+    /// It sent far more messages than necessary.
     Flooding,
-    /// What it said about its decision was dropped.
+    /// Annotations of its decisions were dropped.
     AnnotationsDropped,
     /// A command was refused.
     CommandRefused,
-    /// A message was refused, and the stream with it.
+    /// A message was refused, and its stream ended.
     MessageRefused,
-    /// It did not read what it was sent.
+    /// It did not read its stream.
     NotReading,
-    /// It did not answer again after an answer was refused.
+    /// It did not answer again after a refused answer.
     GaveUpWhenRefused,
-    /// It did not come back after its connection was lost.
+    /// It did not reconnect after its connection was lost.
     DidNotReconnect,
-    /// It came back, but left out events that it had not been told.
+    /// It reconnected but skipped events it had not received.
     EventsSkipped,
-    /// It stopped playing when an answer of its came too late.
+    /// It stopped playing after one of its answers came too late.
     StoppedAfterClosed,
     /// It did not take over again from its substitute.
     NeverResumed,
     /// It played the games of a tournament one by one.
     OneAtATime,
-    /// Its process ended before its game.
+    /// Its process exited before the game was over.
     ExitedEarly,
     /// It left before the game was over.
     LeftEarly,
-    /// It kept its stream open although everything was over.
+    /// It kept its stream open after everything was over.
     NeverLeft,
-    /// Its process did not end.
+    /// Its process did not exit.
     NeverExited,
-    /// Its process ended as failed.
+    /// Its process exited with an error.
     ExitStatus,
-    /// The case took longer than a case may take.
+    /// The case exceeded its time limit.
     CaseTooLong,
     /// The game had no result.
     GameAborted,
-    /// The game ended before the case could be played.
+    /// The game ended before the case could be examined.
     NotExamined,
 }
 
 impl Fault {
-    /// All of them, in the order in which a game may show them.
+    /// All faults, in the order in which they can occur in a game.
     pub const ALL: [Fault; 34] = [
         Self::CommandFailed,
         Self::NeverJoined,
@@ -115,7 +114,7 @@ impl Fault {
         Self::NotExamined,
     ];
 
-    /// Its code, which does not change.
+    /// Stable code.
     pub fn code(self) -> &'static str {
         match self {
             Self::CommandFailed => "COMMAND_FAILED",
@@ -155,96 +154,96 @@ impl Fault {
         }
     }
 
-    /// What to do about it.
+    /// How to correct it.
     pub fn advice(self) -> &'static str {
         match self {
             Self::CommandFailed => {
-                "Give the command that starts your agent after --, as you would type it."
+                "Give the command that starts your agent after --, as you would type it in a shell."
             }
             Self::NeverJoined => {
-                "Connect to {address} and call RoomService.JoinRoom with the join code {code}; for a tournament JoinTournament with {tournament}, then attach."
+                "Connect to {address} and call RoomService.JoinRoom with the join code {code}; for a tournament call JoinTournament with {tournament}. Then attach."
             }
             Self::JoinRefused => {
-                "Call JoinRoom with the join code as given and a name of 1 to 64 characters."
+                "Call JoinRoom with exactly the given join code and a name of 1 to 64 characters."
             }
             Self::NeverAttached => {
-                "Open PlayService.Play and send an Attach with the ticket of the JoinRoomResponse; do not wait for anything in between."
+                "Open PlayService.Play and send an Attach with the ticket of the JoinRoomResponse, without waiting for anything in between."
             }
             Self::AttachRefused => {
-                "Send the ticket as it was given, with at most 32 bytes of entropy."
+                "Send exactly the ticket you received, with at most 32 bytes of entropy."
             }
             Self::JoinedAgain => {
-                "Keep the ticket: after a lost connection open a stream and attach with it; a seat is joined once."
+                "Join once and keep the ticket. After a lost connection open a stream and attach with it."
             }
             Self::NoPlayStream => {
-                "Play over PlayService.Play, the stream both ways; Watch and Act are for browsers and are not examined."
+                "Play over the bidirectional stream PlayService.Play. Watch and Act are for browsers and are not examined."
             }
             Self::NotAnswered => {
-                "Answer every DecisionRequest within the time it states, whatever its kind; any bit set in action_mask will do."
+                "Answer every DecisionRequest, of any kind, within its time; any bit that is set in action_mask will do."
             }
             Self::TooSlow => {
-                "Answer within time_left_ms of the request, with whatever your agent has found by then."
+                "Answer within the request's time_left_ms with the best action found so far."
             }
             Self::IllegalAction => {
-                "Answer the index of a bit set in action_mask: action i is bit i%8 of byte i/8. Every decision has a mask of its own."
+                "Answer with the index of a bit that is set in action_mask: action i is bit i%8 of byte i/8. Every decision has its own mask."
             }
             Self::ActionOutOfSpace => {
-                "Take the number of actions from GameStarted.action_space or the mask: it depends on the rule set."
+                "Take the number of actions from GameStarted.action_space or from the mask: it depends on the rule set."
             }
             Self::AnsweredTwice => {
-                "Answer once, and again only after a result INVALID or when the decision is put again on a new stream."
+                "Answer once. Answer again only after a result INVALID, or when the decision is requested again on a new stream."
             }
-            Self::AnsweredUnasked => {
-                "Wait for a DecisionRequest and name its decision_id in the answer."
-            }
+            Self::AnsweredUnasked => "Wait for a DecisionRequest and answer with its decision_id.",
             Self::RepeatedAfterClosed => {
-                "Let a decision go when its result is CLOSED; answer the newest one."
+                "Ignore a decision whose result is CLOSED; answer the newest one."
             }
             Self::HandleUnknown => {
-                "Send commands with the handle that came with the DecisionRequest; handles begin at 0 on every stream."
+                "Send commands with the handle of the DecisionRequest; handles start at 0 on every stream."
             }
-            Self::Flooding => "Speak when there is something to answer; do not poll or repeat.",
+            Self::Flooding => "Send only answers to requests; do not poll or repeat.",
             Self::AnnotationsDropped => {
-                "Keep annotations to 4 KiB a decision and 256 KiB a game, with finite numbers."
+                "Limit annotations to 4 KiB per decision and 256 KiB per game, with finite numbers."
             }
-            Self::CommandRefused => "Mend the command as the reason says.",
+            Self::CommandRefused => "Correct the command; the reason says how.",
             Self::MessageRefused => {
-                "Keep messages to 64 KiB and 1024 commands, encoded as the .proto files say."
+                "Limit messages to 64 KiB and 1024 commands, encoded as in the .proto files."
             }
             Self::NotReading => {
-                "Read the stream of responses all the time, also while your agent thinks."
+                "Read the stream of responses all the time, also while your agent computes."
             }
             Self::GaveUpWhenRefused => {
-                "On a result INVALID answer the same decision_id again, with an action of its mask; it is not put again."
+                "After a result INVALID answer the same decision_id again with a legal action; the decision is not requested again."
             }
             Self::DidNotReconnect => {
-                "When the stream ends with UNAVAILABLE, wait a moment, open another and attach with the same ticket."
+                "When the stream ends with UNAVAILABLE, wait a moment, open a new stream and attach with the same ticket."
             }
             Self::EventsSkipped => {
-                "Attach with from_sequence = number of the last event you got, plus one; 0 gives all of them again."
+                "Attach with from_sequence = the number of the last event received plus one; 0 requests all events again."
             }
             Self::StoppedAfterClosed => {
-                "A result CLOSED is no error: go on with the decisions that follow."
+                "A result CLOSED is not an error: continue with the following decisions."
             }
             Self::NeverResumed => {
-                "On an event Substituted for your own seat send ResumeSeat, or attach anew."
+                "On an event Substituted for your own seat send ResumeSeat, or attach again."
             }
             Self::OneAtATime => {
                 "Join the tournament with max_games of 2 or more, and play every seat that the server attaches to the stream."
             }
             Self::ExitedEarly => {
-                "Play until the seat is told Detached (GAME_OVER); a Shift's end is not the game's, and no error of one decision is."
+                "Play until the seat receives Detached (GAME_OVER). The end of a Shift or an error of one decision does not end the game."
             }
-            Self::LeftEarly => "Keep the stream open until the seat is told Detached (GAME_OVER).",
+            Self::LeftEarly => "Keep the stream open until the seat receives Detached (GAME_OVER).",
             Self::NeverLeft => {
-                "After Detached (GAME_OVER) of your last seat half-close the stream, or end it."
+                "After Detached (GAME_OVER) of your last seat, half-close or end the stream."
             }
             Self::NeverExited => {
-                "End the process when the game is over: close the channel, stop threads, do not wait for input."
+                "Exit when the game is over: close the channel, stop threads, do not wait for input."
             }
-            Self::ExitStatus => "End with status 0 after a game that was played to its end.",
-            Self::CaseTooLong => "Answer faster, or give the examination more --patience.",
-            Self::GameAborted => "Look into the agent's log; if it did nothing wrong, tell us.",
+            Self::ExitStatus => "Exit with status 0 after a complete game.",
+            Self::CaseTooLong => "Answer faster, or increase --patience.",
+            Self::GameAborted => {
+                "Check the agent's log. If the agent did nothing wrong, please report this."
+            }
             Self::NotExamined => "Run the case again.",
         }
     }
@@ -256,16 +255,16 @@ impl fmt::Display for Fault {
     }
 }
 
-/// A fault as it was found.
+/// A fault that was found.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Finding {
-    /// Which.
+    /// The fault.
     pub fault: Fault,
-    /// What should have come, in words.
+    /// What was expected, in words.
     pub expected: String,
-    /// What came, the first time.
+    /// What happened, the first time.
     pub got: String,
-    /// How often.
+    /// Number of occurrences.
     pub times: u32,
 }
 
