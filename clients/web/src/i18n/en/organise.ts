@@ -1,4 +1,4 @@
-// English texts of making and holding a tournament, in tournaments/.
+// English texts of creating and running a tournament, in tournaments/.
 
 import { plurals } from "../plural";
 

@@ -11,7 +11,7 @@ export const people = {
   kinds: { label: "Who", all: "Everyone", human: "People", robot: "Robots", agent: "Agents" },
   minGames: { label: "With at least", games: (games: number) => plural(games, { one: "# game", other: "# games" }) },
   none: "Nobody has played a rated game here yet.",
-  noneOfThese: "None of them has played that many rated games. Choose fewer games, or everyone.",
+  noneOfThese: "Nobody matches these filters. Choose fewer games, or everyone.",
   toLobby: "Go to the lobby and play one",
   columns: {
     place: "Place",

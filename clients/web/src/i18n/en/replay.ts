@@ -20,7 +20,7 @@ export const replay = {
   possible: "Possible actions",
   answered: (name: string, answer: string) => `${name}: ${answer}`,
   seconds: (seconds: number) => `${seconds.toFixed(1)} s`,
-  estimate: (value: number) => `own estimate ${value.toFixed(2)}`,
+  estimate: (value: number) => `estimate ${value.toFixed(2)}`,
   noTable: "This decision is not a turn, so it has no look-up table.",
   empty: "This record contains no events.",
 };

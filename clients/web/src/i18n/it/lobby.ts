@@ -112,7 +112,7 @@ export const lobby: Texts["lobby"] = {
     name: "Nome della stanza",
     namePlaceholder: "Venerdì sera",
     players: "Giocatori",
-    seats: "Chi siede dove",
+    seats: "Chi si siede dove",
     choices: {
       human: "Libero per una persona",
       anybody: "Libero per chiunque",

@@ -1,4 +1,4 @@
-// Italian texts of making and holding a tournament, in tournaments/.
+// Italian texts of creating and running a tournament, in tournaments/.
 
 import type { Texts } from "../en";
 import { plurals } from "../plural";

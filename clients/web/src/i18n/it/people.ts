@@ -12,7 +12,7 @@ export const people: Texts["people"] = {
   kinds: { label: "Chi", all: "Tutti", human: "Persone", robot: "Robot", agent: "Agenti" },
   minGames: { label: "Con almeno", games: (games) => plural(games, { one: "# partita", other: "# partite" }) },
   none: "Qui nessuno ha ancora giocato una partita valutata.",
-  noneOfThese: "Nessuno di loro ha giocato tante partite valutate. Scegli meno partite, o tutti.",
+  noneOfThese: "Nessuno corrisponde a questi filtri. Scegli meno partite, o tutti.",
   toLobby: "Vai alla sala e giocane una",
   columns: {
     place: "Posizione",

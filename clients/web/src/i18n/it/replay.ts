@@ -22,7 +22,7 @@ export const replay: Texts["replay"] = {
   possible: "Giocate possibili",
   answered: (name, answer) => `${name}: ${answer}`,
   seconds: (seconds) => `${seconds.toFixed(1).replace(".", ",")} s`,
-  estimate: (value) => `stima propria ${value.toFixed(2).replace(".", ",")}`,
+  estimate: (value) => `stima ${value.toFixed(2).replace(".", ",")}`,
   noTable: "Questa decisione non è un turno e non ha una tabella.",
   empty: "Questa registrazione non contiene eventi.",
 };

@@ -25,8 +25,8 @@ export const tournaments: Texts["tournaments"] = {
   table: (table) => `Tavolo ${table}`,
   game: (number) => `partita ${number}`,
   wall: {
-    open: "Vista a parete",
-    close: "Esci dalla vista a parete",
+    open: "Vista per maxischermo",
+    close: "Esci dalla vista per maxischermo",
     more: (from, to) => `da ${from} a ${to}`,
     tables: (from, to) => `tavoli da ${from} a ${to}`,
   },
