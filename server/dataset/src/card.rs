@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::column::markdown;
-use super::export::{DECISIONS, EXPRESSIONS, Export, Exported, Layout};
+use super::export::{Export, Exported, Layout};
 use super::formats::{Format, file_name};
 use super::sheet;
 use super::{TABLES_VERSION, decisions, expressions};
@@ -77,7 +77,7 @@ fn front_matter(export: &Export, exported: &Exported) -> String {
     match export.layout {
         Layout::Tables => {
             let format = preferred(&export.formats);
-            for (table, default) in [(DECISIONS, true), (EXPRESSIONS, false)] {
+            for (table, default) in [(decisions::TABLE, true), (expressions::TABLE, false)] {
                 // Hubs cannot infer types without rows.
                 if !default && exported.expressions == 0 && format != Format::Parquet {
                     continue;
@@ -162,11 +162,13 @@ fn contents(text: &mut String, export: &Export, exported: &Exported) {
 fn columns(text: &mut String) {
     let _ = write!(
         text,
-        "\n## Table `{DECISIONS}`\n\nOne row per decision, in order of games and decisions.\n\n{}\
-         \n## Table `{EXPRESSIONS}`\n\nOne row per expression of a player, in the same order.\n\n{}\
+        "\n## Table `{}`\n\nOne row per decision, in order of games and decisions.\n\n{}\
+         \n## Table `{}`\n\nOne row per expression of a player, in the same order.\n\n{}\
          \nThe types are Arrow's. F is the number of faces (11 in the standard game). In CSV, lists and structs are JSON and\n\
          null is an empty cell; in CSV and JSON Lines, binary is hexadecimal and times are RFC 3339.\n",
+        decisions::TABLE,
         markdown(&decisions::columns()),
+        expressions::TABLE,
         markdown(&expressions::columns())
     );
 }

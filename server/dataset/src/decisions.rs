@@ -6,8 +6,11 @@ use std::sync::Arc;
 use chefshat_engine::{Cards, Mask, Observation, RewardScheme};
 
 use super::column::{Column, ColumnInfo, Type, Value};
+use super::expressions::LatestExpression;
 use super::game::{GameInfo, SeatInfo};
-use super::gather::LatestExpression;
+
+/// Name of the table.
+pub(super) const TABLE: &str = "decisions";
 
 /// Rewards by scheme, in the order of [`RewardScheme::ALL`].
 pub(super) type Rewards = [f32; RewardScheme::ALL.len()];

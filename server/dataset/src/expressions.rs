@@ -3,12 +3,15 @@
 
 use std::sync::Arc;
 
-use chefshat_proto::v1::Expression;
+use chefshat_proto::v1::{Expression, ExpressionSource};
 
 use super::column::{Column, ColumnInfo, Type, Value};
 use super::game::{GameInfo, SeatInfo};
-use super::gather::{expression_source, moment_us};
 
+/// Name of the table.
+pub(super) const TABLE: &str = "expressions";
+
+/// One expression.
 #[derive(Debug, Clone)]
 pub(super) struct ExpressionRow {
     pub(super) game: Arc<GameInfo>,
@@ -19,6 +22,31 @@ pub(super) struct ExpressionRow {
     pub(super) decisions_before: u64,
     pub(super) public: bool,
     pub(super) expression: Expression,
+}
+
+/// The last expression of a seat.
+#[derive(Debug, Clone)]
+pub(super) struct LatestExpression {
+    pub(super) expression: Arc<Expression>,
+    pub(super) public: bool,
+    pub(super) elapsed_ms: u64,
+}
+
+impl LatestExpression {
+    /// The value in the column `expressions` at a later time.
+    pub(super) fn value_at(&self, elapsed_ms: u64) -> Value {
+        let expression = &self.expression;
+        Value::Struct(vec![
+            (&expression.label).into(),
+            expression.valence.into(),
+            expression.arousal.into(),
+            expression.dominance.into(),
+            expression.confidence.into(),
+            expression_source(expression).into(),
+            self.public.into(),
+            elapsed_ms.saturating_sub(self.elapsed_ms).into(),
+        ])
+    }
 }
 
 /// The columns, in the order of the files.
@@ -124,4 +152,23 @@ pub(super) const COLUMNS: &[Column<ExpressionRow>] = &[
 /// Names, types and descriptions of the columns.
 pub(super) fn columns() -> Vec<ColumnInfo> {
     COLUMNS.iter().map(Column::info).collect()
+}
+
+/// The source of an expression, if stated.
+fn expression_source(expression: &Expression) -> Option<&'static str> {
+    match expression.source() {
+        ExpressionSource::Unspecified => None,
+        ExpressionSource::Face => Some("face"),
+        ExpressionSource::Voice => Some("voice"),
+        ExpressionSource::SelfReport => Some("self_report"),
+        ExpressionSource::Model => Some("model"),
+    }
+}
+
+/// Microseconds since the Unix epoch, truncated.
+fn moment_us(moment: &chefshat_proto::Timestamp) -> i64 {
+    moment
+        .seconds
+        .saturating_mul(1_000_000)
+        .saturating_add(i64::from(moment.nanos / 1000))
 }

@@ -9,36 +9,10 @@ use std::sync::Arc;
 use chefshat_engine::{Action, ActionId, BySeat, Game, RewardScheme, Seat, Viewer};
 use chefshat_proto::v1::{self, DecisionKind, DecisionSource, game_event::Kind, record_line::Line};
 
-use super::column::Value;
 use super::decisions::{DecisionRow, RECORDED, Rewards};
-use super::expressions::ExpressionRow;
+use super::expressions::{ExpressionRow, LatestExpression};
 use super::game::{GameInfo, IMPORTED, SeatInfo, checked_info};
 use chefshat_record::replay::{Moment, ReplayError, walk};
-
-/// The last expression of a seat.
-#[derive(Debug, Clone)]
-pub(super) struct LatestExpression {
-    expression: Arc<v1::Expression>,
-    public: bool,
-    elapsed_ms: u64,
-}
-
-impl LatestExpression {
-    /// The value in the column `expressions` at a later time.
-    pub(super) fn value_at(&self, elapsed_ms: u64) -> Value {
-        let expression = &self.expression;
-        Value::Struct(vec![
-            (&expression.label).into(),
-            expression.valence.into(),
-            expression.arousal.into(),
-            expression.dominance.into(),
-            expression.confidence.into(),
-            expression_source(expression).into(),
-            self.public.into(),
-            elapsed_ms.saturating_sub(self.elapsed_ms).into(),
-        ])
-    }
-}
 
 /// The rows of one game.
 #[derive(Debug)]
@@ -321,23 +295,4 @@ fn source_name(source: DecisionSource) -> &'static str {
         DecisionSource::Substitute => "substitute",
         DecisionSource::Recorded => RECORDED,
     }
-}
-
-/// The source of an expression, if stated.
-pub(super) fn expression_source(expression: &v1::Expression) -> Option<&'static str> {
-    match expression.source() {
-        v1::ExpressionSource::Unspecified => None,
-        v1::ExpressionSource::Face => Some("face"),
-        v1::ExpressionSource::Voice => Some("voice"),
-        v1::ExpressionSource::SelfReport => Some("self_report"),
-        v1::ExpressionSource::Model => Some("model"),
-    }
-}
-
-/// Microseconds since the Unix epoch, truncated.
-pub(super) fn moment_us(moment: &chefshat_proto::Timestamp) -> i64 {
-    moment
-        .seconds
-        .saturating_mul(1_000_000)
-        .saturating_add(i64::from(moment.nanos / 1000))
 }

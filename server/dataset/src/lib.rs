@@ -5,7 +5,6 @@ mod card;
 mod chefshatgym;
 mod column;
 mod decisions;
-mod earlier;
 mod export;
 mod expressions;
 mod files;
@@ -15,13 +14,16 @@ mod game;
 mod gather;
 mod parquet;
 mod python;
+mod row;
+mod run;
 mod sheet;
 
 pub use column::{ColumnInfo, Type, markdown};
-pub use export::{Export, ExportError, Exported, Filter, Layout, LeftOut};
+pub use export::{Export, Exported, Filter, Layout, LeftOut};
 pub use files::FileSummary;
 pub use folder::FolderError;
 pub use formats::Format;
+pub use run::ExportError;
 
 /// Version of the tables. Incremented when a column changes its meaning or type or is removed, not
 /// when one is added at the end.

@@ -11,7 +11,7 @@ use serde_arrow::ArrayBuilder;
 
 use super::column::{ColumnInfo, Type, Value};
 use super::files::{FileSummary, SummedFile};
-use super::formats::{Encoding, Object, RowFile};
+use super::row::{Encoding, Object, RowFile};
 
 /// Rows per batch.
 const BATCH_ROWS: usize = 2048;

@@ -1,7 +1,7 @@
 //! Who exchanges cards with whom, and how many (`docs/rules.md` §3.4). How a game asks for the
 //! gifts is in `game::start`.
 
-use crate::{Cards, RuleSet, Seat, SeatOrder};
+use crate::{ActionId, ActionSpace, Cards, RuleSet, Seat, SeatOrder};
 
 /// With fewer players there is neither Sous-Chef nor Waiter.
 const SOUS_CHEF_PLAYERS: usize = 4;
@@ -53,5 +53,17 @@ impl ExchangePair {
     pub fn least_gifts(&self, rules: &RuleSet) -> u8 {
         self.size
             .min(rules.hand_size().saturating_sub(rules.jokers()))
+    }
+}
+
+/// The default gift (§8.3): the highest plain face, else the Golden card, else a joker.
+pub(crate) fn default_gift(hand: Cards, space: ActionSpace) -> ActionId {
+    let mut plain = hand;
+    if hand.has_golden() {
+        plain.remove_counts(space.faces(), 1, 0);
+    }
+    match plain.highest().or(hand.highest()) {
+        Some(face) => space.give(face).expect("a face of the deck"),
+        None => space.give_joker(),
     }
 }

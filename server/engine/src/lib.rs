@@ -49,18 +49,19 @@ pub use deal::{Card, Deal, Seed};
 pub use event::{Event, ShiftEnd, Viewer};
 pub use exchange::ExchangePair;
 pub use game::{
-    ActionError, Decision, DecisionKind, Game, GiftRequirement, PlayRequirement, Refusal,
+    ActionError, Board, Decision, DecisionKind, Game, GiftRequirement, PlayRequirement, Refusal,
     Requirement, Script, ScriptError,
 };
 pub use ids::{ActionId, Face, Seat};
 pub use mask::Mask;
 pub use metrics::{MetricsRecorder, SeatMetrics, ShiftMetrics};
-pub use observation::{Board, Observation};
+pub use observation::Observation;
 pub use order::{SeatOrder, Standings};
 pub use played::{PlayedDecision, RecordedDecision, TakenOver};
 pub use rewards::RewardScheme;
 pub use roles::{Role, SpecialAction};
 pub use rules::{Opening, PassScope, RuleSet, RuleSetError, RuleSetSpec, Stop};
+pub use seed_plan::{MAX_ENTROPY, SeedPlan};
 
 /// Version of the rules that this crate implements. Every record names the version it was played
 /// by.
@@ -71,4 +72,3 @@ pub const MAX_SEATS: usize = 6;
 pub const MAX_FACES: u8 = 15;
 /// The most jokers a deck can have.
 pub const MAX_JOKERS: u8 = 2;
-pub use seed_plan::{MAX_ENTROPY, SeedPlan};

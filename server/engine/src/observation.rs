@@ -2,19 +2,8 @@
 //! vector. `game::view` fills it in. The mask of legal actions is separate
 //! ([`crate::Game::legal_actions`]).
 
-use crate::game::default_gift;
-use crate::{ActionId, ActionSpace, BySeat, Cards, DecisionKind, Mask, Role, Seat};
-
-/// The play on the board.
-#[derive(Copy, Clone, Eq, PartialEq, Debug, Default)]
-pub struct Board {
-    /// The face, F+1 for a joker alone, 0 if the board is empty.
-    pub face: u8,
-    /// Number of cards, jokers included.
-    pub size: u8,
-    /// Number of jokers among them.
-    pub jokers: u8,
-}
+use crate::exchange::default_gift;
+use crate::{ActionId, ActionSpace, Board, BySeat, Cards, DecisionKind, Mask, Role, Seat};
 
 /// Everything that a seat may know at one moment. For a spectator `hand`, `gave` and `received` are
 /// empty.

@@ -5,38 +5,12 @@
 //! hand, on the jokers and on the least size, so a table has the bits of all of them. The tests
 //! `requirement` and `properties` compare the masks with the rules, action by action.
 
+use crate::actions::play_offset;
 use crate::mask::WORDS;
-use crate::{Cards, MAX_FACES, Mask, PlayRequirement};
+use crate::{Cards, Mask, PlayRequirement};
 
-/// Number of plays of cards with a face in the largest deck.
-pub(crate) const MAX_PLAYS: usize = play_offset(MAX_FACES + 1) as usize;
 /// The largest play: fifteen cards and two jokers.
 const MAX_SIZE: usize = 17;
-
-/// Index of the first play of a face: 3f(f-1)/2.
-pub(crate) const fn play_offset(face: u8) -> u16 {
-    3 * (face as u16) * (face as u16 - 1) / 2
-}
-
-/// Face, quantity and jokers of each play, by index.
-pub(crate) static PLAYS: [[u8; 3]; MAX_PLAYS] = {
-    let mut table = [[0; 3]; MAX_PLAYS];
-    let (mut face, mut index) = (1, 0);
-    while face <= MAX_FACES {
-        let mut quantity = 1;
-        while quantity <= face {
-            let mut jokers = 0;
-            while jokers <= 2 {
-                table[index] = [face, quantity, jokers];
-                index += 1;
-                jokers += 1;
-            }
-            quantity += 1;
-        }
-        face += 1;
-    }
-    table
-};
 
 /// The plays of one face that a hand allows: bit i is the i-th play of the face. The bits from
 /// [`PATTERN_BITS`] on are their number.

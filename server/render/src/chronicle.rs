@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 use chefshat_engine::{Event, Seat, SpecialAction, Viewer};
 use chefshat_proto::v1::{self, game_event::Kind};
 
-use super::scene::{self, Card};
+use super::card::Card;
 use chefshat_record::convert::{cards_from_numbers, seat_from_number};
 
 /// The most log entries.
@@ -278,7 +278,7 @@ impl Chronicle {
             giver,
             receiver,
             count: exchanged.count,
-            cards: cards.map(|cards| scene::cards(cards, self.faces)),
+            cards: cards.map(|cards| Card::of_hand(cards, self.faces)),
         })
     }
 
@@ -309,7 +309,7 @@ impl Chronicle {
 /// The cards of a play, jokers last.
 pub(super) fn play_cards(play: &v1::Play, golden: bool) -> Vec<Card> {
     let count = |number: u32| u8::try_from(number).unwrap_or(0);
-    scene::played(
+    Card::of_play(
         count(play.face),
         count(play.quantity),
         count(play.jokers),

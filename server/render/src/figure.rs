@@ -5,8 +5,9 @@ use chefshat_engine::{
     Action, ActionSpace, BySeat, Cards, DecisionKind, Face, Game, Mask, Requirement, Seat, Viewer,
 };
 
+use super::card::Card;
 use super::chronicle::{Chronicle, Participant};
-use super::scene::{Card, Scene};
+use super::scene::Scene;
 
 /// The state of an action: whether the rules allow it now for some hand, and whether this hand has
 /// its cards.
@@ -107,7 +108,7 @@ impl Figure {
             pizza: scene.pizza,
             faces,
             jokers,
-            hand: super::scene::cards(table.hand, faces),
+            hand: Card::of_hand(table.hand, faces),
             board: scene.board,
             requirement: table.requirement,
             plays,

@@ -4,38 +4,15 @@
 mod cut;
 
 use std::ops::RangeInclusive;
-use std::time::Duration;
 
 use chefshat_engine::{Seat, Viewer};
 use chefshat_proto::v1::{self, record_line::Line};
 
 use super::figure::Figure;
-use super::scene::Scene;
 use chefshat_record::convert::{rules_from_proto, seat_from_number};
 use chefshat_record::replay::{ReplayError, walk};
 use cut::{Cut, chronicle_of};
-
-/// A moment of a game.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum When {
-    /// This decision is open, counted over the game from 1.
-    Decision(u64),
-    /// This Shift has just ended.
-    ShiftEnd(u32),
-    /// The game has ended.
-    End,
-}
-
-/// A scene and its duration.
-#[derive(Debug, Clone)]
-pub struct Frame {
-    /// The moment.
-    pub when: When,
-    /// The scene.
-    pub scene: Scene,
-    /// Decision time; zero for built-in agents and at the ends of Shifts and games.
-    pub decision_time: Duration,
-}
+pub use cut::{Frame, When};
 
 /// A recorded game as frames for one viewer.
 #[derive(Debug, Clone)]

@@ -4,6 +4,7 @@
 //! as pixels; a [`GifWriter`] encodes pixels as a GIF. [`Scene::of`] also accepts a game in
 //! progress. Files, threads and video encoders are left to the caller.
 
+mod card;
 mod chronicle;
 mod figure;
 mod figure_svg;
@@ -13,9 +14,10 @@ mod paint;
 mod scene;
 mod table;
 
+pub use card::Card;
 pub use chronicle::{Chronicle, LogEntry, Participant, ParticipantKind, Presence};
 pub use figure::{Figure, State};
 pub use film::{Film, FilmError, Frame, Perspective, When, figure_at};
 pub use gif::{GifError, GifWriter, Palette};
 pub use paint::{MAX_WIDTH, MIN_WIDTH, PaintError, Painter, Pixels};
-pub use scene::{Card, Hand, Now, Scene, SeatScene};
+pub use scene::{Hand, Now, Scene, SeatScene};

@@ -7,6 +7,7 @@ use chefshat_engine::{
     SpecialAction, Standings, Viewer,
 };
 
+use super::card::Card;
 use super::chronicle::{Chronicle, LogEntry, Participant};
 
 /// A moment of a game, redacted for one viewer.
@@ -72,32 +73,6 @@ pub enum Hand {
     Unknown(u8),
 }
 
-/// A card.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Card {
-    /// An ingredient, by its face, 1..=15.
-    Face(u8),
-    /// The Golden card, of this face.
-    Golden(u8),
-    /// A joker.
-    Joker,
-}
-
-impl Card {
-    /// The face; `None` for a joker.
-    pub fn face(self) -> Option<u8> {
-        match self {
-            Card::Face(face) | Card::Golden(face) => Some(face),
-            Card::Joker => None,
-        }
-    }
-
-    /// The card without marking it as Golden.
-    pub(super) fn plain(self) -> Card {
-        self.face().map_or(Card::Joker, Card::Face)
-    }
-}
-
 /// The open decision, or the result.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Now {
@@ -127,6 +102,16 @@ pub enum Now {
     Aborted,
 }
 
+impl Now {
+    /// Whether a Shift or the game is over, so that no decision is open.
+    pub(super) fn is_end(&self) -> bool {
+        matches!(
+            self,
+            Now::ShiftOver { .. } | Now::GameOver(_) | Now::Aborted
+        )
+    }
+}
+
 impl Scene {
     /// The current scene of a game. `known` tells which hands are known at all.
     pub fn of(game: &Game, chronicle: &Chronicle, viewer: Viewer, known: &BySeat<bool>) -> Scene {
@@ -148,7 +133,7 @@ impl Scene {
                 points: view.points[seat],
                 hand: match hands[seat] {
                     Some(_) if !known[seat] => Hand::Unknown(cards_left),
-                    Some(hand) => Hand::Open(cards(hand, faces)),
+                    Some(hand) => Hand::Open(Card::of_hand(hand, faces)),
                     None => Hand::Hidden(cards_left),
                 },
                 passed: view.passed[seat],
@@ -171,7 +156,7 @@ impl Scene {
             pizza: view.pizza,
             turn: game.shift_turns() + 1,
             seats,
-            board: played(view.board.face, quantity, view.board.jokers, golden),
+            board: Card::of_play(view.board.face, quantity, view.board.jokers, golden),
             board_by: chronicle.last_to_play().filter(|_| view.board.size > 0),
             played: view
                 .played
@@ -197,34 +182,6 @@ impl Scene {
             }
         }
     }
-}
-
-/// The cards of a play.
-pub(super) fn played(face: u8, quantity: u8, jokers: u8, golden: bool) -> Vec<Card> {
-    let mut cards = vec![Card::Face(face); usize::from(quantity)];
-    if let (true, Some(first)) = (golden, cards.first_mut()) {
-        *first = Card::Golden(face);
-    }
-    cards.extend(std::iter::repeat_n(Card::Joker, usize::from(jokers)));
-    cards
-}
-
-/// Cards ascending, jokers at the end, the Golden card first of its face.
-pub(super) fn cards(cards: Cards, faces: u8) -> Vec<Card> {
-    let plain = |number| {
-        if number > faces {
-            Card::Joker
-        } else {
-            Card::Face(number)
-        }
-    };
-    let mut seen: Vec<Card> = cards.ascending(faces).map(plain).collect();
-    if cards.has_golden()
-        && let Some(first) = seen.iter().position(|&card| card == Card::Face(faces))
-    {
-        seen[first] = Card::Golden(faces);
-    }
-    seen
 }
 
 /// The hands a viewer may see.

@@ -12,6 +12,7 @@ use super::chronicle::{ParticipantKind, Presence};
 use super::paint::Painter;
 use super::scene::{Now, Scene, SeatScene};
 use hand::{Label, Placed, Sprite, SpriteDefinition};
+use words::{COLUMN, SPACE};
 
 /// Width of the picture, SVG units.
 const WIDTH: f32 = 1280.0;
@@ -31,14 +32,10 @@ const BOARD: (f32, f32) = (WIDTH / 2.0, (UPPER + PANEL + LOWER) / 2.0);
 const BOARD_WIDTH: f32 = 470.0;
 /// The most cards in a row on the board.
 const BOARD_ROW: usize = 9;
-/// Width of the columns beside the board.
-const COLUMN: f32 = 302.0;
 /// Width beside a name: number, chip and points.
 const BESIDE_NAME: f32 = 218.0;
 /// Width beside the line below the name, without the role: symbol and points.
 const BESIDE_LABEL: f32 = 76.0 + 66.0;
-/// Width of a space, which is not measured at the edge of a text.
-const SPACE: f32 = 5.0;
 /// Left edge of the caption.
 const CAPTION: f32 = 182.0;
 
@@ -352,11 +349,6 @@ fn played(scene: &Scene) -> Vec<Played> {
         y: (index / per_row) as f32 * 38.0,
     };
     scene.played.iter().enumerate().map(cell).collect()
-}
-
-/// Whether no decision is open at this moment.
-fn is_end(now: &Now) -> bool {
-    matches!(now, Now::ShiftOver { .. } | Now::GameOver(_) | Now::Aborted)
 }
 
 #[cfg(test)]

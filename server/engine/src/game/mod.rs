@@ -3,6 +3,7 @@
 //! points), `legal` (what is legal), `view` (what a seat may know), `script` (games from given
 //! hands).
 
+mod decision;
 mod end;
 mod error;
 mod legal;
@@ -12,36 +13,16 @@ mod start;
 mod turn;
 mod view;
 
+pub use decision::{Decision, DecisionKind, GiftRequirement, PlayRequirement, Requirement};
 pub use error::{ActionError, Refusal};
-pub(crate) use legal::default_gift;
-pub use legal::{GiftRequirement, PlayRequirement, Requirement};
 pub use script::{Script, ScriptError};
+pub use shift_state::Board;
 
 use crate::{
     Action, ActionId, BySeat, Cards, Deal, Event, Role, RuleSet, Seat, SeatOrder, Seed,
     SpecialAction, Standings, Stop,
 };
 use shift_state::ShiftState;
-
-/// The kind of a decision.
-#[derive(Copy, Clone, Eq, PartialEq, Hash, Debug)]
-pub enum DecisionKind {
-    /// Play or pass.
-    Turn,
-    /// Give one card in the exchange.
-    Exchange,
-    /// Declare the special action or decline.
-    SpecialAction,
-}
-
-/// A decision that a game waits for.
-#[derive(Copy, Clone, Eq, PartialEq, Debug)]
-pub struct Decision {
-    /// The seat that decides.
-    pub seat: Seat,
-    /// Its kind.
-    pub kind: DecisionKind,
-}
 
 /// Where a game stands within a Shift.
 #[derive(Copy, Clone, Eq, PartialEq, Debug)]

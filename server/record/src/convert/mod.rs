@@ -20,4 +20,5 @@ pub use rules::{
     FieldProblem, action_space, reward_scheme_from_proto, reward_scheme_to_proto, role_from_number,
     rules_from_proto, rules_to_proto,
 };
+pub(crate) use start::action_id;
 pub use start::{cards_from_numbers, script_from_proto, script_to_proto, seat_from_number};

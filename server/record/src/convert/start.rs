@@ -1,6 +1,9 @@
-//! Converts scripted Shifts. The engine validates them; its errors become field names here.
+//! Converts scripted Shifts, and the numbers of seats, cards and actions. The engine validates
+//! scripts; its errors become field names here.
 
-use chefshat_engine::{BySeat, Cards, Game, RuleSet, Script, ScriptError, Seat, SeatOrder, Seed};
+use chefshat_engine::{
+    ActionId, BySeat, Cards, Game, RuleSet, Script, ScriptError, Seat, SeatOrder, Seed,
+};
 use chefshat_proto::v1;
 
 use super::events::{seat_cards, seat_number};
@@ -136,4 +139,9 @@ fn field_of(error: &ScriptError) -> &'static str {
         ScriptError::Ended => "points",
         ScriptError::Drawn => "drawn_seat",
     }
+}
+
+/// The action with an index; an index out of range gives an action that does not exist.
+pub(crate) fn action_id(action: u32) -> ActionId {
+    ActionId::new(u16::try_from(action).unwrap_or(u16::MAX))
 }

@@ -1,36 +1,19 @@
 //! Completes the Shifts of a real table: unknown hands and gifts are filled in with cards that fit
 //! all stated facts, so that the rule engine can play the Shift. Deterministic. Reports beside the
-//! hands what is known of them, because it was stated or follows. The search is in `puzzle`.
+//! hands what is known of them, because it was stated or follows. The search is in `search`.
 
-use chefshat_engine::{BySeat, Cards, RuleSet, Seat, SeatOrder};
+use chefshat_engine::{RuleSet, SeatOrder};
 
-use super::facts::{Counts, Fact, Tally};
-use super::gifts::SearchBudget;
-use super::known::Known;
+use super::candidates::SearchBudget;
+use super::facts::{Fact, Tally};
 use super::puzzle::Puzzle;
+use super::search::Plan;
 
 /// Search steps per Shift: gifts and pairs of gifts. Usually one of the first fits; the bound
 /// keeps a made-up record from occupying the server.
 const MAX_SHIFT_STEPS: usize = 200_000;
 /// Search steps per game.
 const MAX_GAME_STEPS: usize = 10 * MAX_SHIFT_STEPS;
-
-/// A Shift the engine can play.
-#[derive(Debug, Clone)]
-pub(crate) struct Plan {
-    /// The hands as dealt.
-    pub(super) dealt: BySeat<Cards>,
-    /// The gift of each seat.
-    pub(super) gifts: BySeat<Counts>,
-    /// Whether a seat chooses its gift.
-    pub(super) choosers: BySeat<bool>,
-    /// The seat drawn at the deal, for the opening `any_top_face`.
-    pub(super) drawn: Option<Seat>,
-    /// What is known of the hands as dealt.
-    pub(super) dealt_known: Known,
-    /// What is known of the hands after the exchange.
-    pub(super) held_known: Known,
-}
 
 /// A fact that contradicts those before it.
 #[derive(Debug, Clone)]
@@ -101,7 +84,7 @@ impl Completer {
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test fails by it")]
 mod tests {
-    use chefshat_engine::{Action, Face, RuleSetSpec};
+    use chefshat_engine::{Action, Face, RuleSetSpec, Seat};
 
     use crate::import::complete::*;
 

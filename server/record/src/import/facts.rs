@@ -1,18 +1,14 @@
 //! The stated facts of a Shift at a real table: hands, gifts and turns, each with its line. They
 //! come from the rows of a transcript or from the lines of an imported record.
 
-use chefshat_engine::{Action, BySeat, Cards, Face, Role, RuleSet, Seat, SeatOrder};
+use chefshat_engine::{Action, BySeat, Cards, RuleSet, Seat};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 
-use super::game::StartState;
-use super::transcript::{Entry, Transcript, TranscriptError};
-use crate::convert::{cards_from_numbers, seat_from_number};
+use super::counts::{Counts, NOTHING, add_action};
+use super::transcript::{Entry, Transcript, TranscriptError, wrong};
+use crate::convert::{action_id, cards_from_numbers, seat_from_number};
 
-/// Cards by kind: index f-1 counts face f, [`JOKER`] the jokers.
-pub(super) type Counts = [u8; JOKER + 1];
-/// The index of the jokers.
-pub(super) const JOKER: usize = chefshat_engine::MAX_FACES as usize;
-
+/// A stated fact.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Fact {
     /// A hand as dealt.
@@ -57,10 +53,10 @@ impl Tally {
         let mut tally = Self {
             dealt: BySeat::filled(players, None),
             special: None,
-            gives: BySeat::filled(players, [0; JOKER + 1]),
+            gives: BySeat::filled(players, NOTHING),
             given: BySeat::filled(players, None),
             exchanged: false,
-            played: BySeat::filled(players, [0; JOKER + 1]),
+            played: BySeat::filled(players, NOTHING),
             opener: None,
         };
         for (_, fact) in facts {
@@ -105,7 +101,7 @@ fn push_facts(rules: &RuleSet, line: &Line, mut push: impl FnMut(Fact)) {
     let seat = |number| seat_from_number(number, players);
     match line {
         Line::Decision(decision) => {
-            let action = crate::replay::action_id(decision.action);
+            let action = action_id(decision.action);
             if let (Some(seat), Some(meaning)) =
                 (seat(decision.seat), rules.actions().decode(action))
             {
@@ -141,10 +137,10 @@ fn push_facts(rules: &RuleSet, line: &Line, mut push: impl FnMut(Fact)) {
     }
 }
 
-/// The facts of a transcript, by Shift, and the state of the game before the first one.
+/// The facts of a transcript, by Shift.
 pub(super) fn facts_of_transcript(
     transcript: &Transcript,
-) -> Result<(StartState, Vec<ShiftFacts>), TranscriptError> {
+) -> Result<Vec<ShiftFacts>, TranscriptError> {
     let mut shifts: Vec<ShiftFacts> = Vec::new();
     let mut current: Option<u32> = None;
     let mut playing = false;
@@ -189,119 +185,5 @@ pub(super) fn facts_of_transcript(
             _ => {}
         }
     }
-    Ok((start_state(transcript)?, shifts))
-}
-
-/// The state before the first stated Shift: unless it is the first of the game, from its rows
-/// `role` and `points`.
-fn start_state(transcript: &Transcript) -> Result<StartState, TranscriptError> {
-    let players = transcript.rules.players();
-    let mut start = StartState {
-        shift: 1,
-        last_order: None,
-        scores: BySeat::filled(players, 0),
-    };
-    let Some(first) = transcript.rows.first().filter(|row| row.shift > 1) else {
-        return Ok(start);
-    };
-    start.shift = first.shift;
-    let mut roles: BySeat<Option<&str>> = BySeat::filled(players, None);
-    for row in transcript.rows.iter().take_while(|row| {
-        row.shift == first.shift && !matches!(row.entry, Entry::Turn(_) | Entry::Special(_))
-    }) {
-        match &row.entry {
-            Entry::Role(name) => roles[row.seat] = Some(name),
-            Entry::Points(points) => {
-                start.scores[row.seat] = u32::try_from(*points)
-                    .map_err(|_| wrong(row.line, "too many points".into()))?;
-            }
-            _ => {}
-        }
-    }
-    let mut order: Vec<Seat> = Vec::new();
-    for role in Role::in_order(players) {
-        let next = roles
-            .seats()
-            .find(|seat| roles[*seat] == Some(role.name()) && !order.contains(seat));
-        order.extend(next);
-    }
-    let order = SeatOrder::from_slice(&order).filter(|order| order.len() == players);
-    start.last_order = Some(order.ok_or_else(|| {
-        wrong(
-            first.line,
-            format!(
-                "the transcript begins with Shift {}, which needs a row `role` for each seat ({})",
-                first.shift,
-                Role::in_order(players)
-                    .map(Role::name)
-                    .collect::<Vec<_>>()
-                    .join(", ")
-            ),
-        )
-    })?);
-    Ok(start)
-}
-
-pub(super) fn wrong(line: usize, problem: String) -> TranscriptError {
-    TranscriptError { line, problem }
-}
-
-/// Adds the cards of an action; saturates far above any deck.
-fn add_action(counts: &mut Counts, cards: Action) {
-    let (face, quantity, jokers) = match cards {
-        Action::Play {
-            face,
-            quantity,
-            jokers,
-        } => (Some(face), quantity, jokers),
-        Action::Give(face) => (Some(face), 1, 0),
-        Action::LoneJoker | Action::GiveJoker => (None, 0, 1),
-        Action::Pass | Action::Decline | Action::Declare => (None, 0, 0),
-    };
-    if let Some(face) = face {
-        let count = &mut counts[index(face)];
-        *count = count.saturating_add(quantity);
-    }
-    counts[JOKER] = counts[JOKER].saturating_add(jokers);
-}
-
-/// The index of a face.
-pub(super) fn index(face: Face) -> usize {
-    usize::from(face.get()) - 1
-}
-
-pub(super) fn counts_of(cards: Cards, faces: u8) -> Counts {
-    let mut counts = [0; JOKER + 1];
-    for (slot, count) in counts.iter_mut().zip(cards.counts(faces)) {
-        *slot = count;
-    }
-    counts[usize::from(faces)..JOKER].fill(0);
-    counts[JOKER] = cards.jokers();
-    counts
-}
-
-/// Whether `all` contains every card of `some`.
-pub(super) fn contains(all: &Counts, some: &Counts) -> bool {
-    all.iter().zip(some).all(|(all, some)| all >= some)
-}
-
-pub(super) fn add(sum: &mut Counts, more: &Counts) {
-    for (sum, more) in sum.iter_mut().zip(more) {
-        *sum = sum.saturating_add(*more);
-    }
-}
-
-/// Removes cards; `None` if some are missing.
-pub(super) fn take(from: &mut Counts, cards: &Counts) -> Option<()> {
-    for (from, cards) in from.iter_mut().zip(cards) {
-        *from = from.checked_sub(*cards)?;
-    }
-    Some(())
-}
-
-/// Raises each count to at least that of `least`.
-pub(super) fn at_least(counts: &mut Counts, least: &Counts) {
-    for (count, least) in counts.iter_mut().zip(least) {
-        *count = (*count).max(*least);
-    }
+    Ok(shifts)
 }

@@ -3,61 +3,15 @@
 //! own; cards that were not stated are redacted from the events.
 
 use chefshat_engine::{
-    Action, BySeat, Deal, DecisionKind, Event, Face, Game, RuleSet, Script, ScriptError, Seat,
-    SeatOrder, Seed,
+    Action, BySeat, DecisionKind, Event, Face, Game, RuleSet, Script, ScriptError, Seat, SeatOrder,
 };
-use chefshat_proto::v1;
 
-use super::complete::{Completer, Contradiction, Plan};
-use super::facts::{Fact, JOKER, ShiftFacts, index};
+use super::complete::{Completer, Contradiction};
+use super::counts::{JOKER, index};
+use super::facts::{Fact, ShiftFacts};
 use super::known::Known;
-use crate::convert::{FieldProblem, script_from_proto};
-
-/// The engine requires a seed, but deals nothing from it.
-const NO_SEED: Seed = Seed([0; 32]);
-
-/// The state of a game before its first stated Shift.
-#[derive(Debug, Clone)]
-pub(crate) struct StartState {
-    /// Number of the first stated Shift.
-    pub(crate) shift: u32,
-    /// The order of the Shift before; `None` for the first.
-    pub(crate) last_order: Option<SeatOrder>,
-    /// Points before it.
-    pub(crate) scores: BySeat<u32>,
-}
-
-impl StartState {
-    /// Reads the header of an imported record: a scripted Shift without hands, or none.
-    pub(crate) fn of(
-        scripted: Option<&v1::ScriptedShift>,
-        rules: &RuleSet,
-    ) -> Result<Self, FieldProblem> {
-        let scripted = scripted.cloned().unwrap_or_default();
-        if !scripted.hands.is_empty() || scripted.drawn_seat.is_some() {
-            return Err(FieldProblem::new(
-                "hands",
-                "hands of an imported game are stated in its Shifts",
-            ));
-        }
-        let deal = Deal::new(rules, NO_SEED, 1);
-        let any_hands = v1::ScriptedShift {
-            hands: deal
-                .hands()
-                .iter()
-                .map(|(seat, &hand)| crate::convert::seat_cards(seat, hand, rules.faces()))
-                .collect(),
-            drawn_seat: deal.drawn().map(crate::convert::seat_number),
-            ..scripted
-        };
-        let script = script_from_proto(&any_hands, rules)?;
-        Ok(Self {
-            shift: script.shift,
-            last_order: script.last_order,
-            scores: script.scores,
-        })
-    }
-}
+use super::search::Plan;
+use super::start::{NO_SEED, StartState};
 
 /// An imported game in progress.
 #[derive(Debug)]

@@ -2,10 +2,9 @@
 //! who may hold the Golden card. A hand, a gift or the golden opening reveals it; other plays do
 //! not.
 
-use chefshat_engine::{BySeat, Cards, ExchangePair, Face, Opening, RuleSet, Seat};
+use chefshat_engine::{BySeat, Cards, Face, Opening, Seat};
 
-use super::facts::{Counts, Tally, counts_of};
-use super::gifts::size_of;
+use super::counts::{Counts, size_of};
 use super::puzzle::{Kept, Puzzle};
 
 /// What is known of all hands at one moment.
@@ -83,44 +82,6 @@ impl Puzzle<'_> {
     fn is_forced(&self, seat: Seat) -> bool {
         self.pairs.iter().any(|pair| pair.forced == seat)
     }
-}
-
-/// The seats that may have been dealt the Golden card, by the hands, gifts and opening stated.
-pub(super) fn golden_seats(
-    rules: &RuleSet,
-    tally: &Tally,
-    pairs: &[ExchangePair],
-    top: usize,
-) -> BySeat<bool> {
-    let faces = rules.faces();
-    let stated: u8 = tally
-        .dealt
-        .values()
-        .flatten()
-        .map(|hand| counts_of(*hand, faces)[top])
-        .fold(0, u8::saturating_add);
-    BySeat::from_fn(rules.players(), |seat| {
-        let as_dealt = tally
-            .dealt
-            .iter()
-            .all(|(other, hand)| hand.is_none_or(|hand| hand.has_golden() == (other == seat)));
-        let as_given = tally
-            .given
-            .iter()
-            .all(|(giver, gift)| giver == seat || gift.is_none_or(|gift| !gift.has_golden()));
-        // All other cards of its face may be stated.
-        let is_there = tally.dealt[seat].is_some() || stated < rules.faces();
-        let given = tally.given[seat].map(|gift| gift.has_golden());
-        let as_opened = match tally.opener.filter(|_| rules.opening() == Opening::Golden) {
-            None => true,
-            Some(opener) if opener == seat => given != Some(true),
-            Some(opener) => {
-                let with_opener = |pair: &ExchangePair| pair.has(seat) && pair.has(opener);
-                pairs.iter().any(with_opener) && given != Some(false)
-            }
-        };
-        as_dealt && as_given && is_there && as_opened
-    })
 }
 
 impl Puzzle<'_> {

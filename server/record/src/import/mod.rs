@@ -1,11 +1,13 @@
 //! Import of games played with real cards: a transcript becomes a record.
 //!
 //! A transcript ([`transcript`]) states part of a game. The cards it does not state are filled in
-//! ([`complete`], [`puzzle`]) so that the rule engine can play each Shift ([`game`]); the first
+//! ([`complete`], [`search`]) so that the rule engine can play each Shift ([`game`]); the first
 //! row that no game can contain is reported. The record contains only what was stated or follows
 //! from it.
 
+mod candidates;
 mod complete;
+mod counts;
 mod facts;
 mod game;
 mod gifts;
@@ -13,6 +15,8 @@ mod known;
 mod notation;
 mod notes;
 mod puzzle;
+mod search;
+mod start;
 mod transcript;
 
 use chefshat_engine::{
@@ -22,16 +26,17 @@ use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 use sha2::{Digest as _, Sha256};
 
 use crate::convert::{
-    By, action_space, decision_kind, event_kind, final_table, invalid_reward,
+    By, action_id, action_space, decision_kind, event_kind, final_table, invalid_reward,
     reward_scheme_from_proto, rules_to_proto, seat_number, with_rewards,
 };
 use crate::jsonl::FORMAT_VERSION;
-use crate::replay::{action_id, game_started, replay};
+use crate::replay::{game_started, replay};
 pub(crate) use facts::facts_of_record;
-use facts::{facts_of_transcript, wrong};
-pub(crate) use game::{ImportedGame, StartState};
+use facts::facts_of_transcript;
+pub(crate) use game::ImportedGame;
 use notes::RuledShifts;
-use transcript::{Entry, Row, Transcript, read};
+pub(crate) use start::StartState;
+use transcript::{Entry, Row, Transcript, read, wrong};
 pub use transcript::{MAX_TRANSCRIPT_BYTES, TranscriptError};
 
 /// Milliseconds of a day, the longest time a policy allows: a real table has no clock.
@@ -79,7 +84,8 @@ struct Importer {
 impl Importer {
     fn new(transcript: Transcript, game_id: &str) -> Result<Self, TranscriptError> {
         let rules = transcript.rules;
-        let (start, shifts) = facts_of_transcript(&transcript)?;
+        let shifts = facts_of_transcript(&transcript)?;
+        let start = StartState::of_transcript(&transcript)?;
         let header = header(&transcript, &start, game_id);
         Ok(Self {
             imported: ImportedGame::new(rules, shifts),

@@ -3,7 +3,7 @@
 use chefshat_engine::{Action, Cards, Face};
 use chefshat_proto::v1;
 
-use super::facts::{Counts, JOKER, index};
+use super::counts::{JOKER, NOTHING, index};
 
 /// Parses cards as faces, `None` for a joker: numbers, `J`, and `G` for the Golden card.
 pub(super) fn kinds(text: &str, faces: u8) -> Result<Vec<Option<Face>>, String> {
@@ -27,7 +27,7 @@ pub(super) fn cards(text: &str, faces: u8) -> Result<Cards, String> {
         .split_whitespace()
         .filter(|word| word.eq_ignore_ascii_case("g"))
         .count();
-    let mut counts: Counts = [0; JOKER + 1];
+    let mut counts = NOTHING;
     for kind in kinds(text, faces)? {
         let count = &mut counts[kind.map_or(JOKER, index)];
         *count = count.saturating_add(1);

@@ -41,6 +41,10 @@ pub struct TranscriptError {
     pub problem: String,
 }
 
+pub(super) fn wrong(line: usize, problem: String) -> TranscriptError {
+    TranscriptError { line, problem }
+}
+
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Player {
     pub(super) name: String,

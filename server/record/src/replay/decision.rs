@@ -5,7 +5,7 @@ use chefshat_proto::v1::{self, DecisionSource as Source};
 
 use super::difference::must_be;
 use super::header::Setup;
-use crate::convert::{decision_kind, invalid_reward, seat_number};
+use crate::convert::{action_id, decision_kind, invalid_reward, seat_number};
 
 /// Invalid attempts before the default decision, even if the policy sets no limit.
 const MAX_ATTEMPTS: u32 = 10_000;
@@ -89,7 +89,7 @@ impl OpenDecision<'_> {
         if record.text != text {
             return Err(must_be("text", record.text.as_str(), text));
         }
-        if let Err(error) = self.game.clone().apply(action, |_| {}) {
+        if let Err(error) = self.game.check(action) {
             return Err(format!("action is {}: {error}", record.action));
         }
         Ok(action)
@@ -207,11 +207,6 @@ impl OpenDecision<'_> {
             Err(must_be("bankLeftMs", record.bank_left_ms, left))
         }
     }
-}
-
-/// The action with an index; an index out of range gives an action that does not exist.
-pub(crate) fn action_id(action: u32) -> ActionId {
-    ActionId::new(u16::try_from(action).unwrap_or(u16::MAX))
 }
 
 fn check_mask(found: &[u8], legal: &Mask, space: ActionSpace) -> Result<(), String> {

@@ -4,9 +4,9 @@ use chefshat_engine::{Game, Seed};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 
 use super::difference::difference;
+use super::fault::Fault;
 use super::game::Replay;
-use super::seed::{check_reveal, dealing_seed};
-use super::{Fault, reveal};
+use super::seed::{check_reveal, dealing_seed, reveal};
 use crate::convert::final_table;
 
 const NOT_OVER: &str = "the footer comes here, but the game is not over";
@@ -21,7 +21,7 @@ impl Replay<'_> {
             });
         };
         reveal(&self.lines[line - 1])
-            .and_then(|reveal| dealing_seed(self.header, reveal))
+            .and_then(|reveal| dealing_seed(self.header, &self.setup.game_id, reveal))
             .ok_or_else(|| Fault {
                 line: Some(line),
                 problem: match &self.lines[line - 1].line {
@@ -96,7 +96,7 @@ impl Replay<'_> {
             };
         }
         let reveal = reveal.ok_or("reveal is missing")?;
-        Ok(check_reveal(self.header, reveal)?)
+        Ok(check_reveal(self.header, &self.setup.game_id, reveal)?)
     }
 
     pub(super) fn end(&mut self, footer: &v1::RecordFooter) -> Result<(), Fault> {

@@ -8,10 +8,10 @@ use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 
 use super::decision::OpenDecision;
 use super::difference::{difference, kind_name, must_be};
+use super::fault::Fault;
 use super::header::{Setup, check};
 use super::seats::Seats;
 use super::seed::Seeds;
-use super::{Fault, Replayed};
 use crate::convert::{By, LAST_MS, event_kind, final_table, with_rewards};
 use crate::import::{ImportedGame, facts_of_record};
 
@@ -20,6 +20,19 @@ const NO_DECISION: By = By {
     source: v1::DecisionSource::Agent,
     decision_time_us: 0,
 };
+
+/// The result of a verified record.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Replayed {
+    /// Finished or aborted.
+    pub state: v1::RoomState,
+    /// The number of decisions.
+    pub decisions: u64,
+    /// The number of events.
+    pub events: u64,
+    /// The final standings, best first; empty for an aborted game.
+    pub standings: Vec<v1::Standing>,
+}
 
 /// A record being replayed.
 pub(super) struct Replay<'a> {

@@ -22,6 +22,7 @@ const DAY_MS: u32 = 86_400_000;
 /// A checked header.
 #[derive(Debug)]
 pub(super) struct Setup {
+    pub(super) game_id: [u8; 16],
     pub(super) rules: RuleSet,
     pub(super) scheme: Option<RewardScheme>,
     pub(super) origin: v1::GameOrigin,
@@ -52,7 +53,7 @@ pub(super) fn check(header: &v1::RecordHeader) -> Result<Setup, String> {
             header.rules_version
         ));
     }
-    check_id("gameId", &header.game_id)?;
+    let game_id = check_id("gameId", &header.game_id)?;
     check_id("roomId", &header.room_id)?;
     if header.created_at_ms > LAST_MS {
         return Err(format!(
@@ -82,11 +83,12 @@ pub(super) fn check(header: &v1::RecordHeader) -> Result<Setup, String> {
         .as_ref()
         .and_then(|start| start.scripted.as_ref());
     let imported = imported
-        .then(|| StartState::of(scripted, &rules))
+        .then(|| StartState::of_header(scripted, &rules))
         .transpose()
         .map_err(|problem| format!("start.scripted.{problem}"))?;
     let (script, taken_over) = check_start(origin, header.start.as_ref(), &rules)?;
     Ok(Setup {
+        game_id,
         rules,
         scheme: reward_scheme_from_proto(policy.reward_scheme()),
         origin,
@@ -98,7 +100,7 @@ pub(super) fn check(header: &v1::RecordHeader) -> Result<Setup, String> {
 }
 
 /// Decodes an id of 32 lower-case hexadecimal digits.
-pub(super) fn check_id(field: &str, id: &str) -> Result<[u8; 16], String> {
+fn check_id(field: &str, id: &str) -> Result<[u8; 16], String> {
     let mut bytes = [0; 16];
     match hex::decode_to_slice(id, &mut bytes) {
         Ok(()) if hex::encode(bytes) == id => Ok(bytes),

@@ -5,40 +5,21 @@
 mod decision;
 mod difference;
 mod end;
+mod fault;
 mod game;
 mod header;
 mod seats;
 mod seed;
 
 use chefshat_engine::{BySeat, Game};
-use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
+use chefshat_proto::v1::{self, record_line::Line};
 
-pub(crate) use decision::action_id;
+use fault::Fault;
+pub use fault::ReplayError;
 use game::Replay;
+pub use game::Replayed;
 pub(crate) use seats::game_started;
-
-/// The result of a verified record.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Replayed {
-    /// Finished or aborted.
-    pub state: v1::RoomState,
-    /// The number of decisions.
-    pub decisions: u64,
-    /// The number of events.
-    pub events: u64,
-    /// The final standings, best first; empty for an aborted game.
-    pub standings: Vec<v1::Standing>,
-}
-
-/// The first wrong line of a record.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("line {line}: {problem}")]
-pub struct ReplayError {
-    /// Number of the line, from 1; one past the last line if the end is missing.
-    pub line: usize,
-    /// A description for people.
-    pub problem: String,
-}
+pub(crate) use seed::reveal;
 
 /// A line of a record and the game at that line.
 #[derive(Debug, Clone, Copy)]
@@ -122,39 +103,5 @@ pub fn walk(
             line: lines.len() + 1,
             problem: "the record is truncated: it ends before its footer".into(),
         }),
-    }
-}
-
-/// The seed reveal of a line that ends the game.
-pub(crate) fn reveal(line: &v1::RecordLine) -> Option<&v1::SeedReveal> {
-    match line.line.as_ref()? {
-        Line::Event(event) => match event.kind.as_ref()? {
-            Kind::GameEnded(ended) => ended.reveal.as_ref(),
-            Kind::GameAborted(aborted) => aborted.reveal.as_ref(),
-            _ => None,
-        },
-        _ => None,
-    }
-}
-
-/// A problem, with its line if that is not the current one.
-#[derive(Debug)]
-struct Fault {
-    line: Option<usize>,
-    problem: String,
-}
-
-impl From<String> for Fault {
-    fn from(problem: String) -> Self {
-        Self {
-            line: None,
-            problem,
-        }
-    }
-}
-
-impl From<&str> for Fault {
-    fn from(problem: &str) -> Self {
-        problem.to_owned().into()
     }
 }

@@ -2,10 +2,9 @@
 //! Shift.
 
 use chefshat_engine::{MAX_ENTROPY, Seed, SeedPlan};
-use chefshat_proto::v1;
+use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 
 use super::difference::must_be;
-use super::header::check_id;
 
 /// Decisions taken over from another record, with the seed of the Shifts dealt in them.
 #[derive(Debug, Clone)]
@@ -46,10 +45,26 @@ impl Seeds {
     }
 }
 
+/// The seed reveal of a line that ends the game.
+pub(crate) fn reveal(line: &v1::RecordLine) -> Option<&v1::SeedReveal> {
+    match line.line.as_ref()? {
+        Line::Event(event) => match event.kind.as_ref()? {
+            Kind::GameEnded(ended) => ended.reveal.as_ref(),
+            Kind::GameAborted(aborted) => aborted.reveal.as_ref(),
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
 /// The seed to deal from. If the reveal does not match the commitment, its game seed is used: the
 /// deals are then checked first, and the reveal is rejected on its own line.
-pub(super) fn dealing_seed(header: &v1::RecordHeader, reveal: &v1::SeedReveal) -> Option<Seed> {
-    plan(header, reveal)
+pub(super) fn dealing_seed(
+    header: &v1::RecordHeader,
+    game_id: &[u8; 16],
+    reveal: &v1::SeedReveal,
+) -> Option<Seed> {
+    plan(header, game_id, reveal)
         .and_then(|plan| {
             plan.map_or(revealed(reveal), |plan| {
                 Ok(plan.game_seed(&reveal.seat_entropy))
@@ -62,10 +77,11 @@ pub(super) fn dealing_seed(header: &v1::RecordHeader, reveal: &v1::SeedReveal) -
 /// Checks a reveal against the header of its record.
 pub(super) fn check_reveal(
     header: &v1::RecordHeader,
+    game_id: &[u8; 16],
     reveal: &v1::SeedReveal,
 ) -> Result<(), String> {
     let seed = revealed(reveal)?;
-    match plan(header, reveal)? {
+    match plan(header, game_id, reveal)? {
         Some(plan) if plan.game_seed(&reveal.seat_entropy) != seed => Err(must_be(
             "reveal.gameSeed (hexadecimal)",
             hex::encode(seed.0),
@@ -89,7 +105,11 @@ pub(super) fn check_reveal(
 }
 
 /// The committed seed plan, checked; `None` for a fixed seed.
-fn plan(header: &v1::RecordHeader, reveal: &v1::SeedReveal) -> Result<Option<SeedPlan>, String> {
+fn plan(
+    header: &v1::RecordHeader,
+    game_id: &[u8; 16],
+    reveal: &v1::SeedReveal,
+) -> Result<Option<SeedPlan>, String> {
     if header.seed_commitment.is_empty() {
         return Ok(None);
     }
@@ -113,8 +133,7 @@ fn plan(header: &v1::RecordHeader, reveal: &v1::SeedReveal) -> Result<Option<See
             "reveal.seatEntropy has an entry of more than {MAX_ENTROPY} bytes"
         ));
     }
-    let game_id = check_id("gameId", &header.game_id)?;
-    let commitment = plan.commitment(&game_id).map(Vec::from);
+    let commitment = plan.commitment(game_id).map(Vec::from);
     if commitment.as_ref() != Some(&header.seed_commitment) {
         return Err(format!(
             "reveal.serverSeed and reveal.nonce do not match the commitment: seedCommitment is {} and they give {} \

@@ -5,11 +5,33 @@ use std::time::Duration;
 use chefshat_engine::{BySeat, Game, Seat, SeatOrder, Viewer};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 
+use super::super::card::Card;
 use super::super::chronicle::{Chronicle, play_cards};
-use super::super::scene::{Card, Hand, Now, Scene};
-use super::{Frame, When};
+use super::super::scene::{Hand, Now, Scene};
 use chefshat_record::convert::{rules_from_proto, seat_from_number};
 use chefshat_record::replay::Moment;
+
+/// A moment of a game.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum When {
+    /// This decision is open, counted over the game from 1.
+    Decision(u64),
+    /// This Shift has just ended.
+    ShiftEnd(u32),
+    /// The game has ended.
+    End,
+}
+
+/// A scene and its duration.
+#[derive(Debug, Clone)]
+pub struct Frame {
+    /// The moment.
+    pub when: When,
+    /// The scene.
+    pub scene: Scene,
+    /// Decision time; zero for built-in agents and at the ends of Shifts and games.
+    pub decision_time: Duration,
+}
 
 /// The chronicle of a record; `None` if its rules are invalid, which the replay rejects.
 pub(super) fn chronicle_of(header: &v1::RecordHeader, viewer: Viewer) -> Option<Chronicle> {

@@ -3,7 +3,8 @@
 
 use serde::Serialize;
 
-use super::super::scene::{Card, Hand};
+use super::super::card::Card;
+use super::super::scene::Hand;
 
 /// Width of a card.
 pub(crate) const CARD_WIDTH: f32 = 64.0;

@@ -3,11 +3,15 @@
 use chefshat_engine::{PlayRequirement, Seat, SpecialAction, Viewer};
 use serde::Serialize;
 
+use super::super::card::Card;
 use super::super::chronicle::LogEntry;
 use super::super::paint::Painter;
-use super::super::scene::{Card, Hand, Now, Scene};
-use super::{COLUMN, SPACE, is_end};
+use super::super::scene::{Hand, Now, Scene};
 
+/// Width of the columns beside the board.
+pub(super) const COLUMN: f32 = 302.0;
+/// Width of a space, which is not measured at the edge of a text.
+pub(super) const SPACE: f32 = 5.0;
 /// Width of a name within a log line.
 const IN_A_LINE: f32 = 92.0;
 
@@ -256,7 +260,7 @@ pub(super) fn notice(painter: &Painter, scene: &Scene) -> Notice {
     };
     Notice {
         heading,
-        seat: seat.filter(|_| !is_end(&scene.now)),
+        seat: seat.filter(|_| !scene.now.is_end()),
         tiles,
         lines,
         rows: rows(painter, scene),

@@ -1,0 +1,264 @@
+//! Runs an export: reads, verifies, filters and writes one game at a time, then writes the card
+//! and checksums and moves the folder into place. A failure leaves the target unchanged.
+
+use std::collections::HashMap;
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+
+use super::card;
+use super::chefshatgym::lay_out;
+use super::decisions::{self, DecisionRow};
+use super::export::{Export, Exported, Layout, LeftOut};
+use super::expressions::{self, ExpressionRow};
+use super::files::{FileSummary, SummedFile};
+use super::folder::{FolderError, NewFolder};
+use super::formats::Table;
+use super::game::{GameInfo, checked_info};
+use super::gather::{GameRows, gather};
+use super::sheet::{self, Sheet};
+use chefshat_record::files::RecordFile;
+use chefshat_record::jsonl;
+use chefshat_record::jsonl::RecordFileError;
+
+/// The most damaged records listed in an error.
+const NAMED_DAMAGES: usize = 10;
+
+/// A failed export.
+#[derive(Debug, thiserror::Error)]
+pub enum ExportError {
+    /// All games were filtered or skipped.
+    #[error("none of {records} records is left to export")]
+    NothingLeft {
+        /// The number of records read.
+        records: usize,
+    },
+    /// Some records are damaged.
+    #[error("{}", damages(.named, *.more))]
+    Damaged {
+        /// The first of them.
+        named: Vec<LeftOut>,
+        /// The number of further ones.
+        more: u64,
+    },
+    /// The target folder is unsuitable.
+    #[error(transparent)]
+    Folder(#[from] FolderError),
+    /// A file cannot be written.
+    #[error("the dataset cannot be written to {path}: {source}")]
+    Write {
+        /// The folder being written.
+        path: PathBuf,
+        /// The cause.
+        source: io::Error,
+    },
+}
+
+fn damages(named: &[LeftOut], more: u64) -> String {
+    let mut text = String::from("nothing was exported because of damaged records:\n");
+    for LeftOut { path, problem } in named {
+        text.push_str(&format!("  {}: {problem}\n", path.display()));
+    }
+    if more > 0 {
+        text.push_str(&format!("  and {more} more\n"));
+    }
+    text + "use --skip-damaged to leave them out"
+}
+
+impl Export {
+    /// Exports the records in order. Calls `progress` with the size of each file read.
+    ///
+    /// # Errors
+    /// The first failure; the target is then unchanged.
+    pub fn run(
+        &self,
+        records: &[RecordFile],
+        mut progress: impl FnMut(u64),
+    ) -> Result<Exported, ExportError> {
+        let folder = NewFolder::begin(&self.out, self.replace)?;
+        let write = |source| ExportError::Write {
+            path: folder.path().to_path_buf(),
+            source,
+        };
+        let mut sink = Sink::new(folder.path(), self).map_err(write)?;
+        let mut exported = Exported::default();
+        let mut games: HashMap<String, PathBuf> = HashMap::new();
+        let mut damaged = 0;
+        for RecordFile { path, bytes } in records {
+            let left_out = match self.read(path) {
+                Err(problem) => {
+                    damaged += 1;
+                    Some(problem)
+                }
+                // The export has failed: keep looking for damaged records only.
+                Ok(_) if damaged > 0 && !self.skip_damaged => None,
+                Ok(game) if !self.filter.includes(game.info()) => {
+                    exported.filtered += 1;
+                    None
+                }
+                Ok(game) => match games.get(&game.info().game_id) {
+                    Some(first) => Some(format!("the same game as {}", first.display())),
+                    None => {
+                        games.insert(game.info().game_id.clone(), path.clone());
+                        sink.add(&game).map_err(write)?;
+                        exported.count(&game);
+                        None
+                    }
+                },
+            };
+            exported.left_out.extend(left_out.map(|problem| LeftOut {
+                path: path.clone(),
+                problem,
+            }));
+            progress(*bytes);
+        }
+        if damaged > 0 && !self.skip_damaged {
+            return Err(damaged_error(exported.left_out));
+        }
+        if exported.games == 0 {
+            return Err(ExportError::NothingLeft {
+                records: records.len(),
+            });
+        }
+        exported.files = sink.finish().map_err(write)?;
+        let card = card::write(self, &exported);
+        let mut file = SummedFile::create(folder.path(), card::FILE_NAME).map_err(write)?;
+        file.write_all(card.as_bytes()).map_err(write)?;
+        exported.files.push(file.finish().map_err(write)?);
+        folder.put_in_place(&exported.files)?;
+        Ok(exported)
+    }
+
+    /// Reads and verifies a record.
+    fn read(&self, path: &Path) -> Result<Game, String> {
+        let lines = jsonl::read(path).map_err(|error| match error {
+            // The caller reports the path.
+            RecordFileError::Io { source, .. } => source.to_string(),
+            RecordFileError::Line { line, problem, .. } => format!("line {line} {problem}"),
+        })?;
+        let game = match self.layout {
+            Layout::Tables => gather(&lines).map(Game::Rows),
+            Layout::ChefsHatGym => checked_info(&lines).and_then(|info| {
+                let sheet = lay_out(&lines, &info)?;
+                Ok(Game::Sheet(info, sheet))
+            }),
+        };
+        game.map_err(|error| error.to_string())
+    }
+}
+
+fn damaged_error(mut damaged: Vec<LeftOut>) -> ExportError {
+    let more = damaged.len().saturating_sub(NAMED_DAMAGES) as u64;
+    damaged.truncate(NAMED_DAMAGES);
+    ExportError::Damaged {
+        named: damaged,
+        more,
+    }
+}
+
+impl Exported {
+    fn count(&mut self, game: &Game) {
+        let info = game.info();
+        self.games += 1;
+        self.finished += u64::from(info.finished);
+        match game {
+            Game::Rows(rows) => {
+                self.decisions += rows.decisions.len() as u64;
+                self.expressions += rows.expressions.len() as u64;
+            }
+            Game::Sheet(_, sheet) => self.decisions += sheet.decisions,
+        }
+        *self.origins.entry(info.origin).or_default() += 1;
+        for seat in &info.seats {
+            *self.kinds.entry(seat.kind).or_default() += 1;
+        }
+        self.servers.insert(info.server_version.clone());
+        self.rules_versions.insert(info.rules_version);
+    }
+}
+
+/// A game to write.
+enum Game {
+    Rows(GameRows),
+    Sheet(GameInfo, Sheet),
+}
+
+impl Game {
+    fn info(&self) -> &GameInfo {
+        match self {
+            Game::Rows(rows) => &rows.game,
+            Game::Sheet(info, _) => info,
+        }
+    }
+}
+
+/// The output of an export.
+enum Sink<'a> {
+    Tables {
+        decisions: Table<DecisionRow>,
+        expressions: Table<ExpressionRow>,
+    },
+    Sheets {
+        folder: &'a Path,
+        files: Vec<FileSummary>,
+    },
+}
+
+impl<'a> Sink<'a> {
+    fn new(folder: &'a Path, export: &Export) -> io::Result<Self> {
+        Ok(match export.layout {
+            Layout::Tables => Sink::Tables {
+                decisions: Table::create(
+                    folder,
+                    decisions::TABLE,
+                    decisions::COLUMNS,
+                    &export.formats,
+                )?,
+                expressions: Table::create(
+                    folder,
+                    expressions::TABLE,
+                    expressions::COLUMNS,
+                    &export.formats,
+                )?,
+            },
+            Layout::ChefsHatGym => Sink::Sheets {
+                folder,
+                files: Vec::new(),
+            },
+        })
+    }
+
+    fn add(&mut self, game: &Game) -> io::Result<()> {
+        match (self, game) {
+            (
+                Sink::Tables {
+                    decisions,
+                    expressions,
+                },
+                Game::Rows(rows),
+            ) => {
+                decisions.write(&rows.decisions)?;
+                expressions.write(&rows.expressions)
+            }
+            (Sink::Sheets { folder, files }, Game::Sheet(info, sheet)) => {
+                let path = format!("{}/{}", info.game_id, sheet::FILE_NAME);
+                files.push(sheet.write(SummedFile::create(folder, &path)?)?);
+                Ok(())
+            }
+            _ => unreachable!("games are read for the layout of the export"),
+        }
+    }
+
+    fn finish(self) -> io::Result<Vec<FileSummary>> {
+        match self {
+            Sink::Tables {
+                decisions,
+                expressions,
+            } => {
+                let mut files = decisions.finish()?;
+                files.extend(expressions.finish()?);
+                Ok(files)
+            }
+            Sink::Sheets { files, .. } => Ok(files),
+        }
+    }
+}
