@@ -1,11 +1,9 @@
-//! The connection to a server and the calls one makes on it, but for those of tournaments (see `tournaments`) and of games of one's own (see
-//! `vector`). Nothing is kept here but the connection: a `Client` is cheap to clone, and everything it starts may run at the same time.
+//! The client and its calls about servers, rooms, seats and records. `tournaments` adds those about tournaments, `vector` those about
+//! games that the caller steps. A `Client` holds a connection and nothing else: it is cheap to clone, and its calls may run in parallel.
 
-use std::time::Duration;
+use tonic::transport::Channel;
 
-use tonic::transport::{Channel, Endpoint};
-
-use crate::error::with_causes;
+use crate::connection::{self, MAX_RESPONSE_BYTES};
 use crate::repeat::{identify, repeated};
 use crate::session::Session;
 use crate::v1::act_request::Command;
@@ -14,19 +12,6 @@ use crate::v1::record_service_client::RecordServiceClient;
 use crate::v1::room_service_client::RoomServiceClient;
 use crate::v1::server_service_client::ServerServiceClient;
 use crate::{Agent, Error, Outcome, PlayError, PlayOptions, Spectator, run, v1};
-
-/// Time for a connection to be made.
-const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
-/// A connection on which nothing comes for this long is probed.
-const KEEPALIVE_INTERVAL: Duration = Duration::from_secs(20);
-/// A probe not answered for this long ends the connection.
-const KEEPALIVE_TIMEOUT: Duration = Duration::from_secs(10);
-/// Bytes the server may send on a stream before the client has read them: room for a message to each of some hundred seats.
-const STREAM_WINDOW_BYTES: u32 = 1 << 20;
-/// The same for all streams of the connection together.
-const CONNECTION_WINDOW_BYTES: u32 = 4 << 20;
-/// The largest message taken from a server: the whole history of hundreds of seats, should it come as one.
-pub(crate) const MAX_RESPONSE_BYTES: usize = 64 << 20;
 
 /// A connection to a server, made again by itself when it is lost.
 #[derive(Clone, Debug)]
@@ -41,31 +26,7 @@ impl Client {
     /// `ADDRESS_REFUSED` if that is no address with a port, or one of another scheme (for TLS, make a channel and use
     /// [`from_channel`](Self::from_channel)); `CONNECT_FAILED` if nobody answers there within five seconds.
     pub async fn connect(url: impl AsRef<str>) -> Result<Self, Error> {
-        let url = url.as_ref();
-        let address = if url.contains("://") {
-            url.to_owned()
-        } else {
-            format!("http://{url}")
-        };
-        let endpoint = Endpoint::from_shared(address)
-            .map_err(|cause| Error::address(url, &with_causes(&cause)))?;
-        if endpoint.uri().scheme_str() != Some("http") {
-            return Err(Error::address(url, "only plain http:// is spoken here"));
-        }
-        if endpoint.uri().port().is_none() {
-            return Err(Error::address(url, "the port is missing"));
-        }
-        let channel = endpoint
-            .connect_timeout(CONNECT_TIMEOUT)
-            .tcp_nodelay(true)
-            .http2_keep_alive_interval(KEEPALIVE_INTERVAL)
-            .keep_alive_timeout(KEEPALIVE_TIMEOUT)
-            .keep_alive_while_idle(true)
-            .initial_stream_window_size(STREAM_WINDOW_BYTES)
-            .initial_connection_window_size(CONNECTION_WINDOW_BYTES)
-            .connect()
-            .await
-            .map_err(|cause| Error::connect(url, &cause))?;
+        let channel = connection::connect(url.as_ref()).await?;
         Ok(Self::from_channel(channel))
     }
 
@@ -209,6 +170,19 @@ impl Client {
         };
         let response = service.close_room(request).await?.into_inner();
         response.room.ok_or_else(|| Error::incomplete("room"))
+    }
+
+    /// A page of the records of the server's games, oldest first unless the request says otherwise.
+    ///
+    /// # Errors
+    /// A failed connection, or a page token that the server does not know.
+    pub async fn list_records(
+        &self,
+        request: v1::ListRecordsRequest,
+    ) -> Result<v1::ListRecordsResponse, Error> {
+        let mut service =
+            RecordServiceClient::new(self.channel()).max_decoding_message_size(MAX_RESPONSE_BYTES);
+        Ok(service.list_records(request).await?.into_inner())
     }
 
     /// The record of a game that has ended, line by line.

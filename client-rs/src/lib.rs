@@ -7,6 +7,7 @@
 mod agent;
 mod backoff;
 mod client;
+mod connection;
 mod error;
 mod mask;
 mod options;

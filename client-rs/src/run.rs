@@ -10,7 +10,7 @@ use tonic::transport::Channel;
 use tonic::{Status, Streaming};
 
 use crate::backoff::{Backoff, Outage};
-use crate::client::MAX_RESPONSE_BYTES;
+use crate::connection::MAX_RESPONSE_BYTES;
 use crate::error::{PlayError, may_retry};
 use crate::session::Session;
 use crate::v1::{self, play_service_client::PlayServiceClient};

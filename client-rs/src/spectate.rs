@@ -8,7 +8,7 @@ use tonic::transport::Channel;
 use tonic::{Status, Streaming};
 
 use crate::backoff::{Backoff, Outage};
-use crate::client::MAX_RESPONSE_BYTES;
+use crate::connection::MAX_RESPONSE_BYTES;
 use crate::error::{Error, may_retry};
 use crate::v1::{self, spectator_service_client::SpectatorServiceClient};
 

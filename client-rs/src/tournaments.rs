@@ -7,7 +7,7 @@ use tonic::transport::Channel;
 use tonic::{Status, Streaming};
 
 use crate::backoff::{Backoff, Outage};
-use crate::client::MAX_RESPONSE_BYTES;
+use crate::connection::MAX_RESPONSE_BYTES;
 use crate::error::{Error, PlayError, may_retry};
 use crate::participant::Participant;
 use crate::repeat::{identify, repeated};

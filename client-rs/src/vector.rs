@@ -5,7 +5,7 @@ use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::Streaming;
 
-use crate::client::MAX_RESPONSE_BYTES;
+use crate::connection::MAX_RESPONSE_BYTES;
 use crate::v1::run_request::Request;
 use crate::v1::run_response::Response;
 use crate::v1::vector_service_client::VectorServiceClient;

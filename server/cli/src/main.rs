@@ -17,6 +17,7 @@ mod leaderboard;
 mod narration;
 mod numbers;
 mod output;
+mod pages;
 mod participant;
 mod policy_args;
 mod ratings;
@@ -88,7 +89,7 @@ enum Command {
     Compare(compare::Compare),
     /// Recompute the leaderboard from records.
     Ratings(ratings::RatingsCommand),
-    /// Run an experiment of the paper
+    /// Run an experiment of the paper.
     Experiment(experiment::ExperimentCommand),
     /// Check the rule engine against test vectors.
     Conformance(conformance::Conformance),

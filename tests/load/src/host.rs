@@ -11,7 +11,6 @@ use tonic::transport::Channel;
 
 use crate::error::LoadError;
 use crate::options::SEATS;
-use crate::play::Slot;
 use crate::pulse::{Plan, Pulse};
 
 /// Long enough that nobody is ever late: clocks run, but do not run out.
@@ -29,6 +28,31 @@ pub(crate) enum News {
     Over(usize),
     /// Its open decision stays unanswered, because the segment stops.
     AtRest(usize),
+}
+
+/// A seat behind a handle: its room, and its number in the room in the order of joining.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Slot {
+    /// The room.
+    pub(crate) room: usize,
+    /// The seat, in the order of joining. The first counts the room's events.
+    pub(crate) seat: usize,
+}
+
+impl Slot {
+    /// As the request id of an attachment, which is never 0.
+    pub(crate) fn request_id(self) -> u32 {
+        u32::try_from(self.room * SEATS + self.seat + 1).expect("rooms are bounded")
+    }
+
+    /// The seat with this request id.
+    pub(crate) fn from_request_id(id: u32) -> Option<Self> {
+        let index = usize::try_from(id).ok()?.checked_sub(1)?;
+        Some(Self {
+            room: index / SEATS,
+            seat: index % SEATS,
+        })
+    }
 }
 
 /// A room that is playing.

@@ -16,8 +16,7 @@ use tonic::transport::{Channel, Endpoint};
 use tonic::{Request, Streaming};
 
 use crate::error::LoadError;
-use crate::host::{Host, News};
-use crate::options::SEATS;
+use crate::host::{Host, News, Slot};
 use crate::pulse::{Latencies, Plan, Pulse, Window, latencies};
 use crate::tally::{Counts, Traffic};
 use crate::wire::{
@@ -139,30 +138,6 @@ fn early_end<T>(end: Option<Result<Result<T, LoadError>, tokio::task::JoinError>
         Some(Ok(Err(error))) => error,
         Some(Err(error)) => LoadError::Protocol(error.to_string()),
         _ => LoadError::Protocol("a stream ended in mid-game".into()),
-    }
-}
-
-/// A seat behind a handle: its room, and its number in the room in the order of joining.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Slot {
-    /// The room.
-    pub(crate) room: usize,
-    /// The seat, in the order of joining. The first counts the room's events.
-    pub(crate) seat: usize,
-}
-
-impl Slot {
-    /// As the request id of an attachment, which is never 0.
-    pub(crate) fn request_id(self) -> u32 {
-        u32::try_from(self.room * SEATS + self.seat + 1).expect("rooms are bounded")
-    }
-
-    fn from_request_id(id: u32) -> Option<Self> {
-        let index = usize::try_from(id).ok()?.checked_sub(1)?;
-        Some(Self {
-            room: index / SEATS,
-            seat: index % SEATS,
-        })
     }
 }
 

@@ -32,37 +32,6 @@ const REMAINING: &[&[&str]] = &[
         "server/src/tournaments/handle.rs",
         "server/src/tournaments/shown.rs",
     ],
-    &[
-        "server/cli/src/narration/story.rs",
-        "server/cli/src/narration/view.rs",
-    ],
-    &["server/cli/src/tui/log.rs", "server/cli/src/tui/view.rs"],
-    &[
-        "client-rs/src/client.rs",
-        "client-rs/src/run.rs",
-        "client-rs/src/spectate.rs",
-    ],
-    &["tests/load/src/host.rs", "tests/load/src/play.rs"],
-    &[
-        "server/cli/src/compare.rs",
-        "server/cli/src/compare/report.rs",
-    ],
-    &[
-        "server/cli/src/participant/delete.rs",
-        "server/cli/src/participant/export.rs",
-        "server/cli/src/participant/mod.rs",
-    ],
-    &[
-        "server/cli/src/records/list.rs",
-        "server/cli/src/records/mod.rs",
-        "server/cli/src/records/transfer.rs",
-    ],
-    &[
-        "server/cli/src/tournament/list.rs",
-        "server/cli/src/tournament/mod.rs",
-        "server/cli/src/tournament/results.rs",
-        "server/cli/src/tournament/simulate.rs",
-    ],
 ];
 
 /// Re-exports that are followed from one name before giving up. Far more than any path has.

@@ -52,7 +52,7 @@ impl Narrator {
             return String::new();
         };
         let before = self.before(kind);
-        let lines = self.view.advance(kind);
+        let lines = story::advance(&mut self.view, event);
         let after = match kind {
             Kind::GameStarted(start) => self.game_started(start),
             Kind::ShiftStarted(start) => self.shift_started(start),

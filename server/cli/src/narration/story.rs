@@ -19,8 +19,16 @@ pub(crate) struct Line {
     pub(crate) heading: bool,
 }
 
+/// Applies an event and returns its lines.
+pub(crate) fn advance(view: &mut GameView, event: &v1::GameEvent) -> Vec<Line> {
+    // The lines first: they need the state before the event.
+    let lines = (event.kind.as_ref()).map_or_else(Vec::new, |kind| lines_of(view, kind));
+    view.apply(event);
+    lines
+}
+
 /// The lines of an event, from the state before it.
-pub(super) fn of(view: &GameView, kind: &Kind) -> Vec<Line> {
+fn lines_of(view: &GameView, kind: &Kind) -> Vec<Line> {
     let line = match kind {
         Kind::Play(play) => {
             let why = because(play.source());

@@ -1,20 +1,15 @@
-//! The state of a game as a viewer knows it from its events: seats, board, hands, turn. Both narrations, lines of text and the terminal
-//! client, are drawn from it. `story` has the sentences; nothing here draws or decides.
-
-use std::collections::VecDeque;
+//! The state of a game as a viewer knows it from its events: seats, board, hands, turn. The narrator and the terminal client are drawn from
+//! it. Nothing here draws or decides.
 
 use chefshat_client::v1::{self, game_event::Kind};
 use chefshat_engine::{PassScope, RuleSet};
 use chefshat_record::convert::rules_from_proto;
 
 use super::hand::Hand;
-use super::story::{self, Line};
 use super::text::{MAX_NAME, clean};
 
 /// Maximum columns of a room's name, as in the server.
 const MAX_ROOM_NAME: usize = 64;
-/// Maximum number of lines of the story.
-const MAX_LINES: usize = 2000;
 
 /// A seat as the viewer knows it.
 #[derive(Debug, Clone, Default)]
@@ -33,7 +28,7 @@ pub(crate) struct SeatView {
     pub(crate) points: u64,
     /// Out of this pizza.
     pub(crate) passed: bool,
-    /// SeatView in this Shift, from 1, once it has finished.
+    /// Place in this Shift, from 1, once it has finished.
     pub(crate) finished: Option<u32>,
     /// The hand, if the viewer may see it.
     pub(crate) hand: Option<Hand>,
@@ -79,10 +74,6 @@ pub(crate) struct GameView {
     pub(crate) turn: Option<u32>,
     /// Seats in the order in which they finished the last Shift.
     pub(crate) last_order: Vec<u32>,
-    /// The newest lines of the story, oldest first.
-    pub(crate) story: VecDeque<Line>,
-    /// Number of lines of the story so far, with those no longer in `story`.
-    pub(crate) story_len: usize,
     pub(crate) end: Option<End>,
 }
 
@@ -127,28 +118,11 @@ impl GameView {
         self.seats.iter().filter(free).count()
     }
 
-    /// Applies an event and adds its lines to the story.
+    /// Applies an event.
     pub(crate) fn apply(&mut self, event: &v1::GameEvent) {
         let Some(kind) = &event.kind else {
             return;
         };
-        let lines = self.advance(kind);
-        self.story_len += lines.len();
-        self.story.extend(lines);
-        while self.story.len() > MAX_LINES {
-            self.story.pop_front();
-        }
-    }
-
-    /// Applies an event; returns its lines.
-    pub(super) fn advance(&mut self, kind: &Kind) -> Vec<Line> {
-        // The lines first: they need the state before the event.
-        let lines = story::of(self, kind);
-        self.fold(kind);
-        lines
-    }
-
-    fn fold(&mut self, kind: &Kind) {
         match kind {
             Kind::Seated(seated) => {
                 let name = clean(&seated.name, MAX_NAME);

@@ -12,7 +12,7 @@ use serde_json::json;
 
 use super::super::numbers::counted;
 use super::super::{CommandError, say};
-use super::{Left, Who, records_with};
+use super::stored::{Skipped, Who, records_with};
 use chefshat_room::ids::Id;
 use chefshat_server::store::Forgetting;
 
@@ -54,7 +54,7 @@ struct Files {
     taken_out: TakenOut,
     /// The pseudonym that an interrupted run stored in the database.
     earlier: Option<String>,
-    left: Left,
+    skipped: Skipped,
 }
 
 impl Delete {
@@ -110,7 +110,7 @@ impl Delete {
                 counted(taken_out.annotations, "annotation"),
             ))?;
         }
-        files.left.check(&who.name)?;
+        files.skipped.check(&who.name)?;
         if !found && !self.json {
             anstream::eprintln!("nothing is stored about {:?}", who.name);
         }
@@ -154,7 +154,7 @@ async fn rewrite(
 ) -> Result<Files, CommandError> {
     let mut files = Files::default();
     for candidate in records_with(data_dir, &who.name)? {
-        let Some(mut lines) = files.left.read(&candidate) else {
+        let Some(mut lines) = files.skipped.read(&candidate) else {
             continue;
         };
         let mut who = who.clone();
@@ -169,7 +169,7 @@ async fn rewrite(
             continue;
         }
         if let Err(error) = jsonl::write(&candidate.path, &lines) {
-            files.left.0.push(error.to_string());
+            files.skipped.fail(error.to_string());
             continue;
         }
         files.changed += 1;

@@ -15,7 +15,7 @@ use serde_json::{Value, json};
 
 use super::super::numbers::counted;
 use super::super::{CommandError, say};
-use super::{Left, Who, records_with};
+use super::stored::{Skipped, Who, records_with};
 use chefshat_room::ids::Id;
 use chefshat_server::convert;
 use chefshat_server::store::tournaments::TournamentEntry;
@@ -58,7 +58,7 @@ struct Sheet {
     tournaments: u64,
     decisions: u64,
     expressions: u64,
-    left: Left,
+    skipped: Skipped,
 }
 
 impl Export {
@@ -73,7 +73,7 @@ impl Export {
         store.close().await;
         let sheet = gathered?;
         if sheet.games + sheet.tournaments == 0 {
-            sheet.left.check(&self.who.name)?;
+            sheet.skipped.check(&self.who.name)?;
             let name = &self.who.name;
             return Err(format!(
                 "nothing is stored about {name:?} in {}: give the exact name the participant played under",
@@ -106,7 +106,7 @@ impl Export {
                 counted(sheet.tournaments, "tournament"),
             ))?;
         }
-        sheet.left.check(&self.who.name)?;
+        sheet.skipped.check(&self.who.name)?;
         Ok(ExitCode::SUCCESS)
     }
 }
@@ -135,14 +135,14 @@ async fn gather(store: &SqliteStore, data_dir: &Path, name: &str) -> Result<Shee
     }
     // Imported records may exist as files only.
     for candidate in records_with(data_dir, name)? {
-        let Some(lines) = sheet.left.read(&candidate) else {
+        let Some(lines) = sheet.skipped.read(&candidate) else {
             continue;
         };
         let replayed = match replay(&lines) {
             Ok(replayed) => replayed,
             Err(error) => {
                 let why = format!("{}: {error}", candidate.path.display());
-                sheet.left.note(&candidate, why);
+                sheet.skipped.note(&candidate, why);
                 continue;
             }
         };

@@ -2,17 +2,13 @@
 
 use std::process::ExitCode;
 
-use chefshat_client::{Error, v1};
+use chefshat_client::v1;
 use clap::Args;
 
 use super::super::connect::ServerArg;
-use super::super::{CommandError, say};
+use super::super::{CommandError, pages};
 use super::filter::FilterArgs;
-use super::service;
 use crate::narration::{abort_reason, clean};
-
-/// Page size.
-const PAGE: u32 = 100;
 
 /// List the records of a server, oldest first.
 #[derive(Debug, Args)]
@@ -35,39 +31,18 @@ pub(super) struct List {
 impl List {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
         let client = self.server.connect().await?;
-        let mut service = service(&client);
-        let mut request = v1::ListRecordsRequest {
-            filter: Some(self.filter.message()),
-            page_size: PAGE,
-            page_token: String::new(),
-            newest_first: self.newest_first,
+        let filter = self.filter.message();
+        let fetch = async |page_token| {
+            let request = v1::ListRecordsRequest {
+                filter: Some(filter.clone()),
+                page_size: pages::PAGE,
+                page_token,
+                newest_first: self.newest_first,
+            };
+            let page = client.list_records(request).await?;
+            Ok((page.records, page.next_page_token))
         };
-        let mut count = 0;
-        loop {
-            let page = (service.list_records(request.clone()).await)
-                .map_err(Error::from)?
-                .into_inner();
-            for summary in &page.records {
-                say(self.line(summary)?)?;
-                count += 1;
-            }
-            if page.next_page_token.is_empty() {
-                break;
-            }
-            request.page_token = page.next_page_token;
-        }
-        if count == 0 && !self.json {
-            say("no records")?;
-        }
-        Ok(ExitCode::SUCCESS)
-    }
-
-    fn line(&self, summary: &v1::RecordSummary) -> Result<String, CommandError> {
-        Ok(if self.json {
-            serde_json::to_string(summary)?
-        } else {
-            in_a_line(summary)
-        })
+        pages::print(fetch, self.json, in_a_line, "no records").await
     }
 }
 

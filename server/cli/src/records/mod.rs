@@ -7,15 +7,9 @@ mod transfer;
 
 use std::process::ExitCode;
 
-use chefshat_client::Client;
-use chefshat_client::v1::record_service_client::RecordServiceClient;
 use clap::{Args, Subcommand};
-use tonic::transport::Channel;
 
 use super::CommandError;
-
-/// Maximum size of a response in bytes: a page of a hundred summaries, or a part of a record.
-const MAX_RESPONSE_BYTES: usize = 16 * 1024 * 1024;
 
 /// List, download and import records of finished games.
 #[derive(Debug, Args)]
@@ -51,8 +45,4 @@ impl RecordsCommand {
             RecordsAction::Import(command) => command.run().await,
         }
     }
-}
-
-fn service(client: &Client) -> RecordServiceClient<Channel> {
-    RecordServiceClient::new(client.channel()).max_decoding_message_size(MAX_RESPONSE_BYTES)
 }

@@ -4,19 +4,22 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use chefshat_client::v1::{self, record_line::Line};
-use chefshat_client::{Error, v1::RecordLine};
+use chefshat_client::v1::record_service_client::RecordServiceClient;
+use chefshat_client::v1::{self, RecordLine, record_line::Line};
+use chefshat_client::{Client, Error};
 use chefshat_record::jsonl;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use prost::Message as _;
+use tonic::transport::Channel;
 
 use super::super::connect::ServerArg;
 use super::super::{CommandError, say};
 use super::filter::FilterArgs;
 use super::list::in_a_line;
-use super::service;
 
+/// Maximum size of a response in bytes: a part of a record.
+const MAX_RESPONSE_BYTES: usize = 16 * 1024 * 1024;
 /// Bytes of lines per message: half of the server's limit.
 const PART_BYTES: usize = 32 * 1024;
 
@@ -156,6 +159,10 @@ impl Import {
         bar.finish_and_clear();
         Ok(ExitCode::SUCCESS)
     }
+}
+
+fn service(client: &Client) -> RecordServiceClient<Channel> {
+    RecordServiceClient::new(client.channel()).max_decoding_message_size(MAX_RESPONSE_BYTES)
 }
 
 fn refused(file: &Path, error: &Error) -> CommandError {

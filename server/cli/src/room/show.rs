@@ -6,12 +6,9 @@ use chefshat_client::v1;
 use clap::{Args, ValueEnum};
 
 use super::super::connect::ServerArg;
-use super::super::{CommandError, say};
+use super::super::{CommandError, pages, say};
 use crate::kind::kind_name;
 use crate::narration::{abort_reason, clean};
-
-/// Page size.
-const PAGE: u32 = 100;
 
 /// List the rooms of a server, newest first.
 #[derive(Debug, Args)]
@@ -59,31 +56,16 @@ impl List {
             Some(StateArg::Finished) => v1::RoomState::Finished,
             Some(StateArg::Aborted) => v1::RoomState::Aborted,
         };
-        let mut request = v1::ListRoomsRequest {
-            state: state.into(),
-            page_size: PAGE,
-            page_token: String::new(),
+        let fetch = async |page_token| {
+            let request = v1::ListRoomsRequest {
+                state: state.into(),
+                page_size: pages::PAGE,
+                page_token,
+            };
+            let page = client.list_rooms(request).await?;
+            Ok((page.rooms, page.next_page_token))
         };
-        let mut count = 0;
-        loop {
-            let page = client.list_rooms(request.clone()).await?;
-            for room in &page.rooms {
-                if self.json {
-                    say(serde_json::to_string(room)?)?;
-                } else {
-                    say(in_a_line(room))?;
-                }
-                count += 1;
-            }
-            if page.next_page_token.is_empty() {
-                break;
-            }
-            request.page_token = page.next_page_token;
-        }
-        if count == 0 && !self.json {
-            say("no rooms")?;
-        }
-        Ok(ExitCode::SUCCESS)
+        pages::print(fetch, self.json, in_a_line, "no rooms").await
     }
 }
 

@@ -2,18 +2,17 @@
 
 use std::process::ExitCode;
 
-use chefshat_client::v1;
+use chefshat_client::{Client, v1};
 use clap::Args;
 
 use super::super::connect::ServerArg;
 use super::super::numbers::{counted, ordinal};
-use super::super::{CommandError, say};
-use super::all_games;
+use super::super::{CommandError, pages, say};
 use super::words::{StateArg, format_name, state};
 use crate::narration::clean;
 
-/// Page size.
-const PAGE: u32 = 100;
+/// Page size of the list of games.
+const GAMES_PAGE: u32 = 500;
 
 /// List the tournaments of a server, newest first.
 #[derive(Debug, Args)]
@@ -53,33 +52,17 @@ pub(super) struct Games {
 impl List {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
         let client = self.server.connect().await?;
-        let mut request = v1::ListTournamentsRequest {
-            page_size: PAGE,
-            page_token: String::new(),
-            state: (self.state)
-                .map_or(v1::TournamentState::Unspecified, StateArg::state)
-                .into(),
+        let state = (self.state).map_or(v1::TournamentState::Unspecified, StateArg::state);
+        let fetch = async |page_token| {
+            let request = v1::ListTournamentsRequest {
+                page_size: pages::PAGE,
+                page_token,
+                state: state.into(),
+            };
+            let page = client.list_tournaments(request).await?;
+            Ok((page.tournaments, page.next_page_token))
         };
-        let mut count = 0;
-        loop {
-            let page = client.list_tournaments(request.clone()).await?;
-            for tournament in &page.tournaments {
-                if self.json {
-                    say(serde_json::to_string(tournament)?)?;
-                } else {
-                    say(in_a_line(tournament))?;
-                }
-                count += 1;
-            }
-            if page.next_page_token.is_empty() {
-                break;
-            }
-            request.page_token = page.next_page_token;
-        }
-        if count == 0 && !self.json {
-            say("no tournaments")?;
-        }
-        Ok(ExitCode::SUCCESS)
+        pages::print(fetch, self.json, in_a_line, "no tournaments").await
     }
 }
 
@@ -109,6 +92,32 @@ impl Games {
         }
         Ok(ExitCode::SUCCESS)
     }
+}
+
+/// All games that have been drawn, in order.
+///
+/// # Errors
+/// `TOURNAMENT_UNKNOWN`.
+pub(super) async fn all_games(
+    client: &Client,
+    tournament_id: &str,
+) -> Result<Vec<v1::TournamentGame>, CommandError> {
+    let fetch = async |page_token| {
+        let request = v1::ListTournamentGamesRequest {
+            tournament_id: tournament_id.to_owned(),
+            page_size: GAMES_PAGE,
+            page_token,
+        };
+        let page = client.tournament_games(request).await?;
+        Ok((page.games, page.next_page_token))
+    };
+    let mut games = Vec::new();
+    let keep = |game| {
+        games.push(game);
+        Ok(())
+    };
+    pages::for_each(fetch, keep).await?;
+    Ok(games)
 }
 
 /// Path of a game's record under the server's data directory, once it exists.

@@ -14,13 +14,9 @@ pub(super) mod words;
 
 use std::process::ExitCode;
 
-use chefshat_client::{Client, v1};
 use clap::{Args, Subcommand};
 
 use super::CommandError;
-
-/// Page size of the list of games.
-const GAMES_PAGE: u32 = 500;
 
 /// Create, join and follow tournaments, and show their results.
 #[derive(Debug, Args)]
@@ -69,29 +65,5 @@ impl TournamentCommand {
             TournamentAction::List(command) => command.run().await,
             TournamentAction::Games(command) => command.run().await,
         }
-    }
-}
-
-/// All games that have been drawn, in order.
-///
-/// # Errors
-/// `TOURNAMENT_UNKNOWN`.
-async fn all_games(
-    client: &Client,
-    tournament_id: &str,
-) -> Result<Vec<v1::TournamentGame>, CommandError> {
-    let mut request = v1::ListTournamentGamesRequest {
-        tournament_id: tournament_id.to_owned(),
-        page_size: GAMES_PAGE,
-        page_token: String::new(),
-    };
-    let mut games = Vec::new();
-    loop {
-        let page = client.tournament_games(request.clone()).await?;
-        games.extend(page.games);
-        if page.next_page_token.is_empty() {
-            return Ok(games);
-        }
-        request.page_token = page.next_page_token;
     }
 }

@@ -11,9 +11,10 @@ use super::super::connect::ServerArg;
 use super::super::numbers::counted;
 use super::super::output::{heading, line};
 use super::super::{CommandError, say};
+use super::files;
+use super::list::all_games;
 use super::tables::{self, Field, NO_GAME_COUNTED};
 use super::words::{format_name, is_over, state};
-use super::{all_games, files};
 use crate::narration::clean;
 
 /// Show the standings of a tournament, their confidence, and statistics of play; final once it is over.

@@ -1,5 +1,8 @@
-//! Draws the story: its newest lines beside the seats or, scrolled back, earlier ones in place of seats and pizza.
+//! The log: what happened, in sentences. The newest lines are drawn beside the seats; scrolled back, earlier ones replace seats and pizza.
 
+use std::collections::VecDeque;
+
+use chefshat_client::v1;
 use ratatui::Frame;
 use ratatui::crossterm::event::KeyCode;
 use ratatui::layout::Rect;
@@ -7,39 +10,59 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
 use super::theme::Theme;
-use super::view::boxed;
 use crate::narration::columns;
 use crate::narration::story;
 use crate::narration::view::GameView;
 
+/// Maximum number of lines.
+const MAX_LINES: usize = 2000;
 /// Lines per key press, for the first and the following ones: less than the smallest window shows.
 const FIRST: usize = 5;
 const PAGE: usize = 10;
 /// Indentation of wrapped lines.
 const INDENT: usize = 2;
 
-/// The scroll position of the story.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(crate) struct Scroll {
+/// What happened in a game, and how far it is scrolled back.
+#[derive(Debug, Default)]
+pub(crate) struct Log {
+    /// The newest lines, oldest first.
+    lines: VecDeque<story::Line>,
+    /// Number of lines so far, with those no longer in `lines`.
+    count: usize,
     /// Number of the line after the last shown one, of all lines so far; none while the newest are shown beside the seats.
     end: Option<usize>,
 }
 
-impl Scroll {
+impl Log {
+    /// Applies an event to the table and adds its lines.
+    pub(crate) fn follow(&mut self, table: &mut GameView, event: &v1::GameEvent) {
+        let lines = story::advance(table, event);
+        self.count += lines.len();
+        self.lines.extend(lines);
+        while self.lines.len() > MAX_LINES {
+            self.lines.pop_front();
+        }
+    }
+
+    /// Number of lines that are no longer in `lines`.
+    fn dropped(&self) -> usize {
+        self.count - self.lines.len()
+    }
+
     /// Whether earlier lines replace the table.
-    pub(crate) fn is_open(self) -> bool {
+    pub(crate) fn is_open(&self) -> bool {
         self.end.is_some()
     }
 
-    /// Handles a key; false if it is not for the story. `PgUp` always is, all others only while earlier lines are shown.
-    pub(crate) fn key(&mut self, code: KeyCode, table: &GameView) -> bool {
+    /// Handles a key; false if it is not for the log. `PgUp` always is, all others only while earlier lines are shown.
+    pub(crate) fn key(&mut self, code: KeyCode) -> bool {
         // At least one page stays visible.
-        let first = (table.story_len - table.story.len() + PAGE).min(table.story_len);
+        let first = (self.dropped() + PAGE).min(self.count);
         self.end = match (code, self.end) {
-            (KeyCode::PageUp, None) => Some(table.story_len.saturating_sub(FIRST).max(first)),
+            (KeyCode::PageUp, None) => Some(self.count.saturating_sub(FIRST).max(first)),
             (KeyCode::PageUp, Some(end)) => Some(end.saturating_sub(PAGE).max(first)),
             (KeyCode::Home, Some(_)) => Some(first),
-            (KeyCode::PageDown, Some(end)) => Some(end + PAGE).filter(|end| *end < table.story_len),
+            (KeyCode::PageDown, Some(end)) => Some(end + PAGE).filter(|end| *end < self.count),
             (_, Some(_)) => None,
             (_, None) => return false,
         };
@@ -48,9 +71,9 @@ impl Scroll {
 }
 
 /// Draws the newest lines.
-pub(super) fn draw(frame: &mut Frame<'_>, theme: Theme, table: &GameView, area: Rect) {
-    let lines = last_lines(theme, table, table.story_len, area);
-    let block = boxed(theme, " what happened ");
+pub(super) fn draw(frame: &mut Frame<'_>, theme: Theme, table: &GameView, log: &Log, area: Rect) {
+    let lines = last_lines(theme, table, log, log.count, area);
+    let block = theme.boxed(" what happened ");
     frame.render_widget(Paragraph::new(lines).block(block), area);
 }
 
@@ -59,28 +82,34 @@ pub(super) fn draw_back(
     frame: &mut Frame<'_>,
     theme: Theme,
     table: &GameView,
-    scroll: Scroll,
+    log: &Log,
     area: Rect,
 ) {
-    let end = scroll.end.unwrap_or(table.story_len).min(table.story_len);
-    let lines = last_lines(theme, table, end, area);
-    let after = match table.story_len - end {
+    let end = log.end.unwrap_or(log.count).min(log.count);
+    let lines = last_lines(theme, table, log, end, area);
+    let after = match log.count - end {
         0 => "the newest".to_owned(),
         after => format!("{after} more after these"),
     };
-    let block = boxed(theme, format!(" what happened · {after} "))
+    let block = theme
+        .boxed(format!(" what happened · {after} "))
         .title_bottom(" PgUp earlier · PgDn later · any other key: the table ");
     frame.render_widget(Paragraph::new(lines).block(block), area);
 }
 
 /// The lines before line number `end` that fit in the area, wrapped.
-fn last_lines(theme: Theme, table: &GameView, end: usize, area: Rect) -> Vec<Line<'static>> {
+fn last_lines(
+    theme: Theme,
+    table: &GameView,
+    log: &Log,
+    end: usize,
+    area: Rect,
+) -> Vec<Line<'static>> {
     let rows = usize::from(area.height.saturating_sub(2));
     let width = usize::from(area.width.saturating_sub(2));
-    let told_before = table.story_len - table.story.len();
-    let shown = end.saturating_sub(told_before).min(table.story.len());
+    let shown = end.saturating_sub(log.dropped()).min(log.lines.len());
     let mut lines: Vec<Line<'static>> = Vec::new();
-    for line in table.story.range(..shown).rev() {
+    for line in log.lines.range(..shown).rev() {
         let wrapped = wrap(theme, table, line, width);
         lines.extend(wrapped.into_iter().rev());
         if lines.len() >= rows {
@@ -92,7 +121,7 @@ fn last_lines(theme: Theme, table: &GameView, end: usize, area: Rect) -> Vec<Lin
     lines
 }
 
-/// A line of the story, wrapped between words.
+/// A line, wrapped between words.
 fn wrap(theme: Theme, table: &GameView, line: &story::Line, width: usize) -> Vec<Line<'static>> {
     let (lead, words) = match (line.heading, line.seat) {
         (true, _) => (None, format!("─ {}", line.words)),

@@ -2,6 +2,8 @@
 
 use chefshat_client::v1;
 use ratatui::style::{Color, Modifier, Style};
+use ratatui::text::Line;
+use ratatui::widgets::{Block, BorderType};
 
 use crate::narration::view::SeatView;
 
@@ -106,9 +108,17 @@ impl Theme {
         }
     }
 
-    /// Frames around parts of the table.
+    /// Frames.
     pub(crate) fn frame(self) -> Style {
         self.fg(Color::Indexed(137))
+    }
+
+    /// A box with a title, around a part of the table.
+    pub(crate) fn boxed<'a>(self, title: impl Into<Line<'a>>) -> Block<'a> {
+        Block::bordered()
+            .border_type(BorderType::Rounded)
+            .border_style(self.frame())
+            .title(title)
     }
 }
 

@@ -8,7 +8,7 @@ use ratatui::widgets::{Block, BorderType, Clear, Paragraph, Wrap};
 
 use super::super::numbers::{counted, ordinal};
 use super::cards::fan;
-use super::log::{self, Scroll};
+use super::log::{self, Log};
 use super::theme::{Theme, ingredient, kind};
 use crate::narration::view::{End, GameView};
 use crate::narration::{MAX_NAME, aborted, clean, columns, title};
@@ -34,7 +34,7 @@ pub(crate) fn draw(
     table: &GameView,
     me: Option<u32>,
     status: &str,
-    scroll: Scroll,
+    log: &Log,
     rows: u16,
 ) -> Option<Rect> {
     let area = frame.area();
@@ -49,14 +49,14 @@ pub(crate) fn draw(
     ])
     .areas(area);
     draw_header(frame, theme, table, status, header);
-    if scroll.is_open() {
-        log::draw_back(frame, theme, table, scroll, upper.union(pizza));
+    if log.is_open() {
+        log::draw_back(frame, theme, table, log, upper.union(pizza));
         return Some(lower);
     }
     let [seats, story] =
         Layout::horizontal([Constraint::Length(SEATS_COLUMNS), Constraint::Min(1)]).areas(upper);
     draw_seats(frame, theme, table, me, seats);
-    log::draw(frame, theme, table, story);
+    log::draw(frame, theme, table, log, story);
     draw_pizza(frame, theme, table, me, pizza);
     Some(lower)
 }
@@ -73,14 +73,6 @@ pub(crate) fn is_too_small(frame: &mut Frame<'_>) -> bool {
         frame.render_widget(Paragraph::new(words).wrap(Wrap { trim: true }), area);
     }
     small
-}
-
-/// A box with a title.
-pub(crate) fn boxed<'a>(theme: Theme, title: impl Into<Line<'a>>) -> Block<'a> {
-    Block::bordered()
-        .border_type(BorderType::Rounded)
-        .border_style(theme.frame())
-        .title(title)
 }
 
 /// A popup in the middle of the screen.
@@ -205,7 +197,7 @@ fn draw_seats(frame: &mut Frame<'_>, theme: Theme, table: &GameView, me: Option<
         Line::from(spans)
     });
     let lines: Vec<Line<'_>> = lines.collect();
-    frame.render_widget(Paragraph::new(lines).block(boxed(theme, SEATS_TITLE)), area);
+    frame.render_widget(Paragraph::new(lines).block(theme.boxed(SEATS_TITLE)), area);
 }
 
 /// A note about a seat that is shown instead of its role.
@@ -220,7 +212,7 @@ fn note_of(place: &crate::narration::view::SeatView) -> Option<String> {
 }
 
 fn draw_pizza(frame: &mut Frame<'_>, theme: Theme, table: &GameView, me: Option<u32>, area: Rect) {
-    let block = boxed(theme, " the pizza ");
+    let block = theme.boxed(" the pizza ");
     let inner = block.inner(area);
     frame.render_widget(block, area);
     let Some(play) = table.board else {

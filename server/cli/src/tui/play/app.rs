@@ -7,7 +7,7 @@ use ratatui::crossterm::event::KeyCode;
 use super::keys::{key_of, names_cards, not_held};
 use super::pick::Decision;
 use crate::narration::view::GameView;
-use crate::tui::log::Scroll;
+use crate::tui::log::Log;
 use crate::tui::screen::Key;
 
 /// Expressions by key: label, valence and arousal, the same as in the page.
@@ -88,8 +88,7 @@ pub(super) struct App {
     pub(super) link: Link,
     /// A notice for the person: why a key was refused, or a message of the server.
     pub(super) notice: String,
-    /// Scroll position of the story.
-    pub(super) scroll: Scroll,
+    pub(super) log: Log,
     /// What Enter does after the end of the game.
     pub(super) then: &'static str,
     /// The person's standing in the tournament, shown with the result.
@@ -123,7 +122,7 @@ impl App {
             dialog: None,
             link: Link::Connecting,
             notice: String::new(),
-            scroll: Scroll::default(),
+            log: Log::default(),
             then: "Enter ends",
             standing: None,
             others: None,
@@ -165,7 +164,7 @@ impl App {
 
     /// Whether keys act on the table, not on a dialog or the story.
     pub(super) fn takes_keys(&self) -> bool {
-        self.dialog.is_none() && !self.scroll.is_open()
+        self.dialog.is_none() && !self.log.is_open()
     }
 
     /// When the open decision arrived; `None` if there is none or its answer has been sent.
@@ -190,7 +189,7 @@ impl App {
             }
             Update::Events(batch) => {
                 for event in &batch.events {
-                    self.table.apply(event);
+                    self.log.follow(&mut self.table, event);
                     self.close_by(event);
                 }
             }
@@ -289,7 +288,7 @@ impl App {
             Key::Interrupt => return self.leave(),
             Key::Code(code) => code,
         };
-        if self.dialog.is_none() && self.scroll.key(code, &self.table) {
+        if self.dialog.is_none() && self.log.key(code) {
             return None;
         }
         if self.table.end.is_some() || matches!(self.link, Link::Over(_)) {

@@ -13,7 +13,7 @@ use crate::narration::{clean, columns};
 use crate::tournament::tables::{Field, mean_score};
 use crate::tournament::words::format_name;
 use crate::tui::theme::{Theme, symbol};
-use crate::tui::view::{boxed, is_too_small, padded, popup};
+use crate::tui::view::{is_too_small, padded, popup};
 
 /// Rows of the person's box, with its frame.
 const OWN_ROWS: u16 = 7;
@@ -138,14 +138,14 @@ fn draw_own(frame: &mut Frame<'_>, theme: Theme, part: &Part, lobby: &Lobby, are
     if let Some(first) = lines.first_mut() {
         *first = first.clone().patch_style(theme.bold());
     }
-    let block = boxed(theme, " your tournament ");
+    let block = theme.boxed(" your tournament ");
     let own = Paragraph::new(lines).wrap(Wrap { trim: false });
     frame.render_widget(own.block(block), area);
 }
 
 fn draw_standings(frame: &mut Frame<'_>, theme: Theme, lobby: &Lobby, area: Rect) {
     let Some(report) = &lobby.report else {
-        frame.render_widget(boxed(theme, " standings "), area);
+        frame.render_widget(theme.boxed(" standings "), area);
         return;
     };
     let tournament = &report.tournament;
@@ -179,7 +179,7 @@ fn draw_standings(frame: &mut Frame<'_>, theme: Theme, lobby: &Lobby, area: Rect
     let mut lines = vec![Line::from(Span::styled(heading, theme.dim()))];
     let shown = report.standings.iter().skip(first).take(rows);
     lines.extend(shown.map(|standing| line(theme, lobby, report, standing)));
-    let mut block = boxed(theme, title);
+    let mut block = theme.boxed(title);
     if most > 0 {
         let to = (first + rows).min(count);
         block = block.title_bottom(format!(" {}–{to} of {count} ", first + 1));

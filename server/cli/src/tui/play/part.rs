@@ -214,7 +214,7 @@ impl Part {
         let ended = *self.ended_ms.get_or_insert(now_ms);
         let asked = self.first_to_ask().is_some();
         let long = if asked { SHORT_RESULT_MS } else { RESULT_MS };
-        let reads = self.game.as_ref().is_some_and(|it| it.scroll.is_open());
+        let reads = self.game.as_ref().is_some_and(|it| it.log.is_open());
         if now_ms.saturating_sub(ended) >= long && (asked || !reads) {
             self.dismiss();
         }
@@ -283,7 +283,7 @@ impl Part {
             }
             (Some(game), Some(_)) if is_over(game) => {
                 match code {
-                    code if game.scroll.key(code, &game.table) => {}
+                    code if game.log.key(code) => {}
                     KeyCode::Enter | KeyCode::Char(' ') | KeyCode::Esc => self.dismiss(),
                     KeyCode::Char('q') => self.ask_to_leave(),
                     _ => {}

@@ -14,7 +14,7 @@ use crate::narration::view::End;
 use crate::tui::cards;
 use crate::tui::cards::Shown;
 use crate::tui::theme::{Theme, ingredient};
-use crate::tui::view::{boxed, draw as draw_table, end_lines, popup};
+use crate::tui::view::{draw as draw_table, end_lines, popup};
 
 /// Rows below the table: hand (7), request (2), keys (1).
 const ROWS: u16 = 10;
@@ -73,7 +73,7 @@ pub(super) fn draw_game(frame: &mut Frame<'_>, theme: Theme, app: &App, now_ms: 
     if let Some(others) = &app.others {
         status = format!("{others} · {status}");
     }
-    let Some(area) = draw_table(frame, theme, &app.table, app.me, &status, app.scroll, ROWS) else {
+    let Some(area) = draw_table(frame, theme, &app.table, app.me, &status, &app.log, ROWS) else {
         return;
     };
     let [hand, asked, keys] = Layout::vertical([
@@ -124,7 +124,7 @@ fn draw_hand(frame: &mut Frame<'_>, theme: Theme, app: &App, area: Rect) {
             crate::numbers::counted(count.into(), "card")
         ),
     };
-    let block = boxed(theme, title);
+    let block = theme.boxed(title);
     let inner = block.inner(area);
     frame.render_widget(block, area);
     if shown.is_empty() {
@@ -285,7 +285,7 @@ fn time(ms: u64) -> String {
 /// Draws the end of the game or a dialog over the table.
 fn draw_over(frame: &mut Frame<'_>, theme: Theme, app: &App) {
     let plain = |words: &str| Line::from(words.to_owned());
-    if app.scroll.is_open() {
+    if app.log.is_open() {
         return;
     }
     match (&app.table.end, &app.link, app.dialog) {

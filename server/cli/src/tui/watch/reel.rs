@@ -4,7 +4,7 @@ use chefshat_client::v1::{self, game_event::Kind};
 use ratatui::crossterm::event::KeyCode;
 
 use crate::narration::view::GameView;
-use crate::tui::log::Scroll;
+use crate::tui::log::Log;
 use crate::tui::screen::Key;
 
 /// Milliseconds per event at each speed, slowest first.
@@ -31,8 +31,7 @@ pub(super) struct Reel {
     pub(super) lost: Option<String>,
     pub(super) hands: bool,
     pub(super) help: bool,
-    /// Scroll position of the story.
-    pub(super) scroll: Scroll,
+    pub(super) log: Log,
     pub(super) left: bool,
 }
 
@@ -63,7 +62,7 @@ impl Reel {
             lost: None,
             hands: !live,
             help: false,
-            scroll: Scroll::default(),
+            log: Log::default(),
             left: false,
         }
     }
@@ -118,9 +117,9 @@ impl Reel {
         if std::mem::take(&mut self.help) {
             return;
         }
-        if self.scroll.key(code, &self.table) {
+        if self.log.key(code) {
             // Stop while the person reads the story.
-            self.running &= !self.scroll.is_open();
+            self.running &= !self.log.is_open();
             return;
         }
         self.moved_ms = now_ms;
@@ -169,10 +168,11 @@ impl Reel {
         let at = at.min(self.events.len());
         if at < self.at {
             self.table = self.start.clone();
+            self.log = Log::default();
             self.at = 0;
         }
         for event in &self.events[self.at..at] {
-            self.table.apply(event);
+            self.log.follow(&mut self.table, event);
         }
         self.at = at;
     }

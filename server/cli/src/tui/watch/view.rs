@@ -10,7 +10,7 @@ use crate::narration::MAX_NAME;
 use crate::narration::hand::Hand;
 use crate::narration::view::GameView;
 use crate::tui::theme::Theme;
-use crate::tui::view::{boxed, draw as draw_table, end_lines, padded, popup};
+use crate::tui::view::{draw as draw_table, end_lines, padded, popup};
 
 const KEYS: &str = " space stop  ←→ step  ↑↓ speed  s S Shift  PgUp story  h hands  ? keys  q end";
 
@@ -45,7 +45,7 @@ pub(super) fn draw(frame: &mut Frame<'_>, theme: Theme, reel: &Reel) {
         (false, true) if reel.at == reel.len() => "■ the end",
         (false, true) => "▶ running",
     };
-    let Some(area) = draw_table(frame, theme, table, None, status, reel.scroll, rows) else {
+    let Some(area) = draw_table(frame, theme, table, None, status, &reel.log, rows) else {
         return;
     };
     let [hands, bar, keys] = Layout::vertical([
@@ -62,8 +62,7 @@ pub(super) fn draw(frame: &mut Frame<'_>, theme: Theme, reel: &Reel) {
     if reel.help {
         let lines = HELP.iter().map(|line| Line::from(*line)).collect();
         popup(frame, theme, "help", lines);
-    } else if let (Some(end), true, false) =
-        (&table.end, reel.at == reel.len(), reel.scroll.is_open())
+    } else if let (Some(end), true, false) = (&table.end, reel.at == reel.len(), reel.log.is_open())
     {
         let mut lines = end_lines(theme, table, end);
         lines.push(Line::default());
@@ -87,7 +86,7 @@ fn draw_hands(frame: &mut Frame<'_>, theme: Theme, table: &GameView, area: Rect)
         Line::from(spans)
     });
     let lines: Vec<Line<'_>> = lines.collect();
-    frame.render_widget(Paragraph::new(lines).block(boxed(theme, " hands ")), area);
+    frame.render_widget(Paragraph::new(lines).block(theme.boxed(" hands ")), area);
 }
 
 /// A hand in a line: `2 5×3 11×2★ J`.
