@@ -3,7 +3,7 @@
 //! its cards. `crate::patterns` lists all legal turns by table look-up; a test compares its masks
 //! with [`PlayRequirement::allows`] in random games, and with a second implementation of the rules.
 
-use super::decision::{GiftRequirement, PlayRequirement, Requirement};
+use super::decision::{Decision, GiftRequirement, PlayRequirement, Requirement};
 use super::error::{ActionError, Refusal};
 use super::{Game, Stage};
 use crate::exchange::default_gift;
@@ -66,6 +66,22 @@ impl Game {
             number,
             total: known.then_some(pair.size),
             receiver: pair.forced,
+        }
+    }
+
+    /// Why an action does not answer the open decision, whatever the hand and the board.
+    #[cold]
+    pub(super) fn wrong_kind(&self, id: ActionId) -> ActionError {
+        let space = self.rules.actions();
+        match (self.decision(), space.decode(id)) {
+            (None, _) => ActionError::GameOver,
+            (Some(_), None) => ActionError::OutOfRange {
+                action: id,
+                size: space.size(),
+            },
+            (Some(Decision { kind, .. }), Some(attempted)) => {
+                ActionError::WrongKind { attempted, kind }
+            }
         }
     }
 

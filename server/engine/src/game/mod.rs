@@ -135,15 +135,8 @@ impl Game {
         id: ActionId,
         mut on_event: impl FnMut(Event),
     ) -> Result<(), ActionError> {
-        let Some(decision) = self.decision() else {
-            return Err(ActionError::GameOver);
-        };
-        let space = self.rules.actions();
-        let Some(action) = space.decode(id) else {
-            return Err(ActionError::OutOfRange {
-                action: id,
-                size: space.size(),
-            });
+        let Some(action) = self.rules.actions().decode(id) else {
+            return Err(self.wrong_kind(id));
         };
         match (self.stage, action) {
             (
@@ -178,12 +171,7 @@ impl Game {
             }
             (Stage::Special(_), Action::Decline) => self.start_exchange(&mut on_event),
             (Stage::Special(seat), Action::Declare) => self.declare(seat, &mut on_event),
-            _ => {
-                return Err(ActionError::WrongKind {
-                    attempted: action,
-                    kind: decision.kind,
-                });
-            }
+            _ => return Err(self.wrong_kind(id)),
         }
         Ok(())
     }
@@ -193,24 +181,16 @@ impl Game {
     /// # Errors
     /// If the action is not legal.
     pub fn check(&self, id: ActionId) -> Result<(), ActionError> {
-        let decision = self.decision().ok_or(ActionError::GameOver)?;
-        let space = self.rules.actions();
-        let action = space.decode(id).ok_or(ActionError::OutOfRange {
-            action: id,
-            size: space.size(),
-        })?;
-        match (self.stage, action) {
-            (Stage::Turn(seat), Action::Play { .. } | Action::LoneJoker | Action::Pass) => {
-                self.check_turn(seat, action)
+        match (self.stage, self.rules.actions().decode(id)) {
+            (
+                Stage::Turn(seat),
+                Some(turn @ (Action::Play { .. } | Action::LoneJoker | Action::Pass)),
+            ) => self.check_turn(seat, turn),
+            (Stage::Exchange { giver, .. }, Some(gift @ (Action::Give(_) | Action::GiveJoker))) => {
+                self.check_gift(giver, gift)
             }
-            (Stage::Exchange { giver, .. }, Action::Give(_) | Action::GiveJoker) => {
-                self.check_gift(giver, action)
-            }
-            (Stage::Special(_), Action::Decline | Action::Declare) => Ok(()),
-            _ => Err(ActionError::WrongKind {
-                attempted: action,
-                kind: decision.kind,
-            }),
+            (Stage::Special(_), Some(Action::Decline | Action::Declare)) => Ok(()),
+            _ => Err(self.wrong_kind(id)),
         }
     }
 
