@@ -62,6 +62,8 @@ mod standings;
 mod state;
 pub mod statistics;
 mod swiss;
+#[cfg(any(test, feature = "testing"))]
+pub mod testing;
 
 pub use change::{
     Change, Ended, Entrant, EntrantKind, Game, GameResult, GameState, SeatPlayed, SeatResult,

@@ -1,9 +1,9 @@
 //! The column `golden` of games at real tables, where the Golden card's holder may be unknown.
 
-use chefshat_engine::{RuleSet, RuleSetSpec, Stop};
-use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
+use chefshat_engine::RuleSet;
+use chefshat_proto::v1;
 use chefshat_record::import::import;
-use chefshat_record::testing::{Observed, TestGame, transcript};
+use chefshat_record::testing::{HiddenGolden, Observed, TestGame, transcript};
 use serde_json::Value;
 
 use super::{Stage, rules};
@@ -18,12 +18,11 @@ fn exported(rules: &RuleSet, played: &[v1::RecordLine], observed: Observed) -> V
 
 #[test]
 fn golden_is_null_while_the_holder_is_unknown() {
-    let any_top_face = RuleSetSpec {
-        stop: Stop::Shifts(1),
-        ..RuleSetSpec::preset("original2020").unwrap()
-    };
-    let rules = any_top_face.validate().unwrap();
-    let played = TestGame::dealt(rules, 7, 1).record(|_| v1::DecisionSource::Agent);
+    let HiddenGolden {
+        rules,
+        lines: played,
+        holder,
+    } = HiddenGolden::record();
     let column = exported(&rules, &played, Observed::TURNS);
     let nulls = column.iter().filter(|golden| golden.is_null()).count();
     assert!(
@@ -34,14 +33,6 @@ fn golden_is_null_while_the_holder_is_unknown() {
     assert!(column.iter().all(|golden| golden.as_bool() != Some(true)));
 
     // The holder's dealt hand reveals it; any other hand does not.
-    let holder = played.iter().find_map(|line| match &line.line {
-        Some(Line::Event(event)) => match &event.kind {
-            Some(Kind::ShiftStarted(started)) => started.hands.iter().find(|hand| hand.golden),
-            _ => None,
-        },
-        _ => None,
-    });
-    let holder = holder.unwrap().seat;
     for seat in 0..4 {
         let observed = Observed {
             hands: 1 << seat,

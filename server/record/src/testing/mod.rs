@@ -12,7 +12,9 @@ pub use transcript::{Observed, transcript};
 
 use crate::branch::Branch;
 use crate::convert::{By, action_space, event_kind, rules_to_proto, script_to_proto, seat_number};
-use chefshat_engine::{ActionId, BySeat, DecisionKind, Event, Game, RuleSet, Script, Seed};
+use chefshat_engine::{
+    ActionId, BySeat, DecisionKind, Event, Game, RuleSet, RuleSetSpec, Script, Seed, Stop,
+};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 
 /// Invalid attempts after which the default decision is taken.
@@ -250,6 +252,34 @@ impl TestGame<'_> {
             action_space: header.action_space,
             hand_size: self.rules.hand_size().into(),
             seed_commitment: header.seed_commitment,
+        }
+    }
+}
+
+/// A game of one Shift with the opening `any_top_face`, in which plays do not reveal the Golden card.
+pub struct HiddenGolden {
+    pub rules: RuleSet,
+    pub lines: Vec<v1::RecordLine>,
+    /// The seat dealt the Golden card.
+    pub holder: u32,
+}
+
+impl HiddenGolden {
+    /// Plays and records the game.
+    pub fn record() -> Self {
+        let spec = RuleSetSpec {
+            stop: Stop::Shifts(1),
+            ..RuleSetSpec::preset("original2020").unwrap()
+        };
+        let rules = spec.validate().unwrap();
+        let game = TestGame::dealt(rules, 7, 1);
+        let start = Game::new(rules, game.seed, |_| {});
+        let hands = start.hands();
+        let holder = hands.seats().find(|&seat| hands[seat].has_golden());
+        HiddenGolden {
+            rules,
+            lines: game.record(|_| v1::DecisionSource::Agent),
+            holder: seat_number(holder.unwrap()),
         }
     }
 }

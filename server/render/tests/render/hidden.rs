@@ -6,11 +6,11 @@ use chefshat_engine::{
     Action, BySeat, Cards, DecisionKind, Game, RuleSet, RuleSetSpec, Script, Seat, SeatOrder, Seed,
     SpecialAction, Stop, TakenOver, Viewer,
 };
-use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
+use chefshat_proto::v1::{self, record_line::Line};
 use chefshat_record::branch::Branch;
 use chefshat_record::import::import;
 use chefshat_record::replay::walk;
-use chefshat_record::testing::{Observed, TestGame, transcript};
+use chefshat_record::testing::{HiddenGolden, Observed, TestGame, transcript};
 use chefshat_render::{Card, Film, Frame, Hand, LogEntry, Now, Painter, Perspective, Scene, When};
 
 use super::{chronicle, film, fixture, rules, scene};
@@ -378,21 +378,12 @@ fn golden_drawn(rules: &RuleSet, played: &[v1::RecordLine], observed: Observed) 
 
 #[test]
 fn the_golden_card_is_drawn_only_where_its_holder_is_known() {
-    let any_top_face = RuleSetSpec {
-        stop: Stop::Shifts(1),
-        ..RuleSetSpec::preset("original2020").unwrap()
-    };
-    let rules = any_top_face.validate().unwrap();
-    let played = TestGame::dealt(rules, 7, 1).record(|_| v1::DecisionSource::Agent);
+    let HiddenGolden {
+        rules,
+        lines: played,
+        holder,
+    } = HiddenGolden::record();
     assert_eq!(golden_drawn(&rules, &played, Observed::TURNS), 0);
-    let holder = played.iter().find_map(|line| match &line.line {
-        Some(Line::Event(event)) => match &event.kind {
-            Some(Kind::ShiftStarted(started)) => started.hands.iter().find(|hand| hand.golden),
-            _ => None,
-        },
-        _ => None,
-    });
-    let holder = holder.unwrap().seat;
     for seat in 0..4 {
         let observed = Observed {
             hands: 1 << seat,

@@ -11,7 +11,6 @@ mod duplicate;
 mod mechanics;
 mod ratings;
 mod same_seat;
-mod support;
 mod tournament;
 mod trust;
 mod vector;

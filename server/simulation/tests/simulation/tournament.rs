@@ -5,10 +5,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use chefshat_agents::AgentKind;
 use chefshat_engine::{RuleSet, RuleSetSpec};
 use chefshat_simulation::tournament::{OfflineProblem, play_offline};
+use chefshat_tournament::testing::{begun, settings};
 use chefshat_tournament::{Deals, Format, Settings, State, Tournament};
 use rayon::ThreadPoolBuilder;
-
-use crate::support::{begun, settings};
 
 fn rules() -> RuleSet {
     RuleSetSpec::default().validate().unwrap()

@@ -4,12 +4,11 @@
 use chefshat_agents::AgentKind;
 use chefshat_engine::{RuleSet, RuleSetSpec, Stop};
 use chefshat_simulation::tournament::play_offline;
+use chefshat_tournament::testing::{begun, settings};
 use chefshat_tournament::{
     Change, Deals, Format, GameResult, SURE, Scored, SeatPlayed, SeatResult, Settings, Tournament,
     order_confidence,
 };
-
-use crate::support::{begun, settings};
 
 const POINTS: [f64; 4] = [5.0, 3.0, 1.0, 0.0];
 

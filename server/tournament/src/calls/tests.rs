@@ -3,36 +3,25 @@
 use std::collections::BTreeMap;
 
 use super::super::chance::Chance;
-use super::super::{Deals, Entrant, EntrantKind, Format, Settings};
+use super::super::{Entrant, Format, Settings, testing};
 use super::*;
 use chefshat_agents::AgentKind;
 
 fn settings() -> Settings {
     Settings {
-        format: Format::RoundRobin,
-        players: 4,
-        points: vec![5, 3, 1, 0],
         rounds: Some(50),
-        games_per_pairing: 1,
-        deals: Deals::Independent,
         max_participants: 400,
-        start_when_joined: None,
-        no_show_ms: 1000,
-        max_calls: 2,
         max_parallel: 256,
-        draw_seed: [7; 32],
-        filler: AgentKind::Random,
+        ..testing::settings(Format::RoundRobin)
     }
 }
 
 fn join(tournament: &mut Tournament, max_games: usize, built_in: Option<AgentKind>) {
+    let name = format!("agent {}", tournament.participants().len());
     let change = tournament.join(Entrant {
-        name: format!("agent {}", tournament.participants().len()),
-        kind: EntrantKind::Agent,
         built_in,
-        filler: false,
-        stateless: true,
         max_games,
+        ..testing::entrant(&name)
     });
     tournament.fold(&change.expect("there is space"));
 }

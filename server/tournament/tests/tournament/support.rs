@@ -1,61 +1,18 @@
-//! Settings, participants and results for tests; games end without being played.
+//! Participants and results for tests; games end without being played.
 
-use chefshat_agents::AgentKind;
-use chefshat_tournament::{
-    Change, Deals, Ended, Entrant, EntrantKind, Format, SeatPlayed, Settings, State, Tournament,
-};
+use std::iter::repeat_n;
 
-/// Settings of a tournament of up to 64 participants in games of four.
-pub(crate) fn settings(format: Format) -> Settings {
-    Settings {
-        format,
-        players: 4,
-        points: vec![5, 3, 1, 0],
-        rounds: None,
-        games_per_pairing: 1,
-        deals: Deals::Independent,
-        max_participants: 64,
-        start_when_joined: None,
-        no_show_ms: 1000,
-        max_calls: 2,
-        max_parallel: 64,
-        draw_seed: [7; 32],
-        filler: AgentKind::Random,
-    }
-}
-
-/// An agent that plays one game at a time.
-pub(crate) fn entrant(name: &str) -> Entrant {
-    Entrant {
-        name: name.to_owned(),
-        kind: EntrantKind::Agent,
-        built_in: None,
-        filler: false,
-        stateless: true,
-        max_games: 1,
-    }
-}
+pub(crate) use chefshat_tournament::testing::{entrant, settings};
+use chefshat_tournament::{Change, Ended, SeatPlayed, Settings, State, Tournament, testing};
 
 /// A tournament with this number of participants, all present.
 pub(crate) fn joined(settings: Settings, participants: usize) -> Tournament {
-    let mut tournament = Tournament::new(settings).unwrap();
-    for number in 0..participants {
-        let change = tournament
-            .join(entrant(&format!("agent {number}")))
-            .unwrap();
-        tournament.fold(&change);
-        tournament.set_present(number, true);
-    }
-    tournament
+    testing::joined(settings, repeat_n(None, participants))
 }
 
-/// The same after the beginning.
+/// The same, begun.
 pub(crate) fn begun(settings: Settings, participants: usize) -> Tournament {
-    let mut tournament = joined(settings, participants);
-    for change in tournament.begin().unwrap() {
-        tournament.fold(&change);
-    }
-    tournament
+    testing::begun(settings, repeat_n(None, participants))
 }
 
 /// A result with these places by seat, and 10 points minus the place.
@@ -105,7 +62,7 @@ pub(crate) fn play_through(tournament: &mut Tournament) -> Vec<Change> {
         let playing: Vec<usize> = tournament.playing().collect();
         assert!(
             !playing.is_empty() || tournament.state() != State::Playing,
-            "nothing goes on"
+            "the tournament is stuck"
         );
         for game in playing {
             let ended = played_by_number(tournament, game);

@@ -1,10 +1,16 @@
 //! Tournaments for tests: settings and participants.
+#![allow(
+    clippy::unwrap_used,
+    missing_docs,
+    reason = "test support: panics where a test fails"
+)]
 
 use chefshat_agents::AgentKind;
-use chefshat_tournament::{Deals, Entrant, EntrantKind, Format, Settings, Tournament};
+
+use crate::{Deals, Entrant, EntrantKind, Format, Settings, Tournament};
 
 /// Settings of a tournament of up to 64 participants in games of four.
-pub(crate) fn settings(format: Format) -> Settings {
+pub fn settings(format: Format) -> Settings {
     Settings {
         format,
         players: 4,
@@ -22,23 +28,41 @@ pub(crate) fn settings(format: Format) -> Settings {
     }
 }
 
-/// A tournament of these built-in agents that has begun; `None` is a client.
-pub(crate) fn begun(
+/// A stateless agent that plays one game at a time.
+pub fn entrant(name: &str) -> Entrant {
+    Entrant {
+        name: name.to_owned(),
+        kind: EntrantKind::Agent,
+        built_in: None,
+        filler: false,
+        stateless: true,
+        max_games: 1,
+    }
+}
+
+/// A tournament that these agents have joined, all present; `None` is a client.
+pub fn joined(
     settings: Settings,
     agents: impl IntoIterator<Item = Option<AgentKind>>,
 ) -> Tournament {
     let mut tournament = Tournament::new(settings).unwrap();
     for (number, built_in) in agents.into_iter().enumerate() {
         let joined = tournament.join(Entrant {
-            name: format!("agent {number}"),
-            kind: EntrantKind::Agent,
             built_in,
-            filler: false,
-            stateless: true,
-            max_games: 1,
+            ..entrant(&format!("agent {number}"))
         });
         tournament.fold(&joined.unwrap());
+        tournament.set_present(number, true);
     }
+    tournament
+}
+
+/// The same, begun.
+pub fn begun(
+    settings: Settings,
+    agents: impl IntoIterator<Item = Option<AgentKind>>,
+) -> Tournament {
+    let mut tournament = joined(settings, agents);
     for change in tournament.begin().unwrap() {
         tournament.fold(&change);
     }
