@@ -1,5 +1,5 @@
-// The agent against a server made of a few lines, which says exactly what each test needs: one game as a script, with its lost
-// connections and refusals. Nothing here knows the rules; the game against the real server is in server.test.js.
+// The agent against a scripted server: games, lost connections and refusals. No rules of the game; games on the real server are in
+// server.test.js.
 import assert from "node:assert/strict";
 import { spawn } from "node:child_process";
 import { once } from "node:events";
@@ -13,15 +13,15 @@ import grpc from "@grpc/grpc-js";
 import { legalActions, play, protocol } from "../agent.js";
 
 const AGENT = fileURLToPath(new URL("../agent.js", import.meta.url));
-const BARE = { CHEFSHAT_TICKET: "", CHEFSHAT_CODE: "" }; // What stands where the tests run is not theirs.
+const BARE = { CHEFSHAT_TICKET: "", CHEFSHAT_CODE: "" }; // Variables of the environment must not reach the agent.
 const STANDINGS = [{ seat: 2, points: 15, place: 1 }, { seat: 0, points: 9, place: 2 }];
 const servers = [];
 after(() => servers.forEach((server) => server.forceShutdown()));
 
-/** A server whose n-th connection is met by the n-th of `connections`, each a function of the stream and its first message. */
+/** A server. Its n-th connection is served by the n-th of `connections`, a function of the stream and of a reader of its commands. */
 async function serve(...connections) {
   const joins = [];
-  const served = { joins, left: connections };
+  const served = { joins, remaining: connections };
   const server = new grpc.Server();
   server.addService(protocol.RoomService.service, {
     JoinRoom: ({ request }, done) => {
@@ -70,7 +70,7 @@ for (const [bytes, actions] of [
   });
 }
 
-test("a game: attach, answer with a set bit, tell the standings", async () => {
+test("a game: attaches, answers with set bits, returns the standings", async () => {
   const answers = [];
   const server = await serve(async (stream, read) => {
     const [{ attach }] = await read();
@@ -93,7 +93,7 @@ test("a game: attach, answer with a set bit, tell the standings", async () => {
   assert.deepEqual([server.joins[0].name, server.joins[0].kind], ["Ada", "PARTICIPANT_KIND_AGENT"]);
 });
 
-test("lost connections are made again and resume after the last event seen", async () => {
+test("a lost connection is replaced by one that resumes after the last event seen", async () => {
   const from = [];
   const attach = async (read) => from.push((await read())[0].attach.from_sequence);
   const server = await serve(
@@ -115,10 +115,10 @@ test("lost connections are made again and resume after the last event seen", asy
   const outcome = await play({ address: server.address, code: "TABLE", name: "Ada" });
   assert.deepEqual(outcome, { seat: 2, standings: STANDINGS });
   assert.deepEqual(from, [0, 3, 3]);
-  assert.equal(server.left.length, 0);
+  assert.equal(server.remaining.length, 0);
 });
 
-test("a refused answer is given anew, a seat is taken over from its substitute", async () => {
+test("a refused decision is answered again, and the seat is taken back from its substitute", async () => {
   const heard = [];
   const server = await serve(async (stream, read) => {
     await read();
@@ -146,25 +146,25 @@ for (const [what, updates, message] of [
     /no result \(ABORT_REASON_SHUTDOWN\)/,
   ],
 ]) {
-  test(`${what} is an error, and no reason to connect again`, async () => {
+  test(`${what} is an error and does not cause a reconnection`, async () => {
     const server = await serve(async (stream, read) => {
       await read();
       stream.write({ updates });
     });
     await assert.rejects(play({ address: server.address, code: "TABLE", name: "Ada" }), message);
-    assert.equal(server.left.length, 0);
+    assert.equal(server.remaining.length, 0);
   });
 }
 
-/** An update of a seat that the server attached by itself: the number of the handle among those, and what is said. */
-const called = (number, update) => ({ ...update, handle: 2 ** 31 + number });
+/** An update of a seat that the server attached: `number` counts these seats from 0. */
+const ofSeat = (number, update) => ({ ...update, handle: 2 ** 31 + number });
 const seated = (number, game_id) => {
   const attached = { game_id, seat: 2, ticket: `ticket of ${game_id}`, tournament_id: "tournament" };
-  return called(number, { attached });
+  return ofSeat(number, { attached });
 };
 const over = (handle) => ({ handle, detached: { reason: "DETACH_REASON_TOURNAMENT_OVER" } });
 
-test("a tournament: several games at a time, over connections that break, to its end", async () => {
+test("a tournament: several games at a time, through lost connections, to its end", async () => {
   const attaches = [];
   const attach = async (read) => attaches.push((await read()).map((command) => [command.attach.ticket, command.attach.from_sequence]));
   const answers = [];
@@ -173,10 +173,10 @@ test("a tournament: several games at a time, over connections that break, to its
     async (stream, read) => {
       await attach(read);
       stream.write({ updates: [{ handle: 0, entered: { participant: 5 } }, seated(0, "a"), seated(1, "b")] });
-      stream.write({ updates: [called(1, ask(7, 1)), called(0, events({ sequence: 1 }, { sequence: 2 }))] });
+      stream.write({ updates: [ofSeat(1, ask(7, 1)), ofSeat(0, events({ sequence: 1 }, { sequence: 2 }))] });
       await answer(read);
-      stream.write({ updates: [called(0, events(ended(3))), called(0, detached("GAME_OVER")), called(0, ask(9, 1))] });
-      stream.write({ updates: [seated(2, "c"), called(2, ask(8, 1))] });
+      stream.write({ updates: [ofSeat(0, events(ended(3))), ofSeat(0, detached("GAME_OVER")), ofSeat(0, ask(9, 1))] });
+      stream.write({ updates: [seated(2, "c"), ofSeat(2, ask(8, 1))] });
       await answer(read);
       stream.emit("error", { code: grpc.status.UNAVAILABLE, details: "cut" });
     },
@@ -201,24 +201,24 @@ test("a tournament: several games at a time, over connections that break, to its
   ]);
 });
 
-test("a newer connection in a tournament is an error, and no reason to connect again", async () => {
+test("a newer connection in a tournament is an error and does not cause a reconnection", async () => {
   const server = await serve(async (stream, read) => {
     await read();
     stream.write({ updates: [{ handle: 0, entered: { participant: 5 } }, detached("SUPERSEDED")] });
   });
   const playing = play({ address: server.address, tournament: "CUP", name: "Ada", games: "1" });
   await assert.rejects(playing, /the tournament is lost \(DETACH_REASON_SUPERSEDED\)/);
-  assert.equal(server.left.length, 0);
+  assert.equal(server.remaining.length, 0);
 });
 
-/** A folder for a test. */
+/** A temporary folder, deleted after the test. */
 async function folderOf(context) {
   const folder = await mkdtemp(join(tmpdir(), "chefshat-node-"));
   context.after(() => rm(folder, { recursive: true }));
   return folder;
 }
 
-/** Runs the agent as a process of its own; `started` is given it. */
+/** Runs the agent as a process; `started` receives the process. */
 async function run(args, env = {}, started = () => {}) {
   const agent = spawn(process.execPath, [AGENT, ...args], { env: { ...process.env, ...BARE, ...env } });
   started(agent);
@@ -245,7 +245,7 @@ test("the process takes part in a tournament and prints its games as one line of
   const server = await serve(async (stream, read) => {
     await read();
     stream.write({ updates: [{ handle: 0, entered: { participant: 5 } }, seated(0, "a")] });
-    stream.write({ updates: [called(0, events(ended(1))), called(0, detached("GAME_OVER")), over(0)] });
+    stream.write({ updates: [ofSeat(0, events(ended(1))), ofSeat(0, detached("GAME_OVER")), over(0)] });
   });
   const { status, out, err } = await run(["--address", server.address, "--tournament", "CUP", "--games", "3"]);
   assert.deepEqual([status, err], [0, "if this process ends before the tournament, resume with --ticket cup\n"]);
@@ -254,7 +254,7 @@ test("the process takes part in a tournament and prints its games as one line of
   assert.equal(server.joins[0].max_games, 3);
 });
 
-/** Meets a connection: notes the ticket it brings, and ends the game. */
+/** Serves a connection: notes its ticket, and ends the game. */
 const ending = (tickets) => async (stream, read) => {
   tickets.push((await read())[0].attach.ticket);
   stream.write({ updates: [attached, events(ended(1)), detached("GAME_OVER")] });
@@ -297,13 +297,13 @@ test("a ticket is stored in a file until the game is over: a killed process resu
   const aborted = [attached, events({ sequence: 1, game_aborted: { reason: "ABORT_REASON_CLOSED" } }), detached("GAME_OVER")];
   const lost = [attached, detached("SUPERSEDED")];
   for (const [updates, left] of [[aborted, []], [lost, ["ticket"]]]) {
-    server.left.push(async (stream, read) => { await read(); stream.write({ updates }); });
+    server.remaining.push(async (stream, read) => { await read(); stream.write({ updates }); });
     assert.equal((await run(args)).status, 1);
     assert.deepEqual(await readdir(folder), left);
   }
 });
 
-test("a second agent with the same ticket file is refused, and one that is gone is in nobody's way", async (context) => {
+test("a second agent with the same ticket file is refused, and a stale lock is ignored", async (context) => {
   const folder = await folderOf(context);
   const file = join(folder, "ticket");
   const tickets = [];
@@ -311,7 +311,7 @@ test("a second agent with the same ticket file is refused, and one that is gone 
   let second;
   const server = await serve(async (stream, read) => {
     tickets.push((await read())[0].attach.ticket);
-    second = await run(args(server)); // While the first one plays.
+    second = await run(args(server)); // While the first agent plays.
     stream.write({ updates: [attached, events(ended(1)), detached("GAME_OVER")] });
   });
   assert.equal((await run(args(server))).status, 0);
@@ -324,29 +324,29 @@ test("a second agent with the same ticket file is refused, and one that is gone 
   await once(gone, "close");
   await writeFile(join(folder, ".ticket.lock"), `${gone.pid}`);
   await writeFile(join(folder, ".ticket.new"), "left behind");
-  server.left.push(ending(tickets));
+  server.remaining.push(ending(tickets));
   assert.equal((await run(args(server))).status, 0);
   assert.deepEqual([tickets.length, await readdir(folder)], [2, []]);
 });
 
-test("a ticket that cannot be kept is told, and the game is played", async (context) => {
+test("a ticket that cannot be stored is printed, and the game is played", async (context) => {
   const folder = await folderOf(context);
   const file = join(folder, "ticket");
   const server = await serve(async (stream, read) => {
     await read();
     stream.write({ updates: [attached, events(ended(1)), detached("GAME_OVER")] });
   });
-  server.joining = () => mkdirSync(file); // After it was begun there is a folder in the file's place.
+  server.joining = () => mkdirSync(file); // A folder takes the file's place after the agent has prepared it.
   const { status, out, err } = await run(["--address", server.address, "--code", "TABLE", "--ticket-file", file]);
   assert.equal(status, 0);
   assert.deepEqual(JSON.parse(out), { seat: 2, standings: STANDINGS });
-  const [warning, told, left] = err.split("\n");
+  const [warning, printed, left] = err.split("\n");
   assert.match(warning, /^warning: cannot store the ticket in .*ticket: EISDIR/);
-  assert.equal(told, "if this process ends before the game, resume with --ticket a ticket");
+  assert.equal(printed, "if this process ends before the game, resume with --ticket a ticket");
   assert.match(left, /^warning: cannot delete the used ticket/);
 });
 
-test("a finished game is no error where the ticket cannot be removed; another's ticket is not removed", async (context) => {
+test("a ticket that cannot be removed after the game is only a warning; another's ticket is not removed", async (context) => {
   const folder = await folderOf(context);
   const file = join(folder, "ticket");
   const server = await serve();
@@ -357,7 +357,7 @@ test("a finished game is no error where the ticket cannot be removed; another's 
   ]) {
     await rm(file, { recursive: true, force: true });
     await writeFile(file, "kept");
-    server.left.push(async (stream, read) => {
+    server.remaining.push(async (stream, read) => {
       await read();
       await meanwhile();
       stream.write({ updates: [attached, events(ended(1)), detached("GAME_OVER")] });
@@ -369,7 +369,7 @@ test("a finished game is no error where the ticket cannot be removed; another's 
   assert.equal(await readFile(file, "utf8"), "another's");
 });
 
-test("the process says what is wrong and exits with 1", async () => {
+test("the process reports errors and exits with 1", async () => {
   const { address } = await serve();
   const wrongCode = await run(["--address", address, "--code", "WRONG"]);
   assert.deepEqual(wrongCode, { status: 1, out: "", err: "agent: no room has this join code\n" });

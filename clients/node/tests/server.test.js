@@ -1,5 +1,4 @@
-// The agent against the real server, where CHEFSHAT_BIN names one: a whole Shift and a whole tournament against built-in agents, on a
-// server in a process of its own.
+// The agent on the real server that CHEFSHAT_BIN names: a complete Shift and a complete tournament against built-in agents.
 import assert from "node:assert/strict";
 import { spawn } from "node:child_process";
 import { once } from "node:events";
@@ -16,16 +15,16 @@ import { legalActions, play, protocol } from "../agent.js";
 const AGENT = fileURLToPath(new URL("../agent.js", import.meta.url));
 const SERVER = process.env.CHEFSHAT_BIN;
 
-/** The address a server says it listens on, in its first line that says so. */
+/** The address that a server reports. */
 async function listening(server) {
   for await (const line of createInterface({ input: server.stdout })) {
-    const said = JSON.parse(line);
-    if (said.event === "listening") return said.address;
+    const report = JSON.parse(line);
+    if (report.event === "listening") return report.address;
   }
   throw new Error("the server ended without listening");
 }
 
-/** A real server on a port of the system's choice, for as long as `use` takes. */
+/** Runs a server on a free port during `use`. */
 async function withServer(use) {
   const data = await mkdtemp(join(tmpdir(), "chefshat-node-"));
   const args = ["serve", "--listen", "127.0.0.1:0", "--json", "--data-dir", data];
@@ -40,7 +39,7 @@ async function withServer(use) {
   }
 }
 
-/** One call of a service. */
+/** Calls a method of a service. */
 async function call(Service, method, address, request) {
   const service = new Service(address, grpc.credentials.createInsecure());
   try {
@@ -51,15 +50,15 @@ async function call(Service, method, address, request) {
 }
 
 /**
- * Attaches to the place with this ticket and answers so many of its decisions with the first legal action, then none until it is let. Gives
- * the moment when it holds the game up, and what lets it.
+ * Attaches the ticket and answers `decisions` decisions with the first legal action, then none until `release`. Returns a promise that
+ * resolves when the game is blocked, and the functions to release and end it.
  */
-function holdUp(address, ticket, decisions) {
+function block(address, ticket, decisions) {
   const service = new protocol.PlayService(address, grpc.credentials.createInsecure());
-  const stream = service.Play().on("error", () => {}); // It is cancelled in the end.
+  const stream = service.Play().on("error", () => {}); // The stream is cancelled at the end.
   const held = [];
-  let [left, holds] = [decisions, undefined];
-  const holding = new Promise((resolve) => { holds = resolve; });
+  let [left, onBlocked] = [decisions, undefined];
+  const blocked = new Promise((resolve) => { onBlocked = resolve; });
   const answer = ({ handle, decision: { decision_id, action_mask } }) => {
     stream.write({ commands: [{ handle, answer: { decision_id, action: legalActions(action_mask)[0] } }] });
   };
@@ -67,29 +66,29 @@ function holdUp(address, ticket, decisions) {
     left -= 1;
     if (left >= 0) return answer(update);
     held.push(update);
-    return holds();
+    return onBlocked();
   }));
   stream.write({ commands: [{ attach: { ticket } }] });
-  const letGo = () => { left = Infinity; held.splice(0).forEach(answer); };
-  return { holding, letGo, end: () => { stream.cancel(); service.close(); } };
+  const release = () => { left = Infinity; held.splice(0).forEach(answer); };
+  return { blocked, release, end: () => { stream.cancel(); service.close(); } };
 }
 
-/** Runs the agent as a process until it is killed, which it is when `holding` says so; then again in the same place. Gives what it says. */
-async function killAndGoOn(way, holding, letGo) {
-  const bare = { CHEFSHAT_TICKET: "", CHEFSHAT_CODE: "" }; // What stands where the tests run is not theirs.
-  const start = (args, env = {}) => spawn(process.execPath, [AGENT, ...args], { env: { ...process.env, ...bare, ...env } });
-  const first = start(way);
+/** Runs the agent, kills it when the game is blocked, and resumes with its ticket. Returns the output of the second process. */
+async function killAndResume(args, { blocked, release }) {
+  const bare = { CHEFSHAT_TICKET: "", CHEFSHAT_CODE: "" }; // Variables of the environment must not reach the agent.
+  const start = (some, env = {}) => spawn(process.execPath, [AGENT, ...some], { env: { ...process.env, ...bare, ...env } });
+  const first = start(args);
   const ended = once(first, "close");
-  let said = "";
-  first.stderr.on("data", (part) => { said += part; });
-  const early = ended.then((end) => assert.fail(`the agent ended (${end}) before it was killed: ${said}`));
-  early.catch(() => {}); // It ends in any case; what counts is what comes first.
-  await Promise.race([holding, early]);
+  let printed = "";
+  first.stderr.on("data", (part) => { printed += part; });
+  const early = ended.then((end) => assert.fail(`the agent ended (${end}) before it was killed: ${printed}`));
+  early.catch(() => {}); // The kill below settles it too.
+  await Promise.race([blocked, early]);
   first.kill("SIGKILL");
   assert.deepEqual(await ended, [null, "SIGKILL"]);
-  const [, ticket] = /--ticket (\S+)\n$/.exec(said);
-  const second = start(way.slice(0, 2), { CHEFSHAT_TICKET: ticket });
-  letGo();
+  const [, ticket] = /--ticket (\S+)\n$/.exec(printed);
+  const second = start(args.slice(0, 2), { CHEFSHAT_TICKET: ticket });
+  release();
   let out = "";
   second.stdout.on("data", (part) => { out += part; });
   second.stderr.pipe(process.stderr);
@@ -142,24 +141,24 @@ test("a tournament on the real server", { skip }, () => withServer(async (addres
   }
 }));
 
-// Far longer than a test: who is killed comes back in time, however slow the machine is.
+// Far longer than a test, so that a killed agent resumes in time on any machine.
 const patient = { decision_time_ms: 600_000 };
 
-test("an agent that was killed in mid-game resumes its seat", { skip }, () => withServer(async (address) => {
+test("an agent killed in the middle of a game resumes its seat", { skip }, () => withServer(async (address) => {
   const request = { name: "kill", policy: patient, seats: [{}, {}, { built_in_agent: "random" }, { built_in_agent: "random" }] };
   const { room, join_code: code } = await call(protocol.RoomService, "CreateRoom", address, request);
   const other = await call(protocol.RoomService, "JoinRoom", address, { join_code: code, name: "other", kind: "PARTICIPANT_KIND_AGENT" });
-  const holder = holdUp(address, other.ticket, 3);
+  const blocker = block(address, other.ticket, 3);
 
-  const { seat, standings } = await killAndGoOn(["--address", address, "--code", code], holder.holding, holder.letGo);
+  const { seat, standings } = await killAndResume(["--address", address, "--code", code], blocker);
 
-  holder.end();
+  blocker.end();
   const seats = (await call(protocol.RoomService, "GetRoom", address, { room_id: room.room_id })).room.seats;
   assert.equal(seats[seat].name, "Node");
   assert.deepEqual(standings.map(({ place }) => place), [1, 2, 3, 4]);
 }));
 
-test("an agent that was killed in mid-game resumes its tournament", { skip }, () => withServer(async (address) => {
+test("an agent killed in the middle of a game resumes its tournament", { skip }, () => withServer(async (address) => {
   const settings = {
     name: "killed",
     format: "TOURNAMENT_FORMAT_ROUND_ROBIN",
@@ -173,12 +172,12 @@ test("an agent that was killed in mid-game resumes its tournament", { skip }, ()
   const made = await call(protocol.TournamentService, "CreateTournament", address, { settings });
   const asked = { join_code: made.join_code, name: "other", kind: "PARTICIPANT_KIND_AGENT", max_games: 2 };
   const other = await call(protocol.TournamentService, "JoinTournament", address, asked);
-  const holder = holdUp(address, other.ticket, 2);
+  const blocker = block(address, other.ticket, 2);
 
-  const way = ["--address", address, "--tournament", made.join_code, "--games", "2"];
-  const played = await killAndGoOn(way, holder.holding, holder.letGo);
+  const args = ["--address", address, "--tournament", made.join_code, "--games", "2"];
+  const played = await killAndResume(args, blocker);
 
-  holder.end();
+  blocker.end();
   const { tournament_id } = made.tournament;
   const { games } = await call(protocol.TournamentService, "ListTournamentGames", address, { tournament_id });
   assert.equal(games.length, 4);

@@ -15,7 +15,7 @@ const transport = createGrpcWebTransport({ baseUrl: location.origin, interceptor
 
 /** The server itself: version, limits, built-in agents, texts of actions. */
 export const serverApi = createClient(ServerService, transport);
-/** Making, finding and joining rooms. */
+/** Creating, finding and joining rooms. */
 export const roomApi = createClient(RoomService, transport);
 /** Playing: `watch` streams a seat's updates, `act` acts for a seat. */
 export const playApi = createClient(PlayService, transport);

@@ -90,7 +90,7 @@ function Clocks(props: FormProps) {
   );
 }
 
-/** What is mostly left alone. */
+/** The settings that few people change. */
 function Folded(props: FormProps & { offered: Offered }) {
   const { form, change, offered } = props;
   const words = t().organise;

@@ -127,7 +127,7 @@ function Places({ places, count }: { places: readonly number[]; count: number })
   );
 }
 
-/** How certain the order of each two neighbours is. */
+/** How certain the order of each pair of neighbours is. */
 export function Confidence(props: { tournament: Tournament; confidence: readonly OrderConfidence[] }) {
   const { tournament, confidence } = props;
   const words = t().tournaments.confidence;

@@ -66,7 +66,7 @@ export function useGames({ tournament, games }: Heard): TournamentGame[] {
   return mergedGames(listed.value ?? [], games);
 }
 
-/** How certain the order of each two neighbours in the standings is. */
+/** How certain the order of each pair of neighbours in the standings is. */
 export function useConfidence({ tournament }: Heard): readonly OrderConfidence[] {
   const { tournamentId, gamesOver } = tournament;
   const ask = async (abort: AbortSignal) => {

@@ -1,7 +1,6 @@
 // The script of the tutorial: a Shift with small hands in which every decision teaches one rule,
 // and the exchange after it. Its events are those of the protocol and are applied by the same model
 // as a real game. The texts are in i18n, by the name of the lesson.
-// same model as a real game's. The words are in the texts, by the lesson's name.
 
 import { create, type MessageInitShape } from "@bufbuild/protobuf";
 import { DecisionKind } from "../gen/chefshat/v1/decision_pb";

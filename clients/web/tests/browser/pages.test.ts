@@ -108,7 +108,7 @@ const PAGES: Record<string, { path: () => string; ready: string; opened?: string
   "not found": { path: () => "/nowhere/at/all", ready: "h1" },
 };
 
-test.each(Object.keys(PAGES))("%s: accessible by light and by dark, and nothing wider than a phone", async (name) => {
+test.each(Object.keys(PAGES))("%s: accessible in both themes, and no wider than a phone", async (name) => {
   const { path = () => "", ready = "", opened } = PAGES[name] ?? {};
   const page = seated;
   await page.emulateMedia({ colorScheme: "light", reducedMotion: "reduce" });

@@ -4,7 +4,7 @@
 import type { Label } from "../expressions";
 import css from "./Tools.module.css";
 
-/** Brows, perspective and mouth of each expression, in a box of 48 by 48. */
+/** Brows, eyes and mouth of each expression, in a box of 48 by 48. */
 const FEATURES: Record<Label, string> = {
   joy: "M15 19v3M33 19v3M14 29c4 8 16 8 20 0",
   amusement: "M12 21c2-4 6-4 8 0M28 21c2-4 6-4 8 0M14 27h20c0 12-20 12-20 0Z",
