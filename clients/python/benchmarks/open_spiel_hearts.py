@@ -1,7 +1,7 @@
-"""Decisions per second of OpenSpiel's hearts, a game of four players with 52 cards: its C++ called from Python, one game at a time.
+"""Decisions per second of OpenSpiel's hearts (C++, called from Python), a game of four players with 52 cards, one game at a time.
 
 All players choose a random legal action. The deal, which OpenSpiel makes card by card, is part of the time but not of the
-decisions. Measured without observations, as fast as it can be, and with the tensor that a learning agent would be given.
+decisions. Measured without observations, and with the tensor that a learning agent would receive.
 """
 
 import functools
@@ -20,7 +20,7 @@ def play_game(game: pyspiel.Game, chance: random.Random, observe: bool) -> int:
     while not state.is_terminal():
         legal = state.legal_actions()
         if state.is_chance_node():
-            # What the deal may bring is equally likely.
+            # All outcomes of the deal are equally likely.
             state.apply_action(legal[int(chance.random() * len(legal))])
             continue
         if observe:

@@ -1,8 +1,7 @@
 """Decisions per second of the reference implementation, chefshatgym 2.4.0.4 from PyPI: `ChefsHatEnv.step` in process, logs off.
 
-All four seats are played by a random masked policy: a legal action out of the mask in the observation. The cards of the exchange,
-which is not part of `step`, are those that the package's own random agent would give. Run it in an environment of its own, see the
-README.
+A random masked policy plays all four seats: it takes a legal action from the mask in the observation. The exchange is not part of
+`step`; its cards are those that the random agent of the package would give. Run it in a separate environment, see the README.
 """
 
 import contextlib
@@ -19,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 from ChefsHatGym.env import ChefsHatEnv as reference
 
-# The last part of an observation.
+# The mask is the last part of an observation.
 TURN_ACTIONS = 200
 NAMES = ["Ada", "Ben", "Cleo", "Dan"]
 
@@ -32,12 +31,12 @@ class Games:
     """
 
     def __init__(self, folder: str, seed: int, *, shifts: int | None = None, exchange: bool = True) -> None:
-        # The package draws its deals from Python's own generator.
+        # The package draws its deals with the module `random`.
         random.seed(seed)
         self._chance = np.random.default_rng(seed)
         self._exchanges = exchange
         self.env = reference.ChefsHatEnv()
-        # A folder is needed, although nothing is written with the logs off.
+        # The package requires a folder, although it writes nothing with the logs off.
         self.env.startExperiment(
             gameType=reference.GAMETYPE["POINTS" if shifts is None else "MATCHES"],
             stopCriteria=15 if shifts is None else shifts,
@@ -50,13 +49,13 @@ class Games:
         self._observation = self._begin()
 
     def step(self) -> int:
-        """Takes one decision and returns 1; begins the next Shift or game where one has ended."""
+        """Takes one decision and returns 1. Starts the next Shift or game after the end of one."""
         self.act()
         return 1
 
     def act(self) -> dict[str, Any] | None:
         """Like `step`; returns the package's info of the turn if it ended a Shift."""
-        # Plays with two jokers are marked with a 2 there, but refused.
+        # The mask has a 2 for plays with two jokers, but refuses them.
         legal = np.flatnonzero(self._observation[-TURN_ACTIONS:] == 1)
         action = np.zeros(TURN_ACTIONS)
         action[legal[self._chance.integers(len(legal))]] = 1
@@ -71,14 +70,14 @@ class Games:
         return info if shift_over else None
 
     def _begin(self) -> npt.NDArray[np.float32]:
-        # It prints where it would log to.
+        # It prints the path of its log.
         with contextlib.redirect_stdout(None):
             observation: npt.NDArray[np.float32] = self.env.reset()[0]
         return observation
 
     def _exchange(self) -> None:
         if not self._exchanges:
-            # What is left of beginning a Shift.
+            # The remaining steps to start a Shift.
             self.env.start_match_define_order()
             return
         _, dishwasher_cards, _, waiter_card, _, sous_chef_hand, _, chef_hand = self.env.get_chef_souschef_roles_cards()

@@ -1,8 +1,8 @@
 """Experiment 1 of the paper in the reference implementation: how often the starter wins, how long a Shift is.
 
-Four random agents, with and without the exchange of cards, each in one long game. What they give in the exchange is what the
-package's own random agent gives: their highest cards. Its starter is a seat drawn at random or the next one that holds a joker, so
-that it cannot play without them. No speed is measured here; it runs in the environment of `reference.py`.
+Four random agents play one long game with the exchange and one without. In the exchange they give their highest cards, as the
+random agent of the package does. The starter is a random seat or the next one that holds a joker, so there is no condition without
+jokers. Does not measure speed; runs in the environment of `reference.py`.
 """
 
 import argparse
@@ -19,7 +19,7 @@ SEATS = 4
 
 def play(folder: str, shifts: int, seed: int, exchange: bool) -> None:
     """Plays Shifts and prints their statistics."""
-    # One more than is played, so that the game does not end.
+    # One more Shift than is played, so that the game does not end.
     games = Games(folder, seed, shifts=shifts + 1, exchange=exchange)
     won = 0
     pizzas, laps, turns = ([0] * shifts for _ in range(3))
@@ -45,7 +45,7 @@ def play(folder: str, shifts: int, seed: int, exchange: bool) -> None:
 
 
 def main() -> int:
-    """Plays both."""
+    """Plays both conditions."""
     parser = argparse.ArgumentParser(
         description=__doc__.split("\n\n")[0],
         epilog="example:\n  python benchmarks/reference_mechanics.py --shifts 3000",

@@ -1,7 +1,6 @@
-"""Players in the manner of the reference implementation's second version, good and bad ones. No tests of their own.
+"""Players for the second version of the reference implementation, good and bad ones. Contains no tests.
 
-They run in processes of their own and import nothing but what such players would. So they are made by name, and tell of themselves
-in files.
+They run in separate processes and import only what such players would. Tests create them by name and read their output from files.
 """
 
 import json
@@ -15,7 +14,7 @@ Info = dict[str, Any]
 
 
 class Player:
-    """What all have in common, and the callbacks that some players leave out."""
+    """The base class, without optional callbacks."""
 
     def __init__(self, name: str, **_: object) -> None:
         self.name = f"PLAYER_{name}"
@@ -44,7 +43,7 @@ class Largest(Player):
 
 
 class Rarest(Player):
-    """Prefers low actions to high ones, in 200 numbers of which none is 0 or 1, and gives as little as it can."""
+    """Prefers low actions, with 200 scores none of which is 0 or 1, and gives its most common cards."""
 
     def get_action(self, observations: Any) -> list[float]:
         return [0.5 - index / 1000 - (0.0 if legal else 10.0) for index, legal in enumerate(observations[28:])]
@@ -57,7 +56,7 @@ class Rarest(Player):
 
 
 class Scribe(Largest):
-    """Like `Largest`, and writes every call with its arguments to a file, one JSON array each."""
+    """Like `Largest`, and writes every call with its arguments to a file, as a JSON array."""
 
     def __init__(self, name: str, log_file: str) -> None:
         super().__init__(name)
@@ -92,7 +91,7 @@ class Scribe(Largest):
 
     def update_my_action(self, info: Info) -> object:
         self.write("update_my_action", info)
-        return object()  # Nothing anybody could write down.
+        return object()  # Not representable in JSON.
 
     def update_action_others(self, info: Info) -> None:
         self.write("update_action_others", info)
@@ -105,7 +104,7 @@ class Scribe(Largest):
 
 
 class Present(Largest):
-    """Writes the number of its process to a file when it is made."""
+    """Writes its process id to a file in its constructor."""
 
     def __init__(self, name: str, file: str) -> None:
         super().__init__(name)
@@ -114,7 +113,7 @@ class Present(Largest):
 
 
 class Slow(Present):
-    """Is never made."""
+    """Never returns from its constructor."""
 
     def __init__(self, name: str, file: str) -> None:
         super().__init__(name, file)
@@ -122,7 +121,7 @@ class Slow(Present):
 
 
 class Knowing(Largest):
-    """Writes the environment variables with a ticket to a file."""
+    """Writes the ticket in its environment to a file."""
 
     def __init__(self, name: str, file: str) -> None:
         super().__init__(name)
@@ -131,7 +130,7 @@ class Knowing(Largest):
 
 
 class Babbling(Largest):
-    """Prints text that looks like answers, by `print` and to the descriptor, and reads its empty input."""
+    """Prints text that looks like answers, with `print` and to the file descriptor, and reads its empty input."""
 
     def get_action(self, observations: Any) -> Any:
         print('{"id": 1, "value": null}')
@@ -144,7 +143,7 @@ class Babbling(Largest):
 
 
 class Stubborn(Player):
-    """Prefers an action that is never legal, an ace with two jokers; then passing."""
+    """Prefers an action that is never legal (face 1 with two jokers), then passing."""
 
     def get_action(self, observations: Any) -> list[float]:
         return [0.0, 0.0, 2.0] + [0.0] * 196 + [1.0]
@@ -155,7 +154,7 @@ class Stubborn(Player):
 
 
 class Raising(Largest):
-    """Fails whenever it is asked for something."""
+    """Raises in every call."""
 
     def get_action(self, observations: Any) -> Any:
         raise RuntimeError("no idea")
@@ -168,7 +167,7 @@ class Raising(Largest):
 
 
 class Mortal(Largest):
-    """Says its last words and dies at its fifth action."""
+    """Prints a line and exits at its fifth action."""
 
     def __init__(self, name: str) -> None:
         super().__init__(name)
@@ -190,7 +189,7 @@ class Hanging(Largest):
 
 
 class Stalling(Largest):
-    """Says in a file that it has come to its fifth action, and thinks about it for as long as its command lives."""
+    """Creates a file at its fifth action, and hangs there as long as its command lives."""
 
     def __init__(self, name: str, file: str) -> None:
         super().__init__(name)
@@ -210,7 +209,7 @@ class Stalling(Largest):
 
 
 class Answering(Largest):
-    """Answers an action with its constructor's argument."""
+    """Answers with its constructor's argument."""
 
     def __init__(self, name: str, answer: object) -> None:
         super().__init__(name)
@@ -224,21 +223,21 @@ class Answering(Largest):
 
 
 class Unspeakable(Largest):
-    """Answers an action with an object that is not a number."""
+    """Answers with an object that is not a number."""
 
     def get_action(self, observations: Any) -> Any:
         return object()
 
 
 class Unmade(Largest):
-    """Cannot be made."""
+    """Raises in its constructor."""
 
     def __init__(self, name: str) -> None:
         raise FileNotFoundError("no model there")
 
 
 class Nothing:
-    """No player."""
+    """Not a player."""
 
     def get_action(self, observations: Any) -> None:
         return None

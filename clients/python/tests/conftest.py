@@ -45,7 +45,7 @@ def toy() -> Iterator[FakeVector]:
 
 @pytest.fixture(scope="session")
 def real_address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """The address of the real server, one for the whole run. A binary that is named but does not serve is a failure."""
+    """The address of the real server, one for the complete run. Fails if CHEFSHAT_BIN names a binary that does not serve."""
     binary = os.environ.get(BINARY)
     if not binary:
         pytest.skip(f"{BINARY} is not set: name the chefshat binary to play against the real server")
@@ -77,5 +77,5 @@ def stage() -> Stage:
     """A session of one seat, attached."""
     stage = Stage()
     stage.connect()
-    stage.say(attached())
+    stage.receive(attached())
     return stage

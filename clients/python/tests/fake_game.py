@@ -1,7 +1,7 @@
-"""The toy game of the fake server: its decisions, the results of answers, and its end.
+"""The toy game of the fake server: decisions, results of answers, and the end.
 
-It asks every seat that is played over the wire the same number of questions, seat after seat, and ends with a table in seat order.
-It knows nothing of cards: which actions are legal is made up. It remembers what arrived, so that tests can ask.
+It asks every connected seat the same number of questions, seat after seat, and ends with standings in seat order. It has no cards:
+legal actions are made up. It records what it receives.
 """
 
 import queue
@@ -14,31 +14,31 @@ from chefshat import pb
 SEATS = 4
 SIZE = 214
 MAX_INVALID = 3
-# Default number of decisions of a seat.
+# Default number of decisions per seat.
 QUESTIONS = 5
 
 Outbox = queue.SimpleQueue[pb.SeatUpdate | None]
 
 
 def legal(decision_id: int) -> set[int]:
-    """The actions that are legal at a seat's decision: two, and different ones each time."""
+    """The legal actions of a seat's decision: two, different each time."""
     return {decision_id % SIZE, (decision_id * 37 + 100) % SIZE}
 
 
 def mask(decision_id: int) -> bytes:
-    """The same as a mask."""
+    """The mask of `legal`."""
     return sum(1 << action for action in legal(decision_id)).to_bytes((SIZE + 7) // 8, "little")
 
 
 @dataclass
 class FakeSeat:
-    """One seat of the toy game."""
+    """A seat of the toy game."""
 
     number: int
     ticket: str
     outbox: Outbox | None = None
     handle: int = 0
-    told: int = 0
+    sent: int = 0
     decision_id: int = 0
     open: bool = False
     attempts_left: int = MAX_INVALID
@@ -48,7 +48,7 @@ class FakeSeat:
 
 
 class FakeGame:
-    """The toy game of one room. All methods want `lock` held."""
+    """The toy game of one room. Callers hold `lock`."""
 
     def __init__(self, number: int, request: pb.CreateRoomRequest, questions: int) -> None:
         self.lock = threading.RLock()
@@ -66,25 +66,24 @@ class FakeGame:
         self.over = False
 
     def add(self, **kind: Any) -> None:
-        """Adds an event."""
         self.events.append(pb.GameEvent(sequence=len(self.events) + 1, **kind))
         self.changed.notify_all()
 
-    def tell(self, seat: FakeSeat, **update: Any) -> None:
-        """Tells a seat something, if it is attached."""
+    def send(self, seat: FakeSeat, **update: Any) -> None:
+        """Sends an update to a seat, if it is attached."""
         if seat.outbox is not None:
             seat.outbox.put(pb.SeatUpdate(handle=seat.handle, **update))
 
-    def tell_events(self, seat: FakeSeat) -> None:
+    def send_events(self, seat: FakeSeat) -> None:
         """Sends a seat the events it has not seen."""
-        if self.events[seat.told :]:
-            self.tell(seat, events=pb.EventBatch(events=self.events[seat.told :]))
-            seat.told = len(self.events)
+        if self.events[seat.sent :]:
+            self.send(seat, events=pb.EventBatch(events=self.events[seat.sent :]))
+            seat.sent = len(self.events)
 
     def attach(self, seat: FakeSeat, attach: pb.Attach, outbox: Outbox, handle: int, tournament_id: str = "") -> None:
         """Attaches a seat to a stream, for a tournament's participant if one is named, and starts or resumes the game."""
-        self.tell(seat, detached=pb.Detached(reason=pb.DETACH_REASON_SUPERSEDED))
-        seat.outbox, seat.handle, seat.told = outbox, handle, max(attach.from_sequence - 1, 0)
+        self.send(seat, detached=pb.Detached(reason=pb.DETACH_REASON_SUPERSEDED))
+        seat.outbox, seat.handle, seat.sent = outbox, handle, max(attach.from_sequence - 1, 0)
         seat.attaches.append(attach)
         attached = pb.Attached(
             request_id=attach.request_id,
@@ -95,12 +94,12 @@ class FakeGame:
             ticket=seat.ticket if tournament_id else "",
             tournament_id=tournament_id,
         )
-        self.tell(seat, attached=attached)
+        self.send(seat, attached=attached)
         if self.over:
-            self.tell_events(seat)
-            self.tell(seat, detached=pb.Detached(reason=pb.DETACH_REASON_GAME_OVER))
+            self.send_events(seat)
+            self.send(seat, detached=pb.Detached(reason=pb.DETACH_REASON_GAME_OVER))
         elif self.room.state == pb.ROOM_STATE_PLAYING:
-            self.tell_events(seat)
+            self.send_events(seat)
             if seat.open:
                 self.ask(seat)
         elif all(other.outbox is not None for other in self.seats.values()):
@@ -120,7 +119,7 @@ class FakeGame:
 
     def ask(self, seat: FakeSeat) -> None:
         """Sends the open decision to its seat."""
-        self.tell_events(seat)
+        self.send_events(seat)
         observation = pb.Observation(
             shift=1,
             pizza=1,
@@ -142,14 +141,14 @@ class FakeGame:
             bank_left_ms=60_000,
             invalid_attempts_left=seat.attempts_left,
         )
-        self.tell(seat, decision=request)
+        self.send(seat, decision=request)
 
     def answer(self, seat: FakeSeat, answer: pb.Answer) -> pb.AnswerResult:
         """Takes an answer and calls `advance`. The caller sends the result."""
         seat.answers.append(answer)
         result = pb.AnswerResult(decision_id=answer.decision_id, action=answer.action)
         if seat.last is not None and (seat.last.decision_id, seat.last.action) == (answer.decision_id, answer.action):
-            return seat.last  # The same answer twice: the same acknowledgement.
+            return seat.last  # A repeated answer gets the same acknowledgement.
         if answer.decision_id > seat.decision_id:
             result.status = pb.ANSWER_STATUS_UNKNOWN_DECISION
         elif answer.decision_id < seat.decision_id or not seat.open:
@@ -168,7 +167,7 @@ class FakeGame:
         return result
 
     def end(self, reason: pb.AbortReason.ValueType | None = None) -> None:
-        """Ends the game: with a table, or aborted for a reason."""
+        """Ends the game with standings, or aborts it for a reason."""
         self.over = True
         if reason is None:
             self.room.state = pb.ROOM_STATE_FINISHED
@@ -179,5 +178,5 @@ class FakeGame:
             self.room.state = pb.ROOM_STATE_ABORTED
             self.add(game_aborted=pb.GameAborted(reason=reason))
         for seat in self.seats.values():
-            self.tell_events(seat)
-            self.tell(seat, detached=pb.Detached(reason=pb.DETACH_REASON_GAME_OVER))
+            self.send_events(seat)
+            self.send(seat, detached=pb.Detached(reason=pb.DETACH_REASON_GAME_OVER))

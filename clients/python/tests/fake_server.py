@@ -21,7 +21,7 @@ from chefshat._gen.chefshat.v1 import spectator_service_pb2_grpc as spectator_gr
 from chefshat._gen.chefshat.v1 import tournament_service_pb2_grpc as tournament_grpc
 from chefshat._gen.chefshat.v1 import vector_service_pb2_grpc as vector_grpc
 
-# Bytes a message to the server may have, as on the real one.
+# Maximum size of a message, bytes, as on the real server.
 MAX_MESSAGE_BYTES = 64 * 1024
 
 
@@ -34,7 +34,7 @@ class FakeServer(
     """The fake server; a context manager.
 
     `fault` is called with a game, a seat and an answer before the answer is taken. If it returns "before", the stream breaks
-    without the answer having been taken; if "after", the answer is taken and the stream breaks before anybody is told.
+    without the answer having been taken; if "after", the answer is taken and the stream breaks before the acknowledgement.
     """
 
     def __init__(self) -> None:
@@ -65,7 +65,6 @@ class FakeServer(
     # Rooms.
 
     def CreateRoom(self, request: pb.CreateRoomRequest, context: Context) -> pb.CreateRoomResponse:
-        """Makes a room."""
         self.created.append(request)
         game = self._make_game(request)
         return pb.CreateRoomResponse(room=game.room, join_code=game.join_code, owner_token="owner")
@@ -76,15 +75,14 @@ class FakeServer(
         return game
 
     def _tournament_game(self, built_in: list[str]) -> FakeGame:
-        """A game of a tournament: built-in agents by seat, empty where a participant plays."""
+        """Creates a game of a tournament: built-in agents by seat, empty for participants."""
         return self._make_game(pb.CreateRoomRequest(seats=[pb.SeatConfig(built_in_agent=name) for name in built_in]))
 
     def GetRoom(self, request: pb.GetRoomRequest, context: Context) -> pb.GetRoomResponse:
-        """One room."""
         return pb.GetRoomResponse(room=self.game(request.room_id, context).room)
 
     def ListRooms(self, request: pb.ListRoomsRequest, context: Context) -> pb.ListRoomsResponse:
-        """Rooms, newest first, two a page."""
+        """Pages of two rooms, newest first."""
         at = int(request.page_token or "0")
         page = [game.room for game in self.games[::-1][at : at + 2]]
         return pb.ListRoomsResponse(rooms=page, next_page_token=str(at + 2) if at + 2 < len(self.games) else "")
@@ -113,7 +111,6 @@ class FakeServer(
         refuse(context, grpc.StatusCode.UNAUTHENTICATED, "TICKET_UNKNOWN", "no seat has this ticket", field="ticket")
 
     def CloseRoom(self, request: pb.CloseRoomRequest, context: Context) -> pb.CloseRoomResponse:
-        """Aborts the game."""
         if request.owner_token != "owner":
             refuse(context, grpc.StatusCode.PERMISSION_DENIED, "OWNER_TOKEN_WRONG", "not the token of this room's creator")
         game = self.game(request.room_id, context)
@@ -122,7 +119,7 @@ class FakeServer(
         return pb.CloseRoomResponse(room=game.room)
 
     def game(self, room_id: str, context: Context) -> FakeGame:
-        """The game of a room, or NOT_FOUND."""
+        """Returns the game of a room; refuses with NOT_FOUND if there is none."""
         for game in self.games:
             if game.room.room_id == room_id:
                 return game
@@ -131,16 +128,15 @@ class FakeServer(
     # Server and records.
 
     def GetServerInfo(self, request: pb.GetServerInfoRequest, context: Context) -> pb.GetServerInfoResponse:
-        """Says that it is fake."""
         return pb.GetServerInfoResponse(server_version="fake", built_in_agents=["random", "random_unmasked", "greedy"])
 
     def GetActionTable(self, request: pb.GetActionTableRequest, context: Context) -> pb.GetActionTableResponse:
-        """The right number of texts, the right first one."""
+        """Returns the right number of texts; only the first one is correct."""
         space = pb.ActionSpace(id="chefshat-11", size=SIZE, turn_actions=200)
         return pb.GetActionTableResponse(action_space=space, texts=["C1;Q1;J0", *["?"] * (SIZE - 1)])
 
     def ListRecords(self, request: pb.ListRecordsRequest, context: Context) -> pb.ListRecordsResponse:
-        """The games of rooms with a name, finished or not, two a page."""
+        """Pages of two games of rooms with a name, finished or not."""
         wanted = request.filter.room_name
         games = [game for game in self.games if not wanted or game.room.name == wanted]
         if request.newest_first:
@@ -150,7 +146,7 @@ class FakeServer(
         return pb.ListRecordsResponse(records=page, next_page_token=str(at + 2) if at + 2 < len(games) else "")
 
     def GetRecord(self, request: pb.GetRecordRequest, context: Context) -> Iterator[pb.GetRecordResponse]:
-        """The events of a game that is over, between a header and a footer."""
+        """Streams the events of a finished game, between a header and a footer."""
         for game in self.games:
             if game.room.game_id == request.game_id:
                 yield pb.GetRecordResponse(lines=[pb.RecordLine(header=pb.RecordHeader(game_id=request.game_id))])
@@ -160,19 +156,18 @@ class FakeServer(
         refuse(context, grpc.StatusCode.NOT_FOUND, "GAME_UNKNOWN", "there is no such game")
 
     def StreamRecords(self, request: pb.StreamRecordsRequest, context: Context) -> NoReturn:
-        """The package fetches records one by one."""
+        """Unused: the package fetches records one by one."""
         context.abort(grpc.StatusCode.UNIMPLEMENTED, "the package does not use it")
         raise AssertionError("abort always raises")
 
     def ImportRecord(self, request_iterator: Iterator[pb.ImportRecordRequest], context: Context) -> NoReturn:
-        """The package adds no records."""
+        """Unused: the package adds no records."""
         context.abort(grpc.StatusCode.UNIMPLEMENTED, "the package does not use it")
         raise AssertionError("abort always raises")
 
     # Playing.
 
     def Play(self, request_iterator: Iterator[pb.PlayRequest], context: Context) -> Iterator[pb.PlayResponse]:
-        """One stream of seats."""
         self.streams += 1
         outbox: Outbox = queue.SimpleQueue()
         broken = threading.Event()
@@ -191,12 +186,12 @@ class FakeServer(
             context.abort(grpc.StatusCode.UNAVAILABLE, "the stream was broken on purpose")
 
     def Watch(self, request: pb.PlayServiceWatchRequest, context: Context) -> NoReturn:
-        """Not for clients that can stream."""
+        """Unused: the package uses `Play`."""
         context.abort(grpc.StatusCode.UNIMPLEMENTED, "the package does not use it")
         raise AssertionError("abort always raises")
 
     def Act(self, request: pb.ActRequest, context: Context) -> pb.ActResponse:
-        """Notes an expression as an event."""
+        """Records an expression as an event."""
         found = self.find(request.ticket)
         if found is None:
             refuse(context, grpc.StatusCode.UNAUTHENTICATED, "TICKET_UNKNOWN", "no seat has this ticket")
@@ -206,7 +201,7 @@ class FakeServer(
         return pb.ActResponse()
 
     def find(self, ticket: str) -> tuple[FakeGame, FakeSeat] | None:
-        """The seat of a ticket."""
+        """Returns the seat of a ticket."""
         for game in self.games:
             for seat in game.seats.values():
                 if seat.ticket == ticket:
@@ -214,7 +209,7 @@ class FakeServer(
         return None
 
     def _read(self, requests: Iterator[pb.PlayRequest], outbox: Outbox, broken: threading.Event) -> None:
-        """Reads a stream's commands until it ends, or until a fault breaks it."""
+        """Reads the commands of a stream until it ends or a fault breaks it."""
         stream = Stream(outbox)
         try:
             for request in requests:
@@ -241,7 +236,7 @@ class FakeServer(
         if found is None:
             if not self.tournaments.enter(attach, stream, handle):
                 refused = pb.Refused(request_id=attach.request_id, reason="TICKET_UNKNOWN", message="no seat has this ticket")
-                stream.tell(handle, refused=refused)
+                stream.send(handle, refused=refused)
             return
         game, seat = found
         with game.lock:
@@ -260,7 +255,7 @@ class FakeServer(
             if fault == "after":
                 seat.outbox = None
             if seat.outbox is stream.outbox:
-                game.tell(seat, result=result)
+                game.send(seat, result=result)
             if was_open and not seat.open:
                 game.advance()
         if game.over:
@@ -275,16 +270,15 @@ class _Spectators(spectator_grpc.SpectatorServiceServicer):
         self._server = server
 
     def Watch(self, request: pb.SpectatorServiceWatchRequest, context: Context) -> Iterator[pb.SpectatorServiceWatchResponse]:
-        """The events of a room until its game is over."""
         game = self._server.game(request.room_id, context)
-        told = max(request.from_sequence - 1, 0)
+        sent = max(request.from_sequence - 1, 0)
         yield pb.SpectatorServiceWatchResponse(room=game.room)
         while context.is_active():
             with game.lock:
-                if len(game.events) <= told and not game.over:
+                if len(game.events) <= sent and not game.over:
                     game.changed.wait(timeout=0.2)
-                events, over = game.events[told:], game.over
+                events, over = game.events[sent:], game.over
             yield pb.SpectatorServiceWatchResponse(events=events)
-            told += len(events)
+            sent += len(events)
             if over:
                 return

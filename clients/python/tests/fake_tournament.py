@@ -1,6 +1,6 @@
 """Tournaments of the fake server: all participants play in every game, as many games at a time as each of them can play.
 
-Of the protocol only what the package uses is here; how a tournament is drawn is the real server's business.
+It implements only what the package uses, without pairings.
 """
 
 import threading
@@ -15,7 +15,7 @@ from refusing import Context, refuse
 from chefshat import pb
 from chefshat._gen.chefshat.v1 import tournament_service_pb2_grpc as tournament_grpc
 
-# First handle of the seats that the server attaches by itself.
+# First handle of the seats that the server attaches.
 CALLED = 2**31
 OWNER = "owner"
 
@@ -25,13 +25,13 @@ class Stream:
     """One Play stream."""
 
     outbox: Outbox
-    # The seats by handle; every Attach has a handle, refused ones and participants' too.
+    # Seats by handle; every Attach has a handle, including refused ones and those of participants.
     seats: dict[int, tuple[FakeGame, FakeSeat]] = field(default_factory=dict)
     attaches: int = 0
-    called: int = CALLED
+    next_called: int = CALLED
 
-    def tell(self, handle: int, **update: object) -> None:
-        """Tells the stream something."""
+    def send(self, handle: int, **update: object) -> None:
+        """Sends an update."""
         self.outbox.put(pb.SeatUpdate(handle=handle, **update))  # type: ignore[arg-type]
 
 
@@ -46,7 +46,7 @@ class Entrant:
 
 
 class FakeTournaments(tournament_grpc.TournamentServiceServicer):
-    """The service. Games of its tournaments are rooms of the server, which `make_game` makes of their seats."""
+    """The service. `make_game` creates the room of a game from its seats."""
 
     def __init__(self, make_game: Callable[[list[str]], FakeGame]) -> None:
         self._make_game = make_game
@@ -55,18 +55,16 @@ class FakeTournaments(tournament_grpc.TournamentServiceServicer):
         self.joins: list[pb.JoinTournamentRequest] = []
 
     def CreateTournament(self, request: pb.CreateTournamentRequest, context: Context) -> pb.CreateTournamentResponse:
-        """Makes a tournament."""
         with self._lock:
             made = FakeTournament(len(self._all) + 1, request.settings, self._make_game)
             self._all.append(made)
             return pb.CreateTournamentResponse(tournament=made.shown, join_code=made.join_code, owner_token=OWNER)
 
     def GetTournament(self, request: pb.GetTournamentRequest, context: Context) -> pb.GetTournamentResponse:
-        """One tournament."""
         return pb.GetTournamentResponse(tournament=self._find(request.tournament_id, context).shown)
 
     def ListTournaments(self, request: pb.ListTournamentsRequest, context: Context) -> pb.ListTournamentsResponse:
-        """Tournaments, newest first, optionally only those in one state, two a page."""
+        """Pages of two tournaments, newest first."""
         at = int(request.page_token or "0")
         found = [made.shown for made in reversed(self._all) if request.state in (0, made.shown.state)]
         return pb.ListTournamentsResponse(
@@ -74,7 +72,6 @@ class FakeTournaments(tournament_grpc.TournamentServiceServicer):
         )
 
     def JoinTournament(self, request: pb.JoinTournamentRequest, context: Context) -> pb.JoinTournamentResponse:
-        """Takes part."""
         found = [tournament for tournament in self._all if tournament.join_code == request.join_code]
         if not found:
             refuse(context, grpc.StatusCode.PERMISSION_DENIED, "JOIN_CODE_WRONG", "no tournament has this join code")
@@ -84,14 +81,12 @@ class FakeTournaments(tournament_grpc.TournamentServiceServicer):
             return pb.JoinTournamentResponse(tournament=found[0].shown, participant=number, ticket=entrant.ticket)
 
     def StartTournament(self, request: pb.StartTournamentRequest, context: Context) -> pb.StartTournamentResponse:
-        """Begins."""
         tournament = self._own(request.tournament_id, request.owner_token, context)
         with self._lock:
             tournament.begin()
         return pb.StartTournamentResponse(tournament=tournament.shown)
 
     def CloseTournament(self, request: pb.CloseTournamentRequest, context: Context) -> pb.CloseTournamentResponse:
-        """Closes it and aborts its games."""
         tournament = self._own(request.tournament_id, request.owner_token, context)
         with self._lock:
             tournament.end(pb.TOURNAMENT_STATE_CLOSED)
@@ -102,7 +97,7 @@ class FakeTournaments(tournament_grpc.TournamentServiceServicer):
         return pb.CloseTournamentResponse(tournament=tournament.shown)
 
     def FollowTournament(self, request: pb.FollowTournamentRequest, context: Context) -> Iterator[pb.FollowTournamentResponse]:
-        """Now and then, with a heartbeat before each report."""
+        """Reports every 20 ms, with a heartbeat before each report."""
         tournament = self._find(request.tournament_id, context)
         while context.is_active():
             yield pb.FollowTournamentResponse()
@@ -113,22 +108,20 @@ class FakeTournaments(tournament_grpc.TournamentServiceServicer):
             time.sleep(0.02)
 
     def GetTournamentResults(self, request: pb.GetTournamentResultsRequest, context: Context) -> pb.GetTournamentResultsResponse:
-        """The standings."""
         tournament = self._find(request.tournament_id, context)
         return pb.GetTournamentResultsResponse(tournament=tournament.shown, standings=tournament.standings())
 
     def ListTournamentGames(self, request: pb.ListTournamentGamesRequest, context: Context) -> pb.ListTournamentGamesResponse:
-        """Games, two a page."""
+        """Pages of two games."""
         games = self._find(request.tournament_id, context).listed()
         at = int(request.page_token or "0")
         return pb.ListTournamentGamesResponse(games=games[at : at + 2], next_page_token=str(at + 2) if at + 2 < len(games) else "")
 
     def GetLeaderboard(self, request: pb.GetLeaderboardRequest, context: Context) -> pb.GetLeaderboardResponse:
-        """All participants, in any order."""
         names = [entrant.name for tournament in self._all for entrant in tournament.shown.participants]
         return pb.GetLeaderboardResponse(rated=[pb.Rated(name=name) for name in names], games=len(names))
 
-    # What the server's streams tell it.
+    # Called by the streams of the server.
 
     def enter(self, attach: pb.Attach, stream: Stream, handle: int) -> bool:
         """Attaches a stream to the participant with this ticket. Returns False if there is none."""
@@ -139,13 +132,13 @@ class FakeTournaments(tournament_grpc.TournamentServiceServicer):
                         entered = pb.Entered(
                             request_id=attach.request_id, tournament_id=tournament.shown.tournament_id, participant=number
                         )
-                        stream.tell(handle, entered=entered)
+                        stream.send(handle, entered=entered)
                         tournament.enter(entrant, stream, handle)
                         return True
             return False
 
     def left(self, stream: Stream) -> None:
-        """A stream has ended."""
+        """Handles the end of a stream."""
         with self._lock:
             for tournament in self._all:
                 for entrant in tournament.entrants:
@@ -153,7 +146,7 @@ class FakeTournaments(tournament_grpc.TournamentServiceServicer):
                         entrant.stream = None
 
     def settle(self) -> None:
-        """Something has happened in a game: the next may follow."""
+        """Starts further games after a change in one."""
         with self._lock:
             for tournament in self._all:
                 tournament.settle()
@@ -171,7 +164,7 @@ class FakeTournaments(tournament_grpc.TournamentServiceServicer):
 
 
 class FakeTournament:
-    """One tournament. All methods want the service's lock held."""
+    """A tournament. The caller holds the service's lock."""
 
     def __init__(self, number: int, settings: pb.TournamentSettings, make_game: Callable[[list[str]], FakeGame]) -> None:
         self._make_game = make_game
@@ -188,11 +181,10 @@ class FakeTournament:
 
     @property
     def over(self) -> bool:
-        """Whether it moves no more."""
+        """Whether it has ended."""
         return self.shown.state in (pb.TOURNAMENT_STATE_FINISHED, pb.TOURNAMENT_STATE_CLOSED)
 
     def join(self, request: pb.JoinTournamentRequest) -> tuple[int, Entrant]:
-        """Takes part."""
         number = len(self.entrants)
         entrant = Entrant(f"{self.join_code}-{number}", max(request.max_games, 1))
         self.entrants.append(entrant)
@@ -212,9 +204,9 @@ class FakeTournament:
     def enter(self, entrant: Entrant, stream: Stream, handle: int) -> None:
         """Attaches a stream to a participant and to the seats of its games."""
         if entrant.stream is not None:
-            entrant.stream.tell(entrant.handle, detached=pb.Detached(reason=pb.DETACH_REASON_SUPERSEDED))
+            entrant.stream.send(entrant.handle, detached=pb.Detached(reason=pb.DETACH_REASON_SUPERSEDED))
         if self.over:
-            stream.tell(handle, detached=pb.Detached(reason=pb.DETACH_REASON_TOURNAMENT_OVER))
+            stream.send(handle, detached=pb.Detached(reason=pb.DETACH_REASON_TOURNAMENT_OVER))
             return
         entrant.stream, entrant.handle = stream, handle
         for game in self.games:
@@ -222,7 +214,7 @@ class FakeTournament:
         self.settle()
 
     def settle(self) -> None:
-        """Calls the games that can be played now; ends with the last."""
+        """Calls the games that can be played now; ends the tournament after the last."""
         if self.shown.state != pb.TOURNAMENT_STATE_PLAYING:
             return
         running = [game for game in self.games if not game.over]
@@ -246,7 +238,7 @@ class FakeTournament:
         self.shown.state = state
         for entrant in self.entrants:
             if entrant.stream is not None:
-                entrant.stream.tell(entrant.handle, detached=pb.Detached(reason=pb.DETACH_REASON_TOURNAMENT_OVER))
+                entrant.stream.send(entrant.handle, detached=pb.Detached(reason=pb.DETACH_REASON_TOURNAMENT_OVER))
                 entrant.stream = None
 
     def _seat(self, entrant: Entrant, game: FakeGame) -> None:
@@ -255,13 +247,13 @@ class FakeTournament:
         with game.lock:
             if stream is None or game.over or seat.outbox is stream.outbox:
                 return
-            handle = stream.called
-            stream.called += 1
+            handle = stream.next_called
+            stream.next_called += 1
             stream.seats[handle] = (game, seat)
             game.attach(seat, pb.Attach(ticket=seat.ticket), stream.outbox, handle, self.shown.tournament_id)
 
     def listed(self) -> list[pb.TournamentGame]:
-        """The games as everybody sees them; seat and participant are the same number, and the table is that of `FakeGame`."""
+        """The public view of the games. Seat and participant have the same number; standings are those of `FakeGame`."""
         listed = []
         for number, game in enumerate(self.games):
             state = pb.TOURNAMENT_GAME_STATE_COUNTED if game.over else pb.TOURNAMENT_GAME_STATE_PLAYING
@@ -278,7 +270,7 @@ class FakeTournament:
         return listed
 
     def standings(self) -> list[pb.TournamentStanding]:
-        """Participants in their order, which is that of every game."""
+        """Participants in the same order as in every game."""
         games = sum(game.over for game in self.games)
         return [
             pb.TournamentStanding(place=entrant.participant + 1, participant=entrant.participant, games=games, score=games * points)

@@ -1,7 +1,7 @@
-"""A fake `VectorService` with a toy game, whose numbers tell where they belong: a column in the wrong place shows.
+"""A fake `VectorService` with a toy game. Its numbers encode their position, so that swapped columns are detected.
 
-In game g the seats decide in turn, beginning with seat g mod N; decision t of an episode may be answered with the actions t and
-199. An episode has 5 + g mod 3 decisions. A decision t brings its seat t+1, an invalid attempt -1, and the end 100 + seat.
+In game g the seats decide in turn, starting with seat g mod N. The legal actions of decision t of an episode are t and 199. An
+episode has 5 + g mod 3 decisions. The reward of decision t is t+1, of an invalid attempt -1, and of the end 100 + seat.
 """
 
 import threading
@@ -21,12 +21,12 @@ PLAYERS = 4
 ACTIONS = 214
 TURN_ACTIONS = 200
 HAND_SIZE = 17
-# Games before which an episode is the game's last.
+# Episodes per game.
 EPISODES = 2
 
 
 def observation(game: int, seat: int, decision: int, episode: int) -> dict[str, list[int]]:
-    """The observation of a seat before a decision, as one row of each column."""
+    """Returns the observation of a seat before a decision, as one row of each column."""
     return {
         "shifts": [episode],
         "pizzas": [decision],
@@ -45,12 +45,12 @@ def observation(game: int, seat: int, decision: int, episode: int) -> dict[str, 
 
 
 def column(values: Sequence[Sequence[int] | float], dtype: str) -> bytes:
-    """A column as it is sent."""
+    """Encodes a column."""
     return np.array(values, dtype).tobytes()
 
 
 def observation_columns(rows: list[dict[str, list[int]]]) -> pb.ObservationColumns:
-    """The rows, by columns."""
+    """Encodes rows as columns."""
     wide = {"shifts": "<u4", "pizzas": "<u4", "points": "<u4"}
     if not rows:
         return pb.ObservationColumns()
@@ -58,7 +58,7 @@ def observation_columns(rows: list[dict[str, list[int]]]) -> pb.ObservationColum
 
 
 class ToyGame:
-    """One game of the toy."""
+    """A game."""
 
     def __init__(self, number: int, seats: list[int]) -> None:
         self.number = number
@@ -67,13 +67,11 @@ class ToyGame:
         self.begin()
 
     def begin(self) -> None:
-        """Starts the next game."""
         self.begun += 1
         self.episode = 1
         self.begin_episode()
 
     def begin_episode(self) -> None:
-        """Begins the next episode."""
         self.decision = 0
         self.attempts = 0
         self.owed = dict.fromkeys(range(PLAYERS), 0.0)
@@ -81,16 +79,16 @@ class ToyGame:
 
     @property
     def seat(self) -> int:
-        """Who decides."""
+        """The deciding seat."""
         return (self.number + self.decision) % PLAYERS
 
     @property
     def length(self) -> int:
-        """Decisions of an episode."""
+        """Decisions per episode."""
         return 5 + self.number % 3
 
     def skip(self) -> None:
-        """Lets the seats decide that are not the client's."""
+        """Takes the decisions of seats that are not the client's."""
         while self.decision < self.length and self.seat not in self.seats:
             self.owed[self.seat] += self.decision + 1
             self.decision += 1
@@ -109,7 +107,7 @@ class ToyGame:
         if self.decision < self.length:
             return []
         over = self.episode == EPISODES
-        # Games with odd numbers are cut off without places.
+        # Odd games are truncated, without places.
         cut_off = self.number % 2
         end = pb.EPISODE_END_CUT_SHORT if cut_off else pb.EPISODE_END_FINISHED
         endings: list[tuple[int, ...]] = [
@@ -147,7 +145,7 @@ class ToyStream:
         self.shifts = 0
 
     def start(self) -> Iterator[pb.RunResponse]:
-        """The first two messages."""
+        """Returns the first two messages."""
         rules = pb.RuleSet(players=PLAYERS, faces=FACES, jokers=2, target_points=15)
         space = pb.ActionSpace(id="chefshat-11", size=ACTIONS, turn_actions=TURN_ACTIONS)
         agents = ["" if seat in self.seats else "random" for seat in range(PLAYERS)]
@@ -164,7 +162,7 @@ class ToyStream:
         yield self.batch()
 
     def answer(self, request: pb.RunRequest, context: Context) -> Iterator[pb.RunResponse]:
-        """The batch after a request, and before it the records of games that have ended."""
+        """Returns the batch after a request, preceded by the records of games that have ended."""
         self.endings, self.began = [], []
         if request.HasField("reset"):
             named = np.frombuffer(request.reset.games, "<u4").tolist()
@@ -189,14 +187,14 @@ class ToyStream:
         yield self.batch()
 
     def record(self, game: ToyGame) -> Iterator[pb.RunResponse]:
-        """A record in two parts."""
+        """Returns a record in two parts."""
         header = pb.RecordLine(header=pb.RecordHeader(game_id=f"{game.number}"))
         footer = pb.RecordLine(footer=pb.RecordFooter(events=game.begun))
         yield pb.RunResponse(record=pb.VectorRecord(game=game.number, index=7, lines=[header]))
         yield pb.RunResponse(record=pb.VectorRecord(game=game.number, index=7, lines=[footer], last=True))
 
     def batch(self) -> pb.RunResponse:
-        """The present batch."""
+        """Returns the current batch."""
         self.step += 1
         games, endings = self.games, self.endings
         masks = np.zeros((len(games), ACTIONS), np.bool_)
@@ -250,7 +248,6 @@ class ToyVector(vector_grpc.VectorServiceServicer):
         self.ended = threading.Event()
 
     def Run(self, request_iterator: Iterator[pb.RunRequest], context: Context) -> Iterator[pb.RunResponse]:
-        """One stream."""
         context.add_callback(self.ended.set)
         setup = next(request_iterator).setup
         self.setups.append(setup)

@@ -17,7 +17,7 @@ class HandMade(Observations):
     mask_bits: Bytes
 
     def default_actions(self) -> list[int]:
-        """The default action of each row, which a server sends with the request."""
+        """Returns the default action of each row, which a server sends with the request."""
         turns = features.turn_actions(self.sizes.faces)
         found = []
         for row, kind in enumerate(self.kinds):
@@ -33,7 +33,7 @@ class HandMade(Observations):
         return found
 
     def actions(self, network: Network) -> list[int]:
-        """The action that an agent takes by a network in each row."""
+        """Returns the action of a network agent in each row."""
         chosen = network.actions(self, self.seats, self.kinds, self.mask_bits)
         if network.info.output == "actions":
             return [int(action) for action in chosen]
@@ -42,7 +42,7 @@ class HandMade(Observations):
 
 
 def hand_made(rows: int, *, seed: int, players: int = 4, faces: int = 11, jokers: int = 2) -> HandMade:
-    """Draws rows that respect the deck, the own seat's count of cards and the decision kind, and are otherwise arbitrary."""
+    """Draws rows consistent with the deck, the seat's number of cards and the decision kind, and otherwise arbitrary."""
     chance = np.random.default_rng(seed)
     deck = np.repeat(np.arange(faces + 1), [*range(1, faces + 1), jokers])
     size = features.dealt(players, faces, jokers)

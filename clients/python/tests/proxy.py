@@ -1,4 +1,4 @@
-"""A TCP proxy whose connections a test can cut, to lose connections to a server that knows nothing of it."""
+"""A TCP proxy whose connections a test can cut."""
 
 import contextlib
 import socket
@@ -32,11 +32,11 @@ class Proxy:
         self.cut()
 
     def cut(self) -> None:
-        """Cuts all connections there are. New ones are forwarded again."""
+        """Cuts all current connections. New ones are forwarded."""
         with self._lock:
             self.cuts += 1
             for end in self._sockets:
-                # Whoever forwards from it wakes up and closes it.
+                # The forwarding thread wakes up and closes it.
                 with contextlib.suppress(OSError):
                     end.shutdown(socket.SHUT_RDWR)
             self._sockets.clear()
@@ -64,7 +64,7 @@ def _serve(near: socket.socket, far: socket.socket) -> None:
 
 
 def _forward(source: socket.socket, sink: socket.socket) -> None:
-    """Copies until one side ends, and then ends the other."""
+    """Copies until one side ends, then ends the other."""
     with contextlib.suppress(OSError):
         source.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         while data := source.recv(65536):

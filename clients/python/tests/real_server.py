@@ -1,10 +1,10 @@
-"""The real server as a child process. What it is asked to do is the tests' business."""
+"""The real server as a child process."""
 
 from pathlib import Path
 
 from chefshat.local_server import LocalServer
 
-# Seconds to start listening: generous, because nothing is measured by it.
+# Time limit for starting, seconds.
 START_S = 60.0
 
 

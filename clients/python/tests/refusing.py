@@ -1,4 +1,4 @@
-"""Refusals of fake services, with the protocol's details."""
+"""Refusals of fake services, with the error details of the protocol."""
 
 from typing import NoReturn
 

@@ -40,13 +40,13 @@ class Scribe(Agent):
 
 
 def attached(request_id: int = 1, seat: int = 0, next_sequence: int = 1) -> pb.SeatUpdate:
-    said = pb.Attached(request_id=request_id, room_id="room", game_id="game", seat=seat, next_sequence=next_sequence)
-    return pb.SeatUpdate(handle=request_id - 1, attached=said)
+    message = pb.Attached(request_id=request_id, room_id="room", game_id="game", seat=seat, next_sequence=next_sequence)
+    return pb.SeatUpdate(handle=request_id - 1, attached=message)
 
 
 def events(*sequences: int, handle: int = 0, **kind: object) -> pb.SeatUpdate:
-    said = [pb.GameEvent(sequence=sequence, **(kind or {"pass": pb.Pass()})) for sequence in sequences]  # type: ignore[arg-type]
-    return pb.SeatUpdate(handle=handle, events=pb.EventBatch(events=said))
+    message = [pb.GameEvent(sequence=sequence, **(kind or {"pass": pb.Pass()})) for sequence in sequences]  # type: ignore[arg-type]
+    return pb.SeatUpdate(handle=handle, events=pb.EventBatch(events=message))
 
 
 def decision(decision_id: int, handle: int = 0) -> pb.SeatUpdate:
@@ -98,7 +98,7 @@ class Stage:
         self.sent = [command for request in self.session.take_requests() for command in request.commands]
         return self.sent
 
-    def say(self, *updates: pb.SeatUpdate) -> list[Ask]:
+    def receive(self, *updates: pb.SeatUpdate) -> list[Ask]:
         asks = self.session.receive(pb.PlayResponse(updates=updates))
         self.flush()
         return asks
@@ -107,7 +107,7 @@ class Stage:
         self.session.answer(ask, action)
         self.flush()
 
-    def said(self) -> list[tuple[int, str | None]]:
+    def commands(self) -> list[tuple[int, str | None]]:
         return [(command.handle, command.WhichOneof("command")) for command in self.sent]
 
     def answers(self) -> list[tuple[int, int, int]]:

@@ -1,4 +1,4 @@
-"""The random agent: legal, even, repeatable."""
+"""The random agent: legal, uniform, repeatable."""
 
 from collections import Counter
 

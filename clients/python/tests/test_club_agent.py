@@ -1,4 +1,4 @@
-"""The agent of a player without a server and without a process: a puppet gives scripted answers."""
+"""`PlayersClubAgent` without a server or a process: a puppet gives scripted answers."""
 
 import logging
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ RULES = pb.RuleSet(players=4, faces=11, jokers=2)
 
 
 class Puppet(AgentProcess):
-    """Answers by the script, in order, and stores its calls. Raises exceptions in the script."""
+    """Answers by a script, in order, and records the calls. Raises the exceptions in the script."""
 
     def __init__(self, *script: object) -> None:
         super().__init__(AgentSpec("puppet:Puppet", "Puppet"))
@@ -86,7 +86,7 @@ def decide_all(agent: PlayersClubAgent, requests: Sequence[Decision]) -> list[in
     return [agent.decide(request) for request in requests]
 
 
-def test_the_largest_of_the_numbers_counts() -> None:
+def test_the_highest_score_wins() -> None:
     agent = seated(wanting(8, 199, 0))
     request = asked(0, 8, 199)
     assert agent.decide(request) == 8
@@ -94,7 +94,7 @@ def test_the_largest_of_the_numbers_counts() -> None:
     assert (agent.counts.failures, agent.counts.replaced) == (0, 0)
 
 
-def test_of_equal_numbers_the_first_counts_and_infinite_ones_are_numbers() -> None:
+def test_ties_go_to_the_first_score_and_infinite_scores_are_allowed() -> None:
     assert seated([1.0] * T).decide(asked(0, 8, 199)) == 0
     numbers: list[float] = [-np.inf] * T
     numbers[8] = np.inf
@@ -106,12 +106,12 @@ def test_an_illegal_choice_is_sent_and_asked_again_then_the_best_legal_one_is_ta
     agent = seated(*[stubborn] * 4, wanting(0), attempts=3)
     assert decide_all(agent, [asked(0, 8, 199)] * 4) == [5, 5, 5, 8]
     assert (agent.counts.failures, agent.counts.replaced) == (0, 1)
-    # At another decision it may insist again, and change its mind.
+    # At another decision the attempts start again.
     assert agent.decide(asked(0, 8, 199, number=10)) == 0
     assert agent.counts.replaced == 1
 
 
-def test_the_last_attempt_that_the_room_grants_is_a_legal_one() -> None:
+def test_the_last_attempt_of_the_room_is_legal() -> None:
     agent = seated(*[wanting(5, 8)] * 2)
     assert decide_all(agent, [asked(0, 8, 199, left=2), asked(0, 8, 199, left=1)]) == [5, 8]
 
@@ -188,7 +188,7 @@ def test_the_sous_chef_is_asked_for_one_card() -> None:
 def test_each_exchange_is_a_new_request() -> None:
     agent = seated([2, 4], [12, 11], seat=CHEF)
     assert agent.decide(gift(*HELD)) == T - 1 + 2
-    # The second card was never asked for: its partner was short of cards.
+    # The second card was never requested: the partner had too few cards.
     agent.on_event(pb.GameEvent(shift_started=pb.ShiftStarted(shift=2)))
     assert decide_all(agent, [gift(*HELD, number=20), gift(*HELD, number=21, given=1)]) == [T - 1 + 12, T - 1 + 11]
 
@@ -238,7 +238,7 @@ def club() -> Players:
 SEAT = asked(0).seat_info
 
 
-def test_every_game_at_a_time_has_a_process_and_each_goes_from_game_to_game(caplog: pytest.LogCaptureFixture) -> None:
+def test_each_parallel_game_has_a_process_which_plays_game_after_game(caplog: pytest.LogCaptureFixture) -> None:
     players = club()
     one, other = players.processes
     first, second = players.seat(SEAT), players.seat(SEAT)
@@ -246,13 +246,13 @@ def test_every_game_at_a_time_has_a_process_and_each_goes_from_game_to_game(capl
     second.on_game_over(SeatResult("room", "game", 0))
     assert players.seat(SEAT)._process is other
     assert (players.crowded, caplog.text) == (0, "")
-    # One too many.
+    # One more than there are processes.
     assert players.seat(SEAT)._process is one
     assert players.crowded == 1
     assert "no process is free" in caplog.text
 
 
-def test_a_process_whose_seat_is_lost_is_free_for_another_game() -> None:
+def test_a_lost_seat_frees_its_process() -> None:
     players = club()
     first, _ = players.seat(SEAT), players.seat(SEAT)
     first.on_seat_lost(ChefsHatError("SUPERSEDED"))
@@ -260,7 +260,7 @@ def test_a_process_whose_seat_is_lost_is_free_for_another_game() -> None:
     assert players.crowded == 0
 
 
-def test_a_process_that_has_been_given_up_is_seated_last() -> None:
+def test_a_process_that_was_given_up_is_used_last() -> None:
     players = club()
     one, other = players.processes
     one.close()

@@ -1,4 +1,4 @@
-"""A player's own process: its answers, and everything that can go wrong with it."""
+"""The process of a player: answers and failures."""
 
 import os
 from collections.abc import Callable, Iterator
@@ -14,7 +14,7 @@ from chefshat.players_club.process import AgentError, AgentLost, AgentProcess, A
 
 TESTS = str(Path(__file__).parent)
 VECTOR = [0.0] * 28 + [1.0] + [0.0] * 196 + [1.0, 0.0, 1.0]
-# Seconds a hanging player is granted in tests; others take far less.
+# Time limit of a hanging player, seconds; others take far less.
 HANGS_S = 3.0
 
 Make = Callable[..., AgentProcess]
@@ -22,7 +22,7 @@ Make = Callable[..., AgentProcess]
 
 @pytest.fixture
 def make() -> Iterator[Make]:
-    """Makes processes of players by the name of their class, and closes them after the test."""
+    """Creates processes by the name of the player class, and closes them after the test."""
     made: list[AgentProcess] = []
 
     def one(player: str, **options: Any) -> AgentProcess:
@@ -102,7 +102,7 @@ def test_a_player_that_hangs_is_ended(make: Make) -> None:
 
 
 @pytest.mark.parametrize(
-    ("player", "options", "said"),
+    ("player", "options", "message"),
     [
         ("Unmade", {}, "creating it raised FileNotFoundError: no model there"),
         ("Nothing", {}, "lacks get_exhanged_cards and do_special_action"),
@@ -112,13 +112,13 @@ def test_a_player_that_hangs_is_ended(make: Make) -> None:
         ("Largest", {"python": "/no/such/python"}, "/no/such/python cannot be started: No such file"),
     ],
 )
-def test_a_failed_start_is_reported(make: Make, player: str, options: dict[str, Any], said: str) -> None:
-    with pytest.raises(AgentError, match=said):
+def test_a_failed_start_is_reported(make: Make, player: str, options: dict[str, Any], message: str) -> None:
+    with pytest.raises(AgentError, match=message):
         make(player, **options).start()
 
 
 @pytest.mark.parametrize(
-    ("script", "said"),
+    ("script", "message"),
     [
         ("read call; exit 3", r"died in creating it \(exit code 3; it printed nothing\)"),
         ("read call; echo hello; read nothing", "sent an invalid answer to creating it: b'hello"),
@@ -126,11 +126,11 @@ def test_a_failed_start_is_reported(make: Make, player: str, options: dict[str, 
         ('read call; echo \'{"id": 5, "value": 1}\'; read nothing', "the id of another call"),
     ],
 )
-def test_a_program_that_is_not_python_is_reported(make: Make, tmp_path: Path, script: str, said: str) -> None:
+def test_a_program_that_is_not_python_is_reported(make: Make, tmp_path: Path, script: str, message: str) -> None:
     python = tmp_path / "python"
     python.write_text(f"#!/bin/sh\n{script}\n")
     python.chmod(0o755)
-    with pytest.raises(AgentLost, match=said):
+    with pytest.raises(AgentLost, match=message):
         make("Largest", python=str(python)).start()
 
 

@@ -1,4 +1,4 @@
-"""The calls to a player of the reference implementation, event by event, compared with calls written by hand."""
+"""The calls to a player of the reference implementation, compared with calls written by hand."""
 
 from typing import Any, TypeAlias
 
@@ -14,7 +14,7 @@ Source: TypeAlias = pb.DecisionSource.ValueType
 AGENT = pb.DECISION_SOURCE_AGENT
 
 
-def happens(table: Table, **kind: Any) -> list[Call]:
+def apply(table: Table, **kind: Any) -> list[Call]:
     return table.event(pb.GameEvent(**kind))
 
 
@@ -30,9 +30,9 @@ def passes(seat: int, source: Source = AGENT) -> dict[str, Any]:
 def dealt(shift: int = 1, names: tuple[str, ...] = ("me", "Bob", "Cleo", "greedy")) -> Table:
     table = Table(OWN, "RANDOM_me")
     seats = [pb.Participant(seat=seat, name=name) for seat, name in enumerate(names)]
-    assert happens(table, game_started=pb.GameStarted(seats=seats, hand_size=17)) == []
+    assert apply(table, game_started=pb.GameStarted(seats=seats, hand_size=17)) == []
     hands = [pb.SeatCards(seat=OWN, cards=HAND)]
-    assert happens(table, shift_started=pb.ShiftStarted(shift=shift, hands=hands)) == []
+    assert apply(table, shift_started=pb.ShiftStarted(shift=shift, hands=hands)) == []
     return table
 
 
@@ -48,11 +48,11 @@ def test_the_actions_are_the_two_hundred() -> None:
     )
 
 
-def test_a_match_begins_when_the_first_to_act_is_known() -> None:
+def test_a_match_begins_when_the_first_player_is_known() -> None:
     table = dealt()
-    (begins,) = happens(table, **play(HERS, 11, 2, left=15))
+    (begins,) = apply(table, **play(HERS, 11, 2, left=15))
     assert begins == Call("update_start_match", [HAND, ["RANDOM_me", "Bob", "Cleo", "greedy"], "Cleo"])
-    # Whose turn it is is known, too, when the player itself is about to be asked.
+    # The turn is also known when the player itself decides next.
     assert dealt().turn_of(OWN)[0].arguments[2] == "RANDOM_me"
 
 
@@ -63,10 +63,10 @@ def test_names_are_made_unique() -> None:
 
 def test_other_seats_actions_are_reported_with_their_consequences() -> None:
     table = dealt()
-    happens(table, **play(HERS, 11, 2, 1, left=14))
-    told = happens(table, **passes(ITS))
-    assert [call.method for call in told] == ["update_action_others"]
-    assert told[0].arguments == [
+    apply(table, **play(HERS, 11, 2, 1, left=14))
+    calls = apply(table, **passes(ITS))
+    assert [call.method for call in calls] == ["update_action_others"]
+    assert calls[0].arguments == [
         {
             "Matches": 1,
             "Rounds": 1,
@@ -105,10 +105,10 @@ def test_own_actions_are_reported_with_both_observations() -> None:
     asked = [0.25] * 28 + [1.0, 0.0] * 100
     table.turn_of(OWN)
     table.asked(asked, replaced=False)
-    happens(table, **play(OWN, 11, 3, 1, left=13))
-    (told,) = happens(table, **passes(HIS))
-    info = told.arguments[0]
-    assert told.method == "update_my_action"
+    apply(table, **play(OWN, 11, 3, 1, left=13))
+    (calls,) = apply(table, **passes(HIS))
+    info = calls.arguments[0]
+    assert calls.method == "update_my_action"
     assert info["Author_Index"] == OWN
     assert info["Action_Random"] is False
     assert info["Observation_Before"] == asked
@@ -122,53 +122,53 @@ def test_own_actions_are_reported_with_both_observations() -> None:
 def test_replaced_choices_count_as_random(source: Source, replaced: bool) -> None:
     table = dealt()
     table.asked([0.0] * 228, replaced=replaced)
-    happens(table, **passes(OWN, source))
+    apply(table, **passes(OWN, source))
     assert table.turn_of(HIS)[0].arguments[0]["Action_Random"] is True
 
 
 def test_actions_of_a_substitute_are_reported() -> None:
     table = dealt()
-    happens(table, **play(OWN, 11, 3, left=14, source=pb.DECISION_SOURCE_SUBSTITUTE))
+    apply(table, **play(OWN, 11, 3, left=14, source=pb.DECISION_SOURCE_SUBSTITUTE))
     info = table.turn_of(HIS)[0].arguments[0]
     assert info["Action_Random"] is True
     assert info["Observation_Before"] == vector(EMPTY, HAND, info["Action_Index"])
     assert info["Author_Possible_Actions"] == ["C11;Q3;J0"]
 
 
-def test_a_pizza_belongs_to_the_action_that_made_it() -> None:
+def test_a_pizza_is_reported_with_the_action_that_ended_it() -> None:
     table = dealt()
     for what in (play(HIS, 11, 1, left=16), play(HERS, 10, 1, left=16), passes(ITS), passes(OWN)):
-        happens(table, **what)
-    happens(table, **passes(HIS))
-    assert happens(table, pizza_done=pb.PizzaDone(pizza=1, last_to_play=HERS, next_leader=HERS)) == []
-    (told,) = table.turn_of(HERS)
-    info = told.arguments[0]
+        apply(table, **what)
+    apply(table, **passes(HIS))
+    assert apply(table, pizza_done=pb.PizzaDone(pizza=1, last_to_play=HERS, next_leader=HERS)) == []
+    (calls,) = table.turn_of(HERS)
+    info = calls.arguments[0]
     assert (info["Is_Pizza"], info["Pizza_Author"], info["Rounds"], info["Next_Player"]) == (True, HERS, 2, HERS)
     assert info["Board_Before"] == info["Board_After"] == [10] + [0] * 10
     assert info["Last_action_Per_Player"] == [""] * 4
-    happens(table, **play(HERS, 0, 0, 1, left=15))
+    apply(table, **play(HERS, 0, 0, 1, left=15))
     info = table.turn_of(ITS)[0].arguments[0]
     assert (info["Is_Pizza"], info["Pizza_Author"], info["Board_Before"]) == (False, -1, EMPTY)
     assert info["Board_After"] == [12] + [0] * 10
     assert (info["Action_Index"], info["Action_Decoded"]) == (198, "C0;Q0;J1")
 
 
-def test_a_board_of_more_cards_than_places_is_cut_off() -> None:
+def test_a_board_with_too_many_cards_is_cut_off() -> None:
     table = dealt()
-    happens(table, **play(HIS, 11, 11, 2, left=4))
+    apply(table, **play(HIS, 11, 11, 2, left=4))
     assert table.turn_of(HERS)[-1].arguments[0]["Board_After"] == [11] * 11
 
 
 def end(table: Table, shift: int, order: tuple[int, ...], pizzas: int) -> list[Call]:
     for place, seat in enumerate(order[:3], 1):
-        happens(table, seat_finished=pb.SeatFinished(seat=seat, place=place))
+        apply(table, seat_finished=pb.SeatFinished(seat=seat, place=place))
     ended = pb.ShiftEnded(shift=shift, order=order, shift_points=[0] * 4, points=[0] * 4, pizzas=pizzas)
-    return happens(table, shift_ended=ended)
+    return apply(table, shift_ended=ended)
 
 
 def test_a_match_ends_with_the_points_of_the_reference() -> None:
     table = dealt()
-    happens(table, **play(HIS, 11, 1, left=0))
+    apply(table, **play(HIS, 11, 1, left=0))
     action, over = end(table, 1, (HERS, OWN, HIS, ITS), pizzas=4)
     assert action.method == "update_action_others"
     assert over == Call("update_end_match", action.arguments)
@@ -180,12 +180,12 @@ def test_a_match_ends_with_the_points_of_the_reference() -> None:
     assert info["Next_Player"] == ITS
     assert info["Observation_After"] == ""
 
-    happens(table, shift_started=pb.ShiftStarted(shift=2, hands=[pb.SeatCards(seat=OWN, cards=HAND)]))
-    happens(table, **play(ITS, 11, 1, left=16))
+    apply(table, shift_started=pb.ShiftStarted(shift=2, hands=[pb.SeatCards(seat=OWN, cards=HAND)]))
+    apply(table, **play(ITS, 11, 1, left=16))
     info = table.turn_of(OWN)[0].arguments[0]
     assert (info["Matches"], info["Rounds"], info["Match_Score"]) == (2, 1, [-1] * 4)
     assert info["Finished_Players"] == [False] * 4
-    happens(table, **passes(OWN))
+    apply(table, **passes(OWN))
     info = end(table, 2, (HERS, HIS, OWN, ITS), pizzas=10)[-1].arguments[0]
     assert info["Match_Score"] == [1, 2, 3, 0]
     assert info["Game_Score"] == [3, 3, 6, 0]
@@ -195,14 +195,14 @@ def test_a_match_ends_with_the_points_of_the_reference() -> None:
 def test_an_exchange_is_reported_before_the_match_begins() -> None:
     table = dealt(shift=2)
     roles = [pb.ROLE_CHEF, pb.ROLE_SOUS_CHEF, pb.ROLE_WAITER, pb.ROLE_DISHWASHER]
-    assert happens(table, roles_assigned=pb.RolesAssigned(roles=roles)) == []
+    assert apply(table, roles_assigned=pb.RolesAssigned(roles=roles)) == []
     for giver, receiver, cards in ((ITS, OWN, [1, 2]), (OWN, ITS, [12]), (OWN, ITS, [11]), (HERS, HIS, []), (HIS, HERS, [])):
         exchanged = pb.CardsExchanged(giver=giver, receiver=receiver, count=len(cards) or 1, cards=cards)
-        assert happens(table, cards_exchanged=exchanged) == []
+        assert apply(table, cards_exchanged=exchanged) == []
     exchange, begins = table.turn_of(HIS)
     assert exchange == Call("update_exchange_cards", [[11, 12], [1, 2]])
     assert begins.arguments[0] == sorted([1, 2, *HAND[:14], 12])
-    happens(table, **passes(HIS))
+    apply(table, **passes(HIS))
     info = table.turn_of(HERS)[0].arguments[0]
     assert info["Current_Roles"] == ["Chef", "Souschef", "Waiter", "Dishwasher"]
 
@@ -213,13 +213,13 @@ def test_an_exchange_is_reported_before_the_match_begins() -> None:
 )
 def test_a_special_action_is_reported_with_its_seat(action: pb.SpecialAction.ValueType, text: str) -> None:
     declared = pb.SpecialActionDeclared(seat=ITS, action=action, source=pb.DECISION_SOURCE_AGENT)
-    assert happens(dealt(shift=2), special_action_declared=declared) == [Call("observe_special_action", [text, ITS])]
+    assert apply(dealt(shift=2), special_action_declared=declared) == [Call("observe_special_action", [text, ITS])]
 
 
 def test_the_end_of_an_aborted_game_is_reported_too() -> None:
-    assert happens(dealt(), game_ended=pb.GameEnded()) == [Call("update_game_over", [])]
+    assert apply(dealt(), game_ended=pb.GameEnded()) == [Call("update_game_over", [])]
     table = dealt()
-    happens(table, **passes(HIS))
-    told = happens(table, game_aborted=pb.GameAborted(reason=pb.ABORT_REASON_CLOSED))
-    assert [call.method for call in told] == ["update_action_others", "update_game_over"]
-    assert told[0].arguments[0]["Next_Player"] == -1
+    apply(table, **passes(HIS))
+    calls = apply(table, game_aborted=pb.GameAborted(reason=pb.ABORT_REASON_CLOSED))
+    assert [call.method for call in calls] == ["update_action_others", "update_game_over"]
+    assert calls[0].arguments[0]["Next_Player"] == -1

@@ -1,6 +1,6 @@
-"""The sample for Ray clusters: its runners without Ray; and the whole sample on a local cluster if Ray is installed.
+"""The sample for Ray clusters: its runners without Ray, and the complete sample on a local cluster if Ray is installed.
 
-Ray (extra `ray`) is heavy, so the tests do not ask for it.
+Ray (extra `ray`) is large, so the tests do not require it.
 """
 
 import importlib.util
@@ -20,12 +20,12 @@ from chefshat.learn import network, runs
 from chefshat.learn.ppo_checkpoint import Plan
 
 SAMPLE = Path(__file__).resolve().parents[1] / "samples" / "cluster" / "rllib_ppo.py"
-# Seconds it may take before it counts as hanging: Ray starts several processes.
+# Time limit in seconds: Ray starts several processes.
 LIMIT_S = 300
 
 
 class Runner:
-    """What of RLlib's `EnvRunner` the sample builds on."""
+    """The part of RLlib's `EnvRunner` that the sample uses."""
 
     def __init__(self, *, config: Any, worker_index: int) -> None:
         self.config = config
@@ -34,7 +34,7 @@ class Runner:
 
 @pytest.fixture
 def sample(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
-    """The sample as a module, with next to nothing in the place of Ray."""
+    """The sample as a module, with a minimal replacement for Ray."""
     names: dict[str, dict[str, Any]] = {
         "ray": {"ObjectRef": object},
         "ray.rllib": {},
@@ -56,7 +56,7 @@ def sample(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     return module
 
 
-def test_every_runner_plays_other_deals_by_the_rules_it_is_given(sample: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_runners_play_different_deals_with_the_given_rules(sample: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[dict[str, Any]] = []
 
     def env(address: str, games: int, **options: Any) -> None:
@@ -80,7 +80,7 @@ def test_every_runner_plays_other_deals_by_the_rules_it_is_given(sample: ModuleT
             runner.sample(None)
     assert all((one["address"], one["games"], one["rules"]) == ("an address", 8, rules) for one in asked)
     seeds = [one["seed"] for one in asked]
-    # Neither two runners, nor two trainings, nor a runner and the evaluation have the same.
+    # No two runners, no two trainings, and no runner and evaluation share a seed.
     assert len({*seeds, runs.EVALUATION_SEED}) == 5
     assert min(seeds) >= runs.SEED_STEP > runs.EVALUATION_SEED
     assert len(set(chances)) == 8
@@ -88,7 +88,7 @@ def test_every_runner_plays_other_deals_by_the_rules_it_is_given(sample: ModuleT
 
 @pytest.mark.server
 @pytest.mark.skipif(importlib.util.find_spec("ray") is None, reason="Ray is not installed: pip install 'chefshat[ray]'")
-def test_it_trains_a_few_iterations(real_address: str, tmp_path: Path) -> None:
+def test_a_few_iterations_are_trained(real_address: str, tmp_path: Path) -> None:
     out = tmp_path / "n.safetensors"
     command = [sys.executable, str(SAMPLE), "--address", real_address, "--runners", "2", "--games", "8", "--iterations", "2"]
     done = subprocess.run([*command, "--out", str(out)], capture_output=True, text=True, timeout=LIMIT_S)

@@ -1,4 +1,4 @@
-"""The picture of how a training went."""
+"""The plot of a training."""
 
 import json
 from pathlib import Path
@@ -25,7 +25,7 @@ LOG = "\n".join(
 )
 
 
-def test_a_look_is_a_point_with_its_interval() -> None:
+def test_each_evaluation_is_a_point_with_its_interval() -> None:
     (panel,) = figure(LOG).panels
     (line,) = panel.lines
     assert panel.title == "Against 3 greedy"
@@ -43,8 +43,8 @@ def test_the_command_draws(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     log.write_text(LOG.splitlines()[0])
     capsys.readouterr()
     assert command.main(["curve", str(log), "--out", str(out), "--json"]) == 1
-    told = json.loads(capsys.readouterr().out)
-    assert (told["event"], "has no evaluation" in told["message"], str(log) in told["message"]) == ("error", True, True)
+    output = json.loads(capsys.readouterr().out)
+    assert (output["event"], "has no evaluation" in output["message"], str(log) in output["message"]) == ("error", True, True)
     for no_log in ("garbage", "17", "[1]"):
         log.write_text(no_log)
         assert command.main(["curve", str(log), "--out", str(out)]) == 1

@@ -1,4 +1,4 @@
-"""Datasets of `chefshat export`, read as a researcher reads them: types, rows, and counts against those of `chefshat simulate`."""
+"""Datasets of `chefshat export`, read with pandas, polars and pyarrow: types, rows, and the counts of `chefshat simulate`."""
 
 import ast
 import hashlib
@@ -58,7 +58,7 @@ POLARS: dict[str, Any] = {
 
 
 def arrow_type(documented: str) -> Any:
-    """The Arrow type that the documentation names."""
+    """Returns the documented Arrow type."""
     if documented.startswith("list<"):
         return pyarrow.list_(arrow_type(documented[5:-1]))
     if documented.startswith("struct<"):
@@ -68,7 +68,7 @@ def arrow_type(documented: str) -> Any:
 
 
 def polars_type(documented: str) -> Any:
-    """The polars type that the documentation names."""
+    """Returns the documented polars type."""
     if documented.startswith("list<"):
         return polars.List(polars_type(documented[5:-1]))
     if documented.startswith("struct<"):
@@ -78,7 +78,7 @@ def polars_type(documented: str) -> Any:
 
 
 def documented_columns(table: str) -> list[tuple[str, str]]:
-    """Names and types of a table's columns, as the documentation has them."""
+    """Returns the documented names and types of a table's columns."""
     section = DOCS.read_text(encoding="utf-8").split(f"\n## {table.capitalize()}\n")[1]
     text = section.split("| column | type | content |\n")[1].split("\n\n")[0]
     return re.findall(r"^\| `(\w+)` \| `([^`]+)` \|", text, re.MULTILINE)
@@ -134,13 +134,13 @@ class Dataset:
 
 
 def export(binary: Path, records: Path, folder: Path) -> None:
-    """Makes the datasets, and checks their sums."""
-    said = run(binary, "export", records, "--out", folder / "dataset", "--format", "parquet,csv,jsonl")
-    assert said["games"] == len(list(records.glob("*.jsonl"))) > 0
-    assert run(binary, "export", records, "--out", folder / "gym", "--layout", "chefshatgym")["games"] == said["games"]
+    """Exports the datasets and checks their checksums."""
+    exported = run(binary, "export", records, "--out", folder / "dataset", "--format", "parquet,csv,jsonl")
+    assert exported["games"] == len(list(records.glob("*.jsonl"))) > 0
+    assert run(binary, "export", records, "--out", folder / "gym", "--layout", "chefshatgym")["games"] == exported["games"]
     for name in ["dataset", "gym"]:
         sums = (folder / name / "SHA256SUMS").read_text(encoding="utf-8").splitlines()
-        assert len(sums) > said["games"] if name == "gym" else len(sums) == 7
+        assert len(sums) > exported["games"] if name == "gym" else len(sums) == 7
         for line in sums:
             digest, path = line.split("  ")
             assert hashlib.sha256((folder / name / path).read_bytes()).hexdigest() == digest
@@ -177,7 +177,7 @@ def hosted(binary: Path, tmp_path_factory: pytest.TempPathFactory) -> Dataset:
 
 @pytest.fixture(scope="module")
 def simulated(binary: Path, tmp_path_factory: pytest.TempPathFactory) -> Dataset:
-    """Simulated games, whose figures were gathered while they were played."""
+    """Simulated games, with statistics collected during the simulation."""
     folder = tmp_path_factory.mktemp("simulated")
     records = folder / "records"
     arguments = ["simulate", "--games", GAMES, "--seed", 7, "--agents", ",".join(AGENTS), "--reward", "paper"]
@@ -217,7 +217,7 @@ def test_every_format_has_the_same_cells(hosted: Dataset, table: str) -> None:
                 assert datetime.fromisoformat(item[name]) == value
                 value = item[name]
             elif documented == "float" and value is not None:
-                # As the file has it: the shortest text that is read as the same 32 bits.
+                # As in the file: the shortest text that parses to the same 32 bits.
                 assert np.float32(item[name]) == np.float32(value)
                 value = item[name]
             assert item[name] == value, name
@@ -247,7 +247,7 @@ def test_rows_are_the_decisions_of_the_records(hosted: Dataset) -> None:
     assert built_in["decision_time_us"].null_count() == built_in.height > 0
     assert set(built_in["built_in_agent"]) == {"random", "greedy"}
     assert decisions["created_at"].null_count() == 0
-    # None was taken over from another game.
+    # No decision was taken over from another game.
     assert decisions["agent"].null_count() == decisions["agent_kind"].null_count() == 0
 
     refused = decisions.filter(polars.col("agent") == "Stubborn")
@@ -259,7 +259,7 @@ def test_rows_are_the_decisions_of_the_records(hosted: Dataset) -> None:
     assert turns["invalid_reward_validity"].unique().to_list() == [-3.0]
 
 
-def test_expressions_are_with_the_decisions_they_came_before(hosted: Dataset) -> None:
+def test_expressions_are_in_the_rows_of_the_decisions_they_precede(hosted: Dataset) -> None:
     expressions = polars.read_parquet(hosted.parquet("expressions"))
     assert set(expressions["label"]) == {"joy", "doubt"}
     assert expressions.filter(polars.col("public"))["label"].unique().to_list() == ["joy"]
@@ -278,34 +278,34 @@ def test_expressions_are_with_the_decisions_they_came_before(hosted: Dataset) ->
     assert any(latest is not None for _, latest in shown)
 
 
-def test_tables_add_up_to_what_simulate_says(simulated: Dataset) -> None:
+def test_tables_agree_with_simulate(simulated: Dataset) -> None:
     decisions = pandas.read_parquet(simulated.parquet("decisions"))
     assert decisions["game_id"].nunique() == GAMES
     assert len(decisions) == simulated.metrics["decisions"]
     turns = decisions[decisions["phase"] == "turn"]
-    for said in simulated.metrics["seats"]:
-        mine = turns[turns["seat"] == said["seat"]]
-        assert mine["agent"].unique().tolist() == [AGENTS[said["seat"]]]
-        assert len(mine) == said["valid_actions"] > 0
-        assert mine["invalid_count"].sum() == said["wrong_actions"]
-        assert (mine["text"] == "pass").sum() == said["passes"] > 0
+    for seat in simulated.metrics["seats"]:
+        mine = turns[turns["seat"] == seat["seat"]]
+        assert mine["agent"].unique().tolist() == [AGENTS[seat["seat"]]]
+        assert len(mine) == seat["valid_actions"] > 0
+        assert mine["invalid_count"].sum() == seat["wrong_actions"]
+        assert (mine["text"] == "pass").sum() == seat["passes"] > 0
         rewards = (mine["reward_paper"].astype(float) + mine["invalid_reward_paper"].astype(float)).sum()
-        count = said["valid_actions"] + said["wrong_actions"]
-        assert rewards / count == pytest.approx(said["mean_reward"], rel=1e-5)
+        count = seat["valid_actions"] + seat["wrong_actions"]
+        assert rewards / count == pytest.approx(seat["mean_reward"], rel=1e-5)
         shifts = mine.drop_duplicates(["game_id", "shift"])
-        assert shifts["shift_points"].sum() == said["points"]
+        assert shifts["shift_points"].sum() == seat["points"]
         games = mine.drop_duplicates(["game_id"])
-        assert (games["game_place"] == 1).sum() == said["games_won"]
-        assert games["game_points"].sum() == said["points"]
+        assert (games["game_place"] == 1).sum() == seat["games_won"]
+        assert games["game_points"].sum() == seat["points"]
 
 
 def names_of(metrics: Any) -> dict[int, str]:
-    """The names that the other layout gives the simulated players: those that are there twice with their seats."""
+    """Returns the names of the simulated players in the chefshatgym layout: duplicates with their seats."""
     agents = [seat["agent"] for seat in metrics["seats"]]
     return {seat: name if agents.count(name) == 1 else f"{name} (seat {seat})" for seat, name in enumerate(agents)}
 
 
-def test_the_chefshatgym_layout_counts_what_simulate_counts(simulated: Dataset) -> None:
+def test_the_chefshatgym_layout_agrees_with_simulate(simulated: Dataset) -> None:
     games = simulated.gym()
     assert len(games) == GAMES
     names = names_of(simulated.metrics)
@@ -327,16 +327,16 @@ def test_the_chefshatgym_layout_counts_what_simulate_counts(simulated: Dataset) 
             for name, score in ast.literal_eval(scores).items():
                 points[name] += score
     metrics = simulated.metrics
-    for said in metrics["seats"]:
-        name = names[said["seat"]]
-        assert played[name] == said["plays"] > 0
-        assert passed[name] == said["passes"] > 0
-        assert points[name] == said["points"]
+    for seat in metrics["seats"]:
+        name = names[seat["seat"]]
+        assert played[name] == seat["plays"] > 0
+        assert passed[name] == seat["passes"] > 0
+        assert points[name] == seat["points"]
         assert pizzas[name] > 0
     assert shifts == metrics["shifts"]
     assert sum(pizzas.values()) == round(metrics["pizzas_per_shift"] * metrics["shifts"])
 
-    # The pizzas of each player, against the events of the records.
+    # The pizzas of each player, compared with the events of the records.
     made = dict.fromkeys(names.values(), 0)
     for path in sorted(simulated.records.glob("*.jsonl")):
         last = None
@@ -350,7 +350,7 @@ def test_the_chefshatgym_layout_counts_what_simulate_counts(simulated: Dataset) 
     assert made == {name: pizzas[name] for name in made}
 
 
-def test_the_chefshatgym_layout_is_read_as_its_own(hosted: Dataset) -> None:
+def test_the_chefshatgym_layout_is_readable_like_the_original(hosted: Dataset) -> None:
     action = re.compile(r"C\d+;Q\d+;J\d+|pass")
     for rows in hosted.gym():
         types = rows["Action_Type"].tolist()
@@ -374,7 +374,7 @@ def test_the_chefshatgym_layout_is_read_as_its_own(hosted: Dataset) -> None:
             assert len(before) == len(after) == 11
             hand = ast.literal_eval(row["Player_Hands"])
             assert len(hand) == 17
-            # What was in the hand is in it still, or on the board.
+            # Each card of the hand is still in it, or on the board.
             gone = [] if text == "pass" else [card for card in after if card]
             assert sorted(card for card in hand + gone if card) == sorted(card for card in hands[row["Source"]] if card)
             assert after == before if text == "pass" else before[0] > after[0]

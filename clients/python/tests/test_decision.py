@@ -1,4 +1,4 @@
-"""Views of a decision request, against values worked out by hand."""
+"""Views of a decision request, compared with values computed by hand."""
 
 from typing import Any
 
@@ -63,7 +63,7 @@ def test_views_show_the_message() -> None:
     assert repr(view) == "Decision(seat=2, decision_id=9, kind=TURN)"
 
 
-def test_a_decision_says_what_the_rules_require() -> None:
+def test_a_decision_has_the_requirements_of_the_rules() -> None:
     play = pb.PlayRequirement(lowest_face=1, highest_face=6, fewest_cards=3, may_pass=True)
     turn = Decision(pb.DecisionRequest(play_requirement=play, default_action=199), SeatInfo("", "", 0))
     assert (turn.play_requirement, turn.gift_requirement, turn.default_action) == (play, None, 199)
@@ -74,7 +74,7 @@ def test_a_decision_says_what_the_rules_require() -> None:
     assert offer.special_action == pb.SPECIAL_ACTION_FOOD_FIGHT
 
 
-def test_views_cannot_be_written_to() -> None:
+def test_views_are_read_only() -> None:
     with pytest.raises(ValueError, match="read-only"):
         decision().hand[0] = 1
 
@@ -110,7 +110,7 @@ def test_attempts_left_may_be_unlimited() -> None:
         ({}, [13]),
         ({"board_face": 4, "board_size": 3, "board_jokers": 1}, [4, 4, 12]),
         ({"board_face": 12, "board_size": 1, "board_jokers": 1}, [12]),
-        # Eleven elevens and two jokers are thirteen cards, of which the board shows eleven.
+        # Eleven 11s and two jokers are thirteen cards; the board shows eleven of them.
         ({"board_face": 11, "board_size": 13, "board_jokers": 2}, [11] * 11),
         ({"board_face": 10, "board_size": 12, "board_jokers": 2}, [10] * 10 + [12]),
     ],
@@ -122,7 +122,7 @@ def test_classic_vector(board: dict[str, Any], slots: list[int]) -> None:
     assert vector.dtype == np.float32
     assert vector.shape == (228,)
     np.testing.assert_array_equal(vector[: F + H], np.array([card / 13 for card in cards], np.float32))
-    # Action 213 is none of a turn's and has no slot.
+    # Action 213 is not an action of a turn and has no slot.
     assert np.flatnonzero(vector[F + H :]).tolist() == [0, 8, 199]
     assert set(vector[F + H :].tolist()) == {0.0, 1.0}
 
@@ -141,12 +141,12 @@ def test_classic_vector_of_another_deck() -> None:
     assert np.flatnonzero(vector[9:]).tolist() == [31]
 
 
-def test_classic_vector_wants_the_start_of_the_game() -> None:
+def test_classic_vector_needs_the_start_of_the_game() -> None:
     with pytest.raises(ValueError, match="start of the game"):
         decision(dealt=0).classic_vector()
 
 
-def test_annotations_are_kept_for_the_answer() -> None:
+def test_annotations_are_stored_for_the_answer() -> None:
     view = decision()
     assert view.annotations is None
     view.annotate(value_estimate=0.5, action_scores=[1.0, 2.0], extra={"why": "because"})

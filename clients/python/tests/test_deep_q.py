@@ -29,7 +29,7 @@ def transitions(config: DeepQConfig, rows: int, seed: int) -> Transitions:
 
 
 def row(of: Transitions, number: int) -> Transitions:
-    """One row alone."""
+    """Returns one row."""
     return Transitions(*(array[number : number + 1] for array in of))
 
 
@@ -43,7 +43,7 @@ def plain(agents: Agents) -> Agents:
 
 
 def same(one: Agents, other: Agents) -> bool:
-    """Whether all numbers are equal to the last bit."""
+    """Returns whether all numbers are bitwise equal."""
     pairs = zip(jax.tree.leaves(plain(one)), jax.tree.leaves(plain(other)), strict=True)
     return all(np.array_equal(np.asarray(left), np.asarray(right)) for left, right in pairs)
 
@@ -61,7 +61,7 @@ def values(config: DeepQConfig, agents: Agents, state: list[float]) -> np.ndarra
     )
 
 
-def test_the_standard_parameters_are_those_of_the_paper() -> None:
+def test_the_default_parameters_are_those_of_the_paper() -> None:
     config = DeepQConfig()
     assert (config.inputs, config.hidden, config.outputs) == (228, (128, 256), 200)
     assert (config.batch_size, config.memory_size, config.discount, config.learning_rate) == (32, 2000, 0.95, 0.001)
@@ -71,7 +71,7 @@ def test_the_standard_parameters_are_those_of_the_paper() -> None:
 
 
 @pytest.mark.parametrize(
-    ("changed", "said"),
+    ("changed", "message"),
     [
         ({"batch_size": 0}, "batch_size must be 1..=4,096, not 0"),
         ({"memory_size": 31}, "memory_size must be 32..=1,000,000, not 31"),
@@ -83,8 +83,8 @@ def test_the_standard_parameters_are_those_of_the_paper() -> None:
         ({"inputs": 200, "see_mask": False}, "without see_mask"),
     ],
 )
-def test_parameters_out_of_range_are_refused(changed: dict[str, Any], said: str) -> None:
-    with pytest.raises(ValueError, match=said.split(",")[0].replace("(", r"\(")):
+def test_parameters_out_of_range_are_refused(changed: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message.split(",")[0].replace("(", r"\(")):
         dataclasses.replace(DeepQConfig(), **changed)
 
 
@@ -153,7 +153,7 @@ def test_with_a_mask_the_next_value_is_that_of_a_legal_action() -> None:
         assert values(config, agents, [1, 0, 0, 0])[0, 0] == pytest.approx(expected, abs=0.05)
 
 
-def test_a_mask_binds_exploring_and_exploiting() -> None:
+def test_with_a_mask_all_actions_are_legal() -> None:
     config = dataclasses.replace(TINY, mask=True)
     masks: Any = np.array([[False, True, True], [True, False, False]])
     states: Any = np.ones((2, 4), np.float32)
@@ -169,7 +169,7 @@ def test_a_mask_binds_exploring_and_exploiting() -> None:
         assert seen[0] == {1, 2} if epsilon else len(seen[0]) == 1 and 0 not in seen[0]
 
 
-def test_without_a_mask_exploring_reaches_every_action() -> None:
+def test_without_a_mask_exploration_reaches_every_action() -> None:
     agents = deep_q.start(TINY, [1])
     nothing: Any = np.zeros((1, 3), np.bool_)
     states: Any = np.ones((1, 4), np.float32)
@@ -210,7 +210,7 @@ def test_epsilon_decays_with_every_update_and_stops() -> None:
     assert int(agents.updates[0]) == 13
 
 
-def test_the_target_is_the_online_network_of_the_last_multiple() -> None:
+def test_the_target_network_is_updated_periodically() -> None:
     agents = deep_q.start(TINY, [1])
     online = []
     for number in range(8 + 24):
@@ -227,36 +227,36 @@ def test_the_memory_forgets_the_oldest_first() -> None:
     config = dataclasses.replace(TINY, memory_size=8)
     agents = deep_q.start(config, [1])
     for number in range(11):
-        told = transitions(config, 1, number)._replace(rewards=jax.numpy.array([float(number)]))
-        agents = deep_q.learn(config, agents, ids(0), told)
+        batch = transitions(config, 1, number)._replace(rewards=jax.numpy.array([float(number)]))
+        agents = deep_q.learn(config, agents, ids(0), batch)
     assert np.asarray(agents.memory.rewards[0]).tolist() == [8, 9, 10, 3, 4, 5, 6, 7]
     assert int(agents.remembered[0]) == 11
 
 
 def test_agents_that_do_not_exist_are_ignored() -> None:
-    told = transitions(TINY, 2, 0)
+    batch = transitions(TINY, 2, 0)
     agents, alone = deep_q.start(TINY, [1]), deep_q.start(TINY, [1])
     for _ in range(12):
-        agents = deep_q.learn(TINY, agents, ids(0, 1), told)
-        alone = deep_q.learn(TINY, alone, ids(0), row(told, 0))
+        agents = deep_q.learn(TINY, agents, ids(0, 1), batch)
+        alone = deep_q.learn(TINY, alone, ids(0), row(batch, 0))
     assert int(agents.updates[0]) == 5
     assert same(agents, alone)
 
 
-def test_agents_in_a_stack_learn_what_they_would_have_learned_alone() -> None:
+def test_agents_in_a_stack_learn_the_same_as_alone() -> None:
     seeds, steps = [3, 1, 4, 1], 30
     nobody = len(seeds)
     stack = deep_q.start(TINY, seeds)
     alone = [deep_q.start(TINY, [seed]) for seed in seeds]
     for step in range(steps):
-        # Not every agent has something to learn in every step.
+        # Not every agent learns in every step.
         busy = [agent if (step + agent) % 3 else nobody for agent in range(nobody)]
-        told = transitions(TINY, len(busy), step)
-        stack = deep_q.learn(TINY, stack, ids(*busy), told)
-        keys, actions = deep_q.act(TINY, stack, ids(*busy), told.states, told.next_masks, ids(0, 0, 0, 0))
+        batch = transitions(TINY, len(busy), step)
+        stack = deep_q.learn(TINY, stack, ids(*busy), batch)
+        keys, actions = deep_q.act(TINY, stack, ids(*busy), batch.states, batch.next_masks, ids(0, 0, 0, 0))
         stack = stack._replace(keys=keys)
         for agent in set(busy) - {nobody}:
-            here = row(told, agent)
+            here = row(batch, agent)
             one = deep_q.learn(TINY, alone[agent], ids(0), here)
             keys, action = deep_q.act(TINY, one, ids(0), here.states, here.next_masks, ids(0))
             alone[agent] = one._replace(keys=keys)
@@ -272,20 +272,20 @@ def test_the_same_seed_learns_the_same() -> None:
     first, second = deep_q.start(TINY, [7]), deep_q.start(TINY, [7])
     other = deep_q.start(TINY, [8])
     for number in range(20):
-        told = transitions(TINY, 1, number)
-        first, second, other = (deep_q.learn(TINY, agents, ids(0), told) for agents in (first, second, other))
+        batch = transitions(TINY, 1, number)
+        first, second, other = (deep_q.learn(TINY, agents, ids(0), batch) for agents in (first, second, other))
     assert same(first, second)
     assert not same(first, other)
 
 
-def test_an_agent_that_does_not_see_the_mask_is_not_moved_by_it() -> None:
+def test_an_agent_that_does_not_see_the_mask_ignores_it() -> None:
     config = dataclasses.replace(TINY, see_mask=False)
     agents = deep_q.start(config, [1])
     assert values(config, agents, [0.5, 0, 0, 0]).tolist() == values(config, agents, [0.5, 1, 0, 1]).tolist()
     assert values(config, agents, [0.5, 0, 0, 0]).tolist() != values(config, agents, [0.2, 0, 0, 0]).tolist()
 
 
-def test_agents_begin_with_networks_that_were_learned_before() -> None:
+def test_agents_start_with_given_networks() -> None:
     agents = deep_q.start(TINY, [1, 2])
     for number in range(12):
         agents = deep_q.learn(TINY, agents, ids(0, 1), transitions(TINY, 2, number))

@@ -53,18 +53,18 @@ def test_a_training_resumes_after_ctrl_c(
     wait_until(place.out.exists, "the network is written", running)
     during = checkpoint.load(place.state)
     running.send_signal(signal.SIGINT)
-    _, said = running.communicate(timeout=LIMIT_S)
-    assert running.returncode == 130, said
-    assert "of 1,000,000 Shifts" in said
-    assert "resume by the same command with --resume" in said
-    assert "Traceback" not in said
+    _, message = running.communicate(timeout=LIMIT_S)
+    assert running.returncode == 130, message
+    assert "of 1,000,000 Shifts" in message
+    assert "resume by the same command with --resume" in message
+    assert "Traceback" not in message
 
     stopped = checkpoint.load(place.state)
     assert stopped.shifts >= during.shifts >= 1
     assert int(stopped.agents.updates[0]) > 0
     (expected,) = stopped.networks("deep-q")
-    for kept, layer in zip(network.load(place.out).layers, expected.layers, strict=True):
-        np.testing.assert_array_equal(kept.weight, layer.weight)
+    for saved, layer in zip(network.load(place.out).layers, expected.layers, strict=True):
+        np.testing.assert_array_equal(saved.weight, layer.weight)
 
     assert main(place.arguments(stopped.shifts + 2, "--resume", "--json")) == 0
     assert json.loads(capsys.readouterr().out)["event"] == "trained"
@@ -88,7 +88,7 @@ def full_rules(real_address: str) -> pb.RuleSet:
 
 @pytest.mark.server
 @pytest.mark.parametrize(
-    ("given", "said"),
+    ("given", "message"),
     [
         (["--mask"], "mask False, not True"),
         (["--opponents", "greedy"], "opponents random, not greedy"),
@@ -98,20 +98,20 @@ def full_rules(real_address: str) -> pb.RuleSet:
         (["--shifts", "3"], "has played 3 Shifts already: give more than that with --shifts"),
     ],
 )
-def test_a_training_is_not_contradicted(
-    place: Place, full_rules: pb.RuleSet, given: Sequence[str], said: str, capsys: pytest.CaptureFixture[str]
+def test_contradicting_options_are_refused(
+    place: Place, full_rules: pb.RuleSet, given: Sequence[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     begin(place, full_rules)
     before = place.state.read_bytes()
     assert main(place.arguments(5, "--resume", *given)) == 1
     found = capsys.readouterr().err
-    assert said in found
+    assert message in found
     assert place.state.read_bytes() == before
     assert not place.out.exists()
 
 
 @pytest.mark.server
-def test_parameters_are_not_contradicted(place: Place, full_rules: pb.RuleSet, capsys: pytest.CaptureFixture[str]) -> None:
+def test_contradicting_parameters_are_refused(place: Place, full_rules: pb.RuleSet, capsys: pytest.CaptureFixture[str]) -> None:
     begin(place, full_rules)
     place.parameters.write_text(json.dumps({"parameters": {**SMALL, "batch_size": 8}}))
     assert main(place.arguments(5, "--resume")) == 1
@@ -124,20 +124,20 @@ def test_resuming_needs_a_checkpoint(tmp_path: Path, capsys: pytest.CaptureFixtu
 
 
 def begin(place: Place, rules: pb.RuleSet) -> None:
-    """Writes a training that has played 3 Shifts."""
+    """Writes a checkpoint after 3 Shifts."""
     config = dataclasses.replace(DeepQConfig(), hidden=(8,), batch_size=4, memory_size=32)
     agents = deep_q.start(config, [7])
     checkpoint.save(place.state, checkpoint.Training(config, agents, rules, "a command", "random", "paper", 7, 3))
 
 
-def test_the_options_that_were_given_are_known() -> None:
+def test_given_options_are_distinguished_from_defaults() -> None:
     options = parse(["deep-q", "--out", "o", "--shifts", "250", "--mask"])
     assert options.given == {"out": Path("o"), "shifts": 250, "mask": True}
     assert (options.mask, options.opponents, parse(["deep-q", "--out", "o"]).mask) == (True, "random", False)
     assert parse(["ppo", "--out", "o", "--minutes", "1", "--games", "256"]).given["games"] == 256
 
 
-def test_commands_are_remembered_but_not_without_end() -> None:
+def test_a_limited_number_of_commands_is_stored() -> None:
     assert runs.trained_by("", "first") == "first"
     assert runs.trained_by("first", "second") == "first; second"
     commands = ""
@@ -150,7 +150,7 @@ def test_commands_are_remembered_but_not_without_end() -> None:
     assert len(runs.trained_by("", "x" * 100_000)) <= runs.MAX_TRAINED_BY
 
 
-def test_the_first_ctrl_c_asks_and_the_second_interrupts() -> None:
+def test_the_first_ctrl_c_requests_a_stop_and_the_second_interrupts() -> None:
     before = signal.getsignal(signal.SIGINT)
     with runs.Interrupts() as interrupts:
         assert not interrupts.asked

@@ -35,13 +35,13 @@ def test_a_training_resumes_exactly(training: Training, tmp_path: Path) -> None:
     for name in ("config", "rules", "trained_by", "opponents", "rewards", "seed", "shifts"):
         assert getattr(read, name) == getattr(training, name), name
     assert same(read.agents, training.agents)
-    # Learning consumes agents, and those of the fixture are needed again.
+    # Learning consumes agents; those of the fixture are needed again.
     one, other = checkpoint.load(tmp_path / "t.training").agents, read.agents
     for number in range(5):
-        told = transitions(SMALL, 2, 100 + number)
-        one, other = (deep_q.learn(SMALL, agents, ids(0, 1), told) for agents in (one, other))
-        keys, actions = deep_q.act(SMALL, one, ids(0, 1), told.states, told.next_masks, ids(0, 0))
-        keys_other, actions_other = deep_q.act(SMALL, other, ids(0, 1), told.states, told.next_masks, ids(0, 0))
+        batch = transitions(SMALL, 2, 100 + number)
+        one, other = (deep_q.learn(SMALL, agents, ids(0, 1), batch) for agents in (one, other))
+        keys, actions = deep_q.act(SMALL, one, ids(0, 1), batch.states, batch.next_masks, ids(0, 0))
+        keys_other, actions_other = deep_q.act(SMALL, other, ids(0, 1), batch.states, batch.next_masks, ids(0, 0))
         assert actions.tolist() == actions_other.tolist()
         one, other = one._replace(keys=keys), other._replace(keys=keys_other)
     assert same(one, other)
@@ -50,17 +50,17 @@ def test_a_training_resumes_exactly(training: Training, tmp_path: Path) -> None:
 
 
 def test_a_network_decides_as_the_agent_does(training: Training, tmp_path: Path) -> None:
-    told = transitions(SMALL, 2, 0)
-    expected = deep_q.outputs(SMALL, jax.tree.map(lambda leaf: leaf[1], training.agents.online), told.states)
+    batch = transitions(SMALL, 2, 0)
+    expected = deep_q.outputs(SMALL, jax.tree.map(lambda leaf: leaf[1], training.agents.online), batch.states)
     net = training.networks("second")[1]
     network.save(tmp_path / "n.safetensors", net.layers, net.info)
     read = network.load(tmp_path / "n.safetensors")
-    np.testing.assert_allclose(read.outputs(np.asarray(told.states)), expected, rtol=1e-5, atol=1e-6)
+    np.testing.assert_allclose(read.outputs(np.asarray(batch.states)), expected, rtol=1e-5, atol=1e-6)
     assert (read.info.input, read.info.output, read.info.masked, read.info.name) == ("classic", "turns", False, "second")
     assert '"targetShifts": 250' in read.info.rules
 
 
-def test_networks_from_files_are_begun_with(training: Training) -> None:
+def test_training_can_start_with_networks_from_files(training: Training) -> None:
     params = checkpoint.stacked(SMALL, training.networks("both"))
     jax.tree.map(np.testing.assert_array_equal, params, training.agents.online)
     with pytest.raises(ValueError, match="have the sizes"):
@@ -102,12 +102,12 @@ def test_files_of_other_formats_are_refused(training: Training, tmp_path: Path) 
     tensors = safetensors.numpy.load_file(path)
     with safetensors.safe_open(path, framework="np") as file:
         metadata = file.metadata()
-    for broken, said in (
+    for broken, message in (
         ({name: tensor for name, tensor in tensors.items() if name != "updates"}, "updates"),
         ({**tensors, "updates": tensors["updates"][:1]}, r"its updates is int32\[1\], not int32\[2\]"),
     ):
         path.write_bytes(safetensors.numpy.save(broken, metadata=metadata))
-        with pytest.raises(TrainingFileError, match=said):
+        with pytest.raises(TrainingFileError, match=message):
             checkpoint.load(path)
     with pytest.raises(FileNotFoundError):
         checkpoint.load(tmp_path / "missing")

@@ -1,4 +1,4 @@
-"""Deep Q agents learn at their seats; against the real server: training, tuning and playing by command."""
+"""Training of Deep Q agents; on the real server also tuning and the commands."""
 
 import json
 import re
@@ -19,12 +19,12 @@ from chefshat.learn.deep_q_training import LockStep
 from chefshat.vector import VectorEnv
 
 
-def told(*numbers: float) -> Any:
+def rewards(*numbers: float) -> Any:
     return np.array(numbers, np.float32)
 
 
 def seen(*numbers: int) -> Any:
-    """States that tell which they are."""
+    """States that are numbered."""
     states = np.zeros((len(numbers), 4), np.float32)
     states[:, 0] = numbers
     return states
@@ -37,11 +37,11 @@ def legal(rows: int) -> Any:
 def test_agents_store_the_outcome_of_each_decision() -> None:
     """Agent 0 decides three times in two episodes, agent 2 once and then again in the next, agent 1 never."""
     stack = LockStep(TINY, deep_q.start(TINY, [1, 2, 3]), 2)
-    first = stack.decide(ids(0, 2), told(9, 9), seen(10, 12), legal(2), ids(0, 0))
-    second = stack.decide(ids(0), told(1), seen(20), legal(1), ids(0))
-    stack.end(ids(0, 1, 2, 0), told(2, 3, 4, 5))
-    third = stack.decide(ids(2, 0), told(9, 9), seen(32, 30), legal(2), ids(0, 0))
-    stack.decide(ids(0), told(6), seen(40), legal(1), ids(0))
+    first = stack.decide(ids(0, 2), rewards(9, 9), seen(10, 12), legal(2), ids(0, 0))
+    second = stack.decide(ids(0), rewards(1), seen(20), legal(1), ids(0))
+    stack.end(ids(0, 1, 2, 0), rewards(2, 3, 4, 5))
+    third = stack.decide(ids(2, 0), rewards(9, 9), seen(32, 30), legal(2), ids(0, 0))
+    stack.decide(ids(0), rewards(6), seen(40), legal(1), ids(0))
     memory = stack.agents.memory
     assert np.asarray(stack.agents.remembered).tolist() == [3, 0, 1]
     assert np.asarray(memory.states[0, :3, 0]).tolist() == [10, 20, 30]
@@ -55,8 +55,8 @@ def test_agents_store_the_outcome_of_each_decision() -> None:
 
 def test_agents_that_do_not_learn_store_nothing() -> None:
     stack = LockStep(TINY, deep_q.start(TINY, [1]), 1, explore=False, learn=False)
-    actions = {int(stack.decide(ids(0), told(1), seen(10), legal(1), ids(0))[0]) for _ in range(20)}
-    stack.end(ids(0), told(1))
+    actions = {int(stack.decide(ids(0), rewards(1), seen(10), legal(1), ids(0))[0]) for _ in range(20)}
+    stack.end(ids(0), rewards(1))
     assert len(actions) == 1
     assert int(stack.agents.remembered[0]) == 0
 
@@ -77,7 +77,7 @@ def games(address: str, *, seats: list[int], seeds: list[bytes], shifts: int = 2
 
 
 @pytest.mark.server
-def test_a_game_is_the_same_whatever_is_played_beside_it(real_address: str) -> None:
+def test_a_game_does_not_depend_on_the_games_beside_it(real_address: str) -> None:
     config = DeepQConfig(hidden=(16,), batch_size=8, memory_size=64, wrong_limit=5)
     seeds = [bytes([number]) * 32 for number in range(3)]
     with games(real_address, seats=[0, 2], seeds=seeds) as env:
@@ -90,7 +90,7 @@ def test_a_game_is_the_same_whatever_is_played_beside_it(real_address: str) -> N
         assert np.array_equal(counted[1:2], played_alone.of_seats[name]), name
     assert int(played.of_seats["wrong"][:, :, [0, 2]].sum()) > 0
     assert played.most_attempts == 5
-    # Every decision of the server's count is a transition: those that went on, and those that ended an episode.
+    # Every decision that the server counted is a transition, including those that ended an episode.
     attempts = played.of_seats["valid"] + played.of_seats["wrong"]
     assert np.asarray(agents.remembered).tolist() == attempts[:, :, [0, 2]].sum(axis=1).ravel().tolist()
     assert np.asarray(alone.remembered).tolist() == np.asarray(agents.remembered[2:4]).tolist()
@@ -123,7 +123,7 @@ def test_an_agent_is_trained_resumed_and_plays_in_a_room(
     assert (before["event"], before["wrong_per_shift"]) == ("trained", 0)
     trained = checkpoint.load(tmp_path / "agent.training")
     assert network.load(out).info.rules == trained.networks("deep-q")[0].info.rules
-    # The Shifts count from the start: one more.
+    # Shifts are counted from the start of the training: one more.
     assert main([*command, "--shifts", "3", "--resume"]) == 0
     resumed = checkpoint.load(tmp_path / "agent.training")
     assert int(resumed.agents.updates[0]) > int(trained.agents.updates[0]) > 0
@@ -138,10 +138,10 @@ def test_an_agent_is_trained_resumed_and_plays_in_a_room(
         play = ["play", str(out), "--address", real_address, "--name", "Deep", "--ticket-file", str(ticket), "--json"]
         code = main([*play, "--code", room.join_code])
         others.join()
-        told = json.loads(capsys.readouterr().out)
-        assert (code, told["event"], told["invalid"], told["late"]) == (0, "finished", 0, 0)
+        output = json.loads(capsys.readouterr().out)
+        assert (code, output["event"], output["invalid"], output["late"]) == (0, "finished", 0, 0)
         # Two Shifts, with an exchange and perhaps a special action before the second.
-        assert told["decisions"] > 2
+        assert output["decisions"] > 2
         cup = pb.TournamentSettings(
             name="Coppa",
             format=pb.TOURNAMENT_FORMAT_ROUND_ROBIN,
@@ -152,8 +152,8 @@ def test_an_agent_is_trained_resumed_and_plays_in_a_room(
         )
         made = client.create_tournament(cup)
         assert main([*play, "--tournament", made.join_code, "--games", "2"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert [(game["event"], game["invalid"], game["late"]) for game in told["games"]] == [("finished", 0, 0)] * 2
+    output = json.loads(capsys.readouterr().out)
+    assert [(game["event"], game["invalid"], game["late"]) for game in output["games"]] == [("finished", 0, 0)] * 2
     assert not ticket.exists()
 
 
@@ -171,7 +171,7 @@ def test_a_network_for_other_decks_does_not_play(real_address: str, tmp_path: Pa
         code = main(
             ["play", str(tmp_path / "n.safetensors"), "--address", real_address, "--code", room.join_code, "--name", "Deep"]
         )
-        # The seat was not attached, so no game has been spoiled.
+        # The seat was not attached, so no game was disturbed.
         assert client.get_room(room.room.room_id).state == pb.ROOM_STATE_WAITING
         client.close_room(room.room.room_id, room.owner_token)
         others.join()
@@ -193,28 +193,28 @@ def test_parameters_are_tuned_and_trained_with(real_address: str, tmp_path: Path
     table = capsys.readouterr().out
     assert "Shifts won" in table
     assert "Trial 0 has the paper's parameters." in table
-    kept = json.loads(found.read_text())
-    assert [trial["number"] for trial in kept["trials"]] == [0, 1]
-    first, second = (trial["parameters"] for trial in kept["trials"])
+    tuned = json.loads(found.read_text())
+    assert [trial["number"] for trial in tuned["trials"]] == [0, 1]
+    first, second = (trial["parameters"] for trial in tuned["trials"])
     assert (first["hidden"], first["batch_size"], first["discount"]) == ([128, 256], 32, 0.95)
     assert first != second
-    assert kept["parameters"] == kept["trials"][kept["best"]]["parameters"]
+    assert tuned["parameters"] == tuned["trials"][tuned["best"]]["parameters"]
     # The best and the paper's parameters once more, with values that were not selected.
-    again = kept["trained_afresh"]
-    assert [trial["number"] for trial in again] == sorted({0, kept["best"]})
+    again = tuned["trained_afresh"]
+    assert [trial["number"] for trial in again] == sorted({0, tuned["best"]})
     for trial in again:
-        assert trial["parameters"] == kept["trials"][trial["number"]]["parameters"]
+        assert trial["parameters"] == tuned["trials"][trial["number"]]["parameters"]
         assert f"{trial['value']:.1%} ({trial['least']:.1%} to {trial['most']:.1%}): trial {trial['number']}" in table
-    # Chance is seeded: the same command finds the same.
+    # Everything is seeded: the same command has the same result.
     assert main([*command[:2], str(tmp_path / "again.json"), *command[3:], "--json"]) == 0
     same = json.loads(capsys.readouterr().out)
-    assert (same["trials"], same["trained_afresh"]) == (kept["trials"], again)
+    assert (same["trials"], same["trained_afresh"]) == (tuned["trials"], again)
     out = tmp_path / "agent.safetensors"
     assert main(["deep-q", "--out", str(out), "--shifts", "1", "--parameters", str(found), "--address", real_address]) == 0
-    assert checkpoint.load(tmp_path / "agent.training").config.batch_size == kept["parameters"]["batch_size"]
+    assert checkpoint.load(tmp_path / "agent.training").config.batch_size == tuned["parameters"]["batch_size"]
 
 
-def test_parameters_of_no_such_file_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_missing_parameter_file_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "p.json"
     options = ["deep-q", "--out", str(tmp_path / "a"), "--parameters", str(path), "--address", "127.0.0.1:1"]
     assert main(options) == 1
@@ -230,6 +230,6 @@ def test_results_of_a_few_shifts_are_counts(real_address: str, tmp_path: Path, c
     # With other seeds an untrained agent without a mask may take thousands of attempts.
     options = ["--shifts", "2", "--seed", "2", "--address", real_address]
     assert main(["deep-q", "--out", str(tmp_path / "a.safetensors"), *options]) == 0
-    said = capsys.readouterr().out
-    assert re.search(r"won [01] of the last 1, ", said)
-    assert "%" not in said
+    output = capsys.readouterr().out
+    assert re.search(r"won [01] of the last 1, ", output)
+    assert "%" not in output

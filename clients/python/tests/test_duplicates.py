@@ -1,4 +1,4 @@
-"""The picture of the effect of duplicate deals."""
+"""The plot of the effect of duplicate deals."""
 
 import json
 from pathlib import Path
@@ -28,7 +28,7 @@ REPORT = json.dumps(
 )
 
 
-def test_every_pair_and_length_has_its_panel() -> None:
+def test_every_pair_and_length_has_a_panel() -> None:
     panels = figure(REPORT).panels
     assert [panel.title for panel in panels] == [
         "trained / random, games of 1 Shift",

@@ -1,4 +1,4 @@
-"""The environments of Gymnasium and PettingZoo: their own checkers against the real server, and details against the toy."""
+"""The Gymnasium and PettingZoo environments: the libraries' checkers on the real server, details on the toy server."""
 
 import io
 import subprocess
@@ -35,7 +35,7 @@ NAMES = ["classic", "table", "columns", "own"]
 @pytest.mark.server
 @pytest.mark.parametrize("episode", ["shift", "game"])
 @pytest.mark.parametrize("observation", FORMS, ids=NAMES)
-def test_gymnasium_finds_nothing_wrong(real_address: str, observation: Any, episode: str) -> None:
+def test_the_gymnasium_checker_passes(real_address: str, observation: Any, episode: str) -> None:
     env = gymnasium.make(ENV_ID, address=real_address, observation=observation, episode=episode)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -49,13 +49,13 @@ def test_gymnasium_finds_nothing_wrong(real_address: str, observation: Any, epis
 @pytest.mark.server
 @pytest.mark.parametrize("episode", ["shift", "game"])
 @pytest.mark.parametrize("observation", FORMS, ids=NAMES)
-def test_pettingzoo_finds_nothing_wrong(real_address: str, observation: Any, episode: str) -> None:
+def test_the_pettingzoo_checker_passes(real_address: str, observation: Any, episode: str) -> None:
     def make(**options: Any) -> Any:
         return chefshat_v1.env(real_address, observation=observation, episode=episode, **options)
 
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        # It knows by name which environments have masks in their observations, and those are not asked for arrays.
+        # The checker knows by name which environments have masks in their observations, and does not require arrays of these.
         warnings.filterwarnings("ignore", message="Observation is not a NumPy array")
         warnings.filterwarnings("ignore", message="Observation space for each agent probably should be")
         # A hand may be empty.
@@ -68,7 +68,7 @@ def test_pettingzoo_finds_nothing_wrong(real_address: str, observation: Any, epi
 
 
 @pytest.mark.server
-def test_a_random_agent_plays_whole_games(real_address: str) -> None:
+def test_a_random_agent_plays_complete_games(real_address: str) -> None:
     env = chefshat.make("gymnasium", address=real_address, episode="game", rewards="points", render_mode="ansi")
     env.action_space.seed(1)
     _, info = env.reset(seed=1)
@@ -89,7 +89,7 @@ def test_a_random_agent_plays_whole_games(real_address: str) -> None:
 
 
 @pytest.mark.server
-def test_the_vector_environment_is_many_of_the_single_one(real_address: str) -> None:
+def test_the_vector_environment_equals_many_single_ones(real_address: str) -> None:
     games = 3
     options: dict[str, Any] = {"address": real_address, "opponents": "greedy", "observation": "columns", "rewards": "paper"}
     vector = gymnasium.make_vec(ENV_ID, num_envs=games, **options)
@@ -106,7 +106,7 @@ def test_the_vector_environment_is_many_of_the_single_one(real_address: str) -> 
         actions = infos["action_mask"].argmax(axis=1)
         observed, rewards, terminations, truncations, infos = vector.step(actions)
         if len(vector.vector.batch.beginnings) > 0:
-            # A game is over, and another seed's turn has come.
+            # A game is over; the next one has another seed.
             break
         for game, env in enumerate(singles):
             alone, reward, terminated, truncated, info = env.step(actions[game])
@@ -130,7 +130,7 @@ def test_the_vector_environment_is_many_of_the_single_one(real_address: str) -> 
 
 
 @pytest.mark.server
-def test_forms_have_their_observations(real_address: str) -> None:
+def test_observation_forms(real_address: str) -> None:
     with chefshat.VectorEnv(real_address, seed=3) as env:
         seen = env.batch
         sizes = env.sizes
@@ -160,7 +160,7 @@ def test_an_episode_of_one_seat(toy: FakeVector) -> None:
     assert (reward, terminated, truncated, info["place"]) == (3 + 102, True, False, 3)
     assert seen["hands"][2] == 5
     assert not seen["action_mask"].any()
-    # The next Shift has been begun by the server, the one after is asked for.
+    # The server has started the next Shift already; the one after it starts on request.
     seen, _ = env.reset()
     assert seen["shifts"].tolist() == [2]
     assert not any(request.HasField("reset") for request in toy.requests)
@@ -198,12 +198,12 @@ def test_the_next_episode_starts_in_the_same_step(toy: FakeVector) -> None:
     env.close()
 
 
-def test_games_without_a_row_stay_as_they_were(toy: FakeVector) -> None:
+def test_games_without_a_row_do_not_change(toy: FakeVector) -> None:
     env = ChefsHatVectorEnv(toy.address, 3, seat=0, observation=hands)
     env.reset()
     whole = env.step([199, 199, 199])[0]
     batch = env.vector.batch
-    # Game 1 has none: the server left decisions of its other seats for later.
+    # Game 1 has no row: the server postponed decisions of its other seats.
     left = batch.take(np.array([0, 2]))
     seen = env._observe(left)
     assert seen.tolist() == whole.tolist()
@@ -236,7 +236,7 @@ def test_all_seats_are_rewarded_when_they_decide_next(toy: FakeVector) -> None:
 
 
 @pytest.mark.parametrize("kind", ["gymnasium", "gymnasium_vector", "pettingzoo", "vector"])
-def test_make_makes_every_kind(toy: FakeVector, kind: Any) -> None:
+def test_make_creates_every_kind(toy: FakeVector, kind: Any) -> None:
     env = chefshat.make(kind, address=toy.address, rewards="points", seed=8)
     assert toy.setups[0].reward_scheme == chefshat.pb.REWARD_SCHEME_POINTS
     assert toy.setups[0].base_seed == 8
@@ -265,7 +265,7 @@ def test_invalid_options_are_reported(toy: FakeVector, make: Any, says: str) -> 
         make(toy.address)
 
 
-def test_many_games_begin_with_a_reset(toy: FakeVector) -> None:
+def test_many_games_start_with_a_reset(toy: FakeVector) -> None:
     env = ChefsHatVectorEnv(toy.address, 3)
     with pytest.raises(gymnasium.error.ResetNeeded):
         env.step([199, 199, 199])
@@ -282,7 +282,7 @@ def test_a_closed_environment_stays_closed(toy: FakeVector, make: Any) -> None:
         env.reset()
 
 
-def test_a_mask_can_be_drawn_from(toy: FakeVector) -> None:
+def test_a_mask_can_be_sampled(toy: FakeVector) -> None:
     env = chefshat.make(address=toy.address)
     _, info = env.reset()
     assert info["action_mask"].dtype == np.int8
@@ -309,7 +309,7 @@ def test_only_needed_packages_are_imported(toy: FakeVector) -> None:
     ("missing", "use"),
     [("gymnasium", "import chefshat.envs"), ("gymnasium", "chefshat.make()"), ("pettingzoo", "chefshat.make('pettingzoo')")],
 )
-def test_it_is_said_which_extra_is_missing(missing: str, use: str) -> None:
+def test_a_missing_extra_is_named(missing: str, use: str) -> None:
     done = without(missing, use)
     assert done.returncode != 0
     assert "pip install 'chefshat[envs]'" in done.stderr

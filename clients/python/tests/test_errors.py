@@ -1,4 +1,4 @@
-"""How refusals reach the caller, over a real connection, and how long the waits between attempts are."""
+"""Refusals over a real connection, and the delays between connection attempts."""
 
 import json
 import random
@@ -14,7 +14,7 @@ from chefshat import Backoff, ChefsHatError, aio
 from chefshat.errors import exit_code
 
 
-def test_a_refusal_carries_reason_metadata_and_code(fake: FakeServer) -> None:
+def test_a_refusal_has_reason_metadata_and_code(fake: FakeServer) -> None:
     with chefshat.Client(fake.address) as client, pytest.raises(ChefsHatError) as caught:
         client.join_room("WRONG", "Ada")
     error = caught.value
@@ -33,14 +33,14 @@ async def async_refusal(address: str) -> ChefsHatError:
     return caught.value
 
 
-def test_a_refusal_reaches_asyncio_alike(fake: FakeServer) -> None:
+def test_a_refusal_is_the_same_under_asyncio(fake: FakeServer) -> None:
     import asyncio
 
     error = asyncio.run(async_refusal(fake.address))
     assert (error.reason, error.metadata) == ("ROOM_UNKNOWN", {"room_id": "nowhere"})
 
 
-def test_a_refused_stream_raises_too(fake: FakeServer) -> None:
+def test_a_refused_stream_raises(fake: FakeServer) -> None:
     with chefshat.Client(fake.address) as client:
         with pytest.raises(ChefsHatError, match="GAME_UNKNOWN"):
             list(client.record("nothing"))
@@ -60,7 +60,7 @@ def test_without_details_the_code_is_the_reason() -> None:
             client.play(chefshat.RandomAgent(), "ticket")
 
 
-def test_a_server_may_take_its_time_to_answer_a_connection(fake: FakeServer) -> None:
+def test_a_slow_connection_is_awaited(fake: FakeServer) -> None:
     with Proxy(fake.address, delay_s=0.5) as proxy, chefshat.Client(proxy.address) as client:
         assert client.server_info().server_version == "fake"
 
@@ -72,7 +72,7 @@ def test_addresses() -> None:
         chefshat.Client("ftp://127.0.0.1:1")
 
 
-def test_backoff_grows_up_to_its_bound() -> None:
+def test_backoff_grows_to_its_limit() -> None:
     backoff = Backoff(first_s=0.1, factor=2.0, max_s=1.0)
     chance = random.Random(3)
     for failures, nominal in [(1, 0.1), (2, 0.2), (4, 0.8), (5, 1.0), (10_000, 1.0)]:
@@ -105,15 +105,15 @@ REFUSAL = ChefsHatError("ROOM_FULL", "no seat is free", {"room_id": "7"}, grpc.S
     ],
     ids=["refusal", "no message", "file"],
 )
-def test_commands_tell_errors_in_words_or_as_json(
+def test_commands_report_errors_as_text_or_json(
     error: Exception, line: dict[str, object], words: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def fails() -> int:
         raise error
 
     assert exit_code(fails, as_json=True) == 1
-    printed, said = capsys.readouterr()
-    assert (printed.count("\n"), json.loads(printed), said) == (1, line, "")
+    printed, expected = capsys.readouterr()
+    assert (printed.count("\n"), json.loads(printed), expected) == (1, line, "")
     assert exit_code(fails, as_json=False) == 1
     assert capsys.readouterr() == ("", words)
 
@@ -127,10 +127,10 @@ def test_expected_errors_are_printed() -> None:
         exit_code(fails, as_json=False)
 
 
-@pytest.mark.parametrize(("words", "said"), [("", "interrupted\n"), ("a place is left", "interrupted; a place is left\n")])
-def test_ctrl_c_prints_the_message_of_the_interrupt(words: str, said: str, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(("words", "expected"), [("", "interrupted\n"), ("a place is left", "interrupted; a place is left\n")])
+def test_ctrl_c_prints_the_message_of_the_interrupt(words: str, expected: str, capsys: pytest.CaptureFixture[str]) -> None:
     def interrupted() -> int:
         raise KeyboardInterrupt(*filter(None, [words]))
 
     assert exit_code(interrupted, as_json=True) == 130
-    assert capsys.readouterr() == ("", said)
+    assert capsys.readouterr() == ("", expected)

@@ -6,9 +6,9 @@ import pytest
 from chefshat.learn.evaluation import summed_up
 
 
-def test_shifts_of_one_game_are_not_taken_for_independent() -> None:
+def test_shifts_of_one_game_are_not_independent() -> None:
     places = np.array([0, 2, 1, 3])
-    # Two games of three Shifts each, all alike within a game: as certain as two numbers are, not as six.
+    # Two games of three equal Shifts each: as certain as two values, not six.
     found = summed_up(("greedy",) * 3, 2, np.array([0, 1, 0, 1, 0, 1]), np.array([5, 1, 5, 1, 5, 1], np.uint32), places)
     assert (found.shifts, found.points, found.places) == (6, 3.0, (0, 2, 1, 3))
     two_numbers = np.std([5, 1], ddof=1) / 2**0.5

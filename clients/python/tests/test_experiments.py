@@ -1,4 +1,4 @@
-"""The experiments: intervals, tables, plots and files on figures of our own, and the whole command against the real server."""
+"""The experiments: intervals, tables, plots and files with made-up figures, and the complete command on the real server."""
 
 import json
 import re
@@ -57,7 +57,7 @@ def png_size(picture: bytes) -> tuple[int, int]:
     ("hits", "of", "low", "high"),
     [(81, 263, 0.2553, 0.3662), (15, 148, 0.0624, 0.1605), (0, 20, 0.0, 0.1611), (1, 29, 0.0061, 0.1718)],
 )
-def test_wilsons_interval(hits: int, of: int, low: float, high: float) -> None:
+def test_wilson_interval(hits: int, of: int, low: float, high: float) -> None:
     estimate = stats.share(hits, of)
     assert (estimate.value, estimate.low, estimate.high) == pytest.approx((hits / of, low, high), abs=5e-5)
     mirrored = stats.share(of - hits, of)
@@ -129,7 +129,7 @@ def test_a_cell(cell: results.Cell, shown: str) -> None:
     assert tables.show(cell) == shown
 
 
-def test_a_results_file_is_read_as_it_was_written(tmp_path: Path) -> None:
+def test_a_results_file_survives_writing_and_reading(tmp_path: Path) -> None:
     result = a_result()
     path = tmp_path / "mechanics.json"
     results.write(result, path)
@@ -152,7 +152,7 @@ def test_other_files_are_refused(tmp_path: Path, spoil: Callable[[dict[str, obje
     assert main(["report", str(tmp_path)]) == 1
 
 
-def test_a_plot_is_a_picture_that_does_not_change(tmp_path: Path) -> None:
+def test_a_plot_is_deterministic(tmp_path: Path) -> None:
     (figure,) = a_result().figures
     picture = plots.png(figure)
     width, height = png_size(picture)
@@ -166,14 +166,14 @@ def test_legends_do_not_cover_lines() -> None:
     (figure,) = a_result().figures
     names = [[text.get_text() for text in legend.get_texts()] for legend in legends_beside_panels(figure)]
     assert names == [["learner", "paper"], ["ours"]]
-    # Where every name has one look and every look one name, one legend serves all panels.
+    # If each name has one line style and each style one name, all panels share a legend.
     panels = [figure.panels[0], replace(figure.panels[0], levels=())]
     (legend,) = legends_beside_panels(replace(figure, panels=panels))
     assert [text.get_text() for text in legend.get_texts()] == ["learner", "paper"]
 
 
 def legends_beside_panels(figure: Figure) -> list[Legend]:
-    """The legends of a figure, none of which touches a panel or leaves the picture."""
+    """Returns the legends of a figure. None touches a panel or leaves the picture."""
     with mpl.rc_context(plots.STYLE):
         canvas = plots.drawn(figure)
         canvas.canvas.draw()
@@ -188,7 +188,7 @@ def legends_beside_panels(figure: Figure) -> list[Legend]:
     return found
 
 
-def test_a_page_is_filled_between_the_marks_alone() -> None:
+def test_a_page_is_filled_only_between_the_marks() -> None:
     result = a_result()
     begin, end = page.marks("mechanics")
     text = f"# Page\n\nBefore.\n\n{begin}\nold\n{end}\n\nAfter.\n\n{page.marks('rules')[0]}\n{page.marks('rules')[1]}\n"
@@ -204,24 +204,24 @@ def test_a_page_is_filled_between_the_marks_alone() -> None:
             page.fill(broken, [result])
 
 
-def test_report_shows_and_fills_saved_results(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    kept = tmp_path / "kept"
-    kept.mkdir()
-    assert main(["report", str(kept)]) == 1
+def test_report_prints_and_fills_in_saved_results(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    saved = tmp_path / "kept"
+    saved.mkdir()
+    assert main(["report", str(saved)]) == 1
     assert "no results in" in capsys.readouterr().err
-    results.write(a_result(), kept / "mechanics.json")
-    assert main(["report", str(kept)]) == 0
+    results.write(a_result(), saved / "mechanics.json")
+    assert main(["report", str(saved)]) == 0
     assert "28.0% (22.8\u201333.9)" in capsys.readouterr().out
-    drawn = (kept / "experiments-mechanics-curves.png").read_bytes()
+    drawn = (saved / "experiments-mechanics-curves.png").read_bytes()
     text = tmp_path / "page.md"
     text.write_text("nothing\n")
-    assert main(["report", str(kept), "--page", str(text), "--json"]) == 1
+    assert main(["report", str(saved), "--page", str(text), "--json"]) == 1
     assert "no place for mechanics" in json.loads(capsys.readouterr().out)["message"]
     text.write_text("\n".join(page.marks("mechanics")))
-    assert main(["report", str(kept), "--page", str(text), "--json"]) == 0
-    said = json.loads(capsys.readouterr().out)
-    assert [result["experiment"] for result in said["results"]] == ["mechanics"]
-    assert [Path(file).is_file() for file in said["files"]] == [True, True]
+    assert main(["report", str(saved), "--page", str(text), "--json"]) == 0
+    output = json.loads(capsys.readouterr().out)
+    assert [result["experiment"] for result in output["results"]] == ["mechanics"]
+    assert [Path(file).is_file() for file in output["files"]] == [True, True]
     assert (tmp_path / "images" / "experiments-mechanics-curves.png").read_bytes() == drawn
     assert "| all | 28% |" in text.read_text(encoding="utf-8")
 
@@ -230,10 +230,10 @@ def test_the_page_of_this_project_matches_its_results() -> None:
     if not PAGE.is_file():
         pytest.skip("the page is in a checkout of the whole project alone")
     text = PAGE.read_text(encoding="utf-8")
-    kept = [results.read(path) for path in sorted((PAGE.parent / "experiments").glob("*.json"))]
-    assert {result.experiment for result in kept} >= set(command.EXPERIMENTS)
-    assert page.fill(text, kept) == text
-    for result in kept:
+    saved = [results.read(path) for path in sorted((PAGE.parent / "experiments").glob("*.json"))]
+    assert {result.experiment for result in saved} >= set(command.EXPERIMENTS)
+    assert page.fill(text, saved) == text
+    for result in saved:
         assert not result.quick
         for figure in result.figures:
             assert png_size((PAGE.parent / page.PICTURES / page.picture_name(result, figure)).read_bytes())[0] > 400
@@ -263,8 +263,8 @@ def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch, capsys: pyt
 
     monkeypatch.setattr(command, "run", run)
     assert main(["rules"]) == 1
-    assert "jax" in (said := capsys.readouterr().err)
-    assert "pip install 'chefshat[learn]'" in said
+    assert "jax" in (output := capsys.readouterr().err)
+    assert "pip install 'chefshat[learn]'" in output
 
 
 def test_a_quick_run_never_replaces_a_full_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -283,7 +283,7 @@ def test_results_need_a_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str
         assert re.search(rf"--out {out}: .*is a file, not a folder", capsys.readouterr().err)
 
 
-def test_a_server_that_is_not_there_is_an_error(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_missing_server_is_an_error(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["mechanics", "--quick", "--out", str(tmp_path), "--address", "127.0.0.1:1", "--json"]) == 1
     assert json.loads(capsys.readouterr().out)["reason"] == "UNAVAILABLE"
     assert list(tmp_path.iterdir()) == []
@@ -296,7 +296,7 @@ def test_the_papers_figures() -> None:
 
 @pytest.fixture(scope="module")
 def quick_run(real_address: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of a quick run of everything."""
+    """The folder of a quick run of all experiments."""
     folder = tmp_path_factory.mktemp("experiments")
     assert main(["all", "--quick", "--out", str(folder), "--address", real_address]) == 0
     return folder
@@ -304,7 +304,7 @@ def quick_run(real_address: str, tmp_path_factory: pytest.TempPathFactory) -> Pa
 
 @pytest.mark.server
 @pytest.mark.parametrize("name", command.EXPERIMENTS)
-def test_a_quick_run_leaves_a_result_and_its_plots(quick_run: Path, name: str) -> None:
+def test_a_quick_run_writes_results_and_plots(quick_run: Path, name: str) -> None:
     result = results.read(command.results_file(quick_run, name))
     assert result.experiment == name
     assert result.quick
@@ -329,7 +329,7 @@ def test_a_quick_run_leaves_a_result_and_its_plots(quick_run: Path, name: str) -
         ("winning", ["215", "117", "45", "55", "33", "30%"]),
     ],
 )
-def test_the_papers_figures_stand_beside_ours(quick_run: Path, name: str, reported: list[str]) -> None:
+def test_the_papers_figures_are_beside_ours(quick_run: Path, name: str, reported: list[str]) -> None:
     result = results.read(command.results_file(quick_run, name))
     shown = [tables.show(cell).split(" ")[0] for table in result.tables for row in table.rows for cell in row]
     assert set(reported) <= set(shown)
@@ -342,7 +342,7 @@ def test_mechanics_counts_shifts(quick_run: Path) -> None:
     for counted in result.values.values():
         assert counted["shifts"] == mechanics.QUICK.shifts > mechanics.FEW
         assert 0 < counted["starter_won"] < counted["shifts"]
-        # Seventeen cards in four hands are not played in one lap, and a pizza takes a turn at least.
+        # Four hands of seventeen cards need more than one lap, and a pizza at least one turn.
         assert counted["laps"] > counted["shifts"]
         assert counted["turns"] > counted["pizzas"] > counted["shifts"]
     rules = result.rules
@@ -350,7 +350,7 @@ def test_mechanics_counts_shifts(quick_run: Path) -> None:
     assert rules["paper, without exchange"]["exchange"] is False
     assert rules["paper, without special actions"]["special_actions"] is False
     assert all(each["target_shifts"] == mechanics.QUICK.shifts_per_game for each in rules.values())
-    # No two conditions are the same game.
+    # No two conditions give the same game.
     assert len({json.dumps(values) for values in result.values.values()}) == len(result.values)
 
 

@@ -1,4 +1,4 @@
-"""Features against the same words computed row by row in plain Python."""
+"""Features compared with a row-by-row computation in plain Python."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ DECKS = [(4, 11, 2), (2, 4, 0), (6, 15, 2), (3, 5, 1)]
 
 
 def plain_table(case: HandMade, row: int, hand_size: int) -> list[float]:
-    """`features.table` for one row, as its words say."""
+    """Computes `features.table` for one row, as documented."""
     players, faces = case.sizes.players, case.sizes.faces
     around = [(int(case.seats[row]) + step) % players for step in range(players)]
     deck = [*range(1, faces + 1), 2]
@@ -34,7 +34,7 @@ def plain_table(case: HandMade, row: int, hand_size: int) -> list[float]:
 
 
 def plain_classic(case: HandMade, row: int, hand_size: int) -> list[float]:
-    """`features.classic` for one row, as its words say."""
+    """Computes `features.classic` for one row, as documented."""
     faces = case.sizes.faces
     face, size, jokers = (int(number) for number in case.boards[row])
     board = [face] * (size - jokers) + [faces + 1] * jokers if face else [faces + 2]
@@ -44,7 +44,7 @@ def plain_classic(case: HandMade, row: int, hand_size: int) -> list[float]:
 
 
 def legal(case: HandMade, row: int, count: int) -> list[float]:
-    """The first bits of the mask."""
+    """Returns the first bits of the mask."""
     return [float(case.mask_bits[row, action // 8] >> action % 8 & 1) for action in range(count)]
 
 
@@ -75,7 +75,7 @@ def test_a_play_larger_than_the_board_has_slots_is_cut_off() -> None:
     np.testing.assert_array_equal(row[:11], np.full(11, 11, np.float32) / np.float32(13))
 
 
-def test_the_standard_widths() -> None:
+def test_the_default_widths() -> None:
     assert features.dealt(4, 11, 2) == 17
     assert features.turn_actions(11) == 200
     assert features.num_actions(11) == 214
@@ -83,7 +83,7 @@ def test_the_standard_widths() -> None:
     assert features.table_width(4, 11) == 334
 
 
-def test_a_buffer_of_the_callers_is_filled_and_no_rows_make_none() -> None:
+def test_a_given_buffer_is_filled_and_no_rows_give_no_features() -> None:
     case = hand_made(5, seed=4)
     buffer = np.full((5, 334), np.nan, np.float32)
     result = features.table(case, case.seats, case.kinds, case.mask_bits, players=4, faces=11, hand_size=17, out=buffer)

@@ -21,7 +21,7 @@ def files(folder: Path) -> dict[str, str]:
     }
 
 
-def test_generated_code_is_fresh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_generated_code_is_up_to_date(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     spec = importlib.util.spec_from_file_location("generate", PACKAGE / "tools" / "generate.py")
     assert spec is not None
     assert spec.loader is not None

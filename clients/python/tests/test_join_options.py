@@ -1,4 +1,4 @@
-"""How commands come by their places, and by the same places again after they were killed, on the fake server and the real one."""
+"""How commands join, and resume after they were killed, on the fake and the real server."""
 
 import errno
 import json
@@ -59,44 +59,44 @@ def start(processes: Processes, *arguments: str, ticket: str = "") -> "subproces
 def wait_until_it_stalls(process: "subprocess.Popen[str]") -> list[str]:
     """Waits until the command is in the middle of a game. Returns its output so far, by line."""
     assert process.stderr is not None
-    said: list[str] = []
+    output: list[str] = []
     for line in process.stderr:
         if line.strip() == STALLS:
-            return said
-        said.append(line)
-    raise AssertionError(f"it never stalled: {said}")
+            return output
+        output.append(line)
+    raise AssertionError(f"it never stalled: {output}")
 
 
 def kill_when_it_stalls(process: "subprocess.Popen[str]") -> list[str]:
     """Kills the command in the middle of a game. Returns its output so far, by line."""
-    said = wait_until_it_stalls(process)
+    output = wait_until_it_stalls(process)
     process.kill()
     process.wait(LIMIT_S)
-    return said
+    return output
 
 
 def one_line(process: "subprocess.Popen[str]") -> dict[str, Any]:
     """Returns the line of JSON that a successful command prints."""
-    printed, said = process.communicate(timeout=LIMIT_S)
-    assert process.returncode == 0, said
+    printed, output = process.communicate(timeout=LIMIT_S)
+    assert process.returncode == 0, output
     assert printed.count("\n") == 1
-    told: dict[str, Any] = json.loads(printed)
-    return told
+    outcome: dict[str, Any] = json.loads(printed)
+    return outcome
 
 
-def kill_and_go_on(address: str, way: list[str], processes: Processes, file: Path | None) -> dict[str, Any]:
-    """Joins, is killed in mid-game, and resumes with the printed ticket or with that in the file."""
-    kept = [] if file is None else ["--ticket-file", str(file)]
-    joining = ["--address", address, *way, *kept]
-    said = kill_when_it_stalls(start(processes, *joining, "--agent", "stalling:Stalling"))
-    (line,) = said
+def kill_and_resume(address: str, way: list[str], processes: Processes, file: Path | None) -> dict[str, Any]:
+    """Joins, kills the command in the middle of a game, and resumes with the printed ticket or the one in the file."""
+    ticket_options = [] if file is None else ["--ticket-file", str(file)]
+    joining = ["--address", address, *way, *ticket_options]
+    output = kill_when_it_stalls(start(processes, *joining, "--agent", "stalling:Stalling"))
+    (line,) = output
     if file is not None:
         assert stat.S_IMODE(file.stat().st_mode) == 0o600
         ticket = file.read_text().strip()
         assert ticket not in line
-        told = one_line(start(processes, *joining))
+        outcome = one_line(start(processes, *joining))
         assert not file.exists(), "nobody goes on where all is over"
-        return told
+        return outcome
     ticket = line.partition("--ticket ")[2].split()[0]
     return one_line(start(processes, "--address", address, ticket=ticket))
 
@@ -109,12 +109,12 @@ def test_a_killed_command_resumes_its_seat(
     with chefshat.Client(address) as client:
         room = new_room(client)
         way = ["--code", room.join_code, "--name", "Ada"]
-        told = kill_and_go_on(address, way, processes, tmp_path / "ticket" if in_file else None)
+        outcome = kill_and_resume(address, way, processes, tmp_path / "ticket" if in_file else None)
         lines = list(client.record(room.room.game_id))
-    assert (told["event"], told["game_id"], told["seat"]) == ("finished", room.room.game_id, 1)
+    assert (outcome["event"], outcome["game_id"], outcome["seat"]) == ("finished", room.room.game_id, 1)
     decisions = [line.decision for line in lines if line.HasField("decision") and line.decision.seat == 1]
-    # The two of before it was killed are not among its own. The records of the fake server have no decisions.
-    assert len(decisions) == (told["decisions"] + 2 if is_real else 0)
+    # The two decisions before the kill are not among its own. Records of the fake server have no decisions.
+    assert len(decisions) == (outcome["decisions"] + 2 if is_real else 0)
     assert all(decision.source == pb.DECISION_SOURCE_AGENT for decision in decisions)
 
 
@@ -124,24 +124,24 @@ def test_a_killed_command_resumes_its_tournament(address: str, in_file: bool, tm
         cup = new_cup(client)
         tournament_id = cup.tournament.tournament_id
         way = ["--tournament", cup.join_code, "--name", "Ada", "--games", "2"]
-        told = kill_and_go_on(address, way, processes, tmp_path / "ticket" if in_file else None)
+        outcome = kill_and_resume(address, way, processes, tmp_path / "ticket" if in_file else None)
         games = {game.game_id: game for game in client.tournament_games(tournament_id)}
         results = client.tournament_results(tournament_id)
-    assert (told["event"], told["tournament_id"]) == ("finished", tournament_id)
-    assert results.tournament.participants[told["participant"]].name == "Ada"
+    assert (outcome["event"], outcome["tournament_id"]) == ("finished", tournament_id)
+    assert results.tournament.participants[outcome["participant"]].name == "Ada"
     assert len(games) == GAMES
-    # Two of them began before the kill; all finished after it.
-    assert {game["game_id"] for game in told["games"]} == set(games)
-    for game in told["games"]:
+    # Two games started before the kill; all finished after it.
+    assert {game["game_id"] for game in outcome["games"]} == set(games)
+    for game in outcome["games"]:
         seat = games[game["game_id"]].seats[game["seat"]]
-        assert (seat.participant, seat.place, seat.points) == (told["participant"], game["place"], game["points"])
+        assert (seat.participant, seat.place, seat.points) == (outcome["participant"], game["place"], game["points"])
     # No seat was substituted meanwhile.
     assert [line.forfeited for line in results.standings] == [0] * 4
     assert [line.substituted for line in results.standings] == [0] * 4
 
 
 def close(game: FakeGame, seat: FakeSeat, answer: pb.Answer) -> str:
-    """A fault of the fake server: the room is closed before anything is answered."""
+    """A fault of the fake server: closes the room before the first answer."""
     game.end(pb.ABORT_REASON_CLOSED)
     return ""
 
@@ -195,9 +195,9 @@ def test_a_ticket_that_cannot_be_stored_is_printed(
     with chefshat.Client(fake.address) as client:
         code = new_room(client).join_code
     assert command.main(["--address", fake.address, "--code", code, "--name", "Ada", "--ticket-file", str(file)]) == 0
-    printed, said = capsys.readouterr()
+    printed, output = capsys.readouterr()
     assert "<- this agent" in printed
-    warning, ticket = said.splitlines()
+    warning, ticket = output.splitlines()
     assert warning == f"warning: cannot store the ticket in {file}: [Errno 28] No space left on device"
     assert re.search(r"if this process ends before the game, resume with --ticket \S+$", ticket)
     assert list(tmp_path.iterdir()) == []
@@ -215,9 +215,9 @@ def test_an_undeletable_ticket_file_is_a_warning(
 
     monkeypatch.setattr(Path, "unlink", refuse)
     assert command.main(["--address", fake.address, "--json", "--ticket-file", str(file)]) == 0
-    printed, said = capsys.readouterr()
+    printed, output = capsys.readouterr()
     assert json.loads(printed)["event"] == "finished"
-    assert f"warning: cannot delete the used ticket: [Errno 13] Permission denied: '{file}'; remove {file}" in said
+    assert f"warning: cannot delete the used ticket: [Errno 13] Permission denied: '{file}'; remove {file}" in output
 
 
 def test_two_commands_do_not_share_a_ticket_file(
@@ -253,12 +253,12 @@ def test_ctrl_c_exits_with_130_and_reports_the_substitute(fake: FakeServer, proc
     process = start(processes, "--address", fake.address, "--code", code, "--name", "Ada", "--agent", "stalling:Stalling")
     wait_until_it_stalls(process)
     process.send_signal(signal.SIGINT)
-    printed, said = process.communicate(timeout=LIMIT_S)
+    printed, output = process.communicate(timeout=LIMIT_S)
     assert (process.returncode, printed) == (130, "")
-    assert said == "interrupted; a substitute plays until the ticket is used again\n"
+    assert output == "interrupted; a substitute plays until the ticket is used again\n"
 
 
-def test_the_ticket_of_a_seat_is_not_a_participants(address: str) -> None:
+def test_a_seat_ticket_is_not_a_participant_ticket(address: str) -> None:
     with chefshat.Client(address) as client:
         seat = client.join_room(new_room(client).join_code, "Ada")
         (result,) = client.play_tournament(seat.ticket, lambda info: RandomAgent(info.seat))
@@ -269,7 +269,7 @@ def test_the_ticket_of_a_seat_is_not_a_participants(address: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "ticket", "said"),
+    ("arguments", "ticket", "output"),
     [
         ([], "", "give --code, --tournament, --ticket or --ticket-file"),
         (["--code", "X"], "", "--name"),
@@ -291,12 +291,12 @@ def test_the_ticket_of_a_seat_is_not_a_participants(address: str) -> None:
         (["--ticket-file", "F", "--stateless"], "", "--stateless is for joining"),
     ],
 )
-def test_ways_in_that_do_not_go_together_are_refused(
-    arguments: list[str], ticket: str, said: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+def test_contradicting_join_options_are_refused(
+    arguments: list[str], ticket: str, output: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     if ticket:
         monkeypatch.setenv(TICKET, ticket)
     with pytest.raises(SystemExit) as exit_info:
         command.main(["--address", "127.0.0.1:1", *arguments])
     assert exit_info.value.code == 2
-    assert said in capsys.readouterr().err
+    assert output in capsys.readouterr().err

@@ -22,7 +22,7 @@ AGENT = DeepQConfig(hidden=(4,), batch_size=2, memory_size=4)
 
 
 def learned(places: list[list[list[int]]]) -> Learned:
-    """Figures of our own: the places of each seat in each Shift of each game, and numbers that go with them."""
+    """Made-up figures: the places of each seat in each Shift of each game, and matching counts."""
     array = np.array(places)
     ones = np.ones_like(array)
     of_seats: dict[str, Any] = {
@@ -60,7 +60,7 @@ def test_the_tables_have_the_counts(tmp_path: Path) -> None:
     assert [row[2] for row in victories][:2] == [Estimate(1.5, 1, 2), Estimate(1.0, 1, 1)]
     table = winning._four(config, dict.fromkeys(winning.FOUR, SOME))
     assert table.rows[0][1:7] == [117, 45, 55, 33, 117, 33]
-    # The seat that wins most is another one in each game, or the same: it wins two, and one.
+    # The best seat wins two Shifts with one seed and one with the other; the last seat wins none.
     assert table.rows[1][5] == Estimate(1.5, 1, 2)
     assert table.rows[1][6] == Estimate(0.0, 0, 0)
 
@@ -69,7 +69,7 @@ def test_an_idle_pass_can_count_as_illegal() -> None:
     masks = np.array([[False, True, True], [False, False, True], [True, False, False]])
     right = deep_q_training._without_idle_passes(masks)
     assert right.tolist() == [[False, True, False], [False, False, True], [True, False, False]]
-    # The first pass is sent as an illegal action; the second has nothing else beside it; the third was illegal before.
+    # The first pass is sent as an illegal action; for the second only passing is legal; the third was illegal already.
     assert deep_q_training._wrong_as_illegal(np.array([2, 2, 2], np.int32), right).tolist() == [0, 2, 1]
     assert deep_q_training._wrong_as_illegal(np.array([1, 2, 0], np.int32), right).tolist() == [1, 2, 0]
 
@@ -87,7 +87,7 @@ def test_experiment_3_begins_with_the_networks_of_2(real_address: str, tmp_path:
     with monkeypatch.context() as patched:
         patched.setattr(learning, "learn", never)
         again = rules.networks(Config(real_address, (1, 2), True, tmp_path), quiet)
-    # A seed gives the same result alone and next to another.
+    # A seed gives the same result alone and beside another.
     (tmp_path / "alone").mkdir()
     alone = rules.networks(Config(real_address, (2,), True, tmp_path / "alone"), quiet)
     jax.tree.map(np.testing.assert_array_equal, both, again)
@@ -102,8 +102,8 @@ def test_networks_of_other_settings_are_learned_again(real_address: str, tmp_pat
     agents = deep_q.start(made, quick.seeds)
     rules._keep(quick, Learned(agents, Played({}, {}, ruleset, 0)))
     monkeypatch.setattr(learning, "learn", never)
-    kept = rules.networks(quick, Progress(show=False))
-    jax.tree.map(np.testing.assert_array_equal, kept, agents.online)
+    loaded = rules.networks(quick, Progress(show=False))
+    jax.tree.map(np.testing.assert_array_equal, loaded, agents.online)
 
     def is_learned_again(config: Config = quick) -> bool:
         with pytest.raises(AssertionError, match="learned again"):

@@ -21,23 +21,23 @@ def test_requests_respect_the_limit_of_commands() -> None:
     assert session.take_requests() == []
 
 
-def test_a_request_is_cut_by_its_size_too() -> None:
+def test_a_request_is_split_by_size() -> None:
     tickets = [f"{number:0200}" for number in range(MAX_COMMANDS)]
     session = PlaySession({ticket: Scribe() for ticket in tickets})
     session.connected()
     requests = session.take_requests()
     assert [command.attach.ticket for request in requests for command in request.commands] == tickets
     assert all(0 < request.ByteSize() <= MAX_REQUEST_BYTES for request in requests)
-    # No two neighbours would have fitted into one.
+    # No two consecutive requests would fit into one.
     together = [one.ByteSize() + other.ByteSize() for one, other in itertools.pairwise(requests)]
     assert len(together) > 4
     assert min(together[:-1]) > MAX_REQUEST_BYTES
 
 
-def test_the_largest_annotations_of_many_seats_are_cut_too() -> None:
+def test_the_largest_annotations_of_many_seats_are_split() -> None:
     stage = Stage(*(f"ticket {number}" for number in range(40)))
     stage.connect()
-    asks = stage.say(*(attached(number) for number in range(1, 41)), *(decision(1, handle) for handle in range(40)))
+    asks = stage.receive(*(attached(number) for number in range(1, 41)), *(decision(1, handle) for handle in range(40)))
     assert len(asks) == 40
     for ask in asks:
         ask.decision.annotations = annotations_of(MAX_ANNOTATIONS_BYTES)
@@ -57,12 +57,12 @@ def annotations_of(size: int) -> pb.Annotations:
     return annotations
 
 
-def test_annotations_travel_with_the_answer(stage: Stage) -> None:
-    (ask,) = stage.say(decision(1))
+def test_annotations_are_sent_with_the_answer(stage: Stage) -> None:
+    (ask,) = stage.receive(decision(1))
     ask.decision.annotate(value_estimate=0.25)
     stage.answer(ask)
     assert stage.sent[0].answer.annotations.value_estimate == 0.25
-    stage.say(ended(1), detached("GAME_OVER"))
+    stage.receive(ended(1), detached("GAME_OVER"))
     assert stage.session.results()["t"].annotations_dropped == 0
 
 
@@ -73,7 +73,7 @@ def test_annotations_travel_with_the_answer(stage: Stage) -> None:
         (annotations_of(100_000), "100000 bytes"),
         (pb.Annotations(value_estimate=math.nan), "value_estimate"),
         (pb.Annotations(value_estimate=-math.inf), "value_estimate"),
-        # Finite as the agent's number, not as the message's.
+        # Finite as the agent's double, not as the message's float.
         (pb.Annotations(value_estimate=1e300), "value_estimate"),
         (pb.Annotations(action_scores=[0.0, 1.0, math.nan]), "action_scores"),
     ],
@@ -84,15 +84,15 @@ def test_invalid_annotations_are_dropped_and_the_answer_is_sent(
 ) -> None:
     caplog.set_level(logging.WARNING, "chefshat")
     for number in (1, 2):
-        (ask,) = stage.say(decision(number))
+        (ask,) = stage.receive(decision(number))
         ask.decision.annotations = annotations
         stage.answer(ask)
         assert stage.answers() == [(0, number, 1)]
         assert not stage.sent[0].answer.HasField("annotations")
-        stage.say(result(number, "ACCEPTED"))
-    # Said once, counted twice.
+        stage.receive(result(number, "ACCEPTED"))
+    # Logged once, counted twice.
     assert [why in record.getMessage() for record in caplog.records] == [True]
-    stage.say(ended(1), detached("GAME_OVER"))
+    stage.receive(ended(1), detached("GAME_OVER"))
     over = stage.session.results()["t"]
     assert (over.decisions, over.annotations_dropped) == (2, 2)
 
@@ -104,14 +104,14 @@ def test_annotations_within_the_limits_are_recorded() -> None:
 
 
 def test_annotations_the_server_drops_are_counted_once(stage: Stage, caplog: pytest.LogCaptureFixture) -> None:
-    (ask,) = stage.say(decision(1))
+    (ask,) = stage.receive(decision(1))
     ask.decision.annotate(value_estimate=0.25)
     stage.answer(ask)
-    said = result(1, "ACCEPTED")
-    said.result.annotations_dropped = True
-    stage.say(said, said)
+    acknowledgement = result(1, "ACCEPTED")
+    acknowledgement.result.annotations_dropped = True
+    stage.receive(acknowledgement, acknowledgement)
     assert ["server refused them" in record.getMessage() for record in caplog.records] == [True]
-    stage.say(ended(1), detached("GAME_OVER"))
+    stage.receive(ended(1), detached("GAME_OVER"))
     assert stage.session.results()["t"].annotations_dropped == 1
 
 

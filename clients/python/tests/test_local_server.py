@@ -14,7 +14,7 @@ from chefshat import ChefsHatError, LocalServer, local_server
 from chefshat.local_server import BINARY
 
 SOURCE = str(Path(chefshat.__file__).parents[1])
-# Time limit in seconds: generous, because nothing is measured by it.
+# Time limit in seconds.
 WAIT_S = 60
 
 # Prints the address and the process id of the shared server, then ends in a given way.
@@ -47,7 +47,7 @@ def program(path: Path, text: str) -> Path:
 
 @pytest.fixture
 def nowhere(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
-    """A machine without the program; returns an empty folder that is the whole path."""
+    """Hides the program; returns an empty folder that is the only one on the PATH."""
     folder = tmp_path / "bin"
     folder.mkdir()
     monkeypatch.delenv(BINARY, raising=False)
@@ -56,7 +56,7 @@ def nowhere(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     return folder
 
 
-def test_the_program_is_looked_for_in_this_order(nowhere: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_program_is_searched_in_this_order(nowhere: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     old, new = (program(tmp_path / name, "exit 0") for name in ("release", "debug"))
     os.utime(old, (1, 1))
     monkeypatch.setattr(local_server, "_cargo_targets", lambda: [old, new, tmp_path / "not there"])
@@ -92,14 +92,14 @@ def test_builds_are_found_in_the_checkout() -> None:
     assert found == [Path("target/release/chefshat"), Path("target/debug/chefshat")]
 
 
-def test_a_package_that_was_installed_finds_the_checkout_it_is_used_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_installed_package_finds_the_checkout_of_the_working_directory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(local_server, "__file__", str(tmp_path / "site-packages" / "chefshat" / "local_server.py"))
     checkout = tmp_path / "checkout"
     within = checkout / "docs" / "images"
     within.mkdir(parents=True)
     monkeypatch.chdir(within)
     (checkout / "Cargo.toml").touch()
-    # Some other project of cargo's.
+    # Another cargo project.
     assert local_server._cargo_targets() == []
     (checkout / "proto" / "chefshat").mkdir(parents=True)
     assert local_server._cargo_targets() == [checkout / "target/release/chefshat", checkout / "target/debug/chefshat"]
@@ -108,7 +108,7 @@ def test_a_package_that_was_installed_finds_the_checkout_it_is_used_in(tmp_path:
 @pytest.mark.server
 def test_a_server_can_be_stopped_and_started_again(monkeypatch: pytest.MonkeyPatch) -> None:
     binary = os.environ.get(BINARY) or pytest.skip(f"{BINARY} is not set")
-    # What configures the user's own server must not reach this one.
+    # Settings of the user's own server must not affect this one.
     monkeypatch.setenv("CHEFSHAT_DATA_DIR", "/no/such/folder")
     with LocalServer(binary) as server:
         address = server.address
@@ -126,7 +126,7 @@ def test_a_server_can_be_stopped_and_started_again(monkeypatch: pytest.MonkeyPat
 
 @pytest.mark.server
 @pytest.mark.parametrize("way", ["return", "raise", "kill"])
-def test_the_shared_server_goes_with_its_process(way: str) -> None:
+def test_the_shared_server_stops_with_its_process(way: str) -> None:
     if not os.environ.get(BINARY):
         pytest.skip(f"{BINARY} is not set")
     environment = {**os.environ, "PYTHONPATH": SOURCE}

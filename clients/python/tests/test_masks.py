@@ -1,4 +1,4 @@
-"""Drawing from masks: only legal actions, all alike likely, for decks of every size."""
+"""Sampling from masks: legal actions only, with equal probabilities, for decks of every size."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def test_only_legal_actions_are_drawn(width: int, share: float) -> None:
         assert (actions == np.arange(500) % width).all()
 
 
-def test_all_legal_actions_are_alike_likely() -> None:
+def test_all_legal_actions_are_equally_likely() -> None:
     legal = [0, 7, 8, 62, 63, 64, 127, 128, 191, 199, 213]
     mask = np.zeros(214, np.bool_)
     mask[legal] = True
@@ -35,7 +35,7 @@ def test_all_legal_actions_are_alike_likely() -> None:
     bits = np.tile(np.packbits(mask, bitorder="little"), (rows, 1))
     drawn, counts = np.unique(sample_legal(bits, np.random.default_rng(2)), return_counts=True)
     assert drawn.tolist() == legal
-    # Each is drawn 10,000 times give or take 95; this leaves five standard deviations.
+    # Each is drawn 10,000 times on average, with a standard deviation of 95; the bound is five of these.
     assert np.abs(counts - rows / len(legal)).max() < 480
 
 

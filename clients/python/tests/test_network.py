@@ -30,7 +30,7 @@ def chance_layers(info: NetworkInfo, hidden: int = 5) -> list[Layer]:
 
 
 @pytest.mark.parametrize("dtype", [np.float16, np.float32])
-def test_a_network_is_read_as_it_was_written(tmp_path: Path, dtype: type[np.float16] | type[np.float32]) -> None:
+def test_a_network_survives_writing_and_reading(tmp_path: Path, dtype: type[np.float16] | type[np.float32]) -> None:
     layers = chance_layers(INFO)
     network.save(tmp_path / "n.safetensors", layers, INFO, dtype=dtype)
     read = network.load(tmp_path / "n.safetensors")
@@ -54,7 +54,7 @@ def test_a_network_is_read_as_it_was_written(tmp_path: Path, dtype: type[np.floa
         ({"masked": "yes"}, "masked"),
     ],
 )
-def test_wrong_metadata_is_refused_in_words(tmp_path: Path, change: dict[str, str], words: str) -> None:
+def test_wrong_metadata_is_refused_with_a_reason(tmp_path: Path, change: dict[str, str], words: str) -> None:
     path = tmp_path / "n.safetensors"
     tensors = {f"layer{i}.{key}": value for i, layer in enumerate(chance_layers(INFO)) for key, value in layer._asdict().items()}
     path.write_bytes(safetensors.numpy.save(tensors, metadata={**INFO.metadata(), **change}))
@@ -94,7 +94,7 @@ def test_weights_that_float16_cannot_hold_are_not_written(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("output", ["actions", "turns"])
-def test_actions_are_legal_and_the_best_ones(output: str) -> None:
+def test_actions_are_the_best_legal_ones(output: str) -> None:
     info = replace(INFO, output="turns" if output == "turns" else "actions")
     net = Network(chance_layers(info), info)
     case = hand_made(200, seed=6)
@@ -160,7 +160,7 @@ def test_a_network_fits_rules_with_as_many_players_faces_and_cards_dealt() -> No
 
 
 @pytest.mark.parametrize("name", ["table-actions", "classic-turns", "small-table"])
-def test_the_fixtures_still_hold(name: str) -> None:
+def test_the_fixtures_are_reproduced(name: str) -> None:
     net = network.load(FIXTURES / f"{name}.safetensors")
     assert net.info.name == name
     rows = json.loads((FIXTURES / f"{name}.json").read_text())

@@ -8,18 +8,18 @@ from chefshat.participant import REQUEST_ID
 from chefshat.seat_session import Ask
 from chefshat.session import PlaySession
 
-# First handle of the seats that a server attaches by itself.
-CALLED = 2**31
+# First handle of the seats that a server attaches.
+FIRST_HANDLE = 2**31
 
 
 class Cup:
-    """A session of one participant, its driver's part, and the agents it has made, by game."""
+    """A session of one participant, its driver, and its agents by game."""
 
     def __init__(self) -> None:
         self.scribes: dict[str, Scribe] = {}
         self.session = PlaySession.of_participant("cup", self._make, PlayOptions(entropy=b"mine"))
         self.connect()
-        self.say(entered())
+        self.receive(entered())
 
     def _make(self, seat: SeatInfo) -> Agent:
         assert seat.game_id not in self.scribes, "one agent a game"
@@ -32,7 +32,7 @@ class Cup:
         assert all(attach.entropy == b"mine" for attach in attaches)
         return [(attach.ticket, attach.from_sequence) for attach in attaches]
 
-    def say(self, *updates: pb.SeatUpdate) -> list[Ask]:
+    def receive(self, *updates: pb.SeatUpdate) -> list[Ask]:
         return self.session.receive(pb.PlayResponse(updates=updates))
 
     def answers(self) -> list[tuple[int, int]]:
@@ -45,7 +45,7 @@ def entered(handle: int = 0) -> pb.SeatUpdate:
 
 
 def seated(handle: int, game: str, *, request_id: int = 0, seat: int = 0, next_sequence: int = 1) -> pb.SeatUpdate:
-    said = pb.Attached(
+    message = pb.Attached(
         request_id=request_id,
         room_id=f"room of {game}",
         game_id=game,
@@ -54,27 +54,31 @@ def seated(handle: int, game: str, *, request_id: int = 0, seat: int = 0, next_s
         ticket=f"ticket of {game}",
         tournament_id="tournament",
     )
-    return pb.SeatUpdate(handle=handle, attached=said)
+    return pb.SeatUpdate(handle=handle, attached=message)
 
 
 def refused(request_id: int) -> pb.SeatUpdate:
     return pb.SeatUpdate(refused=pb.Refused(request_id=request_id, reason="TICKET_UNKNOWN", message="no", code=16))
 
 
-def test_every_game_has_an_agent_of_its_own() -> None:
+def test_every_game_has_its_own_agent() -> None:
     cup = Cup()
-    asks = cup.say(
-        seated(CALLED, "a"), seated(CALLED + 1, "b", seat=1), events(1, handle=CALLED), decision(5, CALLED + 1), decision(4, CALLED)
+    asks = cup.receive(
+        seated(FIRST_HANDLE, "a"),
+        seated(FIRST_HANDLE + 1, "b", seat=1),
+        events(1, handle=FIRST_HANDLE),
+        decision(5, FIRST_HANDLE + 1),
+        decision(4, FIRST_HANDLE),
     )
     assert [ask.agent for ask in asks] == [cup.scribes["b"], cup.scribes["a"]]
     for ask in asks:
         cup.session.answer(ask, 1)
-    assert cup.answers() == [(CALLED + 1, 5), (CALLED, 4)]
+    assert cup.answers() == [(FIRST_HANDLE + 1, 5), (FIRST_HANDLE, 4)]
     assert cup.scribes["a"].log == [("attached", 0), ("event", 1)]
-    cup.say(ended(2, handle=CALLED + 1), detached("GAME_OVER", handle=CALLED + 1))
-    cup.say(ended(2, handle=CALLED), detached("GAME_OVER", handle=CALLED))
+    cup.receive(ended(2, handle=FIRST_HANDLE + 1), detached("GAME_OVER", handle=FIRST_HANDLE + 1))
+    cup.receive(ended(2, handle=FIRST_HANDLE), detached("GAME_OVER", handle=FIRST_HANDLE))
     assert not cup.session.done, "there may be more games"
-    cup.say(detached("TOURNAMENT_OVER"))
+    cup.receive(detached("TOURNAMENT_OVER"))
     assert cup.session.done
     played = cup.session.played()
     assert [(result.game_id, result.place, result.entropy) for result in played] == [("a", 2, b"mine"), ("b", 1, b"mine")]
@@ -82,20 +86,22 @@ def test_every_game_has_an_agent_of_its_own() -> None:
 
 def test_a_new_connection_continues_with_the_same_agents() -> None:
     cup = Cup()
-    (ask,) = cup.say(seated(CALLED, "a"), seated(CALLED + 1, "b"), events(1, 2, handle=CALLED), decision(4, CALLED))
+    (ask,) = cup.receive(
+        seated(FIRST_HANDLE, "a"), seated(FIRST_HANDLE + 1, "b"), events(1, 2, handle=FIRST_HANDLE), decision(4, FIRST_HANDLE)
+    )
     cup.session.answer(ask, 1)
-    assert cup.answers() == [(CALLED, 4)]
+    assert cup.answers() == [(FIRST_HANDLE, 4)]
     cup.session.lost()
     assert cup.connect() == [("ticket of a", 3), ("ticket of b", 0), ("cup", 0)]
-    asks = cup.say(
+    asks = cup.receive(
         seated(0, "a", request_id=1, next_sequence=4),
         seated(1, "b", request_id=2),
         entered(2),
-        seated(CALLED, "c"),
+        seated(FIRST_HANDLE, "c"),
         events(3, handle=0),
         decision(4, 0),
         decision(1, 1),
-        decision(2, CALLED),
+        decision(2, FIRST_HANDLE),
     )
     assert [ask.agent for ask in asks] == [cup.scribes["b"], cup.scribes["c"]], "the answer of a is repeated, and not thought over"
     assert cup.answers() == [(0, 4)]
@@ -104,12 +110,12 @@ def test_a_new_connection_continues_with_the_same_agents() -> None:
 
 def test_a_seat_attached_twice_is_one_seat() -> None:
     cup = Cup()
-    cup.say(seated(CALLED, "a"), events(1, handle=CALLED))
-    (ask,) = cup.say(
-        seated(CALLED + 1, "a", next_sequence=2),
-        detached("SUPERSEDED", handle=CALLED),
-        events(1, 2, handle=CALLED + 1),
-        decision(4, CALLED + 1),
+    cup.receive(seated(FIRST_HANDLE, "a"), events(1, handle=FIRST_HANDLE))
+    (ask,) = cup.receive(
+        seated(FIRST_HANDLE + 1, "a", next_sequence=2),
+        detached("SUPERSEDED", handle=FIRST_HANDLE),
+        events(1, 2, handle=FIRST_HANDLE + 1),
+        decision(4, FIRST_HANDLE + 1),
     )
     assert ask.agent is cup.scribes["a"]
     assert cup.scribes["a"].log == [("attached", 0), ("event", 1), ("attached", 0), ("event", 2)]
@@ -117,12 +123,12 @@ def test_a_seat_attached_twice_is_one_seat() -> None:
 
 def test_the_end_of_the_tournament_waits_for_open_games() -> None:
     cup = Cup()
-    cup.say(seated(CALLED, "a"), detached("TOURNAMENT_OVER"))
+    cup.receive(seated(FIRST_HANDLE, "a"), detached("TOURNAMENT_OVER"))
     assert not cup.session.done
     cup.session.lost()
     assert cup.connect() == [("ticket of a", 0)], "nobody enters what is over"
     aborted = events(1, handle=0, game_aborted=pb.GameAborted(reason=pb.ABORT_REASON_CLOSED))
-    cup.say(seated(0, "a", request_id=1), aborted, detached("GAME_OVER"))
+    cup.receive(seated(0, "a", request_id=1), aborted, detached("GAME_OVER"))
     assert cup.session.done
     (result,) = cup.session.played()
     assert (result.abort_reason, result.finished) == ("CLOSED", False)
@@ -130,11 +136,13 @@ def test_the_end_of_the_tournament_waits_for_open_games() -> None:
 
 def test_a_lost_room_does_not_stop_other_games() -> None:
     cup = Cup()
-    cup.say(seated(CALLED, "a"))
+    cup.receive(seated(FIRST_HANDLE, "a"))
     cup.session.lost()
     assert len(cup.connect()) == 2
-    cup.say(refused(1), entered(1), seated(CALLED, "b"), ended(1, handle=CALLED), detached("GAME_OVER", handle=CALLED))
-    cup.say(detached("TOURNAMENT_OVER", handle=1))
+    cup.receive(
+        refused(1), entered(1), seated(FIRST_HANDLE, "b"), ended(1, handle=FIRST_HANDLE), detached("GAME_OVER", handle=FIRST_HANDLE)
+    )
+    cup.receive(detached("TOURNAMENT_OVER", handle=1))
     lost, played = cup.session.played()
     assert lost.error is not None
     assert (lost.game_id, lost.error.reason) == ("a", "TICKET_UNKNOWN")
@@ -147,9 +155,9 @@ def test_a_lost_room_does_not_stop_other_games() -> None:
 )
 def test_a_lost_participant_has_an_error(update: pb.SeatUpdate, reason: str) -> None:
     cup = Cup()
-    cup.say(seated(CALLED, "a"), update)
+    cup.receive(seated(FIRST_HANDLE, "a"), update)
     assert not cup.session.done, "its game may go on"
-    cup.say(detached("SUPERSEDED", handle=CALLED))
+    cup.receive(detached("SUPERSEDED", handle=FIRST_HANDLE))
     assert cup.session.done
     with pytest.raises(ChefsHatError, match=reason):
         cup.session.played()
@@ -157,21 +165,21 @@ def test_a_lost_participant_has_an_error(update: pb.SeatUpdate, reason: str) -> 
 
 def test_giving_up_ends_the_participant_too() -> None:
     cup = Cup()
-    cup.say(seated(CALLED, "a"))
+    cup.receive(seated(FIRST_HANDLE, "a"))
     cup.session.give_up(ChefsHatError("UNAVAILABLE"))
     assert cup.session.done
     with pytest.raises(ChefsHatError, match="UNAVAILABLE"):
         cup.session.played()
 
 
-def test_strange_updates_stop_no_participant() -> None:
+def test_unexpected_updates_do_not_stop_the_participant() -> None:
     cup = Cup()
-    (ask,) = cup.say(
-        decision(1, CALLED),
-        detached("GAME_OVER", handle=CALLED),
-        seated(CALLED, "a", request_id=77),
-        seated(CALLED, "b"),
-        decision(1, CALLED),
+    (ask,) = cup.receive(
+        decision(1, FIRST_HANDLE),
+        detached("GAME_OVER", handle=FIRST_HANDLE),
+        seated(FIRST_HANDLE, "a", request_id=77),
+        seated(FIRST_HANDLE, "b"),
+        decision(1, FIRST_HANDLE),
         decision(1, 0),
     )
     assert ask.agent is cup.scribes["b"]
@@ -179,7 +187,7 @@ def test_strange_updates_stop_no_participant() -> None:
     assert not cup.session.done
 
 
-def test_the_ticket_of_a_seat_plays_this_seat_alone() -> None:
+def test_a_seat_ticket_plays_only_this_seat() -> None:
     entries: list[pb.Entered] = []
     scribe = Scribe()
     session = PlaySession.of_participant("seat", lambda seat: scribe, PlayOptions(entropy=b"mine"), entries.append)
@@ -209,13 +217,13 @@ def test_on_entered_is_called_on_each_connection() -> None:
         assert [(entry.tournament_id, entry.participant) for entry in entries] == [("tournament", 3)] * connections
 
 
-def test_the_ticket_of_a_participant_is_not_a_seats() -> None:
+def test_a_participant_ticket_is_not_a_seat_ticket() -> None:
     session = PlaySession({"cup": Scribe(), "t": Scribe()})
     session.connected()
     session.take_requests()
-    told = pb.Entered(request_id=1, tournament_id="tournament", participant=3)
+    message = pb.Entered(request_id=1, tournament_id="tournament", participant=3)
     session.receive(
-        pb.PlayResponse(updates=[pb.SeatUpdate(handle=0, entered=told), seated(CALLED, "a"), seated(1, "b", request_id=2)])
+        pb.PlayResponse(updates=[pb.SeatUpdate(handle=0, entered=message), seated(FIRST_HANDLE, "a"), seated(1, "b", request_id=2)])
     )
     (detach,) = [command for request in session.take_requests() for command in request.commands]
     assert (detach.handle, detach.WhichOneof("command")) == (0, "detach")
@@ -228,4 +236,4 @@ def test_the_ticket_of_a_participant_is_not_a_seats() -> None:
 def test_unknown_seats_are_ignored() -> None:
     session = PlaySession({"t": Scribe()})
     session.connected()
-    assert session.receive(pb.PlayResponse(updates=[seated(CALLED, "a"), decision(1, CALLED)])) == []
+    assert session.receive(pb.PlayResponse(updates=[seated(FIRST_HANDLE, "a"), decision(1, FIRST_HANDLE)])) == []

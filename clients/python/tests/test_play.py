@@ -37,7 +37,7 @@ def play(request: pytest.FixtureRequest) -> Player:
 
 
 class Listener(Agent):
-    """Plays the first legal action and remembers the events and the decisions it was asked for."""
+    """Takes the first legal action, and records events and decisions."""
 
     def __init__(self) -> None:
         self.events: list[int] = []
@@ -52,7 +52,7 @@ class Listener(Agent):
 
 
 class Thinker(Listener):
-    """The same in a coroutine."""
+    """`Listener` as a coroutine."""
 
     async def decide(self, request: Decision) -> int:  # type: ignore[override]
         await asyncio.sleep(0)
@@ -60,7 +60,7 @@ class Thinker(Listener):
 
 
 def seats(server: FakeServer, *, games: int = 1, played: int = 4) -> list[str]:
-    """Makes rooms and joins them; returns the tickets."""
+    """Creates rooms and joins them; returns the tickets."""
     tickets = []
     with chefshat.Client(server.address) as client:
         for _ in range(games):
@@ -115,16 +115,15 @@ def test_a_broken_stream_is_restored(fake: FakeServer, play: Player, moment: str
     assert all(entry.source == pb.DECISION_SOURCE_AGENT for entry in plays)
     for ticket, agent in agents.items():
         assert results[ticket].finished
-        # Every event once and in order, no decision thought over twice, every answer acknowledged in the end.
+        # Every event arrives once and in order, no decision is computed twice, every answer is acknowledged.
         assert agent.events == list(range(1, len(game.events) + 1))
         assert agent.asked == list(range(1, QUESTIONS + 1))
-        # The acknowledgement of the answer that ends the game is lost with its connection: the game is over before the answer
-        # could be repeated.
-        unheard = 1 if moment == "after" and results[ticket].seat == 3 else 0
-        assert results[ticket].decisions == QUESTIONS - unheard
+        # The acknowledgement of the last answer is lost with its connection: the game ends before the answer is repeated.
+        unacknowledged = 1 if moment == "after" and results[ticket].seat == 3 else 0
+        assert results[ticket].decisions == QUESTIONS - unacknowledged
         assert results[ticket].invalid == results[ticket].late == 0
     for seat in game.seats.values():
-        # Each connection asks for the events that are missing.
+        # Each connection requests the missing events.
         wanted = [attach.from_sequence for attach in seat.attaches]
         assert wanted[0] == 0
         assert wanted == sorted(wanted)
@@ -137,12 +136,12 @@ def test_connections_without_progress_are_given_up(fake: FakeServer, play: Playe
     result = play(fake.address, {ticket: Listener()})[ticket]
     assert result.error is not None
     assert result.error.reason == "UNAVAILABLE"
-    # The first stream brought the start of the game, which is progress; the ten attempts that may follow brought nothing.
+    # The first stream had the start of the game, which is progress; the ten allowed attempts after it had none.
     assert fake.streams == 1 + QUICK.attempts
 
 
 class Talkative(Listener):
-    """Says more about each answer than a message may hold, or than a record may."""
+    """Annotates each answer with more than a message or a record may contain."""
 
     def decide(self, request: Decision) -> int:
         if request.decision_id % 2:
@@ -152,7 +151,7 @@ class Talkative(Listener):
         return super().decide(request)
 
 
-def test_annotations_that_are_too_much_cost_neither_the_answer_nor_the_stream(fake: FakeServer, play: Player) -> None:
+def test_too_large_annotations_are_dropped_without_losing_the_answer_or_the_stream(fake: FakeServer, play: Player) -> None:
     agents = {ticket: Talkative() for ticket in seats(fake)}
     results = play(fake.address, agents)
     assert fake.streams == 1
@@ -172,7 +171,7 @@ class Stubborn(Agent):
         return int((~request.mask).nonzero()[0][0])
 
 
-def test_invalid_answers_are_asked_again_up_to_the_limit(fake: FakeServer, play: Player) -> None:
+def test_invalid_decisions_are_asked_again_up_to_the_limit(fake: FakeServer, play: Player) -> None:
     (ticket,) = seats(fake, played=1)
     agent = Stubborn()
     result = play(fake.address, {ticket: agent})[ticket]
@@ -208,7 +207,7 @@ def test_exceptions_of_coroutines_propagate(fake: FakeServer) -> None:
         play_asyncio(fake.address, {ticket: BrokenLater()})
 
 
-def test_an_unknown_ticket_stops_its_seat_alone(fake: FakeServer, play: Player) -> None:
+def test_an_unknown_ticket_stops_only_its_seat(fake: FakeServer, play: Player) -> None:
     (ticket,) = seats(fake, played=1)
     results = play(fake.address, {"nonsense": RandomAgent(), ticket: RandomAgent()})
     assert results[ticket].finished
@@ -229,7 +228,7 @@ class Waiting(Agent):
         return int(request.legal_actions[0])
 
 
-def test_the_newest_connection_has_the_seat(fake: FakeServer, play: Player) -> None:
+def test_the_newest_connection_takes_the_seat(fake: FakeServer, play: Player) -> None:
     (ticket,) = seats(fake, played=1)
     waiting = Waiting()
     older: list[SeatResult] = []
@@ -317,7 +316,7 @@ HANDS = pb.ScriptedShift(hands=[pb.SeatCards(seat=0, cards=[1, 4, 12], golden=Tr
 PLAYER = pb.RecordedPlayer(game_id="0f" * 16, seat=2)
 
 
-def test_how_a_game_begins_reaches_the_server(fake: FakeServer) -> None:
+def test_the_start_of_a_game_is_sent_to_the_server(fake: FakeServer) -> None:
     slow = pb.RoomPolicy(pace_ms=500)
     with chefshat.Client(fake.address) as client:
         client.create_room(seats=[PLAYER, "greedy", None, None], branch=POINT)

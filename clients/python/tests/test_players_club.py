@@ -1,4 +1,4 @@
-"""Whole games of the real server with players in the manner of the reference implementation, by the command and by the package."""
+"""Complete games on the real server with players of the reference implementation, by the command and the package."""
 
 import contextlib
 import json
@@ -39,12 +39,12 @@ def command(address: str, code: str, player: str, *options: str) -> list[str]:
 def one_line(capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:
     printed = capsys.readouterr().out
     assert printed.count("\n") == 1
-    said: dict[str, Any] = json.loads(printed)
-    return said
+    outcome: dict[str, Any] = json.loads(printed)
+    return outcome
 
 
 def play_four(address: str, players: list[AgentSpec]) -> dict[str, chefshat.SeatResult]:
-    """Seats these players, and at the rest of the table the random agent, and plays a game. Returns the results by name."""
+    """Plays a game with these players, and random agents in the other seats. Returns the results by name."""
     with chefshat.Client(address) as client, contextlib.ExitStack() as stack:
         code = client.create_room("club").join_code
         agents: dict[str, chefshat.Agent] = {}
@@ -69,11 +69,11 @@ def test_four_commands_play_a_game_with_each_other(real_address: str) -> None:
         )
         for number, player in enumerate(["Largest", "Rarest", "Largest", "Babbling"])
     ]
-    said = [json.loads(process.communicate(timeout=LIMIT_S)[0]) for process in running]
+    outcome = [json.loads(process.communicate(timeout=LIMIT_S)[0]) for process in running]
     assert [process.returncode for process in running] == [0] * 4
-    assert sorted(one["place"] for one in said) == [1, 2, 3, 4]
-    assert len({one["game_id"] for one in said}) == 1
-    for one in said:
+    assert sorted(one["place"] for one in outcome) == [1, 2, 3, 4]
+    assert len({one["game_id"] for one in outcome}) == 1
+    for one in outcome:
         assert one["event"] == "finished"
         assert one["decisions"] > 0
         assert (one["invalid"], one["failures"], one["replaced"], one["restarts"]) == (0, 0, 0, 0)
@@ -96,13 +96,13 @@ def test_a_player_gets_the_calls_of_the_reference(real_address: str, tmp_path: P
     specs += [AgentSpec("club_players:Rarest", name, paths=(TESTS,)) for name in ("Bob", "Cleo")]
     result = play_four(real_address, specs)["Ada"]
     calls = [json.loads(line) for line in log.read_text().splitlines()]
-    told = [call for call in calls if not call[0].startswith(("get", "do"))]
-    check_order([method for method, *_ in told])
+    notified = [call for call in calls if not call[0].startswith(("get", "do"))]
+    check_order([method for method, *_ in notified])
     check_asking(calls)
     infos = [call[1] for call in calls if call[0].startswith("update_") and "action" in call[0]]
     check_actions(infos, result.seat)
     ends = [call[1] for call in calls if call[0] == "update_end_match"]
-    # As the reference counts its points; they name the order of the players as ours do.
+    # The points of the reference, which give the same order as ours.
     game = [sum(end["Match_Score"][seat] for end in ends) for seat in range(4)]
     assert ends[-1]["Game_Score"] == game
     assert all(sorted(end["Match_Score"]) == [0, 1, 2, 3] for end in ends)
@@ -149,7 +149,7 @@ def check_asking(calls: list[list[Any]]) -> None:
 
 
 def check_actions(infos: list[Info], seat: int) -> None:
-    """Each action follows on the one before: board, pizza, whose turn it is."""
+    """Checks that each action follows from the one before: board, pizza, turn."""
     assert all(set(info) == set(infos[0]) for info in infos)
     assert {info["Author_Index"] for info in infos} == {0, 1, 2, 3}
     assert all((info["Observation_Before"] != "") == (info["Author_Index"] == seat) for info in infos)
@@ -171,29 +171,29 @@ def test_illegal_choices_are_counted_as_often_as_the_reference_would_ask(
 ) -> None:
     code = room(real_address, [None, "random", "random", "random"], rules=pb.RuleSet(target_shifts=3))
     assert main(command(real_address, code, "Stubborn", "--json", "--attempts", "2")) == 0
-    said = one_line(capsys)
-    # Never its first choice: two invalid attempts at every turn and at every gift.
-    assert said["invalid"] == 2 * said["replaced"] > 0
-    assert said["replaced"] <= said["decisions"]
+    outcome = one_line(capsys)
+    # Its first choice is never legal: two invalid attempts at every turn and gift.
+    assert outcome["invalid"] == 2 * outcome["replaced"] > 0
+    assert outcome["replaced"] <= outcome["decisions"]
 
 
 def test_the_game_continues_with_a_failing_player(real_address: str, capsys: pytest.CaptureFixture[str]) -> None:
     code = room(real_address, [None, "random", "random", "random"], rules=pb.RuleSet(target_shifts=2))
     assert main(command(real_address, code, "Raising", "--json")) == 0
-    said = one_line(capsys)
-    assert said["invalid"] == 0
-    assert said["failures"] > said["replaced"] > 0
-    assert said["restarts"] == 0
+    outcome = one_line(capsys)
+    assert outcome["invalid"] == 0
+    assert outcome["failures"] > outcome["replaced"] > 0
+    assert outcome["restarts"] == 0
 
 
 def test_the_game_continues_when_the_player_is_given_up(real_address: str, capsys: pytest.CaptureFixture[str]) -> None:
     code = room(real_address, [None, "random", "random", "random"], rules=pb.RuleSet(target_shifts=6))
     assert main(command(real_address, code, "Mortal", "--json", "--restarts", "1")) == 1
-    said = one_line(capsys)
-    assert said["event"] == "finished"
-    assert said["restarts"] == 1
-    # Four actions of each process are its own.
-    assert 0 < said["replaced"] < said["decisions"]
+    outcome = one_line(capsys)
+    assert outcome["event"] == "finished"
+    assert outcome["restarts"] == 1
+    # Four actions of each process are the player's.
+    assert 0 < outcome["replaced"] < outcome["decisions"]
 
 
 def test_an_interrupted_command_leaves_no_process(
@@ -209,8 +209,8 @@ def test_an_interrupted_command_leaves_no_process(
         processes.append(process)
         wait_until(lambda: client.get_room(made.room.room_id).seats[0].connected, "the player is there", process)
     process.send_signal(signal.SIGINT)
-    _, said = process.communicate(timeout=LIMIT_S)
-    assert said.endswith("interrupted; a substitute plays until the ticket is used again\n")
+    _, outcome = process.communicate(timeout=LIMIT_S)
+    assert outcome.endswith("interrupted; a substitute plays until the ticket is used again\n")
     assert process.returncode == 130
     with pytest.raises(ProcessLookupError):
         os.kill(int((tmp_path / "pid").read_text()), 0)
@@ -218,17 +218,17 @@ def test_an_interrupted_command_leaves_no_process(
 
 def test_an_interrupted_start_leaves_no_process(tmp_path: Path, processes: list["subprocess.Popen[str]"]) -> None:
     given = json.dumps({"file": str(tmp_path / "pid.{process}")})
-    # They are ended because the command is, not because they take too long.
-    way = ["--server", "127.0.0.1:1", "--tournament", "X", "--games", "2", "--start-limit", "100000"]
-    options = [*way, "--agent", "club_players:Slow", "--path", TESTS, "--arguments", given]
+    # They end because the command ends, not because they take too long.
+    arguments = ["--server", "127.0.0.1:1", "--tournament", "X", "--games", "2", "--start-limit", "100000"]
+    options = [*arguments, "--agent", "club_players:Slow", "--path", TESTS, "--arguments", given]
     process = subprocess.Popen([sys.executable, "-m", "chefshat.players_club", *options], stderr=subprocess.PIPE, text=True)
     processes.append(process)
     files = [tmp_path / f"pid.{number}" for number in range(2)]
     wait_until(lambda: all(file.exists() and file.read_text() for file in files), "both players are being made", process)
     process.send_signal(signal.SIGINT)
-    _, said = process.communicate(timeout=LIMIT_S)
-    # There was no place yet.
-    assert (process.returncode, said) == (130, "interrupted\n")
+    _, outcome = process.communicate(timeout=LIMIT_S)
+    # It had no seat yet.
+    assert (process.returncode, outcome) == (130, "interrupted\n")
     for file in files:
         with pytest.raises(ProcessLookupError):
             os.kill(int(file.read_text()), 0)
@@ -241,7 +241,7 @@ def test_a_player_that_fails_to_start_takes_no_seat(real_address: str, capsys: p
     assert main(command(real_address, code, "Largest", "--json")) == 0
 
 
-def test_rooms_that_such_players_do_not_know_are_refused(real_address: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_rooms_with_unsupported_rules_are_refused(real_address: str, capsys: pytest.CaptureFixture[str]) -> None:
     code = room(real_address, [None, "random", "random"], rules=pb.RuleSet(players=3))
     assert main(command(real_address, code, "Largest")) == 1
     assert "only play games of 4 players, 11 faces and 2 jokers; this one has 3, 11 and 2" in capsys.readouterr().err
@@ -253,7 +253,7 @@ def test_the_actions_are_those_of_the_server(real_address: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "outcome"),
     [
         (["--agent", "no colon"], "not of the form module.path:Class"),
         (["--arguments", "[1]"], "must be an object"),
@@ -262,11 +262,11 @@ def test_the_actions_are_those_of_the_server(real_address: str) -> None:
         (["--attempts", "-1"], "must be 0 or more"),
     ],
 )
-def test_arguments_are_checked(options: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_arguments_are_checked(options: list[str], outcome: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended:
         main(["--server", "127.0.0.1:1", "--code", "CODE", "--agent", "a:B", *options])
     assert ended.value.code == 2
-    assert said in capsys.readouterr().err
+    assert outcome in capsys.readouterr().err
 
 
 def cup(client: chefshat.Client, rules: pb.RuleSet) -> pb.CreateTournamentResponse:
@@ -275,7 +275,7 @@ def cup(client: chefshat.Client, rules: pb.RuleSet) -> pb.CreateTournamentRespon
         name="Coppa",
         format=pb.TOURNAMENT_FORMAT_ROUND_ROBIN,
         rules=rules,
-        # Far longer than a test: who is killed comes back in time, however slow the machine is.
+        # Far longer than a test, so that a killed command resumes in time on any machine.
         policy=pb.RoomPolicy(decision_time_ms=600_000),
         rounds=3,
         games_per_pairing=2,
@@ -290,7 +290,7 @@ def in_cup(address: str, code: str, player: str, *options: str) -> list[str]:
     return [*named, "--path", TESTS, "--json", *options]
 
 
-def test_a_player_takes_part_in_a_tournament_with_two_processes(
+def test_a_player_plays_a_tournament_with_two_processes(
     real_address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     log = tmp_path / "log"
@@ -298,14 +298,14 @@ def test_a_player_takes_part_in_a_tournament_with_two_processes(
     with chefshat.Client(real_address) as client:
         made = cup(client, pb.RuleSet(players=4, target_shifts=2))
         assert main(in_cup(real_address, made.join_code, "Scribe", "--games", "2", "--arguments", given)) == 0
-        said = one_line(capsys)
+        outcome = one_line(capsys)
         games = list(client.tournament_games(made.tournament.tournament_id))
         results = client.tournament_results(made.tournament.tournament_id)
-    assert (said["event"], said["tournament_id"]) == ("finished", made.tournament.tournament_id)
-    assert (said["failures"], said["replaced"], said["restarts"]) == (0, 0, 0)
-    assert results.tournament.participants[said["participant"]].max_games == 2
-    assert sorted(game["game_id"] for game in said["games"]) == sorted(game.game_id for game in games)
-    for game in said["games"]:
+    assert (outcome["event"], outcome["tournament_id"]) == ("finished", made.tournament.tournament_id)
+    assert (outcome["failures"], outcome["replaced"], outcome["restarts"]) == (0, 0, 0)
+    assert results.tournament.participants[outcome["participant"]].max_games == 2
+    assert sorted(game["game_id"] for game in outcome["games"]) == sorted(game.game_id for game in games)
+    for game in outcome["games"]:
         assert (game["event"], game["invalid"], game["late"]) == ("finished", 0, 0)
         assert game["decisions"] > 0
     assert log.read_text().count('["update_game_over"]') == len(games) == 6
@@ -323,21 +323,21 @@ def test_a_resumed_command_has_as_many_processes_as_declared(
     given = json.dumps({"log_file": str(tmp_path / "log.{process}")})
     options = ["--server", real_address, "--agent", "club_players:Scribe", "--path", TESTS, "--json", "--arguments", given]
     assert main(options) == 0
-    said = one_line(capsys)
-    assert [game["event"] for game in said["games"]] == ["finished"] * 6
-    assert said["crowded"] == 0
-    told = [(tmp_path / f"log.{number}").read_text().count('["update_game_over"]') for number in range(2)]
-    assert sum(told) == 6
-    assert all(told), "both play"
+    outcome = one_line(capsys)
+    assert [game["event"] for game in outcome["games"]] == ["finished"] * 6
+    assert outcome["crowded"] == 0
+    notified = [(tmp_path / f"log.{number}").read_text().count('["update_game_over"]') for number in range(2)]
+    assert sum(notified) == 6
+    assert all(notified), "both play"
 
 
-def test_a_tournament_that_such_players_do_not_know_is_refused(real_address: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_tournament_with_unsupported_rules_is_refused(real_address: str, capsys: pytest.CaptureFixture[str]) -> None:
     with chefshat.Client(real_address) as client:
         made = cup(client, pb.RuleSet(players=3))
         assert main(in_cup(real_address, made.join_code, "Largest")) == 1
         client.close_tournament(made.tournament.tournament_id, made.owner_token)
-    said = one_line(capsys)
-    assert "this one has 3, 11 and 2; the tournament will be played without it" in said["message"]
+    outcome = one_line(capsys)
+    assert "this one has 3, 11 and 2; the tournament will be played without it" in outcome["message"]
 
 
 @pytest.mark.parametrize("where", ["room", "tournament"])
@@ -345,17 +345,17 @@ def test_a_killed_command_resumes(
     real_address: str, where: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], processes: list["subprocess.Popen[str]"]
 ) -> None:
     stalls, log, ticket = tmp_path / "stalls", tmp_path / "log", tmp_path / "ticket"
-    kept = ["--ticket-file", str(ticket)]
+    ticket_options = ["--ticket-file", str(ticket)]
     with chefshat.Client(real_address) as client:
         if where == "room":
             policy = pb.RoomPolicy(decision_time_ms=600_000)
             code = room(real_address, ["random", None, "random", "random"], policy=policy, rules=pb.RuleSet(target_shifts=3))
-            way = command(real_address, code, "Stalling", "--json", *kept)
+            arguments = command(real_address, code, "Stalling", "--json", *ticket_options)
         else:
             made = cup(client, pb.RuleSet(players=4, target_shifts=2))
-            way = in_cup(real_address, made.join_code, "Stalling", *kept)
+            arguments = in_cup(real_address, made.join_code, "Stalling", *ticket_options)
         process = subprocess.Popen(
-            [sys.executable, "-m", "chefshat.players_club", *way, "--arguments", json.dumps({"file": str(stalls)})],
+            [sys.executable, "-m", "chefshat.players_club", *arguments, "--arguments", json.dumps({"file": str(stalls)})],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
@@ -365,14 +365,14 @@ def test_a_killed_command_resumes(
         process.kill()
         process.wait(LIMIT_S)
 
-        again = [*way, "--arguments", json.dumps({"log_file": str(log)})]
+        again = [*arguments, "--arguments", json.dumps({"log_file": str(log)})]
         again[again.index("club_players:Stalling")] = "club_players:Scribe"
         assert main(again) == 0
-        said = one_line(capsys)
-        games = said.get("games", [said])
+        outcome = one_line(capsys)
+        games = outcome.get("games", [outcome])
         records = [list(client.record(game["game_id"])) for game in games]
     assert not ticket.exists()
-    assert (said["failures"], said["replaced"]) == (0, 0)
+    assert (outcome["failures"], outcome["replaced"]) == (0, 0)
     assert len(games) == (1 if where == "room" else 6)
     own = 0
     for game, lines in zip(games, records, strict=True):
@@ -380,7 +380,7 @@ def test_a_killed_command_resumes(
         decisions = [line.decision for line in lines if line.HasField("decision") and line.decision.seat == game["seat"]]
         assert all(decision.source == pb.DECISION_SOURCE_AGENT for decision in decisions)
         own += len(decisions) - game["decisions"]
-    # What was decided before the command was killed.
+    # Decisions before the command was killed.
     assert own >= 4
     if where == "room":
         assert games[0]["seat"] == 1

@@ -52,8 +52,8 @@ def test_the_command_writes_its_files_and_resumes(real_address: str, tmp_path: P
     options = ["ppo", "--out", str(out), "--address", real_address, "--seed", "3", "--name", "small", "--json"]
     plan = ["--games", "16", "--steps", "16", "--minibatches", "2", "--width", "8", "--evaluations", "2", "--evaluation-games", "4"]
     assert command.main([*options, *plan, "--decisions", "512"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert (told["event"], told["decisions"], told["updates"], told["runs"]) == ("trained", 512, 2, 1)
+    output = json.loads(capsys.readouterr().out)
+    assert (output["event"], output["decisions"], output["updates"], output["runs"]) == ("trained", 512, 2, 1)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["small.jsonl", "small.safetensors", "small.training"]
     trained = network.load(out)
     assert trained.info.name == "small"
@@ -64,16 +64,16 @@ def test_the_command_writes_its_files_and_resumes(real_address: str, tmp_path: P
     assert [line["decisions"] for line in lines[1:]] == [0, 256, 512]
 
     options = [*options, "--resume"]
-    for option, given, kept in (("games", 32, 16), ("width", 9, 8), ("seed", 4, 3)):
+    for option, given, stored in (("games", 32, 16), ("width", 9, 8), ("seed", 4, 3)):
         assert command.main([*options, f"--{option}", str(given), "--decisions", "1024"]) == 1
-        assert f"{option} {kept}, not {given}" in json.loads(capsys.readouterr().out)["message"]
+        assert f"{option} {stored}, not {given}" in json.loads(capsys.readouterr().out)["message"]
     assert command.main([*options, "--rules", "rulebook", "--decisions", "1024"]) == 1
     assert "rules points" in json.loads(capsys.readouterr().out)["message"]
 
     assert command.main([*options, "--evaluations", "2", "--decisions", "1024"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert (told["decisions"], told["updates"], told["runs"]) == (1024, 4, 2)
-    assert [evaluation["games"] for evaluation in told["evaluations"]] == [4, 4]
+    output = json.loads(capsys.readouterr().out)
+    assert (output["decisions"], output["updates"], output["runs"]) == (1024, 4, 2)
+    assert [evaluation["games"] for evaluation in output["evaluations"]] == [4, 4]
     assert network.load(out).info.trained_by.count("python -m chefshat.learn ppo") == 2
     assert any((old.weight != new.weight).any() for old, new in zip(trained.layers, network.load(out).layers, strict=True))
 

@@ -1,4 +1,4 @@
-"""Replay: the buffer, and transitions of datasets and records: those a `VectorEnv` gave while the games were played."""
+"""Replay: the buffer, and transitions from datasets and records, which equal those of the `VectorEnv` that played the games."""
 
 import json
 import os
@@ -103,7 +103,7 @@ def test_an_empty_dataset_has_no_transitions(tmp_path: Path) -> None:
     assert nothing.before.masks.shape == (0, 214)
 
 
-def test_it_is_said_why_records_need_the_program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_need_for_the_program_is_explained(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(BINARY, raising=False)
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setattr(local_server, "_cargo_targets", list)
@@ -112,7 +112,7 @@ def test_it_is_said_why_records_need_the_program(tmp_path: Path, monkeypatch: py
     assert "address" not in refused.value.message
 
 
-def test_invalid_attempts_are_transitions_of_their_own(tmp_path: Path) -> None:
+def test_invalid_attempts_are_separate_transitions(tmp_path: Path) -> None:
     tried = {"action": 7, "invalid_attempts": [5, 70_000], "invalid_count": 2, "invalid_reward_winning": -2.0}
     exhausted = {**tried, "action": 199, "source": "invalid"}
     folder = dataset(tmp_path, {"action": 1}, tried, exhausted)
@@ -159,7 +159,7 @@ def test_other_files_are_refused(tmp_path: Path, rows: list[Any], options: Any, 
         replay.from_dataset(tmp_path / "a.txt")
 
 
-def test_a_buffer_keeps_the_latest_and_draws_them_all(tmp_path: Path) -> None:
+def test_a_buffer_stores_the_latest_and_samples_all_of_them(tmp_path: Path) -> None:
     buffer = replay.ReplayBuffer(5, seed=1)
     with pytest.raises(ValueError, match="empty"):
         buffer.sample(1)
@@ -203,12 +203,12 @@ def test_a_buffer_stores_transitions_of_an_env() -> None:
 
 @pytest.fixture(scope="module")
 def binary() -> str:
-    """The program."""
+    """The binary."""
     return os.environ.get(BINARY) or pytest.skip(f"{BINARY} is not set: name the chefshat binary to replay with it")
 
 
 def in_order(transitions: Transitions) -> list[Transitions]:
-    """The transitions of each game, by seat and in the order in which they were made; the games by their first hands."""
+    """Returns the transitions of each game, by seat and in order; games by their first hands."""
     games = []
     for game in np.unique(transitions.games):
         own = transitions.take(transitions.games == game)
@@ -219,7 +219,7 @@ def in_order(transitions: Transitions) -> list[Transitions]:
 @pytest.mark.server
 @pytest.mark.parametrize("invalid", ["error", "ask_again"])
 @pytest.mark.parametrize("episode", ["shift", "game"])
-def test_records_give_the_transitions_of_the_games_as_they_were_played(
+def test_records_give_the_transitions_of_the_played_games(
     real_address: str, binary: str, tmp_path: Path, episode: str, invalid: str
 ) -> None:
     rng = np.random.default_rng(5)
@@ -256,7 +256,7 @@ def test_records_give_the_transitions_of_the_games_as_they_were_played(
         goes_on = ~lived.ended
         columns = read.flatten()
         for name, array in lived.flatten().items():
-            # What was seen at an end is not in a dataset, and games are counted otherwise.
+            # Datasets have no final observations, and number games differently.
             rows: NDArray[np.bool_] = goes_on if name.startswith("after.") else np.ones(len(lived), np.bool_)
             if name == "rewards":
                 np.testing.assert_allclose(array, columns[name], rtol=1e-6)
@@ -265,7 +265,7 @@ def test_records_give_the_transitions_of_the_games_as_they_were_played(
 
 
 @pytest.mark.server
-def test_all_forms_of_a_dataset_are_read_alike(binary: str, tmp_path: Path) -> None:
+def test_all_formats_of_a_dataset_give_the_same(binary: str, tmp_path: Path) -> None:
     records, folder = tmp_path / "records", tmp_path / "dataset"
     simulate = [binary, "simulate", "--games", "2", "--seed", "1", "--agents", "greedy,random,random_unmasked,random"]
     subprocess.run([*simulate, "--records", str(records)], check=True, capture_output=True)

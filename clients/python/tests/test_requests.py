@@ -40,7 +40,7 @@ class Method:
 
 @pytest.fixture(autouse=True)
 def no_pauses(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Tests do not wait."""
+    """Removes the pauses between attempts."""
     monkeypatch.setattr(requests, "PAUSES_S", (0.0, 0.0, 0.0))
 
 

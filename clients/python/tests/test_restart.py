@@ -17,11 +17,11 @@ from chefshat.local_server import BINARY
 
 pytestmark = pytest.mark.server
 
-# Keeps trying for as long as a server may take to start on a slow machine.
+# Retries for as long as a server may take to start on a slow machine.
 PATIENT = Backoff(first_s=0.005, max_s=0.05, attempts=2000)
 # Acknowledged decisions of the game after which the server is killed.
 KILLS = (5, 20, 21, 60)
-# Time limit in seconds: generous, because nothing is measured by it.
+# Time limit in seconds.
 WAIT_S = 120.0
 
 Agents = dict[str, Agent]
@@ -42,7 +42,7 @@ def play_asyncio(address: str, agents: Agents) -> dict[str, SeatResult]:
 
 
 class Ledger:
-    """The log of all agents. At certain counts they wait until the server has been killed."""
+    """The log of all agents. At certain counts the agents wait until the server has been killed."""
 
     def __init__(self) -> None:
         # The action of each acknowledged decision, by seat (or game and seat) and number.
@@ -52,7 +52,7 @@ class Ledger:
         self.killed = {count: threading.Event() for count in KILLS}
 
     def accept(self, who: object, result: pb.AnswerResult) -> None:
-        """Notes an acknowledged decision."""
+        """Records an acknowledged decision."""
         assert result.status == pb.ANSWER_STATUS_ACCEPTED
         with self.lock:
             self.accepted[who, result.decision_id] = result.action
@@ -110,10 +110,10 @@ def test_agents_play_on_through_restarts(play: Player, tmp_path: Path) -> None:
     restarts = sum(line.event.HasField("server_restarted") for line in lines if line.HasField("event"))
     assert restarts == len(KILLS)
     decisions = [line.decision for line in lines if line.HasField("decision")]
-    kept = {(decision.seat, decision.decision_id): decision.action for decision in decisions}
-    assert len(kept) == len(decisions)
+    recorded = {(decision.seat, decision.decision_id): decision.action for decision in decisions}
+    assert len(recorded) == len(decisions)
     assert all(decision.source == pb.DECISION_SOURCE_AGENT for decision in decisions)
-    assert ledger.accepted.items() <= kept.items()
+    assert ledger.accepted.items() <= recorded.items()
     for ticket, agent in agents.items():
         assert results[ticket].finished
         assert results[ticket].reconnects >= len(KILLS)
@@ -142,7 +142,7 @@ def test_a_tournament_survives_restarts(tmp_path: Path) -> None:
         name="Coppa",
         format=pb.TOURNAMENT_FORMAT_ROUND_ROBIN,
         rules=pb.RuleSet(target_shifts=1),
-        # Generous times: the test is about losses, not about the speed of connections.
+        # Long time limits: the test is about losses, not speed.
         policy=pb.RoomPolicy(decision_time_ms=600_000),
         rounds=2,
         games_per_pairing=2,
@@ -163,7 +163,7 @@ def test_a_tournament_survives_restarts(tmp_path: Path) -> None:
         played = [results.result(WAIT_S) for results in playing]
         with chefshat.Client(server.address) as client:
             games = list(client.tournament_games(made.tournament.tournament_id))
-            kept = {
+            recorded = {
                 ((game.game_id, line.decision.seat), line.decision.decision_id): line.decision.action
                 for game in games
                 for line in client.record(game.game_id)
@@ -174,7 +174,7 @@ def test_a_tournament_survives_restarts(tmp_path: Path) -> None:
     for results in played:
         assert sorted(result.game_id for result in results) == sorted(game.game_id for game in games)
         assert all(result.finished for result in results)
-    assert ledger.accepted.items() <= kept.items()
+    assert ledger.accepted.items() <= recorded.items()
     for agent in agents.values():
         assert set(agent.asked.values()) == {1}
         assert agent.sequences == list(range(1, len(agent.sequences) + 1))

@@ -1,4 +1,4 @@
-"""Every sample runs: the Python in the README, the files in samples/, and the command, against both servers."""
+"""Every sample runs on both servers: the Python in the READMEs, the files in samples/, and the command."""
 
 import json
 import os
@@ -15,7 +15,7 @@ from chefshat import agent as command
 
 PACKAGE = Path(__file__).resolve().parents[1]
 PRINTED_ADDRESS = "127.0.0.1:50051"
-# The package's own README and, in a checkout of the whole project, that one's.
+# The README of the package and, in a complete checkout, of the project.
 READMES = [path for path in (PACKAGE / "README.md", PACKAGE.parents[1] / "README.md") if path.is_file()]
 README = [
     block
@@ -23,7 +23,7 @@ README = [
     for block in re.findall(r"^```python\n(.*?)^```", path.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
 ]
 SAMPLES = sorted(path.name for path in (PACKAGE / "samples").glob("*.py"))
-# Seconds a sample may take before it counts as hanging.
+# Time limit of a sample, seconds.
 LIMIT_S = 120
 
 
@@ -58,13 +58,13 @@ def test_command_prints_one_line_of_json(address: str, agent: str) -> None:
     with chefshat.Client(address) as client:
         code = client.create_room(seats=[None, "random", "random", "random"]).join_code
     printed = run_python("-m", "chefshat.agent", "--address", address, "--code", code, "--name", "Ada", "--agent", agent, "--json")
-    said = json.loads(printed)
+    outcome = json.loads(printed)
     assert printed.count("\n") == 1
-    assert said["event"] == "finished"
-    assert sorted(line["seat"] for line in said["standings"]) == [0, 1, 2, 3]
-    assert said["place"] == next(line["place"] for line in said["standings"] if line["seat"] == said["seat"])
-    assert said["decisions"] > 0
-    assert said["invalid"] == 0
+    assert outcome["event"] == "finished"
+    assert sorted(line["seat"] for line in outcome["standings"]) == [0, 1, 2, 3]
+    assert outcome["place"] == next(line["place"] for line in outcome["standings"] if line["seat"] == outcome["seat"])
+    assert outcome["decisions"] > 0
+    assert outcome["invalid"] == 0
 
 
 def test_command_prints_a_table(fake: FakeServer, capsys: pytest.CaptureFixture[str]) -> None:

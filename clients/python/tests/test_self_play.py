@@ -12,7 +12,7 @@ STEPS, GAMES, PLAYERS = 40, 6, 4
 
 
 def made_up(seed: int) -> Rollout:
-    """A rollout in which seats decide by chance, games are left out by chance, and Shifts end by chance, some twice in a step."""
+    """Returns a rollout in which deciding seats, skipped games and ends of Shifts are random; some Shifts end twice in a step."""
     chance = np.random.default_rng(seed)
     shape = (STEPS, GAMES)
     ends = []
@@ -33,7 +33,7 @@ def made_up(seed: int) -> Rollout:
 
 
 def plain(rollout: Rollout, discount: float, gae_lambda: float) -> dict[tuple[int, int], float]:
-    """The advantage of every decision of which it is known, by step and game."""
+    """Returns the advantage of every decision that has one, by step and game."""
     # For each game and seat, in order: its decisions (step) and the rewards of its ends (None, reward).
     stories: dict[tuple[int, int], list[int | float]] = defaultdict(list)
     for step in range(STEPS):
@@ -62,7 +62,7 @@ def plain(rollout: Rollout, discount: float, gae_lambda: float) -> dict[tuple[in
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_advantages_are_those_of_a_plain_loop(seed: int) -> None:
+def test_advantages_equal_those_of_a_plain_loop(seed: int) -> None:
     rollout = made_up(seed)
     found, known = advantages(rollout, PLAYERS, discount=0.9, gae_lambda=0.8)
     expected = plain(rollout, 0.9, 0.8)

@@ -59,7 +59,7 @@ class Checking(RandomAgent):
 
 
 def check(agents: dict[str, Checking], results: dict[str, chefshat.SeatResult]) -> None:
-    """The four seats of one game agree about it."""
+    """Checks that the four seats of a game agree."""
     assert sorted(result.seat for result in results.values()) == [0, 1, 2, 3]
     assert len({result.standings for result in results.values()}) == 1
     for result in results.values():
@@ -123,19 +123,19 @@ def test_a_game_of_four_processes(real_address: str, processes: list[subprocess.
         code = client.create_room("four processes").join_code
     for number in range(4):
         arguments = ["--address", real_address, "--code", code, "--name", f"player {number}", "--seed", str(number), "--json"]
-        # Should one hang, the tracebacks of its threads are worth more than the fact.
+        # If a process hangs, its output has the tracebacks of its threads.
         arguments = [sys.executable, "-c", DUMPING, *arguments]
         processes.append(subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True))
     outputs = [process.communicate() for process in processes]
     assert [process.returncode for process in processes] == [0] * 4, [errors for _, errors in outputs]
-    said = [json.loads(output) for output, _ in outputs]
-    assert all(line["event"] == "finished" for line in said)
-    assert sorted(line["seat"] for line in said) == [0, 1, 2, 3]
-    assert len({json.dumps(line["standings"]) for line in said}) == 1
+    outcomes = [json.loads(output) for output, _ in outputs]
+    assert all(line["event"] == "finished" for line in outcomes)
+    assert sorted(line["seat"] for line in outcomes) == [0, 1, 2, 3]
+    assert len({json.dumps(line["standings"]) for line in outcomes}) == 1
 
 
 class Cutter(Checking):
-    """Cuts its own connection now and then: before it answers, or after an answer was acknowledged."""
+    """Cuts its own connection at times: before an answer, or after its acknowledgement."""
 
     def __init__(self, seed: int, proxy: Proxy) -> None:
         super().__init__(seed)
@@ -170,7 +170,7 @@ def test_reconnections_miss_no_event(
     real_address: str, play: Callable[[str, dict[str, Checking]], dict[str, chefshat.SeatResult]]
 ) -> None:
     with chefshat.Client(real_address) as client, Proxy(real_address) as proxy:
-        # Generous times: the test is about lost decisions, not about the speed of connections.
+        # Long time limits: the test is about lost decisions, not speed.
         policy = pb.RoomPolicy(decision_time_ms=60_000)
         room = client.create_room("cut", rules=pb.RuleSet(target_shifts=2), policy=policy)
         agents: dict[str, Checking] = {}
@@ -202,7 +202,7 @@ class Stubborn(Agent):
         return int((~request.mask).nonzero()[0][0])
 
 
-def test_a_stubborn_agent_meets_the_servers_limit(real_address: str) -> None:
+def test_a_stubborn_agent_reaches_the_limit_of_attempts(real_address: str) -> None:
     with chefshat.Client(real_address) as client:
         policy = pb.RoomPolicy(max_invalid_attempts=3)
         rules = pb.RuleSet(target_shifts=1)
@@ -248,7 +248,7 @@ def test_refusals(real_address: str) -> None:
             client.get_room("0" * 32)
 
 
-def test_a_recorded_game_is_branched_and_played_again(real_address: str) -> None:
+def test_a_recorded_game_is_branched_and_replayed(real_address: str) -> None:
     with chefshat.Client(real_address) as client:
 
         def ended(room: pb.Room) -> list[tuple[int, int]]:
@@ -275,7 +275,7 @@ def test_a_recorded_game_is_branched_and_played_again(real_address: str) -> None
         assert listed[again.game_id].decisions == len(course)
         assert first.game_id not in listed
 
-        # The hands of its second Shift begin another game.
+        # The hands of its second Shift start another game.
         starts = [line.event.shift_started for line in client.record(first.game_id) if line.event.HasField("shift_started")]
         hands = pb.ScriptedShift(hands=starts[1].hands)
         scripted = client.create_room("given", rules=pb.RuleSet(target_shifts=1), seats=["greedy"] * 4, hands=hands).room
@@ -288,7 +288,7 @@ def test_a_recorded_game_is_branched_and_played_again(real_address: str) -> None
             client.create_room(branch=pb.BranchPoint(game_id=first.game_id, decisions=len(course)))
 
 
-def test_a_seat_that_was_given_back_is_free(real_address: str) -> None:
+def test_a_seat_that_was_given_up_is_free(real_address: str) -> None:
     with chefshat.Client(real_address) as client:
         room = client.create_room(seats=[None, "random", "random", "random"])
         left = client.join_room(room.join_code, "Ada").ticket

@@ -13,16 +13,16 @@ def test_a_game_from_attaching_to_its_end() -> None:
     stage.connect()
     attach = stage.sent[0].attach
     assert (attach.ticket, attach.request_id, attach.from_sequence, attach.entropy) == ("t", 1, 0, b"mine")
-    assert stage.say(attached()) == []
-    asks = stage.say(events(1, game_started=pb.GameStarted(hand_size=17)), decision(1))
+    assert stage.receive(attached()) == []
+    asks = stage.receive(events(1, game_started=pb.GameStarted(hand_size=17)), decision(1))
     assert [ask.decision.decision_id for ask in asks] == [1]
     assert asks[0].decision.hand_size == 17
     assert asks[0].agent is stage.scribes["t"]
     stage.answer(asks[0], 2)
     assert stage.answers() == [(0, 1, 2)]
-    stage.say(result(1, "ACCEPTED"), ended(2))
+    stage.receive(result(1, "ACCEPTED"), ended(2))
     assert not stage.session.done
-    stage.say(detached("GAME_OVER"))
+    stage.receive(detached("GAME_OVER"))
     assert stage.session.done
     over = stage.session.results()["t"]
     assert (over.finished, over.seat, over.place, over.points) == (True, 0, 2, 9)
@@ -53,56 +53,56 @@ def test_entropy_can_be_set_or_empty() -> None:
 
 
 def test_the_result_has_the_entropy_of_the_reveal(stage: Stage) -> None:
-    stage.say(ended(1), detached("GAME_OVER"))
+    stage.receive(ended(1), detached("GAME_OVER"))
     over = stage.session.results()["t"]
     assert over.reveal is not None
     assert over.reveal.seat_entropy[over.seat] == over.entropy == b"mine"
 
 
 def test_an_aborted_game_has_no_result(stage: Stage) -> None:
-    stage.say(events(1, game_aborted=pb.GameAborted(reason=pb.ABORT_REASON_SHUTDOWN)), detached("GAME_OVER"))
+    stage.receive(events(1, game_aborted=pb.GameAborted(reason=pb.ABORT_REASON_SHUTDOWN)), detached("GAME_OVER"))
     over = stage.session.results()["t"]
     assert (over.finished, over.abort_reason, over.place, over.points) == (False, "SHUTDOWN", None, None)
     over.raise_for_error()
 
 
-def test_an_invalid_answer_is_asked_again_until_the_servers_limit(stage: Stage) -> None:
-    (ask,) = stage.say(decision(1))
+def test_a_decision_is_asked_again_after_invalid_answers_up_to_the_limit(stage: Stage) -> None:
+    (ask,) = stage.receive(decision(1))
     stage.answer(ask)
-    (again,) = stage.say(result(1, "INVALID", attempts_left=1))
+    (again,) = stage.receive(result(1, "INVALID", attempts_left=1))
     assert again.decision.request == ask.decision.request
     assert again.decision.invalid_attempts_left == 1
     stage.answer(again)
     assert stage.answers() == [(0, 1, 1)]
-    assert stage.say(result(1, "INVALID", attempts_left=0)) == []
-    (following,) = stage.say(decision(2))
+    assert stage.receive(result(1, "INVALID", attempts_left=0)) == []
+    (following,) = stage.receive(decision(2))
     assert following.decision.decision_id == 2
-    stage.say(detached("GAME_OVER"))
+    stage.receive(detached("GAME_OVER"))
     assert stage.session.results()["t"].invalid == 2
 
 
 def test_unlimited_attempts_are_asked_again(stage: Stage) -> None:
-    (ask,) = stage.say(decision(1))
+    (ask,) = stage.receive(decision(1))
     for _ in range(20):
         stage.answer(ask)
-        (ask,) = stage.say(result(1, "INVALID"))
+        (ask,) = stage.receive(result(1, "INVALID"))
         assert ask.decision.invalid_attempts_left is None
 
 
 def test_a_late_answer_is_counted_and_not_repeated(stage: Stage) -> None:
-    (ask,) = stage.say(decision(1))
+    (ask,) = stage.receive(decision(1))
     stage.answer(ask)
-    (following,) = stage.say(decision(2))
-    assert stage.say(result(1, "CLOSED")) == []
+    (following,) = stage.receive(decision(2))
+    assert stage.receive(result(1, "CLOSED")) == []
     stage.answer(following)
     assert stage.answers() == [(0, 2, 1)]
-    stage.say(detached("GAME_OVER"))
+    stage.receive(detached("GAME_OVER"))
     assert stage.session.results()["t"].late == 1
 
 
 def test_an_answer_to_a_decision_that_was_replaced_is_dropped(stage: Stage) -> None:
-    (slow,) = stage.say(decision(1))
-    (following,) = stage.say(decision(2))
+    (slow,) = stage.receive(decision(1))
+    (following,) = stage.receive(decision(2))
     stage.answer(slow)
     assert stage.sent == []
     stage.answer(following)
@@ -112,8 +112,8 @@ def test_an_answer_to_a_decision_that_was_replaced_is_dropped(stage: Stage) -> N
 def test_a_superseded_seat_stops_and_the_others_play_on() -> None:
     stage = Stage("t", "u")
     stage.connect()
-    stage.say(attached(1), attached(2))
-    stage.say(detached("SUPERSEDED", handle=0))
+    stage.receive(attached(1), attached(2))
+    stage.receive(detached("SUPERSEDED", handle=0))
     assert not stage.session.done
     stage.session.lost()
     stage.connect()
@@ -124,31 +124,31 @@ def test_a_superseded_seat_stops_and_the_others_play_on() -> None:
     assert stage.scribes["u"].log == [("attached", 0)]
 
 
-def test_a_refused_ticket_stops_that_seat_alone() -> None:
+def test_a_refused_ticket_stops_only_its_seat() -> None:
     stage = Stage("t", "u")
     stage.connect()
     refused = pb.Refused(request_id=1, reason="TICKET_UNKNOWN", message="no", metadata={"field": "ticket"}, code=16)
     # A refused attachment has a handle too.
-    stage.say(pb.SeatUpdate(handle=0, refused=refused), attached(2, seat=1))
+    stage.receive(pb.SeatUpdate(handle=0, refused=refused), attached(2, seat=1))
     over = stage.session.results()["t"]
     assert over.error is not None
     assert (over.error.reason, over.error.metadata, over.seat) == ("TICKET_UNKNOWN", {"field": "ticket"}, -1)
     assert over.error.code is grpc.StatusCode.UNAUTHENTICATED
-    assert stage.say(decision(1, handle=0)) == []
-    (ask,) = stage.say(decision(1, handle=1))
+    assert stage.receive(decision(1, handle=0)) == []
+    (ask,) = stage.receive(decision(1, handle=1))
     assert ask.agent is stage.scribes["u"]
 
 
 def test_other_refused_commands_are_only_reported(stage: Stage) -> None:
-    stage.say(pb.SeatUpdate(handle=0, refused=pb.Refused(reason="EXPRESSION_REFUSED", message="too long")))
+    stage.receive(pb.SeatUpdate(handle=0, refused=pb.Refused(reason="EXPRESSION_REFUSED", message="too long")))
     assert stage.log[-1] == ("refused", "EXPRESSION_REFUSED")
     assert not stage.session.done
 
 
 def test_a_snapshot_replaces_earlier_events(stage: Stage) -> None:
     started = pb.GameStarted(hand_size=17)
-    stage.say(pb.SeatUpdate(snapshot=pb.Snapshot(game_started=started, next_sequence=40)))
-    (ask,) = stage.say(events(39, 40), decision(3))
+    stage.receive(pb.SeatUpdate(snapshot=pb.Snapshot(game_started=started, next_sequence=40)))
+    (ask,) = stage.receive(events(39, 40), decision(3))
     assert ask.decision.hand_size == 17
     assert stage.log[-2:] == [("snapshot", 40), ("event", 40)]
 

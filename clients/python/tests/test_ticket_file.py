@@ -16,7 +16,7 @@ def path(tmp_path: Path) -> Path:
     return tmp_path / "ticket"
 
 
-def test_a_ticket_replaces_an_empty_file_and_is_its_owner_s_alone(path: Path) -> None:
+def test_a_ticket_replaces_an_empty_file_readable_only_by_its_owner(path: Path) -> None:
     path.write_text("\n")
     path.chmod(0o644)
     with TicketFile(path):
@@ -57,7 +57,7 @@ def test_files_of_a_killed_command_are_reused_privately(path: Path) -> None:
     assert list(path.parent.iterdir()) == [path]
 
 
-def test_another_s_ticket_is_not_removed(path: Path) -> None:
+def test_a_ticket_of_another_command_is_not_removed(path: Path) -> None:
     with TicketFile(path) as file:
         file.keep("mine")
         path.write_text("another's")

@@ -22,7 +22,7 @@ from chefshat.participant import MakeAgent
 
 PACKAGE = Path(__file__).resolve().parents[1]
 QUICK = Backoff(first_s=0.001, max_s=0.05, attempts=100)
-# Time limit in seconds: generous, because nothing is measured by it.
+# Time limit in seconds.
 LIMIT_S = 120
 GAMES = 6
 
@@ -140,7 +140,7 @@ def test_a_broken_stream_is_restored(fake: FakeServer, play: Player, moment: str
 
 
 class Cutter(Checking):
-    """Has all connections cut before every fourth decision."""
+    """Cuts all connections before every fourth decision."""
 
     def __init__(self, seat: SeatInfo, proxy: Proxy) -> None:
         super().__init__(seat)
@@ -177,7 +177,7 @@ def test_a_cut_connection_is_restored_with_the_real_server(real_address: str, pl
 
 
 class Waiting(RandomAgent):
-    """Waits with its first decision until it is let."""
+    """Waits at its first decision until it is released."""
 
     reached = threading.Event()
     go_on = threading.Event()
@@ -188,7 +188,7 @@ class Waiting(RandomAgent):
         return super().decide(request)
 
 
-def test_the_newest_connection_takes_part(address: str, play: Player) -> None:
+def test_the_newest_connection_plays(address: str, play: Player) -> None:
     Waiting.reached.clear()
     Waiting.go_on.clear()
     with chefshat.Client(address) as client, ThreadPoolExecutor(1) as pool:
@@ -203,7 +203,7 @@ def test_the_newest_connection_takes_part(address: str, play: Player) -> None:
             older.result(LIMIT_S)
 
 
-def test_a_tournament_that_is_closed_ends_for_its_participants(address: str, play: Player) -> None:
+def test_closing_a_tournament_ends_it_for_its_participants(address: str, play: Player) -> None:
     Waiting.reached.clear()
     Waiting.go_on.clear()
     with chefshat.Client(address) as client, ThreadPoolExecutor(1) as pool:
@@ -298,12 +298,12 @@ def test_the_command_takes_part(address: str, more: list[str]) -> None:
             [sys.executable, "-m", "chefshat.agent", *arguments], capture_output=True, text=True, timeout=LIMIT_S, cwd=PACKAGE
         )
         assert done.returncode == 0, done.stderr
-        said = json.loads(done.stdout)
+        outcome = json.loads(done.stdout)
         results = client.tournament_results(made.tournament.tournament_id)
-    assert (said["event"], said["tournament_id"]) == ("finished", made.tournament.tournament_id)
-    assert [game["event"] for game in said["games"]] == ["finished"] * GAMES
-    assert [line["participant"] for line in said["standings"]] == [line.participant for line in results.standings]
-    assert said["place"] == next(line.place for line in results.standings if line.participant == said["participant"])
+    assert (outcome["event"], outcome["tournament_id"]) == ("finished", made.tournament.tournament_id)
+    assert [game["event"] for game in outcome["games"]] == ["finished"] * GAMES
+    assert [line["participant"] for line in outcome["standings"]] == [line.participant for line in results.standings]
+    assert outcome["place"] == next(line.place for line in results.standings if line.participant == outcome["participant"])
 
 
 def test_the_command_prints_a_table(fake: FakeServer, capsys: pytest.CaptureFixture[str]) -> None:

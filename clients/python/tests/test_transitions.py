@@ -12,7 +12,7 @@ from chefshat.vector import Batch
 
 
 def legal(batch: Batch) -> NDArray[np.uint16]:
-    """The action 199 in every row."""
+    """Returns the action 199 for every row."""
     return np.full(len(batch), 199, np.uint16)
 
 
@@ -27,7 +27,7 @@ def collect(env: VectorEnv, steps: int) -> list[tuple[Transitions, Batch]]:
 
 def test_transitions_pair_each_decision_with_the_seats_next(toy: FakeVector) -> None:
     games, steps = 5, 40
-    # What a plain loop makes of the same games: (game, episode, seat, decision) -> (decision after, reward, ended, place).
+    # A plain loop over the same games: (game, episode, seat, decision) -> (next decision, reward, ended, place).
     expected: dict[tuple[int, ...], tuple[int, ...]] = {}
     for game in range(games):
         length = 5 + game % 3
@@ -67,7 +67,7 @@ def test_transitions_pair_each_decision_with_the_seats_next(toy: FakeVector) -> 
             assert not transitions.invalid.any()
             for game in np.unique(batch.endings.games).tolist():
                 played[game] += 1
-    # All decisions except for the open ones: at most one of each seat.
+    # All decisions except the open ones, at most one per seat.
     assert games * steps - games * PLAYERS <= found < games * steps
 
 
@@ -93,7 +93,7 @@ def test_a_reset_drops_open_decisions(toy: FakeVector) -> None:
         assert batch.observations.hands[:, 2].tolist() == [1, 0, 1]
         assert len(batch.transitions) == 0
         found = [transitions.before.observations.hands[:, [0, 2]].tolist() for transitions, _ in collect(env, 4)]
-    # The decision that game 1 took before its reset led nowhere; those of the others did.
+    # The decision of game 1 before its reset has no transition; those of the others have.
     first = {game: min(pair[1] for step in found for pair in step if pair[0] == game) for game in range(3)}
     assert first == {0: 0, 1: 0, 2: 0}
     assert [sum(pair == [1, 0] for pair in step) for step in found] == [0, 0, 0, 1]

@@ -1,4 +1,4 @@
-"""`VectorEnv` with a toy server: requests, columns, results and errors."""
+"""`VectorEnv` on the toy server: requests, columns, results and errors."""
 
 import gc
 from collections.abc import Iterable
@@ -16,7 +16,7 @@ from chefshat.vector import Batch
 
 
 def legal(batch: Batch) -> NDArray[np.uint16]:
-    """The action 199 in every row."""
+    """Returns the action 199 for every row."""
     return np.full(len(batch), 199, np.uint16)
 
 
@@ -152,7 +152,7 @@ def test_endings_and_beginnings(toy: FakeVector) -> None:
             assert len(env.step(legal(env.batch)).endings) == 0
         endings = env.step(legal(env.batch)).endings
         assert endings.seats.tolist() == [0, 1, 2, 3]
-        # Seat 0 decided at first and last: the first was paid when it decided again.
+        # Seat 0 decided first and last: its first reward came with its second decision.
         assert endings.rewards.tolist() == [105, 103, 105, 107]
         assert endings.ends.tolist() == [pb.EPISODE_END_FINISHED] * 4
         assert endings.game_over.tolist() == [0] * 4
@@ -189,7 +189,7 @@ def test_resets(toy: FakeVector) -> None:
             env.reset(games=[2])
 
 
-def test_records_arrive_whole(toy: FakeVector, tmp_path: Path) -> None:
+def test_records_arrive_complete(toy: FakeVector, tmp_path: Path) -> None:
     with VectorEnv(toy.address, 2, records=True) as env:
         records = [record for _ in range(12) for record in env.step(legal(env.batch)).records]
     assert [(record.game, record.index, len(record.lines)) for record in records] == [(0, 7, 2), (1, 7, 2)]

@@ -1,4 +1,4 @@
-"""`VectorEnv` with the real server: invariants of games, and refusals."""
+"""`VectorEnv` on the real server: invariants of games, and refusals."""
 
 from collections import Counter
 from typing import Any
@@ -52,7 +52,7 @@ def test_invariants_hold_in_every_game(real_address: str) -> None:
 
 
 def trajectory(env: VectorEnv, steps: int) -> list[Any]:
-    """What is seen and given while the last legal action is taken each time."""
+    """Returns observations and rewards while the last legal action is taken each time."""
     found = []
     for _ in range(steps):
         batch = env.step(env.num_actions - 1 - env.batch.masks[:, ::-1].argmax(axis=1))
@@ -62,7 +62,7 @@ def trajectory(env: VectorEnv, steps: int) -> list[Any]:
     return found
 
 
-def test_a_game_of_a_batch_can_be_played_again_alone(real_address: str) -> None:
+def test_a_game_of_a_batch_can_be_replayed_alone(real_address: str) -> None:
     options: dict[str, Any] = {"rewards": "paper", "client_seats": [1], "opponents": ["greedy", "random", "random_unmasked"]}
     with VectorEnv(real_address, 3, seed=5, **options) as env:
         seeds = [bytes(seed) for seed in env.batch.beginnings.seeds]
@@ -96,15 +96,15 @@ def test_a_custom_reward_can_equal_a_scheme(real_address: str) -> None:
             tried = rng.random(len(actions)) < 0.3
             actions[tried] = rng.integers(0, 214, tried.sum())
             wrong += int((~scheme.batch.masks[np.arange(len(actions)), actions]).sum())
-            told, made = scheme.step(actions), own.step(actions)
-            assert told.seats.tolist() == made.seats.tolist()
-            assert told.attempts.tolist() == made.attempts.tolist()
-            assert told.rewards.tolist() == made.rewards.tolist()
-            assert told.endings.rewards.tolist() == made.endings.rewards.tolist()
+            expected, actual = scheme.step(actions), own.step(actions)
+            assert expected.seats.tolist() == actual.seats.tolist()
+            assert expected.attempts.tolist() == actual.attempts.tolist()
+            assert expected.rewards.tolist() == actual.rewards.tolist()
+            assert expected.endings.rewards.tolist() == actual.endings.rewards.tolist()
         assert scheme.batch.totals.invalid_attempts == wrong
 
 
-def test_turns_alone_are_the_papers_200_actions(real_address: str) -> None:
+def test_turns_have_the_200_actions_of_the_paper(real_address: str) -> None:
     with VectorEnv(real_address, 8, seed=1, decisions="turns", other_decisions="greedy", skip_forced=True) as env:
         kinds: Counter[int] = Counter()
         while env.batch.totals.games < 2:
@@ -115,7 +115,7 @@ def test_turns_alone_are_the_papers_200_actions(real_address: str) -> None:
         assert set(kinds) == {pb.DECISION_KIND_TURN}
 
 
-def test_a_number_of_games_and_then_no_more(real_address: str) -> None:
+def test_a_limited_number_of_games(real_address: str) -> None:
     rng = np.random.default_rng(3)
     with VectorEnv(real_address, 2, seed=1, total_games=5, episode="game", rules={"target_shifts": 2}) as env:
         begun, over = env.batch.beginnings.indices.tolist(), 0
@@ -132,7 +132,7 @@ def test_a_number_of_games_and_then_no_more(real_address: str) -> None:
         assert len(env.reset(9)) == 2
 
 
-def test_other_tables_have_other_widths(real_address: str) -> None:
+def test_other_rules_have_other_widths(real_address: str) -> None:
     with VectorEnv(real_address, 2, rules={"players": 6, "faces": 15, "jokers": 1}, transitions=True) as env:
         for _ in range(50):
             batch = env.step(sample_legal(env.batch.mask_bits, np.random.default_rng(4)))
@@ -161,7 +161,7 @@ def test_games_continue_from_a_record(real_address: str) -> None:
     assert refused.value.reason == "GAME_UNKNOWN"
 
 
-def test_games_begin_with_given_hands(real_address: str) -> None:
+def test_games_start_with_given_hands(real_address: str) -> None:
     rules = pb.RuleSet(players=2, faces=4, jokers=2)
     cards = [[1, 2, 3, 4, 4, 5], [2, 3, 3, 4, 4, 5]]
     hands = [pb.SeatCards(seat=seat, cards=held, golden=seat == 1) for seat, held in enumerate(cards)]
@@ -188,7 +188,7 @@ def test_setups_are_refused_with_their_reason(real_address: str, options: Any, r
     assert not refused.value.retryable
 
 
-def test_an_illegal_action_is_named_by_its_row(real_address: str) -> None:
+def test_an_illegal_action_is_reported_with_its_row(real_address: str) -> None:
     with VectorEnv(real_address, 4, seed=1) as env:
         actions = env.batch.masks.argmax(axis=1)
         actions[2] = env.batch.masks[2].argmin()

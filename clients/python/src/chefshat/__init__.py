@@ -1,11 +1,11 @@
 """Agents for the card game Chef's Hat, played on a server over gRPC.
 
 Subclass `Agent` with one method, `decide`, and give it to `play`, or to a `Client` (blocking) or `aio.Client` (asyncio), which also
-make and find rooms, watch them and fetch records. The messages of the protocol are in `pb`. The package knows no rules: the server
-says what is legal.
+create and find rooms, watch them and fetch records. The messages of the protocol are in `pb`. The package contains no rules: the
+server says what is legal.
 
 To learn, `make` an environment: `VectorEnv` steps many games at once in columns, `envs` has the interfaces of Gymnasium and
-PettingZoo, `replay` learns from games that were played before.
+PettingZoo, `replay` learns from recorded games.
 """
 
 from chefshat import aio, pb
@@ -45,14 +45,14 @@ __all__ = [
 
 
 def play(agent: Agent, address: str, *, join_code: str, name: str, seat: int | None = None) -> SeatResult:
-    """Joins a room, plays its game to the end and returns the result: all an agent needs.
+    """Joins a room, plays its game to the end and returns the result.
 
     Args:
-        agent: the player.
+        agent: the agent.
         address: "host:port", "http://host:port" or, for TLS, "https://host:port".
         join_code: the room's join code.
-        name: name to show, 1..=64 characters.
-        seat: a certain seat; the first free one if None.
+        name: display name, 1..=64 characters.
+        seat: the seat; None: the first free one.
 
     Raises:
         ChefsHatError: the room or the seat was refused, another connection took the seat, or the server stayed unreachable.

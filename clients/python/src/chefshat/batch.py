@@ -61,7 +61,7 @@ class Batch(Situations):
         self.step = self._message.step
         #: Whether all games are over and no other follows; only a reset with a seed starts new ones.
         self.done = self._message.done
-        #: The records of the games that have ended, if the env was made with `records=True`.
+        #: The records of the games that have ended, if the env was created with `records=True`.
         self.records: tuple[GameRecord, ...] = ()
         self._transitions: Transitions | None = None
 
@@ -79,7 +79,7 @@ class Batch(Situations):
 
     @cached_property
     def shifts(self) -> ShiftStatistics | None:
-        """The Shifts that have ended, if the env was made with `shift_statistics=True`."""
+        """The Shifts that have ended, if the env was created with `shift_statistics=True`."""
         if not self._message.HasField("shifts"):
             return None
         message = self._message.shifts
@@ -93,9 +93,9 @@ class Batch(Situations):
 
     @property
     def transitions(self) -> Transitions:
-        """The outcomes of earlier decisions of the client, if the env was made with `transitions=True` or a `reward_function`."""
+        """The outcomes of earlier decisions of the client; requires `transitions=True` or a `reward_function`."""
         if self._transitions is None:
-            raise AttributeError("there are no transitions: make the VectorEnv with transitions=True")
+            raise AttributeError("there are no transitions: create the VectorEnv with transitions=True")
         return self._transitions
 
     def complete(self, memory: Memory, reward_function: RewardFunction | None) -> None:

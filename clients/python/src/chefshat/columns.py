@@ -155,7 +155,7 @@ class Table:
 
 
 class Observations(Table):
-    """What a seat may know, one row each. Own cards are those of the row's seat."""
+    """What a seat may know, one row each. `hands` and other cards are those of the row's seat."""
 
     shifts = Column[np.uint32]("<u4")
     """(R,): number of the Shift, from 1."""
@@ -164,7 +164,7 @@ class Observations(Table):
     hands = Column[np.uint8]("u1", "card_kinds")
     """(R, F+1): own hand."""
     golden = Column[np.uint8]("u1")
-    """(R,): 1 if the own hand holds the Golden card."""
+    """(R,): 1 if the hand has the Golden card."""
     boards = Column[np.uint8]("u1", 3)
     """(R, 3): face on the board (0 empty, F+1 a joker alone), number of cards, jokers among them."""
     cards_left = Column[np.uint8]("u1", "players")

@@ -40,7 +40,7 @@ class Decision:
     """A decision of a seat. Answer it with the index of any action in `legal_actions`.
 
     F is the number of faces (default 11), N the number of seats (default 4). Arrays of cards have F+1 counts: index f-1 counts
-    face f, index F the jokers. Arrays of seats have one number a seat. All arrays are read-only views of the message's bytes.
+    face f, index F the jokers. Arrays of seats have one number per seat. All arrays are read-only views of the message's bytes.
 
     Attributes:
         request: the message.
@@ -175,12 +175,12 @@ class Decision:
 
     @property
     def hand(self) -> Counts:
-        """Own hand: F+1 counts."""
+        """The hand: F+1 counts."""
         return np.frombuffer(self.request.observation.hand, np.uint8)
 
     @property
     def golden(self) -> bool:
-        """Whether the own hand holds the Golden card."""
+        """Whether the hand has the Golden card."""
         return self.request.observation.golden
 
     @property

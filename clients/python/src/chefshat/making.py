@@ -1,6 +1,6 @@
 """`make`: creates any of the environments in `vector` and `envs`."""
 
-# ruff: noqa: ANN401 - The options are those of what is made.
+# ruff: noqa: ANN401 - The options are those of the environment.
 import importlib
 from typing import TYPE_CHECKING, Any, Literal, overload
 

@@ -1,6 +1,6 @@
 """All messages and enums of the protocol under one name: `from chefshat import pb`, then `pb.RuleSet(preset="rulebook")`.
 
-What each field means is written in the .proto files and shown by editors from the typed stubs. The services' stubs are not here:
+The .proto files document the fields; editors show them from the typed stubs. The services' stubs are not here:
 `Client` and `aio.Client` wrap them.
 """
 

@@ -55,7 +55,7 @@ class VectorEnv:
     The server ends an environment after an hour without an answer (CLIENT_IDLE), and serves 64 of them at a time.
 
     Every method raises `ChefsHatError` with the server's reason if the server refuses. Then the environment has ended, and every
-    further call raises an error: make a new one.
+    further call raises an error: create a new one.
 
     Attributes:
         address: the server.

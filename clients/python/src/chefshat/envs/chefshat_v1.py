@@ -33,7 +33,7 @@ class raw_env(AECEnv[str, Any, Any]):  # type: ignore[misc]  # PettingZoo has no
     """The environment without checks. The agents are "player_0" to "player_{N-1}", by seat.
 
     An observation is a dictionary: "observation", of the form chosen, and "action_mask", A numbers of 0 or 1 (default 214), all 0
-    unless it is the agent's turn. The observation of another agent is that of its last decision. `infos` have "kind" (a value of
+    unless the agent decides next. The observation of another agent is that of its last decision. `infos` have "kind" (a value of
     `pb.DecisionKind`), "invalid_attempts", and at the end "place", from 1.
 
     An illegal action is an invalid attempt: it gets the reward of the scheme, and the same agent decides again. An agent gets the

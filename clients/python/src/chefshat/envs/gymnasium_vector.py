@@ -19,7 +19,7 @@ from chefshat.vector import Batch, VectorEnv
 class ChefsHatVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
     """Many games stepped together; the agent has the same seat in all of them, the others are built-in agents of the server.
 
-    Observations, actions, rewards and episodes are those of `ChefsHatEnv`, one row a game. When an episode ends, the next one
+    Observations, actions, rewards and episodes are those of `ChefsHatEnv`, one row per game. When an episode ends, the next one
     starts in the same step (`AutoresetMode.SAME_STEP`): the observation returned is the first of the next episode; the last one of
     the old is in `infos["final_obs"]`, an array of objects, None where no episode has ended, and its info in
     `infos["final_info"]`. `infos["action_mask"]` is an array of n rows of A numbers, 0 or 1. As in Gymnasium, `infos["_key"]` marks

@@ -198,8 +198,8 @@ def _starter_table(counted: Mapping[tuple[str, str], Counted]) -> Table:
         title="The starter wins the Shift, four random agents, by rule set and number of Shifts",
         columns=["", "2020 paper, 250", *_few_and_many(counted, "all")],
         rows=rows,
-        note="In brackets Wilson's 95% intervals, of the paper's figures those that 250 Shifts leave. Without any advantage the "
-        "starter would win 25%. The first 250 Shifts are part of the others.",
+        note="In brackets: Wilson's 95% intervals; for the paper's figures, those of 250 Shifts. Without any advantage the starter "
+        "would win 25%. The larger samples include the smaller ones.",
     )
 
 
@@ -213,7 +213,7 @@ def _laps_table(counted: Mapping[tuple[str, str], Counted]) -> Table:
         title="Laps per Shift, four random agents, by rule set and number of Shifts",
         columns=["", "2020 paper, 250", *_few_and_many(counted, "all")],
         rows=rows,
-        note="In brackets 95% intervals of the mean. A lap in progress at the end of a Shift counts.",
+        note="In brackets: 95% intervals of the mean. A lap in progress at the end of a Shift counts.",
     )
 
 
@@ -228,11 +228,11 @@ def _defaults_table(counted: Mapping[tuple[str, str], Counted], of_defaults: Map
     columns = ["", "2020 paper, 250"] + [f"{preset}, {gifts}" for preset in PRESETS for gifts in ("random gifts", "highest")]
     return Table(
         name="gifts",
-        title=f"The starter wins the Shift, by what is given in the exchange, {shifts:,} Shifts, by rule set",
+        title=f"The starter wins the Shift, by gifts in the exchange, {shifts:,} Shifts, by rule set",
         columns=columns,
         rows=rows,
         note="Turns are random. Random gifts: as above. Highest: Chef and Sous-Chef give their highest faces, special actions are "
-        "declined. In brackets Wilson's 95% intervals.",
+        "declined. In brackets: Wilson's 95% intervals.",
     )
 
 
@@ -251,7 +251,7 @@ def _length_table(counted: Mapping[tuple[str, str], Counted]) -> Table:
         title=f"Pizzas and turns per Shift, four random agents, {shifts:,} Shifts, by rule set",
         columns=columns,
         rows=rows,
-        note="The paper does not report these. In brackets 95% intervals of the mean.",
+        note="The paper does not report these. In brackets: 95% intervals of the mean.",
     )
 
 

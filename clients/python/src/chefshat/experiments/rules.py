@@ -193,12 +193,12 @@ def _actions(config: Config, learned: Mapping[str, Learned]) -> Table:
             {n: stats.spread(wrong_of_random(each), digits=0) for n, each in learned.items()},
         ),
         row(
-            "the learner's wrong actions, of a random agent's",
+            "the learner's wrong actions, as a share of a random agent's",
             Estimate(paper.RULES_WRONG_ACTIONS_RATIO, percent=True, digits=0),
             {n: compared(each) for n, each in learned.items()},
         ),
         row(
-            f"passes of the learner, of its turns, last {width}",
+            f"passes of the learner, as a share of its turns, last {width}",
             None,
             {n: stats.spread(each.share_of_turns("passes", LEARNER, end), percent=True) for n, each in learned.items()},
         ),
@@ -208,8 +208,8 @@ def _actions(config: Config, learned: Mapping[str, Learned]) -> Table:
         title=f"Experiment 2: rewards and wrong actions in {learning.shifts_of(config)} Shifts",
         columns=["", "paper", *learned],
         rows=rows,
-        note=f"Means over {len(config.seeds)} seeds, in brackets the least and the most of them. The mean reward is that of an "
-        "action in a Shift, averaged over Shifts; the paper prints wrong actions as “almost half”.",
+        note=f"Means over {len(config.seeds)} seeds; in brackets: minimum and maximum. The mean reward is per action in a "
+        "Shift, averaged over Shifts; the paper prints wrong actions as “almost half”.",
     )
 
 
@@ -227,7 +227,7 @@ def _victories(config: Config, learned: Mapping[str, Learned]) -> Table:
         title=f"Experiment 2: Shifts won of {learning.shifts_of(config)}",
         columns=["", learning.of_all(config, "paper"), *learned],
         rows=rows,
-        note="Means over the seeds, in brackets the least and the most. The paper speaks of 100 simulations here; its numbers add "
+        note="Means over the seeds; in brackets: minimum and maximum. The paper speaks of 100 simulations here; its numbers add "
         "up to 250.",
     )
 

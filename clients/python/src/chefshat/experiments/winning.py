@@ -127,8 +127,7 @@ def _one(config: Config, learned: Mapping[Condition, Learned]) -> Table:
             "starter wins",
         ],
         rows=rows,
-        note=f"Means over {len(config.seeds)} seeds, in brackets the least and the most of them. “By a random agent” is the mean "
-        "of three.",
+        note=f"Means over {len(config.seeds)} seeds; in brackets: minimum and maximum. “By a random agent” is the mean of three.",
     )
 
 
@@ -159,8 +158,8 @@ def _four(config: Config, learned: Mapping[Condition, Learned]) -> Table:
         title=f"Experiment 3: four learners, Shifts won of {learning.shifts_of(config)}",
         columns=["agents, reward", *(f"seat {seat + 1}" for seat in ALL_SEATS), "best seat", "last seat", "starter wins"],
         rows=rows,
-        note="Means over the seeds, in brackets the least and the most. Nothing but chance tells the seats apart; “best” and "
-        "“last” are found for every seed by itself. The paper's 30% is that of random agents.",
+        note="Means over the seeds; in brackets: minimum and maximum. The seats differ only by chance; “best” and “last” "
+        "are determined for each seed. The paper's 30% is that of random agents.",
     )
 
 
@@ -185,10 +184,10 @@ def _behaviour(config: Config, learned: Mapping[Condition, Learned]) -> Table:
         )
     return Table(
         name="behaviour",
-        title=f"Experiment 3: what the learners do in the last {learning.in_words(learning.window(config))}",
+        title=f"Experiment 3: behaviour of the learners in the last {learning.in_words(learning.window(config))}",
         columns=["learners", "agent, reward", "mean reward", "wrong actions per Shift", "passes, of turns", "turns of a Shift"],
         rows=rows,
-        note="Means over the learners and the seeds, in brackets the least and the most of the seeds. Mean rewards of the two "
+        note="Means over the learners and the seeds; in brackets: minimum and maximum of the seeds. Mean rewards of the two "
         "schemes cannot be compared.",
     )
 

@@ -1,7 +1,7 @@
 """The Deep Q agent of the 2020 paper, as pure functions over a stack of independent agents that are trained in lock-step.
 
 Here are its hyper-parameters, the state of the agents, and the functions `start`, `act` and `learn`. Every array of the state has
-a leading axis, one entry an agent. Agents share nothing: an agent in a stack learns what it would have learned alone. Playing games
+a leading axis, one entry per agent. Agents share nothing: each learns the same as alone. Playing games
 is in `deep_q_training`, files are in `checkpoint`.
 
 Where the paper is silent, this is decided:
@@ -110,7 +110,7 @@ class Hyperparameters(NamedTuple):
 
 
 class Transitions(NamedTuple):
-    """What followed a decision, one row an agent. Rows of agents that have nothing to learn are ignored.
+    """What followed a decision, one row per agent. Rows of agents that have nothing to learn are ignored.
 
     Attributes:
         states: (rows, inputs) f32, the observation.
@@ -158,7 +158,7 @@ LEARNED = ("online", "target", "optimiser", "epsilon", "updates", "keys")
 
 
 def start(config: DeepQConfig, seeds: Sequence[int]) -> Agents:
-    """Returns new agents, one a seed: Glorot-uniform weights, biases 0, empty memories."""
+    """Returns new agents, one per seed: Glorot-uniform weights, biases 0, empty memories."""
     agents: Agents = _init(_shapes(config), _keys(seeds))
     return _exploring(config, agents)
 
@@ -205,14 +205,14 @@ def act(
 
 
 def learn(config: DeepQConfig, agents: Agents, ids: ArrayLike, transitions: Transitions) -> Agents:
-    """Stores one transition a row and, where the memory holds a batch, updates the row's agent once.
+    """Stores one transition per row and, where the memory holds a batch, updates the row's agent once.
 
     Args:
         config: the hyper-parameters.
         agents: all agents. Consumed.
         ids: (rows,) i32, the row's agent; each agent at most once. Rows of an agent that does not exist (any number from the
             number of agents on) are ignored: padding with them keeps the number of rows constant and avoids recompilation.
-        transitions: one a row.
+        transitions: one per row.
     """
     learned: Agents = _learn_step(_compiled(config), agents, _hyperparameters(config), ids, transitions)
     return learned

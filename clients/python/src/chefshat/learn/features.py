@@ -52,7 +52,7 @@ def table_width(players: int, faces: int) -> int:
 
 
 def classic(observations: Observations, mask_bits: Bytes, *, faces: int, hand_size: int, out: Floats | None = None) -> Floats:
-    """Computes the paper's vector: the board, the own hand, the legal actions of a turn.
+    """Computes the paper's vector: the board, the hand, the legal actions of a turn.
 
     Board (F slots): the cards of the play ascending, jokers as F+1, cut off after F slots; an empty board is F+2 in slot 0. Hand (H
     slots): ascending, zeros first. Both are divided by F+2. Then the first T bits of the mask as 0 or 1.
@@ -102,7 +102,7 @@ def table(
     hand_size: int,
     out: Floats | None = None,
 ) -> Floats:
-    """Computes everything a seat may know, from its perspective: arrays of seats begin with the own seat and continue to its left.
+    """Computes everything a seat may know, from its perspective: arrays of seats start with the seat and continue to its left.
 
     In this order: hand (F+1; counts of face f divided by f, of jokers by 2), holds the Golden card (1), face on the board, one-hot
     0..F+1 (F+2), cards on it / F (1), jokers on it / 2 (1), cards left / H (N), passed (N), places / N (N), roles, one-hot of 0..5
@@ -112,7 +112,7 @@ def table(
 
     Args:
         observations: R rows of columns.
-        seats: (R,), the own seat of each row.
+        seats: (R,), the seat of each row.
         kinds: (R,), values of DecisionKind.
         mask_bits: (R, ceil(A/8)), packed as in `Batch.mask_bits`.
         players: N.

@@ -52,7 +52,7 @@ def to_layers(params: Params) -> list[Layer]:
 
 
 def stack(networks: Sequence[Sequence[Layer]]) -> Params:
-    """Converts the layers of networks of one shape to parameters with a leading axis, one entry a network."""
+    """Converts the layers of networks of one shape to parameters with a leading axis, one entry per network."""
     params: Any = {
         f"Dense_{number}": {
             "kernel": jnp.stack([jnp.asarray(layer.weight.T) for layer in layers]),

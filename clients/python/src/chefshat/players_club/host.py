@@ -1,6 +1,6 @@
 """The program in an agent's process: creates the agent and calls its methods, on requests over a pipe.
 
-It runs as a file, in environments without this package, so it uses only the standard library. It reads one JSON object a line,
+It runs as a file, in environments without this package, so it uses only the standard library. It reads one JSON object per line,
 `{"id", "call", "arguments"}`, and answers with `{"id", "value"}` or `{"id", "error", "trace"}`. The first call is "start".
 `process` makes the calls.
 """
