@@ -1,6 +1,6 @@
-//! How many decisions the engine takes in a second on one core, uniformly random among the legal
-//! ones: with the mask of each decision alone, and with the deciding seat's observation, or its
-//! classic vector, as well. Elements are decisions; dealing is included.
+//! Decisions per second on one core, drawn uniformly among the legal actions: with the mask alone,
+//! and with the observation of the deciding seat or its classic vector too. Elements are decisions;
+//! dealing is included.
 
 use std::hint::black_box;
 
@@ -9,11 +9,10 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 
 /// Games played in one iteration.
 const GAMES: u64 = 100;
-/// Decisions in those games: what is measured, counted anew in every iteration, so that a benchmark
-/// cannot measure nothing.
+/// Decisions in those games. Every iteration counts them, so that no benchmark measures nothing.
 const DECISIONS: u64 = 49_186;
 
-/// A cheap generator, so that the engine is measured and not the choice (SplitMix64).
+/// A generator that is cheap beside the engine (SplitMix64).
 struct Chance(u64);
 
 impl Chance {
@@ -26,7 +25,7 @@ impl Chance {
     }
 }
 
-/// Plays all games, shows each decision to `look`, and gives the number of decisions taken.
+/// Plays all games and calls `look` at each decision. Returns the number of decisions.
 fn play(mut look: impl FnMut(&Game, &Mask)) -> u64 {
     let rules = RuleSetSpec::default()
         .validate()

@@ -1,12 +1,13 @@
-//! Which records become part of a dataset: damaged ones, repeated ones, filters.
+//! Which records are exported: damaged and duplicate ones, filters.
 
 use chefshat_dataset::{Export, ExportError, Filter};
 use chefshat_record::files::find_records;
+use chefshat_record::testing::header;
 
-use super::{Stage, a_record, header, players};
+use super::{Stage, a_record, players};
 
 #[test]
-fn damaged_records_are_named_and_nothing_is_put_in_place() {
+fn damaged_records_are_reported_and_nothing_is_written() {
     let mut damaged = a_record(2);
     damaged.pop();
     let stage = Stage::new(&[("a.jsonl", a_record(1)), ("b.jsonl", damaged)]);
@@ -20,18 +21,18 @@ fn damaged_records_are_named_and_nothing_is_put_in_place() {
         !error.contains("a.jsonl") && error.contains("--skip-damaged"),
         "{error}"
     );
-    assert_eq!(stage.left_lying(), [""; 0]);
+    assert_eq!(stage.leftovers(), [""; 0]);
     let skipping = Export {
         skip_damaged: true,
         ..stage.export()
     };
     let exported = stage.run(&skipping).unwrap();
     assert_eq!((exported.games, exported.left_out.len()), (1, 2));
-    assert_eq!(stage.left_lying(), ["out"]);
+    assert_eq!(stage.leftovers(), ["out"]);
 }
 
 #[test]
-fn a_game_comes_once() {
+fn a_game_is_exported_once() {
     let stage = Stage::new(&[("a.jsonl", a_record(1)), ("b.jsonl", a_record(1))]);
     let exported = stage.run(&stage.export()).unwrap();
     assert_eq!(exported.games, 1);
@@ -42,7 +43,7 @@ fn a_game_comes_once() {
 }
 
 #[test]
-fn filters_leave_out_games() {
+fn filters_exclude_games() {
     let stage = Stage::new(&[("a.jsonl", a_record(1)), ("b.jsonl", a_record(2))]);
     let with = |filter| Export {
         filter,
@@ -59,12 +60,12 @@ fn filters_leave_out_games() {
         "" => "agent",
         _ => "built_in",
     };
-    let there = with(Filter {
+    let present = with(Filter {
         player_kind: Some(kind.into()),
         finished_only: true,
         ..Filter::default()
     });
-    assert_eq!(stage.run(&there).unwrap().games, 2);
+    assert_eq!(stage.run(&present).unwrap().games, 2);
     let human = with(Filter {
         player_kind: Some("human".into()),
         ..Filter::default()
@@ -73,7 +74,7 @@ fn filters_leave_out_games() {
         stage.run(&human),
         Err(ExportError::NothingLeft { records: 2 })
     ));
-    // What was there stays.
+    // The failed export left the dataset unchanged.
     assert_eq!(
         stage
             .rows("decisions")
@@ -85,7 +86,7 @@ fn filters_leave_out_games() {
 }
 
 #[test]
-fn a_moment_after_the_year_9999_harms_its_own_record_alone() {
+fn a_time_after_the_year_9999_damages_only_its_own_record() {
     const LAST_MS: u64 = 253_402_300_799_999;
     let (mut last, mut beyond) = (a_record(2), a_record(3));
     header(&mut last).created_at_ms = LAST_MS;

@@ -1,4 +1,4 @@
-//! Expressions: in the table of their own, and with the decisions that came after them.
+//! Expressions: in their own table, and beside the decisions after them.
 
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 use serde_json::{Value, json};
@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use super::{Stage, a_record, renumbered, with_lines};
 
 #[test]
-fn expressions_stand_in_both_tables() {
+fn expressions_are_in_both_tables() {
     let joy = v1::Expression {
         label: "joy".into(),
         valence: Some(0.7),
@@ -85,7 +85,7 @@ fn expressions_stand_in_both_tables() {
     assert_eq!(latest[5][2]["public"], true);
 }
 
-/// An expression that the room was told of.
+/// A public expression.
 fn shown(seat: u32, label: &str) -> Line {
     let expression = v1::Expression {
         label: label.into(),
@@ -105,7 +105,7 @@ fn event(kind: Kind) -> Line {
 }
 
 #[test]
-fn whoever_leaves_takes_their_expressions_along() {
+fn a_participant_that_leaves_removes_its_last_expression() {
     let mut lines = a_record(4);
     let ann = event(Kind::Seated(Box::new(v1::Seated {
         seat: 0,
@@ -122,7 +122,7 @@ fn whoever_leaves_takes_their_expressions_along() {
     ];
     let added = added.map(|line| v1::RecordLine { line: Some(line) });
     lines.splice(1..1, added);
-    // Seats 0 to 3 are taken after this, then the game begins.
+    // After this, participants take the seats 0 to 3 and the game starts.
     let lines = with_lines(renumbered(lines), &[(2, shown(1, "joy"))]);
     let stage = Stage::new(&[("a.jsonl", lines)]);
     stage.run(&stage.export()).unwrap();

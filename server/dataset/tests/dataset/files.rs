@@ -1,4 +1,4 @@
-//! The files of a dataset: the formats against each other, sums, the card.
+//! The files of a dataset: the formats agree, checksums, the card.
 
 use chefshat_dataset::{
     ColumnInfo, Export, Format, decision_columns, expression_columns, markdown,
@@ -14,12 +14,12 @@ use super::{Stage, a_record, with_lines};
 const DOCS: &str = include_str!("../../../../docs/datasets.md");
 
 #[test]
-fn every_format_has_every_row_and_the_same_input_the_same_bytes() {
+fn every_format_has_every_row_and_exports_are_deterministic() {
     let stage = Stage::new(&[("b.jsonl", a_record(2)), ("a.jsonl", a_record(1))]);
     let exported = stage.run(&stage.export()).unwrap();
     assert_eq!((exported.games, exported.finished), (2, 2));
     let rows = stage.rows("decisions");
-    // By the names of the files.
+    // In order of the file names.
     assert_eq!(rows[0]["room_name"], "room 1");
     assert_eq!(rows[rows.len() - 1]["room_name"], "room 2");
     let mut csv = csv::Reader::from_path(stage.out().join("decisions.csv")).unwrap();
@@ -75,11 +75,11 @@ fn every_format_has_every_row_and_the_same_input_the_same_bytes() {
         ..stage.export()
     };
     assert_eq!(stage.run(&again).unwrap().files, exported.files);
-    assert_eq!(stage.left_lying(), ["out"]);
+    assert_eq!(stage.leftovers(), ["out"]);
 }
 
 #[test]
-fn the_card_is_read_by_hubs_and_people() {
+fn the_card_is_readable_by_hubs_and_people() {
     let stage = Stage::new(&[("a.jsonl", a_record(1))]);
     let export = Export {
         formats: vec![Format::Csv, Format::Parquet],

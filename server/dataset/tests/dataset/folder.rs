@@ -1,4 +1,4 @@
-//! Where a dataset goes, and what is replaced by it.
+//! The target folder of a dataset, and what an export replaces.
 
 use std::path::Path;
 
@@ -22,7 +22,7 @@ fn only_datasets_are_replaced() {
     assert!(error.contains("it is not only a dataset"), "{error}");
     assert_eq!(std::fs::read(&precious).unwrap(), b"kept");
     std::fs::remove_file(&precious).unwrap();
-    // An empty folder will do.
+    // An empty folder is accepted.
     stage.run(&stage.export()).unwrap();
     assert!(stage.run(&stage.export()).is_err());
     stage.run(&replacing).unwrap();
@@ -48,13 +48,13 @@ fn a_dataset(layout: Layout) -> (Stage, Export) {
     (stage, replacing)
 }
 
-/// Everything in a folder and in its folders: paths and contents.
-fn everything(folder: &Path) -> Vec<(String, Vec<u8>)> {
+/// The files of a folder and its subfolders: paths and contents.
+fn contents(folder: &Path) -> Vec<(String, Vec<u8>)> {
     let mut found = Vec::new();
     for entry in std::fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
         if path.is_dir() {
-            found.extend(everything(&path));
+            found.extend(contents(&path));
         } else {
             let content = std::fs::read(&path).unwrap();
             found.push((path.display().to_string(), content));
@@ -65,7 +65,7 @@ fn everything(folder: &Path) -> Vec<(String, Vec<u8>)> {
 }
 
 #[test]
-fn a_folder_with_a_foreign_file_is_left_as_it_is() {
+fn a_folder_with_a_foreign_file_is_left_unchanged() {
     let game = format!("{:032x}", 1);
     let in_game = format!("{game}/notes.txt");
     for (layout, foreign, named) in [
@@ -80,15 +80,15 @@ fn a_folder_with_a_foreign_file_is_left_as_it_is() {
         let path = stage.out().join(foreign);
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
         std::fs::write(&path, "precious").unwrap();
-        let before = everything(&stage.out());
+        let before = contents(&stage.out());
         let error = stage.run(&replacing).unwrap_err().to_string();
         let words = format!("it contains {named}, which SHA256SUMS does not list");
         assert!(error.contains(&words), "{foreign}: {error}");
-        assert_eq!(everything(&stage.out()), before, "{foreign}");
-        assert_eq!(stage.left_lying(), ["out"], "{foreign}");
+        assert_eq!(contents(&stage.out()), before, "{foreign}");
+        assert_eq!(stage.leftovers(), ["out"], "{foreign}");
         std::fs::remove_file(&path).unwrap();
         if named != foreign {
-            // A folder that no dataset has is foreign, too, even if it is empty.
+            // A folder that no dataset has is foreign even if it is empty.
             assert!(stage.run(&replacing).is_err(), "{foreign}");
             std::fs::remove_dir(path.parent().unwrap()).unwrap();
         }
@@ -97,7 +97,7 @@ fn a_folder_with_a_foreign_file_is_left_as_it_is() {
 }
 
 #[test]
-fn checksums_alone_make_no_dataset() {
+fn checksums_alone_are_not_a_dataset() {
     for (file, content, words) in [
         (
             "README.md",
@@ -113,10 +113,10 @@ fn checksums_alone_make_no_dataset() {
     ] {
         let (stage, replacing) = a_dataset(Layout::Tables);
         std::fs::write(stage.out().join(file), content).unwrap();
-        let before = everything(&stage.out());
+        let before = contents(&stage.out());
         let error = stage.run(&replacing).unwrap_err().to_string();
         assert!(error.contains(words), "{error}");
-        assert_eq!(everything(&stage.out()), before);
+        assert_eq!(contents(&stage.out()), before);
     }
     for file in ["README.md", "SHA256SUMS"] {
         let (stage, replacing) = a_dataset(Layout::Tables);
@@ -124,7 +124,7 @@ fn checksums_alone_make_no_dataset() {
         assert!(stage.run(&replacing).is_err(), "{file}");
         assert!(stage.out().join("decisions.parquet").is_file());
     }
-    // Less than a whole dataset is nobody else's all the same.
+    // An incomplete dataset is replaced too.
     let (stage, replacing) = a_dataset(Layout::Tables);
     std::fs::remove_file(stage.out().join("decisions.csv")).unwrap();
     stage.run(&replacing).unwrap();
@@ -142,7 +142,7 @@ fn links_are_not_followed_out_of_the_folder() {
     let error = stage.run(&replacing).unwrap_err().to_string();
     assert!(error.contains("it contains link"), "{error}");
     std::fs::remove_file(&link).unwrap();
-    // A link to the folder of the dataset stands for that folder.
+    // A link to the folder of the dataset is followed.
     let by_link = stage.folder.path().join("by-link");
     std::os::unix::fs::symlink(stage.out(), &by_link).unwrap();
     let through = Export {

@@ -1,4 +1,4 @@
-//! The columns of the package chefshatgym.
+//! The columns of the package `chefshatgym`.
 
 use chefshat_dataset::{Export, Layout};
 use chefshat_engine::{BySeat, RewardScheme};
@@ -6,7 +6,7 @@ use chefshat_engine::{BySeat, RewardScheme};
 use super::{Stage, a_record, counted, players};
 
 #[test]
-fn the_other_layout_counts_the_same() {
+fn both_layouts_have_the_same_counts() {
     let lines = a_record(5);
     let stage = Stage::new(&[("a.jsonl", lines.clone())]);
     let export = Export {

@@ -1,5 +1,4 @@
-//! Datasets: their rows against a second count of the same games, their files against each other, and what is refused. Here is what these
-//! tests share.
+//! Tests of datasets, a module for each subject, and their shared helpers.
 
 #![allow(
     clippy::unwrap_used,
@@ -28,7 +27,7 @@ use tempfile::TempDir;
 
 use chefshat_record::testing::TestGame;
 
-/// Games whose records lie in a folder, and a place for datasets.
+/// A folder with records and a place for datasets.
 struct Stage {
     folder: TempDir,
 }
@@ -76,15 +75,15 @@ impl Stage {
             .collect()
     }
 
-    /// Everything in the folder of the stage but the records.
-    fn left_lying(&self) -> Vec<String> {
+    /// The entries of the folder except the records.
+    fn leftovers(&self) -> Vec<String> {
         let entries = std::fs::read_dir(self.folder.path()).unwrap();
         let names = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap());
         names.filter(|name| name != "records").collect()
     }
 }
 
-/// The standard rules, with so many Shifts.
+/// The default rules with this number of Shifts.
 fn rules(shifts: u32) -> RuleSet {
     let spec = RuleSetSpec {
         stop: Stop::Shifts(shifts),
@@ -93,15 +92,15 @@ fn rules(shifts: u32) -> RuleSet {
     spec.validate().unwrap()
 }
 
-/// A game of two Shifts, with a number of its own.
+/// The record of a game of two Shifts, with a number that identifies it.
 fn a_record(number: u8) -> Vec<v1::RecordLine> {
-    let making = TestGame::dealt(rules(2), number, u64::from(number));
-    let mut lines = making.record(|_| v1::DecisionSource::Agent);
+    let game = TestGame::dealt(rules(2), number, u64::from(number));
+    let mut lines = game.record(|_| v1::DecisionSource::Agent);
     rename(&mut lines, number);
     lines
 }
 
-/// Gives a record an id and a room of its own.
+/// Sets the id and the room of a record by its number.
 fn rename(lines: &mut [v1::RecordLine], number: u8) {
     for line in lines {
         match line.line.as_mut().unwrap() {
@@ -127,15 +126,7 @@ fn players(lines: &[v1::RecordLine]) -> Vec<v1::Participant> {
     }
 }
 
-/// The header of a record.
-fn header(lines: &mut [v1::RecordLine]) -> &mut v1::RecordHeader {
-    match &mut lines[0].line {
-        Some(Line::Header(header)) => header,
-        other => panic!("{other:?}"),
-    }
-}
-
-/// The record with lines put in after its first decisions, its events numbered anew.
+/// The record with lines added before decisions, by their index, and its events renumbered.
 fn with_lines(lines: Vec<v1::RecordLine>, added: &[(usize, Line)]) -> Vec<v1::RecordLine> {
     let mut all = Vec::new();
     let mut decisions = 0;
@@ -152,7 +143,7 @@ fn with_lines(lines: Vec<v1::RecordLine>, added: &[(usize, Line)]) -> Vec<v1::Re
     renumbered(all)
 }
 
-/// The record with its events numbered anew.
+/// The record with its events renumbered.
 fn renumbered(mut lines: Vec<v1::RecordLine>) -> Vec<v1::RecordLine> {
     let mut events = 0;
     for line in &mut lines {
@@ -168,7 +159,7 @@ fn renumbered(mut lines: Vec<v1::RecordLine>) -> Vec<v1::RecordLine> {
     lines
 }
 
-/// The Shifts of a record counted by the engine's own recorder, which knows nothing of datasets.
+/// The metrics of a record's Shifts by the engine's recorder, independent of datasets.
 fn counted(lines: &[v1::RecordLine], scheme: RewardScheme) -> Vec<ShiftMetrics> {
     let rules = rules(2);
     let seed = lines.iter().find_map(|line| match &line.line {

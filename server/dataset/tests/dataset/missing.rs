@@ -1,35 +1,35 @@
-//! What is null: what nobody saw, what did not come to be, whose decision it was not.
+//! Null values: unobserved cards, results of aborted games, decisions taken over.
 
 use chefshat_dataset::{Export, ExportError, Filter, Layout};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 use chefshat_record::branch::branch_of;
 use chefshat_record::import::import;
-use chefshat_record::testing::{Observed, TestGame, transcript};
+use chefshat_record::testing::{Observed, TestGame, aborted, transcript};
 use serde_json::Value;
 
-use super::{Stage, a_record, rename, renumbered, rules};
+use super::{Stage, a_record, rename, rules};
 
-/// Turns of a game at a real table that were written down: few enough to leave open what others held.
-const TOLD_TURNS: usize = 20;
+/// Observed turns of a game at a real table: few enough to leave the other hands unknown.
+const OBSERVED_TURNS: usize = 20;
 
-/// A real table of which only the hand of seat 0 and the first turns were observed.
+/// A game at a real table with the hand of seat 0 and the first turns.
 fn a_real_table() -> Vec<v1::RecordLine> {
     let rules = rules(1);
     let lines = TestGame::dealt(rules, 8, 8).record(|_| v1::DecisionSource::Agent);
     let observed = Observed {
         hands: 1,
-        turns: TOLD_TURNS,
+        turns: OBSERVED_TURNS,
         ..Observed::TURNS
     };
     import(transcript(&rules, &lines, observed).as_bytes()).unwrap()
 }
 
 #[test]
-fn what_nobody_saw_is_null() {
+fn unobserved_cards_are_null() {
     let stage = Stage::new(&[("a.jsonl", a_real_table())]);
     stage.run(&stage.export()).unwrap();
     let rows = stage.rows("decisions");
-    assert_eq!(rows.len(), TOLD_TURNS);
+    assert_eq!(rows.len(), OBSERVED_TURNS);
     let hidden = ["hand", "golden", "mask", "legal_actions"];
     let mut unknown = 0;
     for row in &rows {
@@ -67,15 +67,8 @@ fn what_nobody_saw_is_null() {
 
 #[test]
 fn an_aborted_game_has_no_result() {
-    let mut lines = a_record(6);
-    let reveal = lines.iter().find_map(|line| match &line.line {
-        Some(Line::Event(event)) => match &event.kind {
-            Some(Kind::GameEnded(ended)) => ended.reveal.clone(),
-            _ => None,
-        },
-        _ => None,
-    });
-    // Cut off in its second Shift, before a decision.
+    let lines = a_record(6);
+    // Aborted in its second Shift, before a decision.
     let is_play = |line: &v1::RecordLine| match &line.line {
         Some(Line::Event(event)) => matches!(&event.kind, Some(Kind::Play(_))),
         _ => false,
@@ -88,28 +81,12 @@ fn an_aborted_game_has_no_result() {
         })
         .unwrap();
     let play = lines[second..].iter().position(is_play).unwrap();
-    lines.truncate(second + play + 1);
+    let lines = aborted(lines, second + play + 1);
     let decisions = lines
         .iter()
         .filter(|line| matches!(line.line, Some(Line::Decision(_))))
         .count() as u64;
-    let aborted = Kind::GameAborted(Box::new(v1::GameAborted {
-        reason: v1::AbortReason::Closed.into(),
-        reveal,
-    }));
-    let end = [
-        Line::Event(v1::GameEvent {
-            kind: Some(aborted),
-            ..v1::GameEvent::default()
-        }),
-        Line::Footer(v1::RecordFooter {
-            state: v1::RoomState::Aborted.into(),
-            events: 0,
-            decisions,
-        }),
-    ];
-    lines.extend(end.map(|line| v1::RecordLine { line: Some(line) }));
-    let stage = Stage::new(&[("a.jsonl", renumbered(lines))]);
+    let stage = Stage::new(&[("a.jsonl", lines)]);
     let exported = stage.run(&stage.export()).unwrap();
     assert_eq!((exported.games, exported.finished), (1, 0));
     let rows = stage.rows("decisions");
@@ -150,15 +127,15 @@ fn an_aborted_game_has_no_result() {
 const TAKEN_OVER: u64 = 100;
 
 #[test]
-fn decisions_taken_over_are_nobodys_here() {
+fn decisions_taken_over_have_no_player() {
     let mut before = TestGame::dealt(rules(3), 7, 3).record(|_| v1::DecisionSource::Agent);
     rename(&mut before, 7);
     let branch = branch_of(&before, TAKEN_OVER).unwrap();
-    let making = TestGame {
+    let game = TestGame {
         branch: Some(&branch),
         ..TestGame::dealt(rules(3), 8, 4)
     };
-    let mut after = making.record(|_| v1::DecisionSource::Agent);
+    let mut after = game.record(|_| v1::DecisionSource::Agent);
     rename(&mut after, 8);
     let stage = Stage::new(&[("a.jsonl", before), ("b.jsonl", after)]);
     stage.run(&stage.export()).unwrap();
@@ -171,17 +148,17 @@ fn decisions_taken_over_are_nobodys_here() {
     let (first, second) = (of_game(7), of_game(8));
     assert!(second.len() as u64 > TAKEN_OVER);
     let whose = ["agent", "agent_kind", "built_in_agent", "decision_time_us"];
-    // What was taken over is what was decided there, but for whose it was, which room that was and what became of it.
+    // These facts are taken over, unlike player, room and result.
     let facts = ["number", "shift", "turn", "seat", "hand", "mask", "action"];
-    for (row, there) in second.iter().zip(&first) {
+    for (row, original) in second.iter().zip(&first) {
         if row["number"].as_u64() > Some(TAKEN_OVER) {
             break;
         }
         assert_eq!(row["source"], "recorded");
         assert!(whose.iter().all(|column| row[*column].is_null()), "{row}");
-        assert_eq!(there["agent"], format!("player {}", there["seat"]));
+        assert_eq!(original["agent"], format!("player {}", original["seat"]));
         for fact in facts {
-            assert_eq!(row[fact], there[fact], "{fact} of {row}");
+            assert_eq!(row[fact], original[fact], "{fact} of {row}");
         }
     }
     for row in &second[TAKEN_OVER as usize..] {
@@ -189,7 +166,7 @@ fn decisions_taken_over_are_nobodys_here() {
         assert_eq!(row["agent"], format!("player {}", row["seat"]));
         assert_eq!(row["agent_kind"], "agent");
     }
-    // The other layout has no word for it: whoever sits there bears all turns of the seat.
+    // The other layout cannot express this: all turns of a seat are those of its player.
     let sheets = Export {
         layout: Layout::ChefsHatGym,
         replace: true,

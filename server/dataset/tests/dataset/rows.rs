@@ -1,4 +1,4 @@
-//! Rows of decisions: against a second count of the same games, and against what the record says of each.
+//! Rows of decisions agree with the engine's metrics and with the record.
 
 use std::collections::BTreeMap;
 
@@ -25,7 +25,7 @@ fn with_attempts(mut lines: Vec<v1::RecordLine>) -> Vec<v1::RecordLine> {
 }
 
 #[test]
-fn rows_agree_with_the_engines_own_count() {
+fn rows_agree_with_the_engines_metrics() {
     let lines = with_attempts(a_record(3));
     let stage = Stage::new(&[("a.jsonl", lines.clone())]);
     let exported = stage.run(&stage.export()).unwrap();
@@ -73,7 +73,7 @@ fn rows_agree_with_the_engines_own_count() {
 }
 
 #[test]
-fn what_a_shifts_end_gives_falls_to_each_seats_last_turn() {
+fn rewards_of_a_shifts_end_are_in_each_seats_last_turn() {
     let stage = Stage::new(&[("a.jsonl", a_record(3))]);
     stage.run(&stage.export()).unwrap();
     let rows = stage.rows("decisions");
@@ -98,7 +98,7 @@ fn what_a_shifts_end_gives_falls_to_each_seats_last_turn() {
 }
 
 #[test]
-fn a_row_says_what_the_seat_knew_and_did() {
+fn a_row_has_the_observation_and_action_of_its_seat() {
     let lines = a_record(3);
     let players = players(&lines);
     let stage = Stage::new(&[("a.jsonl", lines)]);

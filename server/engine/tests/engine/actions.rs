@@ -1,4 +1,4 @@
-//! The numbering of actions and its texts.
+//! Indices and texts of actions.
 
 use chefshat_engine::{Action, ActionId, ActionSpace, Face};
 
@@ -41,7 +41,7 @@ fn standard_table() {
 }
 
 #[test]
-fn texts_and_moves_both_ways_for_every_number_of_faces() {
+fn texts_and_indices_convert_both_ways_for_every_number_of_faces() {
     let mut checked = 0u32;
     for faces in 4..=15 {
         let space = ActionSpace::new(faces).unwrap();
@@ -92,7 +92,7 @@ fn play_numbers_follow_the_formula() {
 }
 
 #[test]
-fn other_texts_are_not_understood() {
+fn other_texts_are_refused() {
     let space = ActionSpace::new(11).unwrap();
     let texts = [
         "",

@@ -1,4 +1,4 @@
-//! How turns, pizzas, Shifts and games end, with hands one can check by eye.
+//! The ends of turns, pizzas, Shifts and games, with small hands.
 
 use chefshat_engine::{
     BySeat, DecisionKind, Event, Game, PassScope, RuleSetSpec, Script, Seat, Seed, ShiftEnd, Stop,
@@ -79,7 +79,7 @@ fn a_finished_seat_can_be_answered_and_its_left_neighbour_leads_next() {
 }
 
 #[test]
-fn pizzas_without_a_play_move_the_lead_and_then_force_a_play() {
+fn pizzas_without_a_play_move_the_lead_then_force_a_play() {
     let spec = RuleSetSpec {
         max_idle_pizzas: 2,
         ..three()
@@ -118,7 +118,7 @@ fn pizzas_without_a_play_move_the_lead_and_then_force_a_play() {
 }
 
 #[test]
-fn a_pass_for_its_turn_only_can_be_followed_by_a_play() {
+fn a_pass_that_binds_for_one_turn_can_be_followed_by_a_play() {
     let lines = ["3 4 4 G", "1 2 2 J", "3 3 4 J"];
     let mut bound = first_shift(&three(), &lines);
     let mut free = first_shift(
@@ -134,15 +134,15 @@ fn a_pass_for_its_turn_only_can_be_followed_by_a_play() {
         act(game, "C3;Q1;J0");
         act(game, "pass");
     }
-    // In both seat 0 has passed since the last play; seat 1 passed before it, which binds in one of
-    // them alone.
+    // In both games seat 0 has passed since the last play. Seat 1 passed before it, which binds in
+    // one of the games only.
     assert_eq!(turn_of(&bound), 2);
     assert_eq!(turn_of(&free), 1);
     assert_eq!(legal_texts(&free)[0], "C1;Q1;J0");
 }
 
 #[test]
-fn adjudication_places_by_cards_left_and_then_by_distance() {
+fn adjudication_places_by_cards_left_then_by_distance() {
     let spec = RuleSetSpec {
         max_turns: 4,
         ..three()
@@ -176,7 +176,7 @@ fn adjudication_places_by_cards_left_and_then_by_distance() {
 }
 
 #[test]
-fn the_last_turn_allowed_may_end_the_shift_by_itself() {
+fn the_last_turn_allowed_may_end_the_shift() {
     let spec = RuleSetSpec {
         players: 2,
         jokers: 0,
@@ -202,7 +202,7 @@ fn the_last_turn_allowed_may_end_the_shift_by_itself() {
 
 #[test]
 fn laps_count_reaching_and_passing_over_the_starter() {
-    // Seat 0 starts and finishes at once: from then on the turn passes over it.
+    // Seat 0 starts and finishes at once, so the turn then passes over it.
     let mut game = first_shift(&three(), &["4 4 4 G", "1 2 2 J", "3 3 3 J"]);
     for text in [
         "C4;Q4;J0", "pass", "pass", "C2;Q1;J0", "pass", "C2;Q1;J0", "pass", "C1;Q1;J0", "pass",
@@ -227,7 +227,7 @@ fn laps_count_reaching_and_passing_over_the_starter() {
 }
 
 #[test]
-fn equal_points_are_settled_by_the_last_shift() {
+fn the_last_shift_breaks_ties() {
     let spec = RuleSetSpec {
         players: 2,
         jokers: 0,

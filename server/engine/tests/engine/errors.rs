@@ -34,7 +34,7 @@ fn refusal(game: &Game, text: &str) -> String {
 }
 
 #[test]
-fn refusals_in_words() {
+fn refused_turns() {
     let mut game = game(&three(), None);
     assert_eq!(
         refusal(&game, "C3;Q1;J0"),
@@ -90,7 +90,7 @@ fn refusals_in_words() {
 }
 
 #[test]
-fn any_top_face_says_so() {
+fn refused_openings_with_any_top_face() {
     let spec = RuleSetSpec {
         opening: Opening::AnyTopFace,
         ..three()
@@ -107,7 +107,7 @@ fn any_top_face_says_so() {
 }
 
 #[test]
-fn exchange_special_action_and_end_say_so() {
+fn refused_special_actions_and_gifts() {
     let script = Script {
         shift: 2,
         last_order: Some(order(&[0, 1, 2])),

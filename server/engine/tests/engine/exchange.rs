@@ -1,5 +1,5 @@
-//! The exchange, with hands one can check by eye: who gives what, who chooses, what is seen before
-//! it is complete.
+//! The exchange, with small hands: who gives what, who chooses, and what is visible before it is
+//! complete.
 
 use chefshat_engine::{BySeat, Cards, DecisionKind, Event, Role, Seat, Viewer};
 
@@ -14,7 +14,7 @@ fn exchange_of_four() {
             .unwrap();
     assert_eq!(events[1..], [Event::RolesAssigned { roles }]);
 
-    // The Chef chooses from the hand as dealt: the Dishwasher's 2 and 3 are not there yet.
+    // The Chef chooses from the hand as dealt, without the Dishwasher's 2 and 3.
     assert_eq!(open(&game), (2, DecisionKind::Exchange));
     assert_eq!(
         legal_texts(&game),
@@ -124,7 +124,7 @@ fn jokers_may_be_chosen() {
 }
 
 #[test]
-fn a_giver_short_of_ingredient_cards_gives_what_it_has_and_gets_as_many() {
+fn a_giver_short_of_ingredient_cards_gives_all_and_receives_as_many() {
     let lines = ["2 3 4", "3 J J", "1 2 G", "3 4 4"];
     let (mut game, _) = second_shift(&spec(4, 4), &lines, &ORDER);
     assert_eq!(open(&game), (1, DecisionKind::SpecialAction));
@@ -139,7 +139,7 @@ fn a_giver_short_of_ingredient_cards_gives_what_it_has_and_gets_as_many() {
     assert_eq!(
         open(&game),
         (0, DecisionKind::Exchange),
-        "one card is given for the one that comes"
+        "the Chef gives as many as it receives"
     );
     let events = act(&mut game, "give C4");
     let counts: Vec<u8> = events
@@ -193,7 +193,7 @@ fn default_gifts() {
             "{lines:?}"
         );
     }
-    // Nothing but the Golden card and jokers: the Golden card first, then a joker.
+    // Only the Golden card and jokers: the Golden card first, then a joker.
     let (mut game, _) = second_shift(&spec(4, 4), &["2 3 4", "3 4 4", "G J J", "1 2 3"], &ORDER);
     let mut defaults = Vec::new();
     for _ in 0..3 {

@@ -1,6 +1,5 @@
-//! The tests of the rule engine, one binary. Each module below is a subject; what several of them
-//! need is in `support`, and `model` is a second, plain reading of the rules to hold the engine
-//! against.
+//! Tests of the rule engine, a module for each subject. `support` has shared helpers, `model` a
+//! second, plain implementation of the rules.
 
 #![allow(
     clippy::unwrap_used,

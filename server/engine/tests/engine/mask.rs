@@ -8,7 +8,7 @@ fn mask(indices: &[u16]) -> Mask {
 }
 
 #[test]
-fn bytes_are_little_in_bit_order() {
+fn bytes_have_the_lowest_bit_first() {
     let mask = mask(&[0, 9, 199]);
     let bytes = mask.to_bytes(214);
     assert_eq!(bytes.len(), 27);
@@ -23,7 +23,7 @@ fn bytes_are_little_in_bit_order() {
 }
 
 #[test]
-fn actions_beyond_the_capacity_are_not_in_a_set() {
+fn actions_beyond_the_capacity_are_ignored() {
     assert_eq!(mask(&[383, 384, u16::MAX]), mask(&[383]));
     assert!(!mask(&[383]).contains(ActionId::new(384)));
     assert!(!mask(&[383]).contains(ActionId::new(u16::MAX)));

@@ -1,4 +1,4 @@
-//! Metrics of a Shift one can follow by hand, and their sums over whole games.
+//! Metrics of a Shift computed by hand, and their sums over games.
 
 use chefshat_engine::{Event, Game, MetricsRecorder, RewardScheme, RuleSetSpec, Seat, Seed, Stop};
 
@@ -71,7 +71,7 @@ fn a_shift_by_hand() {
 }
 
 #[test]
-fn without_a_scheme_there_is_no_reward() {
+fn without_a_scheme_there_are_no_rewards() {
     let (rules, mut game) = two_players(3);
     let mut recorder = MetricsRecorder::new(rules, None);
     recorder.wrong(Seat::new(0));
@@ -95,7 +95,7 @@ fn without_a_scheme_there_is_no_reward() {
 }
 
 #[test]
-fn counts_agree_with_the_shift_and_start_anew() {
+fn counts_agree_with_the_shift_and_restart_with_the_next() {
     let rules = RuleSetSpec {
         stop: Stop::Shifts(6),
         ..RuleSetSpec::default()

@@ -1,15 +1,15 @@
-//! A second reading of the rules, as plain as it can be: it follows a game by its events, keeps
-//! every card in a list, and says of each action by its text whether it is legal. It shares no
-//! table and no packed number with the engine.
+//! A second, plain implementation of the rules: it follows a game by its events, keeps every card in
+//! a list, and decides from an action's text whether it is legal. It shares no table and no packed
+//! number with the engine.
 
 use chefshat_engine::{Cards, DecisionKind, Event, Game, Opening, RuleSet};
 
-/// What the model knows of the game.
+/// The state of a game.
 pub(crate) struct Model {
     rules: RuleSet,
     /// Each seat's cards, F+1 for a joker.
     hands: Vec<Vec<u8>>,
-    /// Which seat holds the Golden card, once dealt and until played.
+    /// The seat that holds the Golden card, until it is played.
     golden: Option<usize>,
     /// Cards played in this Shift.
     played: Vec<u8>,
@@ -114,12 +114,12 @@ impl Model {
         }
     }
 
-    /// Whether the rules allow the action with this text now, read sentence by sentence.
+    /// Whether the rules allow the action with this text now.
     pub(crate) fn allows(&self, game: &Game, text: &str) -> bool {
         let Some(decision) = game.decision() else {
             return false;
         };
-        // What the seat has given in an exchange that is still going on has left its hand.
+        // A card given in the exchange leaves the hand at once.
         let mut hand = self.hands[decision.seat.index()].clone();
         if decision.kind == DecisionKind::Exchange {
             self.list(game.gave()[decision.seat])
@@ -159,8 +159,7 @@ impl Model {
         }
     }
 
-    /// Checks that the engine holds the same cards in the same places, and that none is lost or
-    /// doubled.
+    /// Checks that the engine has the same cards in the same places, none lost or duplicated.
     pub(crate) fn check_cards(&self, game: &Game) {
         let in_exchange = game
             .decision()

@@ -1,4 +1,4 @@
-//! What a seat may know, and the classic vector of it.
+//! Observations and classic vectors.
 
 use chefshat_engine::{
     BySeat, Cards, DecisionKind, Game, RuleSetSpec, Script, Seat, Seed, Stop, Viewer,
@@ -82,7 +82,7 @@ fn vectors_by_hand() {
 }
 
 #[test]
-fn a_long_play_is_cut_off_and_a_joker_is_above_all_faces() {
+fn a_long_play_is_truncated_and_a_joker_is_above_all_faces() {
     let mut game = two(2, &["3 4 4 G J J", "1 2 2 3 3 4"]);
     let mut long = game.clone();
     act(&mut long, "C4;Q3;J2");
@@ -129,7 +129,7 @@ fn the_mask_of_another_kind_of_decision_is_not_in_the_vector() {
 }
 
 #[test]
-fn what_seats_and_spectators_see() {
+fn observations_of_seats_and_spectators() {
     let mut game = two(0, &["1 2 3 4 G", "2 3 3 4 4"]);
     act(&mut game, "C4;Q2;J0");
     act(&mut game, "C3;Q2;J0");
@@ -150,7 +150,7 @@ fn what_seats_and_spectators_see() {
     assert_eq!(
         own.played,
         cards(4, "3 3 4 4"),
-        "by face: the Golden card is not told apart"
+        "by face: the Golden card is not marked"
     );
     assert_eq!(own.roles.as_slice(), [None, None]);
     assert_eq!(own.points.as_slice(), [0, 0]);
@@ -189,7 +189,7 @@ fn what_seats_and_spectators_see() {
 }
 
 #[test]
-fn passes_are_seen_until_the_next_pizza() {
+fn passes_are_visible_until_the_next_pizza() {
     let spec = RuleSetSpec {
         players: 3,
         faces: 4,

@@ -1,5 +1,4 @@
-//! What must hold in every game: for any rule set that makes sense, any seed and any way of
-//! playing.
+//! Properties of every game: for any valid rule set, seed and policy.
 
 use chefshat_engine::{ActionId, Game, Mask, RuleSet, Seed, Stop, Viewer};
 use proptest::prelude::*;
@@ -7,11 +6,11 @@ use proptest::prelude::*;
 use crate::model::Model;
 use crate::support::{Chance, any_rules};
 
-/// Ways of playing that lead games to different corners.
+/// How actions are chosen; each reaches different situations.
 #[derive(Copy, Clone, Debug)]
 enum Policy {
     Random,
-    /// Passes whenever it may.
+    /// Passes if that is legal.
     Default,
     /// The lowest legal index.
     Lowest,
@@ -39,12 +38,12 @@ fn choose(policy: Policy, game: &Game, chance: &mut Chance) -> ActionId {
     choice.expect("an open decision has a legal action")
 }
 
-/// The most decisions that a game may take: no Shift is longer than its limit of turns, a special
-/// action and three gifts.
+/// The most decisions of a game: each Shift has at most its limit of turns, a special action and
+/// three gifts.
 fn most_decisions(rules: &RuleSet) -> u64 {
     let shifts = match rules.stop() {
         Stop::Shifts(shifts) => u64::from(shifts),
-        // Every Shift gives at least one point to somebody.
+        // Every Shift gives at least one point.
         Stop::Points(points) => (u64::from(points) - 1) * rules.players() as u64 + 1,
     };
     shifts * (u64::from(rules.max_turns()) + 4)
@@ -92,7 +91,7 @@ proptest! {
     }
 
     #[test]
-    fn apply_takes_what_the_mask_shows_and_nothing_else(
+    fn apply_accepts_exactly_the_actions_of_the_mask(
         rules in any_rules(), seed in any::<[u8; 32]>(), chance in any::<u64>()
     ) {
         let mut chance = Chance(chance);
@@ -109,7 +108,7 @@ proptest! {
                 prop_assert_eq!(game.check(action), applied);
                 match applied {
                     Ok(()) => {
-                        prop_assert!(mask.contains(action), "{} was taken", index);
+                        prop_assert!(mask.contains(action), "{} was accepted", index);
                         prop_assert!(tried != game);
                     }
                     Err(error) => {

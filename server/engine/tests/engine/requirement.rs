@@ -1,4 +1,4 @@
-//! What a decision requires says the same as the mask of legal actions, and tells no hidden card.
+//! Requirements of decisions agree with the mask of legal actions and reveal no hidden card.
 
 use chefshat_engine::{
     Action, Cards, Event, Game, GiftRequirement, Opening, PlayRequirement, Requirement,
@@ -68,7 +68,7 @@ proptest! {
             }
             for event in events {
                 match event {
-                    // Each gift was announced: its number, how many there are, who receives it.
+                    // Each gift was announced with its number, the total and the receiver.
                     Event::CardsExchanged { giver, receiver, count, .. } => {
                         let gifts: Vec<_> = due.iter().filter(|(seat, _)| *seat == giver).collect();
                         prop_assert!(gifts.is_empty() || gifts.len() == usize::from(count));
@@ -149,7 +149,7 @@ fn plays_are_required_to_open_then_to_beat_the_board() {
 }
 
 #[test]
-fn nothing_beats_the_lowest_face_and_a_lone_joker_is_beaten_by_all_others() {
+fn nothing_beats_the_lowest_face_and_every_face_beats_a_lone_joker() {
     let without_exchange = RuleSetSpec {
         exchange: false,
         ..spec(4, 5)
@@ -186,7 +186,7 @@ fn gifts_are_numbered_and_name_their_receiver() {
 }
 
 #[test]
-fn the_number_of_gifts_does_not_tell_the_chef_that_the_dishwasher_holds_two_jokers() {
+fn the_number_of_gifts_does_not_reveal_the_dishwashers_jokers() {
     let small = RuleSetSpec {
         special_actions: false,
         ..spec(4, 4)
@@ -199,13 +199,13 @@ fn the_number_of_gifts_does_not_tell_the_chef_that_the_dishwasher_holds_two_joke
     assert_eq!(full.requirement(), gift(1, None, 1));
     act(&mut short, "give C3");
     act(&mut full, "give C3");
-    // That a second one is due tells it.
+    // A second gift reveals the total.
     assert_eq!(short.requirement(), gift(1, Some(1), 3));
     assert_eq!(full.requirement(), gift(2, Some(2), 1));
 }
 
 #[test]
-fn the_role_decides_which_special_action_is_offered() {
+fn the_role_determines_the_special_action() {
     let special = |special| Some(Requirement::SpecialAction(special));
     let fight = ["3 4 5 5", "2 3 J J", "1 2 4 G", "3 4 4 5"];
     let (game, _) = second_shift(&spec(4, 5), &fight, &ORDER);
@@ -216,7 +216,7 @@ fn the_role_decides_which_special_action_is_offered() {
 }
 
 #[test]
-fn what_a_play_must_be_does_not_depend_on_hands() {
+fn requirements_do_not_depend_on_hands() {
     let without_exchange = RuleSetSpec {
         exchange: false,
         ..spec(4, 5)

@@ -1,4 +1,4 @@
-//! Rewards, against numbers worked out by hand.
+//! Rewards, computed by hand.
 
 use chefshat_engine::{Event, Game, RewardScheme, RuleSet, RuleSetSpec, Script, Seed, Stop};
 
@@ -32,15 +32,15 @@ fn rewards(scheme: RewardScheme, max_turns: u32) -> Vec<Vec<(usize, f32, usize)>
     let mut all = Vec::new();
     for text in TURNS.iter().take(max_turns as usize) {
         let events = act(&mut game, text);
-        let mut brought = Vec::new();
+        let mut given = Vec::new();
         scheme.of_events(&rules, &events, |seat, reward, index| {
             assert!(matches!(
                 events[index],
                 Event::Played { .. } | Event::Passed { .. } | Event::ShiftEnded(_)
             ));
-            brought.push((seat.index(), reward, index));
+            given.push((seat.index(), reward, index));
         });
-        all.push(brought);
+        all.push(given);
     }
     all
 }
@@ -65,7 +65,7 @@ fn check(scheme: RewardScheme, max_turns: u32, expected: &[&[(usize, f32, usize)
 }
 
 #[test]
-fn a_whole_shift() {
+fn every_turn_of_a_shift() {
     // Cards left after each turn: 3 3 3 1 3 0, of five; the last turn yields Played, SeatFinished,
     // ShiftEnded, GameEnded.
     check(
@@ -131,7 +131,7 @@ fn a_whole_shift() {
 }
 
 #[test]
-fn an_adjudicated_shift_gives_the_finishing_part_to_all_who_held_cards() {
+fn an_adjudicated_shift_gives_the_finishing_part_to_seats_with_cards() {
     // After three turns both hold three cards; seat 0 acted last, so seat 1 is first.
     check(
         RewardScheme::Paper,
@@ -170,8 +170,7 @@ fn an_adjudicated_shift_gives_the_finishing_part_to_all_who_held_cards() {
 #[test]
 fn single_turns_of_the_standard_game() {
     let rules = RuleSetSpec::default().validate().unwrap();
-    // Hands of 17 cards. As printed, nothing left is worth 1/17 of 0.7, and a full hand nearly
-    // -0.66.
+    // Hands of 17 cards. As printed, an empty hand gives 1/17 of 0.7, a full one nearly -0.66.
     let table = [
         (RewardScheme::Paper, 0, Some(1), 0.7 / 17.0 + 0.3),
         (RewardScheme::Paper, 0, Some(3), 0.7 / 17.0 + 0.12),
@@ -213,7 +212,7 @@ fn invalid_attempts_and_names() {
 }
 
 #[test]
-fn exchange_and_special_action_give_nothing() {
+fn exchange_and_special_action_are_not_rewarded() {
     let rules = RuleSetSpec {
         stop: Stop::Shifts(4),
         ..RuleSetSpec::default()
@@ -227,12 +226,12 @@ fn exchange_and_special_action_give_nothing() {
         let action = chance.legal_action(&game);
         let mut events = Vec::new();
         game.apply(action, |event| events.push(event)).unwrap();
-        let mut brought = 0;
-        RewardScheme::Validity.of_events(&rules, &events, |_, _, _| brought += 1);
+        let mut given = 0;
+        RewardScheme::Validity.of_events(&rules, &events, |_, _, _| given += 1);
         if decision.kind == chefshat_engine::DecisionKind::Turn {
-            assert_eq!(brought, 1);
+            assert_eq!(given, 1);
         } else {
-            assert_eq!(brought, 0);
+            assert_eq!(given, 0);
             others += 1;
         }
     }

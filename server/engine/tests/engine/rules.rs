@@ -1,4 +1,4 @@
-//! Rule sets: presets, standard values, and every refusal with its field and reason.
+//! Rule sets: presets, defaults, and every refusal with its field and reason.
 
 use chefshat_engine::{Opening, PassScope, RuleSetSpec, Stop};
 
@@ -59,7 +59,7 @@ fn presets() {
 }
 
 #[test]
-fn standard_points_by_number_of_players() {
+fn default_points_by_number_of_players() {
     let table: [(u8, &[u32]); 5] = [
         (2, &[5, 0]),
         (3, &[5, 3, 0]),
@@ -93,7 +93,7 @@ fn standard_points_by_number_of_players() {
 }
 
 #[test]
-fn senseless_rule_sets_are_refused_with_field_and_reason() {
+fn invalid_rule_sets_are_refused_with_field_and_reason() {
     let standard = RuleSetSpec::default;
     let table: [(RuleSetSpec, &str, &str); 17] = [
         (
@@ -244,7 +244,7 @@ fn senseless_rule_sets_are_refused_with_field_and_reason() {
 }
 
 #[test]
-fn the_smallest_and_largest_games_make_sense() {
+fn the_smallest_and_largest_games_are_valid() {
     let table = [
         (4, 4, 2, 3),
         (3, 4, 0, 3),

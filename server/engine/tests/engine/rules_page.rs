@@ -1,5 +1,5 @@
-//! `docs/rules.md` and the engine agree: the sections that source code cites exist, and the
-//! example Shift is what the engine plays.
+//! `docs/rules.md` agrees with the engine: the sections that source code cites exist, and the engine
+//! plays the example Shift.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -104,7 +104,7 @@ fn cited_sections_exist() {
 }
 
 #[test]
-fn the_example_shift_is_played_by_the_rules() {
+fn the_engine_plays_the_example_shift() {
     let page = page();
     let seats = table(&page, "player");
     let dealt: Vec<String> = seats

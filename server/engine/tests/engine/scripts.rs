@@ -1,4 +1,4 @@
-//! Games from given hands, and which hands make none.
+//! Games from given hands, and the refused ones.
 
 use chefshat_engine::{BySeat, Game, Opening, RuleSetSpec, Script, ScriptError, Seat, Seed};
 
@@ -19,7 +19,7 @@ fn script() -> Script {
 }
 
 #[test]
-fn senseless_scripts_are_refused() {
+fn invalid_scripts_are_refused() {
     let top_face = RuleSetSpec {
         opening: Opening::AnyTopFace,
         ..spec()
@@ -147,7 +147,7 @@ fn a_scripted_shift_is_followed_by_dealt_ones() {
 }
 
 #[test]
-fn another_seed_deals_the_shifts_that_begin_after_it() {
+fn another_seed_deals_the_later_shifts() {
     let rules = spec().validate().unwrap();
     let (first, second) = (Seed([8; 32]), Seed([9; 32]));
     let mut original = Game::new(rules, first, |_| {});

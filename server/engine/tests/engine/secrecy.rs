@@ -1,6 +1,5 @@
-//! Nobody learns what it may not know: two games that differ only in cards hidden from a viewer,
-//! played by the same decisions, look the same to that viewer. The same check must catch views that
-//! leak, planted here on purpose.
+//! Two games that differ only in cards hidden from a viewer, played by the same decisions, look the
+//! same to that viewer. The same check must catch views that leak on purpose.
 
 use chefshat_engine::{
     BySeat, Cards, DecisionKind, Event, Game, Observation, Opening, PassScope, RuleSet,
@@ -48,7 +47,7 @@ fn viewers(rules: &RuleSet) -> Vec<Viewer> {
         .collect()
 }
 
-/// Twins that part in the middle of a Shift: hidden cards of two other seats change hands.
+/// Twins that differ from the middle of a Shift on: two other seats swap hidden cards.
 fn check_turns(view: View, rounds: usize) -> Verdict {
     let mut chance = Chance(11);
     let mut compared = 0;
@@ -64,7 +63,7 @@ fn check_turns(view: View, rounds: usize) -> Verdict {
                 }
             }
             for viewer in viewers(&rules) {
-                // What the viewer gave it knows to be in another hand.
+                // The viewer knows the cards it gave to be in another hand.
                 let known = own(viewer).map_or(Cards::EMPTY, |seat| game.gave()[seat]);
                 let twin = swapped(game.hands(), &rules, viewer, known, &mut chance);
                 if let Some(twin) = twin.and_then(|hands| game.with_hands(hands).ok()) {
@@ -76,7 +75,7 @@ fn check_turns(view: View, rounds: usize) -> Verdict {
     Ok(compared)
 }
 
-/// Twins that part at the deal, before special action and exchange.
+/// Twins that differ from the deal on, before special action and exchange.
 fn check_deals(view: View, rounds: usize) -> Verdict {
     let mut chance = Chance(12);
     let mut compared = 0;
@@ -109,15 +108,15 @@ fn check_deals(view: View, rounds: usize) -> Verdict {
                     // How many cards are given is public.
                     continue;
                 }
-                let [(game, told), (twin, twin_told)] = [start(dealt.hands()), start(twin)];
+                let [(game, events), (twin, twin_events)] = [start(dealt.hands()), start(twin)];
                 let seen = |events: &[Event]| {
                     events
                         .iter()
                         .map(|event| (view.event)(event, viewer))
                         .collect::<Vec<_>>()
                 };
-                if seen(&told) != seen(&twin_told) {
-                    return Err(format!("the deal: {told:?} and {twin_told:?}"));
+                if seen(&events) != seen(&twin_events) {
+                    return Err(format!("the deal: {events:?} and {twin_events:?}"));
                 }
                 compared += compare(view, viewer, [game, twin], &mut chance)?;
             }
@@ -192,17 +191,17 @@ fn planted_leaks_are_caught() {
 }
 
 #[test]
-fn the_golden_card_is_not_told_apart_when_played() {
+fn the_golden_card_is_not_recognised_when_played() {
     assert!(golden_swap(HONEST).unwrap() > 100);
 }
 
 #[test]
-fn declining_a_special_action_is_known_to_nobody() {
+fn declining_a_special_action_is_hidden() {
     assert!(silent_decline(HONEST).unwrap() > 100);
 }
 
-/// Twins of which one alone has a seat that may declare, and declines: nobody else can tell, at the
-/// moment it is asked either.
+/// Twins of which one has a seat that may declare, and declines. No other viewer can tell them apart,
+/// even while the decision is open.
 fn silent_decline(view: View) -> Verdict {
     let rules = RuleSetSpec {
         players: 4,
@@ -219,7 +218,7 @@ fn silent_decline(view: View) -> Verdict {
         };
         Game::scripted(rules, Seed([4; 32]), &script, |_| {}).unwrap()
     };
-    // Seats 0 and 3 change a joker for a 5, which is no forced gift.
+    // Seats 0 and 3 swap a joker and a 5, which is not a forced gift.
     let offered = start(&["3 4 J J", "2 3 5 5", "1 2 4 G", "3 4 4 5"]);
     let other = start(&["3 4 5 J", "2 3 5 5", "1 2 4 G", "3 4 4 J"]);
     assert_eq!(
@@ -248,8 +247,8 @@ fn silent_decline(view: View) -> Verdict {
     Ok(compared)
 }
 
-/// Twins in which the Golden card and a plain card of its face change hands where the opening does
-/// not show it.
+/// Twins in which two seats swap the Golden card and a plain card of its face, with an opening that
+/// does not reveal it.
 fn golden_swap(view: View) -> Verdict {
     let rules = RuleSetSpec {
         players: 3,
@@ -332,7 +331,7 @@ fn leaky_exchange(event: &Event, viewer: Viewer) -> Event {
 }
 
 #[test]
-fn private_fields_are_left_out_and_nothing_else() {
+fn only_private_fields_are_redacted() {
     let rules = RuleSetSpec::default().validate().unwrap();
     let mut events = Vec::new();
     let mut game = Game::new(rules, Seed([2; 32]), |event| events.push(event));
@@ -347,7 +346,11 @@ fn private_fields_are_left_out_and_nothing_else() {
         for viewer in viewers(&rules) {
             let seen = event.seen_by(viewer);
             assert_eq!(std::mem::discriminant(&seen), std::mem::discriminant(event));
-            assert_eq!(seen.seen_by(viewer), seen, "seeing twice shows no less");
+            assert_eq!(
+                seen.seen_by(viewer),
+                seen,
+                "redacting twice changes nothing"
+            );
             match (event.clone(), seen.clone()) {
                 (Event::ShiftStarted { hands, .. }, Event::ShiftStarted { hands: shown, .. }) => {
                     deals += 1;

@@ -1,5 +1,5 @@
-//! How a Shift begins, with hands one can check by eye: roles, special action, who opens. The
-//! exchange has a module of its own.
+//! The start of a Shift, with small hands: roles, special action and opening. The exchange is in
+//! `exchange`.
 
 use chefshat_engine::{
     BySeat, DecisionKind, Event, Game, Opening, Role, RuleSetSpec, Script, Seat, Seed,
@@ -92,7 +92,7 @@ fn food_fight_reverses_the_roles_and_the_exchange() {
 }
 
 #[test]
-fn dinner_is_served_leaves_out_the_exchange() {
+fn dinner_is_served_skips_the_exchange() {
     let (mut game, _) = second_shift(
         &spec(4, 5),
         &["3 4 J J", "2 3 5 5", "1 2 4 G", "3 4 4 5"],
@@ -160,7 +160,7 @@ fn roles_by_number_of_players() {
         .validate()
         .unwrap();
         let hands = chefshat_engine::Deal::new(&rules, Seed([1; 32]), 2).hands();
-        // The seats in their own order: seat 0 was first.
+        // The seats by number: seat 0 was first.
         let seats: Vec<usize> = (0..players).collect();
         let script = Script {
             shift: 2,
@@ -206,7 +206,7 @@ fn any_top_face_opens_from_the_drawn_seat() {
 }
 
 #[test]
-fn the_golden_card_opens_even_where_a_pass_would_do() {
+fn the_golden_card_opens_even_if_passing_is_legal() {
     let spec = RuleSetSpec {
         opening_pass: true,
         ..spec(3, 4)

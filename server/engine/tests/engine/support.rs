@@ -1,5 +1,4 @@
-//! What several subjects need: rule sets from the vectors' JSON, hands from a line of text, playing
-//! a game at random.
+//! Shared helpers: rule sets from the vectors' JSON, hands from a line of text, random games.
 
 use chefshat_engine::{
     ActionId, BySeat, Cards, Event, Game, Opening, PassScope, RuleSet, RuleSetSpec, Seat,
@@ -95,7 +94,7 @@ pub(crate) fn order(seats: &[usize]) -> SeatOrder {
     SeatOrder::from_slice(&seats.iter().copied().map(Seat::new).collect::<Vec<_>>()).unwrap()
 }
 
-/// Takes the open decision with the action of this text and gives what happened.
+/// Applies the action with this text and returns its events.
 pub(crate) fn act(game: &mut Game, text: &str) -> Vec<Event> {
     let action = game
         .rules()
@@ -117,7 +116,7 @@ pub(crate) fn legal_texts(game: &Game) -> Vec<String> {
         .collect()
 }
 
-/// A small seeded generator, so that a failing case can be run again (SplitMix64).
+/// A small seeded generator, so that failures are reproducible (SplitMix64).
 pub(crate) struct Chance(pub(crate) u64);
 
 impl Chance {
@@ -137,7 +136,7 @@ impl Chance {
     }
 }
 
-/// Any rule set that makes sense, with games short enough to be played many times.
+/// Any valid rule set with short games.
 pub(crate) fn any_rules() -> impl Strategy<Value = RuleSet> {
     let stop = prop_oneof![
         (1u32..12).prop_map(Stop::Points),

@@ -1,6 +1,5 @@
-//! Twins: two games that differ only in cards hidden from a viewer, played by the same decisions,
-//! and compared as the viewer sees them. Which twins there are and what is expected of them is in
-//! `secrecy`.
+//! Twins: two games that differ only in cards hidden from a viewer, played by the same decisions and
+//! compared as the viewer sees them. `secrecy` creates them and states what is expected.
 
 use chefshat_engine::{
     BySeat, Cards, DecisionKind, Event, Face, Game, Observation, RuleSet, Seat, Viewer,
@@ -23,8 +22,8 @@ pub(crate) const HONEST: View = View {
 /// What a viewer cannot tell apart, or what it can.
 pub(crate) type Verdict = Result<u32, String>;
 
-/// Plays twins by the same decisions for as long as these are legal in both, and compares what the
-/// viewer sees after each. Gives the number of comparisons.
+/// Plays twins by the same decisions while these are legal in both, and compares what the viewer sees
+/// after each. Returns the number of comparisons.
 pub(crate) fn compare(
     view: View,
     viewer: Viewer,
@@ -34,15 +33,14 @@ pub(crate) fn compare(
     let mut compared = 0;
     let mut seen = [Vec::new(), Vec::new()];
     loop {
-        // Whether a seat declines is known to it alone: it must not show, not even in the number of
-        // events.
+        // Only the seat itself knows that it declines; not even the number of events may show it.
         for (twin, seen) in twins.iter_mut().zip(&mut seen) {
             settle(twin, viewer, |event| {
                 seen.push((view.event)(&event, viewer))
             });
         }
         let [decision, other] = [0, 1].map(|index| twins[index].decision());
-        // Cards received, and who opens the Shift, are among the things that the viewer may know.
+        // The viewer may know the cards it received and the seat that opens the Shift.
         let received = |game: &Game| own(viewer).map(|seat| game.received()[seat]);
         if decision != other || received(&twins[0]) != received(&twins[1]) {
             return Ok(compared);
@@ -84,7 +82,7 @@ pub(crate) fn own(viewer: Viewer) -> Option<Seat> {
     }
 }
 
-/// Lets every seat but the viewer decline a special action.
+/// Declines special actions of all seats but the viewer.
 fn settle(game: &mut Game, viewer: Viewer, on_event: impl FnMut(Event)) {
     if let Some(decision) = game.decision()
         && decision.kind == DecisionKind::SpecialAction
@@ -95,7 +93,7 @@ fn settle(game: &mut Game, viewer: Viewer, on_event: impl FnMut(Event)) {
     }
 }
 
-/// A card that can change hands: a plain card of a face, or a joker.
+/// A card that can be swapped: a plain card of a face, or a joker.
 #[derive(Copy, Clone, Eq, PartialEq, Debug)]
 enum Hidden {
     Plain(Face),
@@ -124,8 +122,8 @@ fn replaced(hand: Cards, faces: u8, out: Hidden, into: Hidden) -> Cards {
     Cards::from_counts(faces, &counts, hand.has_golden()).unwrap()
 }
 
-/// Draws a hidden card of each of two seats and exchanges them; `None` if the two are alike or
-/// known to the viewer.
+/// Draws a hidden card of each of two seats and swaps them; `None` if the two are equal or known to
+/// the viewer.
 pub(crate) fn swapped(
     game_hands: &BySeat<Cards>,
     rules: &RuleSet,

@@ -1,5 +1,5 @@
-//! The vectors of `tests/fixtures/vectors`: deals and whole games played by another engine, to be
-//! met card for card.
+//! The vectors of `tests/fixtures/vectors`: deals and games of another engine, which must match card
+//! for card.
 
 use std::path::PathBuf;
 
@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use crate::support::{VectorRules, seed_from_hex};
 
-/// How many lines the files hold, so that a lost file or line is noticed.
+/// The lines of the files, so that a lost file or line is noticed.
 const DEALS: usize = 87;
 const GAMES: usize = 57;
 

@@ -256,7 +256,8 @@ impl TestGame<'_> {
     }
 }
 
-/// A game of one Shift with the opening `any_top_face`, in which plays do not reveal the Golden card.
+/// A game of one Shift with the opening `any_top_face`, in which plays do not reveal the Golden
+/// card.
 pub struct HiddenGolden {
     pub rules: RuleSet,
     pub lines: Vec<v1::RecordLine>,
@@ -281,6 +282,49 @@ impl HiddenGolden {
             lines: game.record(|_| v1::DecisionSource::Agent),
             holder: seat_number(holder.unwrap()),
         }
+    }
+}
+
+/// The record of the same game aborted after its first `after` lines.
+pub fn aborted(mut lines: Vec<v1::RecordLine>, after: usize) -> Vec<v1::RecordLine> {
+    let reveal = lines.iter().find_map(|line| match &line.line {
+        Some(Line::Event(event)) => match &event.kind {
+            Some(Kind::GameEnded(ended)) => ended.reveal.clone(),
+            _ => None,
+        },
+        _ => None,
+    });
+    lines.truncate(after);
+    let count = |is: fn(&Line) -> bool| {
+        let kinds = lines.iter().filter_map(|line| line.line.as_ref());
+        kinds.filter(|line| is(line)).count() as u64
+    };
+    let events = count(|line| matches!(line, Line::Event(_))) + 1;
+    let decisions = count(|line| matches!(line, Line::Decision(_)));
+    let dealt = |line: &Line| matches!(line, Line::Event(event) if matches!(event.kind, Some(Kind::ShiftStarted(_))));
+    let end = v1::GameEvent {
+        sequence: events,
+        kind: Some(Kind::GameAborted(Box::new(v1::GameAborted {
+            reason: v1::AbortReason::Closed.into(),
+            reveal: reveal.filter(|_| count(dealt) > 0),
+        }))),
+        ..v1::GameEvent::default()
+    };
+    let footer = v1::RecordFooter {
+        state: v1::RoomState::Aborted.into(),
+        events,
+        decisions,
+    };
+    let end = [Line::Event(end), Line::Footer(footer)];
+    lines.extend(end.map(|line| v1::RecordLine { line: Some(line) }));
+    lines
+}
+
+/// The header of a record.
+pub fn header(lines: &mut [v1::RecordLine]) -> &mut v1::RecordHeader {
+    match &mut lines[0].line {
+        Some(Line::Header(header)) => header,
+        other => panic!("{other:?}"),
     }
 }
 

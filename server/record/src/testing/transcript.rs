@@ -1,4 +1,4 @@
-//! Transcripts of recorded games, as somebody at a real table might have written them.
+//! Transcripts of recorded games, as an observer at a real table might have written them.
 
 use std::fmt::Write as _;
 
@@ -26,6 +26,7 @@ impl Observed {
         declines: false,
         turns: usize::MAX,
     };
+    /// All turns and all hidden cards.
     pub const EVERYTHING: Self = Self {
         hands: u32::MAX,
         gifts: u32::MAX,
@@ -77,7 +78,7 @@ fn cards_text(cards: &[u32], golden: bool, faces: u32) -> String {
     words.join(" ")
 }
 
-/// A transcript of a recorded game by somebody who observed part of it.
+/// A transcript of a recorded game with what was observed.
 pub fn transcript(rules: &RuleSet, lines: &[v1::RecordLine], observed: Observed) -> String {
     let faces = u32::from(rules.faces());
     let mut text = String::from("shift,seat,what,value\n");

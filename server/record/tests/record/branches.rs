@@ -1,5 +1,5 @@
-//! Branching from records and reading players out of them: what is taken over plays the beginning of the game again, whatever the game
-//! itself began with, and points that make no sense are refused.
+//! Branches and players of records: the decisions taken over repeat the game up to the branch point,
+//! and impossible branch points are refused.
 
 use chefshat_engine::TakenOver;
 use chefshat_engine::{ActionId, Game, RuleSet, RuleSetSpec, Script, Seat, Seed, Stop, Viewer};
@@ -9,9 +9,9 @@ use chefshat_record::import::import;
 use chefshat_record::players::{PlayerError, recorded_player};
 use chefshat_record::replay::{replay, walk};
 
-use chefshat_record::testing::{TestGame, taken_over};
+use chefshat_record::testing::{TestGame, aborted, taken_over};
 
-/// Lines before the game begins: the header, and four seats taken.
+/// Lines before the game starts: the header and four seated participants.
 const SEATED: usize = 5;
 const AGENT: v1::DecisionSource = v1::DecisionSource::Agent;
 
@@ -28,27 +28,27 @@ fn record() -> Vec<v1::RecordLine> {
 }
 
 /// The recorded game before each of its decisions.
-fn course(lines: &[v1::RecordLine]) -> Vec<(Game, ActionId)> {
-    let mut course = Vec::new();
+fn decisions_of(lines: &[v1::RecordLine]) -> Vec<(Game, ActionId)> {
+    let mut decisions = Vec::new();
     walk(lines, |moment| {
         if let (Line::Decision(decision), Some(game)) = (moment.entry, moment.game) {
             let action = ActionId::new(u16::try_from(decision.action).unwrap());
-            course.push((game.clone(), action));
+            decisions.push((game.clone(), action));
         }
     })
     .unwrap();
-    course
+    decisions
 }
 
-/// The game of a branch at its point, with the seed that is to deal from there on.
-fn played_up(branch: &Branch, seed: Seed) -> Game {
+/// The game of a branch at its branch point, with the seed of the later deals.
+fn game_at_point(branch: &Branch, seed: Seed) -> Game {
     branch.played(seed).unwrap()
 }
 
 #[test]
-fn a_branch_plays_the_beginning_again_at_every_point() {
+fn a_branch_repeats_the_game_up_to_every_point() {
     let lines = record();
-    let course = course(&lines);
+    let course = decisions_of(&lines);
     assert!(course.len() > 100, "{} decisions", course.len());
     for (point, (game, _)) in course.iter().enumerate() {
         let branch = branch_of(&lines, point as u64).unwrap();
@@ -58,14 +58,14 @@ fn a_branch_plays_the_beginning_again_at_every_point() {
         let actions = course[..point].iter().map(|(_, action)| *action).collect();
         let seed = Seed([7; 32]);
         assert_eq!(branch.taken_over, [TakenOver { seed, actions }]);
-        assert_eq!(played_up(&branch, seed), *game, "point {point}");
+        assert_eq!(game_at_point(&branch, seed), *game, "point {point}");
     }
 }
 
 #[test]
-fn a_branch_goes_on_with_other_deals_or_the_same() {
+fn a_branch_continues_with_the_same_deals_or_others() {
     let lines = record();
-    let course = course(&lines);
+    let course = decisions_of(&lines);
     // In the second Shift.
     let point = course
         .iter()
@@ -75,7 +75,7 @@ fn a_branch_goes_on_with_other_deals_or_the_same() {
     let branch = branch_of(&lines, point as u64).unwrap();
     let same = branch.later_deals.unwrap();
     let third = |seed| {
-        let mut game = played_up(&branch, seed);
+        let mut game = game_at_point(&branch, seed);
         for (_, action) in &course[point..] {
             if game.shift() == 3 {
                 break;
@@ -91,7 +91,7 @@ fn a_branch_goes_on_with_other_deals_or_the_same() {
 }
 
 #[test]
-fn a_branch_of_a_branch_knows_which_seed_dealt_what() {
+fn a_branch_of_a_branch_has_the_seed_of_each_shift() {
     let first = record();
     let shift_of = |course: &[(Game, ActionId)], shift| {
         course
@@ -99,7 +99,7 @@ fn a_branch_of_a_branch_knows_which_seed_dealt_what() {
             .position(|(game, _)| game.shift() == shift)
             .unwrap()
     };
-    let point = shift_of(&course(&first), 2) + 5;
+    let point = shift_of(&decisions_of(&first), 2) + 5;
     let branch = branch_of(&first, point as u64).unwrap();
     let second = TestGame {
         branch: Some(&branch),
@@ -107,7 +107,7 @@ fn a_branch_of_a_branch_knows_which_seed_dealt_what() {
     }
     .record(|_| AGENT);
     replay(&second).unwrap();
-    let course = course(&second);
+    let course = decisions_of(&second);
     let third_shift = shift_of(&course, 3);
     assert!(point < third_shift);
     for at in [
@@ -122,14 +122,14 @@ fn a_branch_of_a_branch_knows_which_seed_dealt_what() {
         let again = branch_of(&second, at as u64).unwrap();
         assert_eq!(taken_over(&again), at as u64);
         assert_eq!(
-            played_up(&again, course[at].0.seed()),
+            game_at_point(&again, course[at].0.seed()),
             course[at].0,
             "point {at}"
         );
         let seeds: Vec<u8> = again.taken_over.iter().map(|part| part.seed.0[0]).collect();
         let expected: &[u8] = if at <= point { &[7] } else { &[7, 9] };
         assert_eq!(seeds, expected, "point {at}");
-        // In the first Shift, the second is still to come from the one seed and the third from the other.
+        // From the first Shift on, one seed deals the second Shift and another the third.
         let first_shift = course[at].0.shift() == 1;
         let deals = again.later_deals.map(|seed| seed.0[0]);
         assert_eq!(deals, (!first_shift).then_some(9), "point {at}");
@@ -141,24 +141,24 @@ fn given_hands_are_taken_over() {
     let rules = standard();
     let dealt = *Game::new(rules, Seed([50; 32]), |_| {}).hands();
     let script = Script::first_shift(dealt);
-    let making = TestGame {
+    let game = TestGame {
         script: Some(script.clone()),
         ..TestGame::dealt(rules, 7, 3)
     };
-    let lines = making.record(|_| AGENT);
+    let lines = game.record(|_| AGENT);
     replay(&lines).unwrap();
-    let course = course(&lines);
+    let course = decisions_of(&lines);
     for at in [0, 10, course.len() - 1] {
         let branch = branch_of(&lines, at as u64).unwrap();
         assert_eq!(branch.script.as_ref(), Some(&script));
-        assert_eq!(played_up(&branch, Seed([7; 32])), course[at].0);
+        assert_eq!(game_at_point(&branch, Seed([7; 32])), course[at].0);
     }
 }
 
 #[test]
-fn points_that_make_no_sense_are_refused() {
+fn impossible_branch_points_are_refused() {
     let lines = record();
-    let decisions = course(&lines).len() as u64;
+    let decisions = decisions_of(&lines).len() as u64;
     assert_eq!(
         branch_of(&lines, decisions),
         Err(BranchError::Over(decisions))
@@ -172,45 +172,8 @@ fn points_that_make_no_sense_are_refused() {
     assert!(matches!(cut, Err(BranchError::Record(_))), "{cut:?}");
 }
 
-/// The record of a game that was given up after so many of the lines of another.
-fn aborted(mut lines: Vec<v1::RecordLine>, after: usize) -> Vec<v1::RecordLine> {
-    let reveal = lines.iter().find_map(|line| match &line.line {
-        Some(Line::Event(event)) => match &event.kind {
-            Some(Kind::GameEnded(ended)) => ended.reveal.clone(),
-            _ => None,
-        },
-        _ => None,
-    });
-    lines.truncate(after);
-    let kind = |is: fn(&Line) -> bool| {
-        let of_kind = lines
-            .iter()
-            .filter(|line| line.line.as_ref().is_some_and(is));
-        of_kind.count() as u64
-    };
-    let events = kind(|line| matches!(line, Line::Event(_))) + 1;
-    let decisions = kind(|line| matches!(line, Line::Decision(_)));
-    let end = v1::GameEvent {
-        sequence: events,
-        kind: Some(Kind::GameAborted(Box::new(v1::GameAborted {
-            reason: v1::AbortReason::Closed.into(),
-            reveal: reveal.filter(|_| after > SEATED),
-        }))),
-        ..v1::GameEvent::default()
-    };
-    let footer = v1::RecordFooter {
-        state: v1::RoomState::Aborted.into(),
-        events,
-        decisions,
-    };
-    for line in [Line::Event(end), Line::Footer(footer)] {
-        lines.push(v1::RecordLine { line: Some(line) });
-    }
-    lines
-}
-
 #[test]
-fn an_aborted_game_can_be_gone_on_with() {
+fn an_aborted_game_can_be_branched() {
     let lines = record();
     let fiftieth = lines
         .iter()
@@ -223,7 +186,7 @@ fn an_aborted_game_can_be_gone_on_with() {
     let branch = branch_of(&aborted_later, 50).unwrap();
     assert_eq!(taken_over(&branch), 50);
     assert_eq!(branch.later_deals, Some(Seed([7; 32])));
-    // Given up before the deal: there is nothing to take over.
+    // Aborted before the deal, so there is nothing to take over.
     assert_eq!(
         branch_of(&aborted(lines, SEATED), 0),
         Err(BranchError::NeverBegan)
@@ -231,12 +194,12 @@ fn an_aborted_game_can_be_gone_on_with() {
 }
 
 #[test]
-fn a_player_is_what_its_seat_knew_and_did() {
+fn a_recorded_player_has_the_observations_and_actions_of_its_seat() {
     use v1::DecisionSource::{Agent, Disconnected, Invalid, Substitute, Timeout};
     let sources = [Agent, Timeout, Invalid, Disconnected, Substitute];
     let source = |decision: u64| sources[decision as usize % sources.len()];
     let lines = TestGame::dealt(standard(), 7, 1).record(source);
-    let course = course(&lines);
+    let course = decisions_of(&lines);
     let mut all = 0;
     for seat in 0..4 {
         let decisions = recorded_player(&lines, seat).unwrap();
@@ -272,8 +235,8 @@ fn seats_without_a_player_are_refused() {
     assert!(matches!(cut, Err(PlayerError::Record(_))), "{cut:?}");
 }
 
-/// A game of two Shifts as somebody wrote it down who saw every card, and the hands of these seats.
-fn written_down(hands: &[u32]) -> Vec<v1::RecordLine> {
+/// An imported game of two Shifts, with all plays and the hands of these seats.
+fn imported(hands: &[u32]) -> Vec<v1::RecordLine> {
     let spec = RuleSetSpec {
         players: 2,
         faces: 4,
@@ -305,11 +268,11 @@ fn written_down(hands: &[u32]) -> Vec<v1::RecordLine> {
         match event.kind.as_ref().unwrap() {
             Kind::ShiftStarted(started) => {
                 shift = started.shift;
-                let told = started
+                let stated = started
                     .hands
                     .iter()
                     .filter(|hand| hands.contains(&hand.seat));
-                for hand in told {
+                for hand in stated {
                     let cards = words(&hand.cards, hand.golden);
                     text.push_str(&format!("{shift},{},hand,{cards}\n", hand.seat));
                 }
@@ -328,9 +291,9 @@ fn written_down(hands: &[u32]) -> Vec<v1::RecordLine> {
 }
 
 #[test]
-fn a_real_game_can_be_gone_on_with_in_its_first_shift() {
-    let lines = written_down(&[0, 1]);
-    let course = course(&lines);
+fn an_imported_game_can_be_branched_in_its_first_shift() {
+    let lines = imported(&[0, 1]);
+    let course = decisions_of(&lines);
     let first_shift = course.iter().filter(|(game, _)| game.shift() == 1).count();
     assert!(first_shift > 3 && first_shift < course.len());
     for (point, (game, _)) in course[..first_shift].iter().enumerate() {
@@ -338,22 +301,22 @@ fn a_real_game_can_be_gone_on_with_in_its_first_shift() {
         assert_eq!(branch.later_deals, None);
         let mut game = game.clone();
         game.reseed(Seed([9; 32]));
-        assert_eq!(played_up(&branch, Seed([9; 32])), game);
+        assert_eq!(game_at_point(&branch, Seed([9; 32])), game);
     }
     let second = branch_of(&lines, first_shift as u64);
     assert_eq!(second, Err(BranchError::RealCards));
-    // Everybody is known as a player.
+    // All players are known.
     let decisions = (0..2).map(|seat| recorded_player(&lines, seat).unwrap().len());
     assert_eq!(decisions.sum::<usize>(), course.len());
 }
 
 #[test]
-fn hands_that_nobody_wrote_down_are_no_ground_to_play_on() {
-    // The other hand is not known: one of the eleven cards was dealt to nobody.
-    let lines = written_down(&[1]);
+fn unknown_hands_cannot_be_branched() {
+    // The other hand is unknown: one of the eleven cards was set aside.
+    let lines = imported(&[1]);
     assert_eq!(branch_of(&lines, 0), Err(BranchError::HandsUnknown));
     let known = recorded_player(&lines, 1).unwrap();
-    let all = course(&lines).len();
+    let all = decisions_of(&lines).len();
     let other = recorded_player(&lines, 0).map_or(0, |decisions| decisions.len());
     assert!(!known.is_empty() && known.len() + other < all);
 }

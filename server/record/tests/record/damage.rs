@@ -1,4 +1,4 @@
-//! Records damaged in one place each: the first line that does not fit is named, and what is wrong with it, in words.
+//! Records damaged in one place: the error names the first wrong line and the problem.
 
 use std::path::{Path, PathBuf};
 
@@ -7,23 +7,23 @@ use chefshat_record::jsonl::{MAX_LINE_BYTES, RecordFileError};
 use chefshat_record::replay::replay;
 use serde_json::{Value, json};
 
-/// What is done to a record. Lines are counted from 1.
+/// A change to a record. Lines are numbered from 1.
 enum Damage {
-    /// Puts a value into a line.
+    /// Sets a field of a line.
     Set(usize, &'static str, Value),
-    /// Takes a field out of a line.
+    /// Removes a field of a line.
     Unset(usize, &'static str, &'static str),
-    /// Takes a line out.
+    /// Removes a line.
     Drop(usize),
-    /// Writes a line twice.
+    /// Duplicates a line.
     Double(usize),
-    /// Lets two lines change places.
+    /// Swaps two lines.
     Swap(usize, usize),
-    /// Cuts the file off behind a line.
+    /// Truncates the file after a line.
     CutBehind(usize),
-    /// Cuts the file off within a line.
+    /// Truncates the file within a line.
     CutWithin(usize),
-    /// Puts these bytes in place of a line.
+    /// Replaces a line by these bytes.
     Bytes(usize, Vec<u8>),
     /// Appends a line.
     Append(&'static str),
@@ -37,7 +37,7 @@ fn fixture(name: &str) -> PathBuf {
         .join(name)
 }
 
-/// The first line that does not fit, and why, or `None` for a record that is whole.
+/// The first wrong line and the problem; `None` if the record verifies.
 fn verdict(path: &Path) -> Option<(usize, String)> {
     match jsonl::read(path) {
         Err(RecordFileError::Line { line, problem, .. }) => Some((line, problem.to_string())),
@@ -50,7 +50,7 @@ fn verdict(path: &Path) -> Option<(usize, String)> {
 
 fn damaged(text: &str, damage: &Damage) -> Vec<u8> {
     let mut lines: Vec<Vec<u8>> = text.lines().map(|line| line.as_bytes().to_vec()).collect();
-    let mut whole = true;
+    let mut ends_with_newline = true;
     let mut edit = |line: usize, change: &dyn Fn(&mut Value)| {
         let mut value = serde_json::from_slice(&lines[line - 1]).unwrap();
         change(&mut value);
@@ -62,7 +62,11 @@ fn damaged(text: &str, damage: &Damage) -> Vec<u8> {
             match value.pointer_mut(parent).unwrap() {
                 Value::Object(object) => {
                     let before = object.insert(name.to_owned(), new.clone());
-                    assert_ne!(before.as_ref(), Some(new), "{pointer} was that already");
+                    assert_ne!(
+                        before.as_ref(),
+                        Some(new),
+                        "{pointer} had this value already"
+                    );
                 }
                 Value::Array(array) => array[name.parse::<usize>().unwrap()] = new.clone(),
                 other => panic!("{pointer} is within {other}"),
@@ -82,20 +86,20 @@ fn damaged(text: &str, damage: &Damage) -> Vec<u8> {
             lines.truncate(*line);
             let last = lines.last_mut().unwrap();
             last.truncate(last.len() / 2);
-            whole = false;
+            ends_with_newline = false;
         }
         Bytes(line, bytes) => lines[line - 1].clone_from(bytes),
         Append(line) => lines.push(line.as_bytes().to_vec()),
     }
     let mut bytes = lines.join(&b'\n');
-    if whole && !bytes.is_empty() {
+    if ends_with_newline && !bytes.is_empty() {
         bytes.push(b'\n');
     }
     bytes
 }
 
-/// Each damage, the line that must be named and words that must be said.
-#[rustfmt::skip] // A table is read by its rows.
+/// Names of the damages, the wrong line and a part of the message.
+#[rustfmt::skip] // One row each.
 fn damages() -> Vec<(&'static str, Damage, usize, &'static str)> {
     vec![
         // The header.
@@ -105,7 +109,7 @@ fn damages() -> Vec<(&'static str, Damage, usize, &'static str)> {
         ("another game id", Set(1, "/header/gameId", json!("22b73f3bba773c1120e1858de68cd802")), 4, "gameStarted.gameId"),
         ("a rule", Set(1, "/header/rules/points", json!([3, 2, 1, 0])), 4, "gameStarted.rules.points is [5,3,1,0] and must be [3,2,1,0]"),
         ("an impossible rule", Set(1, "/header/rules/faces", json!(16)), 1, "rules.faces"),
-        ("a rule left out", Unset(1, "/header/rules", "exchange"), 1, "rules.exchange"),
+        ("a missing rule", Unset(1, "/header/rules", "exchange"), 1, "rules.exchange"),
         ("the action space", Set(1, "/header/actionSpace/size", json!(215)), 1, "actionSpace.size is 215 and must be 214"),
         ("the policy", Set(1, "/header/policy/bankMs", json!(90_000_000)), 1, "policy.bankMs is 90000000"),
         ("a seat's number", Set(1, "/header/seats/1/seat", json!(2)), 1, "seats[1].seat is 2 and must be 1"),
@@ -115,19 +119,19 @@ fn damages() -> Vec<(&'static str, Damage, usize, &'static str)> {
         ("the commitment", Set(1, "/header/seedCommitment", json!("AAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAA=")), 4, "gameStarted.seedCommitment"),
         ("a start", Set(1, "/header/start", json!({"branchedFrom": {"gameId": "22b73f3bba773c1120e1858de68cd801"}})), 1, "start.branchedFrom is present"),
         ("substituted at the end", Unset(1, "/header/seats/2", "substituted"), 493, "seat 2 as not substituted"),
-        ("the day it was made", Set(1, "/header/createdAtMs", json!("253402300800000")), 1, "createdAtMs is 253402300800000, after the year 9999"),
+        ("the creation time", Set(1, "/header/createdAtMs", json!("253402300800000")), 1, "createdAtMs is 253402300800000, after the year 9999"),
         ("too many seats", Set(1, "/header/seats", json!([{}, {}, {}, {}, {}, {}, {}])), 1, "has more than 6 entries in `seats`"),
         // Seats.
-        ("a seat that is not there", Set(2, "/event/seated/seat", json!(4)), 2, "seated.seat is 4 and must be in 0..=3"),
+        ("a missing seat", Set(2, "/event/seated/seat", json!(4)), 2, "seated.seat is 4 and must be in 0..=3"),
         ("a built-in agent's seat", Set(2, "/event/seated/seat", json!(1)), 2, "which is a built-in agent's"),
         ("another substitute", Set(51, "/event/substituted/builtInAgent", json!("greedy")), 51, "is \"greedy\" and must be \"random\""),
-        ("nobody was substituted", Drop(51), 52, "sequence is 30 and must be 29"),
+        ("a missing substitution", Drop(51), 52, "sequence is 30 and must be 29"),
         // The deal.
         ("a hand", Set(5, "/event/shiftStarted/hands/1/cards/0", json!(2)), 5, "shiftStarted.hands[1].cards"),
         ("the Golden card", Set(5, "/event/shiftStarted/hands/1/golden", json!(true)), 5, "shiftStarted.hands[1].golden is true and must be false"),
         ("a long hand", Set(5, "/event/shiftStarted/hands/1/cards", json!(vec![1; 123])), 5, "has more than 122 entries in `cards`"),
         ("too many hands", Set(5, "/event/shiftStarted/hands", json!(vec![json!({}); 1000])), 5, "has more than 6 entries in `hands`"),
-        ("a hand left out", Set(5, "/event/shiftStarted/hands", json!([])), 5, "shiftStarted.hands is [] and must be a list of 4"),
+        ("missing hands", Set(5, "/event/shiftStarted/hands", json!([])), 5, "shiftStarted.hands is [] and must be a list of 4"),
         ("a later hand", Set(171, "/event/shiftStarted/hands/3/cards/16", json!(11)), 171, "shiftStarted.hands[3].cards"),
         ("a role", Set(172, "/event/rolesAssigned/roles/1", json!("ROLE_COOK")), 172, "rolesAssigned.roles"),
         ("exchanged cards", Set(176, "/event/cardsExchanged/cards", json!([3, 5])), 176, "cardsExchanged.cards is [3,5] and must be [3,3]"),
@@ -211,7 +215,7 @@ fn damages() -> Vec<(&'static str, Damage, usize, &'static str)> {
 }
 
 #[test]
-fn each_damage_is_named_at_the_first_line_that_does_not_fit() {
+fn each_damage_is_reported_at_the_first_wrong_line() {
     let path = fixture("committed.jsonl");
     assert_eq!(verdict(&path), None);
     let text = std::fs::read_to_string(&path).unwrap();

@@ -17,10 +17,10 @@ fn names(folder: &Path) -> Vec<String> {
 }
 
 #[test]
-fn records_are_files_and_those_of_folders() {
+fn records_are_found_in_files_and_folders() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
-    // A folder is one whatever its name is, and its records are not those of the folder around it.
+    // The search of a folder does not include its subfolders, whatever their names.
     std::fs::create_dir_all(at("records/old.jsonl")).unwrap();
     for name in [
         "named.txt",
@@ -109,7 +109,7 @@ fn writers_of_one_file_do_not_disturb_each_other() {
 }
 
 #[test]
-fn files_that_killed_writers_left_are_removed() {
+fn part_files_of_killed_writers_are_removed() {
     let folder = tempfile::tempdir().unwrap();
     jsonl::remove_unfinished(folder.path()).unwrap();
     let records = folder.path().join("records");

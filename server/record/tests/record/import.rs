@@ -1,5 +1,5 @@
-//! Games of real tables: whatever of a game was written down, it becomes a record that replays, with what nobody wrote down left out; what
-//! cannot have happened is refused at its row. Here is what these tests share, and what is taken.
+//! Import of games at real tables: a transcript of any part of a game becomes a record that verifies.
+//! Refusals are in `refused`, what is known of the hands in `known`.
 
 mod known;
 mod refused;
@@ -21,8 +21,8 @@ fn spec(players: u8, faces: u8, shifts: u32) -> RuleSetSpec {
     }
 }
 
-/// The public events and decisions of a game, without numbers and what may be unknown.
-fn course(lines: &[v1::RecordLine]) -> Vec<String> {
+/// The public events of a game, without sequence numbers and cards that may be unknown.
+fn public_events(lines: &[v1::RecordLine]) -> Vec<String> {
     let kinds = lines.iter().filter_map(|line| match &line.line {
         Some(Line::Event(event)) => event.kind.clone(),
         _ => None,
@@ -42,7 +42,7 @@ fn course(lines: &[v1::RecordLine]) -> Vec<String> {
 }
 
 #[test]
-fn whatever_is_told_of_a_game_becomes_a_record_that_replays() {
+fn any_transcript_of_a_game_becomes_a_record_that_verifies() {
     let original = RuleSetSpec {
         stop: Stop::Shifts(3),
         ..RuleSetSpec::preset("original2020").unwrap()
@@ -62,7 +62,7 @@ fn whatever_is_told_of_a_game_becomes_a_record_that_replays() {
         gifts,
         ..Observed::TURNS
     };
-    let tellings = [
+    let observations = [
         Observed::TURNS,
         Observed::EVERYTHING,
         some(1, 3),
@@ -76,11 +76,15 @@ fn whatever_is_told_of_a_game_becomes_a_record_that_replays() {
         for chance in 0..2 {
             let played = TestGame::dealt(rules, 7 + chance, chance.into())
                 .record(|_| v1::DecisionSource::Agent);
-            for told in tellings {
-                let text = transcript(&rules, &played, told);
+            for observed in observations {
+                let text = transcript(&rules, &played, observed);
                 let record = import(text.as_bytes())
-                    .unwrap_or_else(|error| panic!("{error}\n{told:?}\n{text}"));
-                assert_eq!(course(&record), course(&played), "{told:?}");
+                    .unwrap_or_else(|error| panic!("{error}\n{observed:?}\n{text}"));
+                assert_eq!(
+                    public_events(&record),
+                    public_events(&played),
+                    "{observed:?}"
+                );
                 assert_eq!(replay(&record).unwrap().state, v1::RoomState::Finished);
                 games += 1;
             }
@@ -90,32 +94,35 @@ fn whatever_is_told_of_a_game_becomes_a_record_that_replays() {
 }
 
 #[test]
-fn a_game_that_was_broken_off_is_told_as_far_as_it_went() {
+fn a_transcript_that_breaks_off_becomes_an_aborted_game() {
     let rules = spec(4, 11, 3).validate().unwrap();
     let played = TestGame::dealt(rules, 5, 9).record(|_| v1::DecisionSource::Agent);
-    let turns = course(&played)
+    let turns = public_events(&played)
         .iter()
         .filter(|event| event.starts_with("Play(") || event.starts_with("Pass("))
         .count();
     assert!(turns > 100, "{turns} turns");
     for hands in [0, 0b1000] {
         for turns in (0..turns).step_by(7) {
-            let told = Observed {
+            let observed = Observed {
                 hands,
                 turns,
                 ..Observed::TURNS
             };
-            let text = transcript(&rules, &played, told);
+            let text = transcript(&rules, &played, observed);
             let record = import(text.as_bytes())
                 .unwrap_or_else(|error| panic!("after {turns} turns: {error}\n{text}"));
             let replayed = replay(&record).unwrap();
             assert_eq!(replayed.state, v1::RoomState::Aborted);
-            assert!(course(&played).starts_with(&course(&record)[..course(&record).len() - 1]));
+            assert!(
+                public_events(&played)
+                    .starts_with(&public_events(&record)[..public_events(&record).len() - 1])
+            );
         }
     }
 }
 
-/// A short game with one card set aside, as the documentation tells it.
+/// The transcript in the documentation: a short game with one card set aside.
 fn documented() -> String {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/records.md");
     let text = std::fs::read_to_string(path).unwrap();
@@ -127,7 +134,11 @@ fn documented() -> String {
 fn the_documented_transcript_becomes_a_record() {
     let text = documented();
     let record = import(text.as_bytes()).unwrap();
-    assert_eq!(record, import(text.as_bytes()).unwrap(), "twice the same");
+    assert_eq!(
+        record,
+        import(text.as_bytes()).unwrap(),
+        "the result is deterministic"
+    );
     let replayed = replay(&record).unwrap();
     assert_eq!((replayed.decisions, replayed.events), (7, 17));
     assert_eq!(replayed.standings[0].seat, 0);
@@ -137,7 +148,7 @@ fn the_documented_transcript_becomes_a_record() {
     assert_eq!(header.origin(), v1::GameOrigin::Imported);
     assert_eq!(header.room_name, "Lab table 3");
     assert_eq!(header.created_at_ms, 1_773_500_400_000);
-    // Ana's hand was shown. Of Pepper's, one card was neither played nor seen, and another was set aside.
+    // Ana's hand is stated. One card of Pepper's is not, and another was set aside.
     let known = known::knowledge(&record);
     assert!(
         known
@@ -167,12 +178,12 @@ fn the_documented_transcript_becomes_a_record() {
     assert_eq!(shown, Some((12_500, 0)));
 }
 
-/// The second Shift of a game in which everything was written down, told as if nothing before it had been watched.
+/// A complete transcript of the second Shift of a game, without the first.
 fn from_the_second_shift() -> (String, Vec<v1::RecordLine>) {
     let rules = spec(4, 11, 2).validate().unwrap();
     let played = TestGame::dealt(rules, 11, 2).record(|_| v1::DecisionSource::Agent);
-    let whole = transcript(&rules, &played, Observed::EVERYTHING);
-    let (_, second) = whole.split_once("\n2,").unwrap();
+    let complete = transcript(&rules, &played, Observed::EVERYTHING);
+    let (_, second) = complete.split_once("\n2,").unwrap();
     let ended = played.iter().find_map(|line| match &line.line {
         Some(Line::Event(event)) => match &event.kind {
             Some(Kind::ShiftEnded(ended)) => Some(ended.clone()),
@@ -181,7 +192,7 @@ fn from_the_second_shift() -> (String, Vec<v1::RecordLine>) {
         _ => None,
     });
     let ended = ended.unwrap();
-    let mut text: String = whole
+    let mut text: String = complete
         .lines()
         .take(6)
         .map(|line| format!("{line}\n"))
@@ -198,10 +209,10 @@ fn from_the_second_shift() -> (String, Vec<v1::RecordLine>) {
 }
 
 #[test]
-fn a_game_can_be_told_from_a_later_shift_on() {
+fn a_transcript_may_begin_with_a_later_shift() {
     let (text, played) = from_the_second_shift();
     let record = import(text.as_bytes()).unwrap_or_else(|error| panic!("{error}\n{text}"));
-    let (all, later) = (course(&played), course(&record));
+    let (all, later) = (public_events(&played), public_events(&record));
     assert_eq!(later[..], all[all.len() - later.len()..]);
     assert!(later[0].starts_with("Shift 2"));
 
@@ -215,7 +226,8 @@ fn a_game_can_be_told_from_a_later_shift_on() {
     );
 }
 
-/// A game of six with 122 cards, of whose second Shift two hands of rare cards were seen: few of the many gifts there might be are left.
+/// The second Shift of a game of six with 122 cards and two stated hands of rare cards: few of the
+/// many possible gifts fit.
 const SPARSE: &str = "\
 shift,seat,what,value
 ,,rules,paper players=6 faces=15 jokers=2 target_points=60
@@ -239,10 +251,10 @@ shift,seat,what,value
 ";
 
 #[test]
-fn gifts_that_fit_are_found_where_most_do_not() {
+fn gifts_that_fit_are_found_among_many_that_do_not() {
     let record = import(SPARSE.as_bytes()).unwrap();
     assert_eq!(replay(&record).unwrap().decisions, 3);
-    // With these gifts nothing is left to be found.
+    // All gifts are stated.
     let seen = SPARSE.replace(
         "2,0,plays",
         "2,5,gives,9 9\n2,4,gives,9\n2,0,gives,15 15\n2,1,gives,15\n2,0,plays",
@@ -251,7 +263,7 @@ fn gifts_that_fit_are_found_where_most_do_not() {
     assert_eq!(replay(&record).unwrap().decisions, 6);
 }
 
-/// A game of which two Shifts were watched; what was noted of the second was written down after its last turn.
+/// Two Shifts of a game, with the notes on the second after its last turn.
 const NOTED: &str = "\
 shift,seat,what,value
 ,,rules,paper players=2 faces=4 jokers=1 target_points=100 exchange=off special_actions=off
@@ -272,7 +284,7 @@ shift,seat,what,value
 ";
 
 #[test]
-fn what_is_noted_of_a_shift_may_be_written_down_after_it() {
+fn notes_on_a_shift_may_follow_its_last_turn() {
     let record = import(NOTED.as_bytes()).unwrap();
     assert_eq!(replay(&record).unwrap().decisions, 6);
 }

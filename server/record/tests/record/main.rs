@@ -1,4 +1,4 @@
-//! The tests of records, one binary. A module for each subject.
+//! Tests of records, a module for each subject.
 
 #![allow(
     clippy::unwrap_used,

@@ -1,4 +1,4 @@
-//! What each seat did is told from its record as it stands, and which games count for ratings.
+//! Outcomes: what each seat did in a game, and which games count for ratings.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use chefshat_proto::v1::{self, DecisionSource, record_line::Line};
 use chefshat_record::jsonl;
 use chefshat_record::outcome::{Identity, Outcome, OutcomeError, Unrated, outcome};
 
-use chefshat_record::testing::TestGame;
+use chefshat_record::testing::{TestGame, header};
 
 fn rules() -> RuleSet {
     let spec = RuleSetSpec {
@@ -22,18 +22,11 @@ fn fixture(name: &str) -> Vec<v1::RecordLine> {
     jsonl::read(&folder.join(name)).unwrap()
 }
 
-/// The record of a game that a server dealt, all of whose seats decided themselves.
+/// The record of a game that a server dealt, in which every participant decided itself.
 fn dealt() -> Vec<v1::RecordLine> {
     let mut lines = TestGame::dealt(rules(), 7, 3).record(|_| DecisionSource::Agent);
     header(&mut lines).origin = v1::GameOrigin::Dealt.into();
     lines
-}
-
-fn header(lines: &mut [v1::RecordLine]) -> &mut v1::RecordHeader {
-    match &mut lines[0].line {
-        Some(Line::Header(header)) => header,
-        other => panic!("{other:?}"),
-    }
 }
 
 fn last<T>(lines: &mut [v1::RecordLine], of: impl Fn(&mut Line) -> Option<&mut T>) -> &mut T {
@@ -53,7 +46,8 @@ fn standings(lines: &mut [v1::RecordLine]) -> &mut Vec<v1::Standing> {
     })
 }
 
-/// By seat: place, points, decisions, wrong actions, timeouts, timed decisions, time of these, performance score in hundredths.
+/// By seat: place, points, decisions, wrong actions, timeouts, timed decisions, their time, performance
+/// score in hundredths.
 fn figures(outcome: &Outcome) -> Vec<[u64; 8]> {
     let seats = outcome.seats.iter();
     seats
@@ -73,8 +67,8 @@ fn figures(outcome: &Outcome) -> Vec<[u64; 8]> {
 }
 
 #[test]
-fn what_was_counted_by_hand_is_told() {
-    // Counted with a script from the lines of the file.
+fn outcomes_agree_with_a_count_of_the_file() {
+    // Counted from the lines of the file with a script.
     let played = outcome(&fixture("committed.jsonl")).unwrap();
     assert_eq!(
         figures(&played),
@@ -118,7 +112,7 @@ fn what_was_counted_by_hand_is_told() {
 }
 
 #[test]
-fn the_performance_score_is_that_of_the_engine() {
+fn the_performance_score_equals_the_engines() {
     use chefshat_engine::{ActionId, Game, MetricsRecorder, Seed};
     let lines = dealt();
     let mut recorder = MetricsRecorder::new(rules(), None);
@@ -139,27 +133,27 @@ fn the_performance_score_is_that_of_the_engine() {
             game.apply(action, &mut note).unwrap();
         }
     }
-    let told = outcome(&lines).unwrap();
+    let outcome = outcome(&lines).unwrap();
     assert_eq!(scores.len(), 4);
-    for (seat, score) in told.seats.iter().zip(&scores) {
+    for (seat, score) in outcome.seats.iter().zip(&scores) {
         assert!((seat.performance_score - score).abs() < 1e-12, "{scores:?}");
     }
 }
 
 #[test]
-fn a_game_that_all_played_themselves_is_rated() {
+fn a_game_in_which_all_decided_themselves_is_rated() {
     let played = outcome(&dealt()).unwrap();
     assert!(played.is_rated());
     let decisions: u64 = played.seats.iter().map(|seat| seat.decisions).sum();
     let lines = dealt();
-    let told = lines
+    let stated = lines
         .iter()
         .filter(|line| matches!(line.line, Some(Line::Decision(_))));
-    assert_eq!(decisions, told.count() as u64);
+    assert_eq!(decisions, stated.count() as u64);
 }
 
 #[test]
-fn lost_decisions_count_and_those_of_others_do_not() {
+fn default_decisions_count_and_those_of_substitutes_do_not() {
     let record = |source: fn(u64) -> DecisionSource| {
         let mut lines = TestGame::dealt(rules(), 7, 3).record(source);
         header(&mut lines).origin = v1::GameOrigin::Dealt.into();
@@ -180,7 +174,7 @@ fn lost_decisions_count_and_those_of_others_do_not() {
     });
     let of = |source| all.iter().filter(|other| **other == source).count() as u64;
     assert!(of(DecisionSource::Invalid) > 0);
-    assert!(lost.is_rated(), "whoever is late plays badly, but plays");
+    assert!(lost.is_rated(), "a late participant plays badly, but plays");
     assert_eq!(sum(&lost, 2), all.len() as u64);
     assert_eq!(sum(&lost, 3), 10 * of(DecisionSource::Invalid));
     assert_eq!(
@@ -198,7 +192,7 @@ fn lost_decisions_count_and_those_of_others_do_not() {
 }
 
 #[test]
-fn games_that_say_nothing_of_skill_are_not_rated() {
+fn games_that_do_not_show_skill_are_not_rated() {
     let unrated = |change: fn(&mut v1::RecordHeader)| {
         let mut lines = dealt();
         change(header(&mut lines));
@@ -247,7 +241,7 @@ fn games_that_say_nothing_of_skill_are_not_rated() {
 }
 
 #[test]
-fn what_is_no_finished_game_has_no_outcome() {
+fn unfinished_games_have_no_outcome() {
     let broken = |change: fn(&mut Vec<v1::RecordLine>)| {
         let mut lines = dealt();
         change(&mut lines);

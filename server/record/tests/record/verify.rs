@@ -1,4 +1,4 @@
-//! Records that fit are replayed to their end, however their game began; those whose beginning was altered are not.
+//! Verification of records with every kind of start, and refusal of altered starts.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use chefshat_record::branch::branch_of;
 use chefshat_record::jsonl;
 use chefshat_record::replay::{replay, walk};
 
-use chefshat_record::testing::TestGame;
+use chefshat_record::testing::{TestGame, header};
 
 fn rules(shifts: u32) -> RuleSet {
     let spec = RuleSetSpec {
@@ -23,7 +23,7 @@ fn scripted() -> Vec<v1::RecordLine> {
     let rules = rules(5);
     let dealt = Game::new(rules, Seed([9; 32]), |_| {});
     let order = [2, 0, 3, 1].map(Seat::new);
-    let making = TestGame {
+    let game = TestGame {
         script: Some(Script {
             shift: 3,
             hands: *dealt.hands(),
@@ -33,25 +33,18 @@ fn scripted() -> Vec<v1::RecordLine> {
         }),
         ..TestGame::dealt(rules, 7, 3)
     };
-    making.record(|_| v1::DecisionSource::Agent)
+    game.record(|_| v1::DecisionSource::Agent)
 }
 
 /// A game that branches in the middle of another.
 fn branched() -> Vec<v1::RecordLine> {
     let before = TestGame::dealt(rules(3), 7, 3).record(|_| v1::DecisionSource::Agent);
     let branch = branch_of(&before, 100).unwrap();
-    let making = TestGame {
+    let game = TestGame {
         branch: Some(&branch),
         ..TestGame::dealt(rules(3), 8, 4)
     };
-    making.record(|_| v1::DecisionSource::Agent)
-}
-
-fn header(lines: &mut [v1::RecordLine]) -> &mut v1::RecordHeader {
-    match &mut lines[0].line {
-        Some(Line::Header(header)) => header,
-        other => panic!("{other:?}"),
-    }
+    game.record(|_| v1::DecisionSource::Agent)
 }
 
 fn start(lines: &mut [v1::RecordLine]) -> &mut v1::GameStart {
@@ -67,7 +60,7 @@ fn decision(lines: &mut [v1::RecordLine], number: usize) -> &mut v1::DecisionRec
 }
 
 #[test]
-fn recorded_games_replay() {
+fn recorded_games_verify() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/fixtures/records");
     for (file, decisions, events, winner) in [
         ("committed.jsonl", 207, 284, 3),
@@ -109,7 +102,7 @@ fn a_walk_shows_every_line_with_the_game_before_its_decision() {
 }
 
 #[test]
-fn a_scripted_game_replays_from_its_hands() {
+fn a_scripted_game_verifies_from_its_hands() {
     let lines = scripted();
     let replayed = replay(&lines).unwrap();
     assert_eq!(replayed.standings.len(), 4);
@@ -169,7 +162,7 @@ fn a_scripted_game_replays_from_its_hands() {
 }
 
 #[test]
-fn a_branched_game_replays_from_the_seeds_it_took_over() {
+fn a_branched_game_verifies_from_the_seeds_it_took_over() {
     let lines = branched();
     let replayed = replay(&lines).unwrap();
     assert!(replayed.decisions > 100);

@@ -1,4 +1,4 @@
-//! Drawings: they come out whole and the same every time, whatever names and cards there are. That they look well was seen to by eye.
+//! Drawings are complete and deterministic for all names and cards.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -11,7 +11,7 @@ use resvg::tiny_skia::Pixmap;
 use super::{chronicle, film, rules};
 use chefshat_record::testing::TestGame;
 
-/// Pixels that the pictures of these tests are wide: few, because nobody looks at them.
+/// Width of the pictures, pixels; small, to be fast.
 const WIDTH: u32 = 320;
 
 #[test]
@@ -33,16 +33,16 @@ fn names_of_every_kind_fit_and_break_nothing() {
     let scene = Scene::of(&game, &chronicle(&rules, &names, viewer), viewer, &known);
     let svg = painter.table(&scene);
     assert!(svg.contains("Wilhelmina Wi") && svg.contains("…<"));
-    assert!(!svg.contains(&"Wilhelmina ".repeat(3)), "it is cut");
+    assert!(!svg.contains(&"Wilhelmina ".repeat(3)), "it is shortened");
     assert!(!svg.contains("<b>") && !svg.contains('\u{202e}') && !svg.contains('\u{0}'));
     assert!(svg.contains("Žofie Łączyńska") && svg.contains("seat 4"));
-    assert!(svg.contains("??? ??????? ???"), "what the font lacks");
+    assert!(svg.contains("??? ??????? ???"), "replaced characters");
     let picture = painter.pixels(&svg, WIDTH).unwrap();
     assert_eq!((picture.width(), picture.height()), (WIDTH, 200));
 }
 
 #[test]
-fn a_letter_that_the_font_lacks_is_drawn_as_near_as_it_has() {
+fn a_letter_that_the_font_lacks_is_drawn_as_its_base_letter() {
     let rules = rules(2, 4);
     let painter = Painter::new();
     let viewer = Viewer::Spectator;
@@ -50,9 +50,9 @@ fn a_letter_that_the_font_lacks_is_drawn_as_near_as_it_has() {
     let known = BySeat::filled(2, true);
     for (name, expected) in [
         ("Žofie Łączyńska-Ångström", "Žofie Łączyńska-Ångström"),
-        // One letter or a letter and its mark: the font has either.
+        // The font has a letter and its mark, composed or not.
         ("Jose\u{301}", "Jose\u{301}"),
-        // The font lacks the whole letter, and of its marks the dot below.
+        // The font lacks the composed letter and the mark of a dot below.
         ("Nguyễn Thị", "Nguye\u{302}\u{303}n Thi"),
         ("Ana\u{323}", "Ana"),
         ("料理\u{3000}長", "?? ?"),
@@ -66,7 +66,7 @@ fn a_letter_that_the_font_lacks_is_drawn_as_near_as_it_has() {
 }
 
 #[test]
-fn a_picture_is_the_same_every_time() {
+fn pictures_are_deterministic() {
     let film = film("committed.jsonl", Perspective::Seat(1));
     let scene = &film.at(When::Decision(120)).unwrap().scene;
     let picture = || {
@@ -95,9 +95,9 @@ fn a_picture_is_the_same_every_time() {
     }
 }
 
-/// Whoever changes a drawing on purpose looks at it, then puts the new text in the place of the old.
+/// After an intended change, look at the new drawings and replace the files.
 #[test]
-fn the_drawings_are_those_that_were_looked_at() {
+fn drawings_equal_the_reviewed_ones() {
     let lines = TestGame::dealt(rules(2, 4), 6, 2).record(|_| v1::DecisionSource::Agent);
     let painter = Painter::new();
     let film = Film::new(&lines, Perspective::Seat(0)).unwrap();
@@ -124,14 +124,14 @@ fn a_gif_has_a_frame_for_every_change_and_keeps_the_colours() {
         .iter()
         .map(|frame| painter.pixels(&painter.table(&frame.scene), WIDTH).unwrap())
         .collect();
-    // A picture that stands still makes the one before last longer.
+    // A repeated picture extends the delay of the one before.
     pictures.insert(2, pictures[1].clone());
     let mut writer = GifWriter::new(Vec::new(), WIDTH, 200, Palette::of(&pictures)).unwrap();
     for picture in &pictures {
         writer.add(picture, 40).unwrap();
     }
     let other = Pixmap::new(10, 10).unwrap();
-    assert!(writer.add(&other, 1).is_err(), "of another size");
+    assert!(writer.add(&other, 1).is_err(), "another size");
     let bytes = writer.finish().unwrap();
 
     let mut options = gif::DecodeOptions::new();

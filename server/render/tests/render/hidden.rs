@@ -1,4 +1,4 @@
-//! What a viewer may not know is neither in a scene nor in its picture, and leaves no trace in a film.
+//! Scenes, pictures and films reveal nothing that their viewer may not know.
 
 use std::time::Duration;
 
@@ -15,7 +15,7 @@ use chefshat_render::{Card, Film, Frame, Hand, LogEntry, Now, Painter, Perspecti
 
 use super::{chronicle, film, fixture, rules, scene};
 
-/// Of so many scenes one is drawn where all are looked at.
+/// One in this many scenes is drawn too.
 const DRAWN: usize = 9;
 
 /// The cards that an SVG picture draws.
@@ -59,28 +59,27 @@ fn nothing_hidden_is_in_a_scene_or_its_picture() {
         };
         let film = film("committed.jsonl", perspective);
         let mut gifts = 0;
-        for (number, (frame, open)) in film.frames().iter().zip(all.frames()).enumerate() {
+        for (number, (frame, all)) in film.frames().iter().zip(all.frames()).enumerate() {
             let mut visible = frame.scene.board.clone();
-            for (seat, (shown, whole)) in
-                frame.scene.seats.iter().zip(&open.scene.seats).enumerate()
+            for (seat, (shown, open)) in frame.scene.seats.iter().zip(&all.scene.seats).enumerate()
             {
-                let Hand::Open(cards) = &whole.hand else {
+                let Hand::Open(cards) = &open.hand else {
                     panic!("all hands are open")
                 };
                 if Some(seat) == own {
-                    assert_eq!(shown.hand, whole.hand);
+                    assert_eq!(shown.hand, open.hand);
                     visible.extend(cards);
                 } else {
                     assert_eq!(shown.hand, Hand::Hidden(u8::try_from(cards.len()).unwrap()));
                 }
             }
-            for happening in &frame.scene.log {
+            for entry in &frame.scene.log {
                 if let LogEntry::Gave {
                     giver,
                     receiver,
                     cards,
                     ..
-                } = happening
+                } = entry
                 {
                     let involved = [giver.index(), receiver.index()];
                     assert_eq!(
@@ -94,7 +93,7 @@ fn nothing_hidden_is_in_a_scene_or_its_picture() {
                 continue;
             }
             let svg = painter.table(&frame.scene);
-            // Beyond ASCII our own words hold no letters but these, which the embedded font has.
+            // The embedded font has all characters of our own words.
             let known = |letter: char| letter.is_ascii() || "×·…≤≥’".contains(letter);
             assert!(svg.chars().all(known), "{:?}", frame.when);
             let drawn = drawn(&svg);
@@ -136,14 +135,14 @@ fn games_that_differ_in_hidden_cards_give_the_same_picture() {
     assert!(compared > 10, "{compared}");
 }
 
-/// The same game with one card of seat 2 and one of seat 3 in each other's place.
+/// The same game after seats 2 and 3 swap one card.
 fn with_other_hidden_cards(game: &Game) -> Option<Game> {
     let (left, right) = (Seat::new(2), Seat::new(3));
     let mut hands = *game.hands();
     let faces = game.rules().faces();
     let counts = |seat: Seat| -> Vec<u8> { hands[seat].counts(faces).collect() };
     let (mut lefts, mut rights) = (counts(left), counts(right));
-    // The top face stays, and with it the Golden card.
+    // Cards of the top face stay, the Golden card among them.
     let plain = usize::from(faces) - 1;
     let (from, to) = (0..plain)
         .flat_map(|from| (0..plain).map(move |to| (from, to)))
@@ -158,7 +157,7 @@ fn with_other_hidden_cards(game: &Game) -> Option<Game> {
     Some(game.with_hands(hands).unwrap())
 }
 
-/// The decisions that only a seat itself and all-seeing perspective know of, and whose they are.
+/// The decisions about special actions, known only to their seat and to viewers of everything.
 fn specials(all: &Film) -> Vec<(u64, Seat, SpecialAction)> {
     let special = |frame: &Frame| match (frame.when, &frame.scene.now) {
         (When::Decision(number), Now::Special(seat, special)) => Some((number, *seat, *special)),
@@ -172,7 +171,7 @@ fn own(seat: Seat) -> Perspective {
 }
 
 #[test]
-fn that_a_special_action_may_be_declared_is_for_the_seat_alone() {
+fn only_the_seat_sees_that_it_may_declare_a_special_action() {
     let lines = fixture("fixed.jsonl");
     let all = Film::new(&lines, Perspective::All).unwrap();
     let [(number, seat, special)] = specials(&all)[..] else {
@@ -196,7 +195,7 @@ fn that_a_special_action_may_be_declared_is_for_the_seat_alone() {
         };
         assert_eq!(film.frames().len(), all.frames().len() - 1);
         assert_eq!(whens(1..=film.decisions()).len(), film.frames().len());
-        // The moment before stands for it: that viewer's Shift had ended, and next a card was given.
+        // The frame before replaces it: the end of the Shift, before the first gift.
         let before = When::ShiftEnd(1);
         assert_eq!(film.at(moment).unwrap().when, before);
         assert_eq!(whens(number..=number), [before]);
@@ -211,7 +210,7 @@ fn that_a_special_action_may_be_declared_is_for_the_seat_alone() {
 }
 
 #[test]
-fn a_film_may_begin_with_what_its_viewer_does_not_know_of() {
+fn a_film_may_begin_with_a_hidden_decision() {
     let rules = rules(3, 11);
     let mut hands = None;
     walk(&fixture("fixed.jsonl"), |moment| {
@@ -229,11 +228,11 @@ fn a_film_may_begin_with_what_its_viewer_does_not_know_of() {
         scores: BySeat::filled(3, 0),
         drawn: None,
     };
-    let making = TestGame {
+    let game = TestGame {
         script: Some(script),
         ..TestGame::dealt(rules, 1, 2)
     };
-    let lines = making.record(|_| v1::DecisionSource::Agent);
+    let lines = game.record(|_| v1::DecisionSource::Agent);
     let all = Film::new(&lines, Perspective::All).unwrap();
     assert_eq!(specials(&all)[0].0, 1);
     let film = Film::new(&lines, Perspective::Spectator).unwrap();
@@ -243,9 +242,9 @@ fn a_film_may_begin_with_what_its_viewer_does_not_know_of() {
 }
 
 #[test]
-fn the_number_of_a_decision_is_for_those_who_see_all() {
+fn only_viewers_of_everything_see_numbers_of_decisions() {
     let painter = Painter::new();
-    for (perspective, told) in [
+    for (perspective, has_numbers) in [
         (Perspective::All, true),
         (Perspective::Seat(0), false),
         (Perspective::Seat(1), false),
@@ -254,17 +253,17 @@ fn the_number_of_a_decision_is_for_those_who_see_all() {
         let film = film("fixed.jsonl", perspective);
         for frame in film.frames() {
             let number = match frame.when {
-                When::Decision(number) if told => Some(number),
+                When::Decision(number) if has_numbers => Some(number),
                 _ => None,
             };
             assert_eq!(frame.scene.decision, number);
         }
         let svg = painter.table(&film.at(When::Decision(57)).unwrap().scene);
-        assert_eq!(svg.contains("decision 57"), told);
+        assert_eq!(svg.contains("decision 57"), has_numbers);
     }
 }
 
-/// A whole game of two sets of rules that differ in whether special actions are offered. Where they are, they are declined.
+/// The same game with and without special actions; all are declined.
 fn with_and_without_special_actions(players: u8, seed: u8) -> [Vec<v1::RecordLine>; 2] {
     [true, false].map(|special_actions| {
         let spec = RuleSetSpec {
@@ -295,16 +294,16 @@ fn with_and_without_special_actions(players: u8, seed: u8) -> [Vec<v1::RecordLin
             taken_over: vec![TakenOver { seed, actions }],
             later_deals: None,
         };
-        let making = TestGame {
+        let game = TestGame {
             branch: Some(&branch),
             seed,
             ..TestGame::dealt(rules, 0, 0)
         };
-        making.record(|_| v1::DecisionSource::Recorded)
+        game.record(|_| v1::DecisionSource::Recorded)
     })
 }
 
-/// What a film shows, and for how long; not by which number its moments are found, and without the viewer's own special decisions.
+/// The scenes of a film and their times, without the viewer's own special actions.
 fn shown(film: &Film) -> Vec<(&Scene, Duration)> {
     let frames = film.frames().iter();
     frames
@@ -331,7 +330,7 @@ fn games_that_differ_in_a_silent_decline_give_the_same_film() {
                 .filter(|(_, seat, _)| own(*seat) != perspective);
             for &(number, _, _) in of_others {
                 compared += 1;
-                // Whoever asks for the decision gets the moment before, and nothing in its picture says that there was more.
+                // The frame before replaces the decision, and its picture shows no number.
                 let [film, _] = &films;
                 let [before, moment] = [number - 1, number].map(|decision| {
                     let frame = film.at(When::Decision(decision)).unwrap();
@@ -349,7 +348,7 @@ fn games_that_differ_in_a_silent_decline_give_the_same_film() {
 }
 
 #[test]
-fn hands_that_nobody_wrote_down_are_drawn_as_unknown() {
+fn unknown_hands_are_drawn_as_unknown() {
     let rules = rules(2, 4);
     let game = Game::new(rules, Seed([1; 32]), |_| {});
     let known = BySeat::from_fn(2, |seat| seat.index() == 0);
@@ -364,7 +363,7 @@ fn hands_that_nobody_wrote_down_are_drawn_as_unknown() {
     assert_eq!(drawn(&Painter::new().table(&scene)), expected);
 }
 
-/// The number of times the Golden card is drawn in a hand of a game at a real table.
+/// The number of hands with the Golden card in the film of an imported game.
 fn golden_drawn(rules: &RuleSet, played: &[v1::RecordLine], observed: Observed) -> usize {
     let record = import(transcript(rules, played, observed).as_bytes()).unwrap();
     let film = Film::new(&record, Perspective::All).unwrap();
@@ -377,7 +376,7 @@ fn golden_drawn(rules: &RuleSet, played: &[v1::RecordLine], observed: Observed) 
 }
 
 #[test]
-fn the_golden_card_is_drawn_only_where_its_holder_is_known() {
+fn the_golden_card_is_drawn_only_if_its_holder_is_known() {
     let HiddenGolden {
         rules,
         lines: played,
@@ -391,7 +390,7 @@ fn the_golden_card_is_drawn_only_where_its_holder_is_known() {
         };
         assert_eq!(golden_drawn(&rules, &played, observed) > 0, seat == holder);
     }
-    // The opener of the standard game holds it.
+    // By the default rules, the opening reveals the holder.
     let rules = RuleSetSpec {
         stop: Stop::Shifts(1),
         ..RuleSetSpec::default()

@@ -1,4 +1,4 @@
-//! The look-up table of a decision: it agrees with the mask and is for the seat that decides.
+//! The action table of a decision agrees with the mask and is only for the seat that decides.
 
 use chefshat_engine::{Action, ActionId, DecisionKind, Game, Requirement, Seed, Viewer};
 use chefshat_render::{Figure, FilmError, Perspective, State, figure_at};
@@ -6,7 +6,7 @@ use chefshat_render::{Figure, FilmError, Perspective, State, figure_at};
 use super::{chronicle, fixture, rules};
 
 #[test]
-fn the_look_up_table_agrees_with_the_mask() {
+fn the_action_table_agrees_with_the_mask() {
     let tables = [(4, 11), (3, 4), (6, 15)];
     let mut legal = 0;
     for (players, faces) in tables {
@@ -29,12 +29,13 @@ fn the_look_up_table_agrees_with_the_mask() {
     assert!(legal > 1000);
 }
 
-/// Every action of the mask is told as legal and no other, and what is told of the others follows from hand and board.
+/// Checks that exactly the actions of the mask are legal, and that the states of the others follow
+/// from hand and board.
 fn check(game: &Game, figure: &Figure) {
     let (space, mask) = (game.rules().actions(), game.legal_actions());
     let hand = game.hands()[figure.seat];
-    let mut told: Vec<(Action, State)> = vec![(Action::Pass, figure.pass)];
-    told.extend(figure.lone_joker.map(|state| (Action::LoneJoker, state)));
+    let mut actions: Vec<(Action, State)> = vec![(Action::Pass, figure.pass)];
+    actions.extend(figure.lone_joker.map(|state| (Action::LoneJoker, state)));
     for (face, quantities) in (1..).zip(&figure.plays) {
         let face = chefshat_engine::Face::new(face).unwrap();
         assert_eq!(quantities.len(), usize::from(face.get()));
@@ -60,19 +61,19 @@ fn check(game: &Game, figure: &Figure) {
                     (false, false) => State::Impossible,
                 };
                 assert_eq!(state, expected, "{play}");
-                told.push((play, state));
+                actions.push((play, state));
             }
         }
     }
     let faces = (1..=figure.faces).filter_map(chefshat_engine::Face::new);
     let gifts = faces.map(Action::Give).chain([Action::GiveJoker]);
-    told.extend(gifts.zip(figure.gives.iter().copied()));
-    told.extend(
+    actions.extend(gifts.zip(figure.gives.iter().copied()));
+    actions.extend(
         [Action::Declare, Action::Decline]
             .into_iter()
             .zip(figure.special.iter().copied()),
     );
-    let mut legal: Vec<ActionId> = told
+    let mut legal: Vec<ActionId> = actions
         .iter()
         .filter(|(_, state)| *state == State::Legal)
         .map(|(meaning, _)| space.encode(*meaning).unwrap())
@@ -88,7 +89,7 @@ fn check(game: &Game, figure: &Figure) {
 }
 
 #[test]
-fn the_look_up_table_is_for_the_seat_that_decides() {
+fn the_action_table_is_only_for_the_seat_that_decides() {
     let lines = fixture("committed.jsonl");
     let seat = figure_at(&lines, Perspective::All, 7).unwrap().seat;
     let own = u32::try_from(seat.index()).unwrap();
@@ -114,6 +115,9 @@ fn the_look_up_table_is_for_the_seat_that_decides() {
     for perspective in [Perspective::Spectator, Perspective::Seat((own + 1) % 4)] {
         let error = figure_at(&lines, perspective, 7).unwrap_err();
         assert_eq!(error, FilmError::HandNotSeen { decision: 7 });
-        assert!(!error.to_string().contains("seat "), "not even whose it is");
+        assert!(
+            !error.to_string().contains("seat "),
+            "the error does not name the seat"
+        );
     }
 }

@@ -1,4 +1,4 @@
-//! Pictures: what the scenes of a recorded game show. What they hide, the look-up table and the drawings have modules of their own.
+//! Scenes of recorded games. What they hide, the action table and the drawings have their own modules.
 
 #![allow(
     clippy::unwrap_used,
@@ -12,9 +12,10 @@ mod look_up;
 use std::path::Path;
 
 use chefshat_engine::{BySeat, Game, PlayRequirement, RuleSet, RuleSetSpec, Stop, Viewer};
-use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
+use chefshat_proto::v1::{self, record_line::Line};
 use chefshat_record::import::import;
 use chefshat_record::jsonl;
+use chefshat_record::testing::aborted;
 use chefshat_render::{
     Card, Chronicle, Film, FilmError, Hand, LogEntry, Now, Painter, ParticipantKind, Perspective,
     Scene, When,
@@ -39,7 +40,7 @@ fn rules(players: u8, faces: u8) -> RuleSet {
     spec.validate().unwrap()
 }
 
-/// Who sits at a table with these names, as one viewer sees what happens there.
+/// The chronicle of a game between robots with these names, for one viewer.
 fn chronicle(rules: &RuleSet, names: &[&str], viewer: Viewer) -> Chronicle {
     let seats: Vec<v1::Participant> = (0..)
         .zip(names)
@@ -97,7 +98,7 @@ fn a_film_has_a_frame_for_every_moment() {
         ParticipantKind::BuiltIn("greedy".into())
     );
 
-    // The opening is answered with the Golden card on the board.
+    // After the opening, the Golden card is on the board.
     let second = &film.at(When::Decision(2)).unwrap().scene;
     assert_eq!(
         (second.board[0], second.board_by),
@@ -153,7 +154,7 @@ fn a_film_has_a_frame_for_every_moment() {
 }
 
 #[test]
-fn a_part_of_a_film_is_what_was_asked_for() {
+fn parts_of_a_film() {
     let film = film("fixed.jsonl", Perspective::All);
     let whens = |frames: Vec<&chefshat_render::Frame>| -> Vec<When> {
         frames.iter().map(|frame| frame.when).collect()
@@ -163,7 +164,7 @@ fn a_part_of_a_film_is_what_was_asked_for() {
     assert_eq!(first.last(), Some(&When::ShiftEnd(1)));
     let turns = u64::try_from(first.len() - 1).unwrap();
 
-    // The end of a Shift stands between decisions, and is no part of a row that stops before it.
+    // The end of a Shift is between decisions, not in a range that stops before it.
     assert_eq!(
         whens(film.range(turns..=turns + 1).unwrap()),
         [
@@ -215,43 +216,14 @@ fn a_part_of_a_film_is_what_was_asked_for() {
 }
 
 #[test]
-fn a_game_that_was_given_up_is_drawn_as_far_as_it_went() {
-    let mut lines = fixture("fixed.jsonl");
-    let reveal = lines.iter().find_map(|line| match line.line.as_ref()? {
-        Line::Event(event) => match event.kind.as_ref()? {
-            Kind::GameEnded(ended) => ended.reveal.clone(),
-            _ => None,
-        },
-        _ => None,
-    });
+fn an_aborted_game_is_drawn_up_to_its_end() {
+    let lines = fixture("fixed.jsonl");
     let is_decision = |line: &v1::RecordLine| matches!(line.line, Some(Line::Decision(_)));
     let tenth = (0..lines.len())
         .filter(|&index| is_decision(&lines[index]))
         .nth(9)
         .unwrap();
-    lines.truncate(tenth);
-    let events = lines
-        .iter()
-        .filter(|line| matches!(line.line, Some(Line::Event(_))))
-        .count();
-    let sequence = u64::try_from(events).unwrap() + 1;
-    let aborted = v1::GameEvent {
-        sequence,
-        kind: Some(Kind::GameAborted(Box::new(v1::GameAborted {
-            reason: v1::AbortReason::Closed.into(),
-            reveal,
-        }))),
-        ..v1::GameEvent::default()
-    };
-    let footer = v1::RecordFooter {
-        state: v1::RoomState::Aborted.into(),
-        events: sequence,
-        decisions: 9,
-    };
-    for line in [Line::Event(aborted), Line::Footer(footer)] {
-        lines.push(v1::RecordLine { line: Some(line) });
-    }
-
+    let lines = aborted(lines, tenth);
     let film = Film::new(&lines, Perspective::Seat(0)).unwrap();
     assert_eq!((film.decisions(), film.frames().len()), (9, 10));
     let scene = &film.at(When::End).unwrap().scene;
@@ -265,7 +237,7 @@ fn a_game_that_was_given_up_is_drawn_as_far_as_it_went() {
 }
 
 #[test]
-fn a_real_game_that_was_left_between_two_shifts_ends_as_its_last_shift_did() {
+fn an_imported_game_that_stops_between_shifts_ends_with_the_scene_of_the_last_one() {
     let transcript = "shift,seat,what,value
 ,,rules,paper players=2 faces=4 jokers=1 target_points=100
 ,0,human,Ana
@@ -274,29 +246,29 @@ fn a_real_game_that_was_left_between_two_shifts_ends_as_its_last_shift_did() {
 1,1,passes,
 1,0,plays,1
 ";
-    let film = |transcript: &str| {
+    let film_of = |transcript: &str| {
         let lines = import(transcript.as_bytes()).unwrap();
         Film::new(&lines, Perspective::All).unwrap()
     };
-    let left = film(transcript);
-    let [.., before, last] = left.frames() else {
-        panic!("{} frames", left.frames().len())
+    let film = film_of(transcript);
+    let [.., before, last] = film.frames() else {
+        panic!("{} frames", film.frames().len())
     };
     assert_eq!((before.when, last.when), (When::ShiftEnd(1), When::End));
-    let given_up = Scene {
+    let aborted = Scene {
         now: Now::Aborted,
         ..before.scene.clone()
     };
-    assert_eq!(last.scene, given_up, "nobody dealt a second Shift");
+    assert_eq!(last.scene, aborted, "there was no second deal");
 
-    // Of a Shift that was dealt the cards lie there, though nobody had decided anything.
-    let left = film(&format!("{transcript}2,0,hand,1 2 2 3 3\n"));
-    let last = left.frames().last().unwrap();
+    // A dealt Shift is shown even without a decision.
+    let film = film_of(&format!("{transcript}2,0,hand,1 2 2 3 3\n"));
+    let last = film.frames().last().unwrap();
     assert_eq!(
         (last.scene.now.clone(), last.scene.shift),
         (Now::Aborted, 2)
     );
-    let whens: Vec<When> = (left.shift(2).unwrap().iter())
+    let whens: Vec<When> = (film.shift(2).unwrap().iter())
         .map(|frame| frame.when)
         .collect();
     assert_eq!(whens, [When::End]);

@@ -1,15 +1,16 @@
-//! What of the hands of a real table counts as known: what was told, and what follows from it. It must be so, and nothing else is shown.
+//! Which hands of a real table are known, because they were stated or follow. Known hands must be
+//! right, and no others are in the record.
 
 use chefshat_engine::{BySeat, Cards, RuleSet, RuleSetSpec, Stop};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 use chefshat_record::import::import;
 use chefshat_record::replay::walk;
 
-use chefshat_record::testing::{Observed, TestGame, transcript};
+use chefshat_record::testing::{HiddenGolden, Observed, TestGame, transcript};
 
 use super::spec;
 
-/// Which hands are known, and for which decisions there are masks, by seat.
+/// The seat of each decision, whether its hand is known and whether it has a mask.
 pub(super) fn knowledge(record: &[v1::RecordLine]) -> Vec<(u32, bool, bool)> {
     let mut known = Vec::new();
     walk(record, |moment| {
@@ -24,21 +25,21 @@ pub(super) fn knowledge(record: &[v1::RecordLine]) -> Vec<(u32, bool, bool)> {
 }
 
 #[test]
-fn a_hand_is_known_where_it_is_told_or_follows_from_what_is_told() {
+fn stated_hands_and_those_that_follow_are_known() {
     let rules = spec(4, 11, 2).validate().unwrap();
     let played = TestGame::dealt(rules, 5, 9).record(|_| v1::DecisionSource::Agent);
-    // Watched to the end, all hands of the standard game follow from the cards that were played.
-    let whole = import(transcript(&rules, &played, Observed::TURNS).as_bytes()).unwrap();
-    let known = knowledge(&whole);
+    // All turns of the default game determine all hands.
+    let complete = import(transcript(&rules, &played, Observed::TURNS).as_bytes()).unwrap();
+    let known = knowledge(&complete);
     assert!(known.len() > 50, "{} decisions", known.len());
     assert!(known.iter().all(|(_, hand, mask)| *hand && *mask));
-    // Broken off early, only the hand that was told is known.
-    let told = Observed {
+    // After the first turns, only the stated hand is known.
+    let observed = Observed {
         hands: 0b0100,
         turns: 20,
         ..Observed::TURNS
     };
-    let broken_off = import(transcript(&rules, &played, told).as_bytes()).unwrap();
+    let broken_off = import(transcript(&rules, &played, observed).as_bytes()).unwrap();
     let known = knowledge(&broken_off);
     assert_eq!(known.len(), 20);
     for (seat, hand, mask) in known {
@@ -57,7 +58,7 @@ fn a_hand_is_known_where_it_is_told_or_follows_from_what_is_told() {
     assert_eq!(hands, [1]);
 }
 
-/// The hands before each turn, whose are known, and of whose it is known whether the Golden card is in them.
+/// The hands before each turn, which of them are known, and which including the Golden card.
 fn before_turns(lines: &[v1::RecordLine]) -> Vec<(BySeat<Cards>, BySeat<bool>, BySeat<bool>)> {
     let mut all = Vec::new();
     walk(lines, |moment| {
@@ -71,13 +72,13 @@ fn before_turns(lines: &[v1::RecordLine]) -> Vec<(BySeat<Cards>, BySeat<bool>, B
     all
 }
 
-/// Hands without what tells the Golden card from others of its face.
+/// The counts of a hand, without the mark of the Golden card.
 fn counts(cards: Cards, rules: &RuleSet) -> Vec<u8> {
     cards.counts(rules.faces()).collect()
 }
 
 #[test]
-fn what_counts_as_known_was_so() {
+fn known_hands_are_right() {
     let original = |players, faces| RuleSetSpec {
         stop: Stop::Shifts(2),
         points: Vec::new(),
@@ -93,12 +94,12 @@ fn what_counts_as_known_was_so() {
         spec(4, 5, 3),
         original(2, 4),
     ];
-    let (mut whole, mut without_golden) = (0, 0);
+    let (mut with_golden, mut without_golden) = (0, 0);
     for (number, spec) in (0u8..).zip(specs) {
         let rules = spec.validate().unwrap();
         let played = TestGame::dealt(rules, 40 + number, 3).record(|_| v1::DecisionSource::Agent);
-        let course = before_turns(&played);
-        // Others are seen, and the game is broken off elsewhere, each time.
+        let expected = before_turns(&played);
+        // Other hands and gifts are observed each time, and other numbers of turns.
         for (hands, gifts) in [
             (0, 0),
             (0b1011, 0),
@@ -107,24 +108,24 @@ fn what_counts_as_known_was_so() {
             (0b11_1101, 0),
         ] {
             for part in 1..=4 {
-                let told = Observed {
+                let observed = Observed {
                     hands,
                     gifts,
-                    turns: course.len() * part / 4,
+                    turns: expected.len() * part / 4,
                     ..Observed::TURNS
                 };
-                let text = transcript(&rules, &played, told);
+                let text = transcript(&rules, &played, observed);
                 let record = import(text.as_bytes())
-                    .unwrap_or_else(|error| panic!("{error}\n{told:?}\n{text}"));
+                    .unwrap_or_else(|error| panic!("{error}\n{observed:?}\n{text}"));
                 let found = before_turns(&record);
-                assert_eq!(found.len(), told.turns);
-                for ((right, ..), (hands, known, golden)) in course.iter().zip(found) {
+                assert_eq!(found.len(), observed.turns);
+                for ((right, ..), (hands, known, golden)) in expected.iter().zip(found) {
                     for seat in known.seats() {
-                        let at = || format!("seat {seat}, {told:?}\n{text}");
+                        let at = || format!("seat {seat}, {observed:?}\n{text}");
                         assert!(known[seat] || !golden[seat], "{}", at());
                         if golden[seat] {
                             assert_eq!(hands[seat], right[seat], "{}", at());
-                            whole += 1;
+                            with_golden += 1;
                         } else if known[seat] {
                             let hand = counts(hands[seat], &rules);
                             assert_eq!(hand, counts(right[seat], &rules), "{}", at());
@@ -135,21 +136,20 @@ fn what_counts_as_known_was_so() {
             }
         }
     }
-    assert!(whole > 1000, "{whole}");
+    assert!(with_golden > 1000, "{with_golden}");
     assert!(without_golden > 1000, "{without_golden}");
 }
 
 #[test]
 fn the_golden_card_is_not_inferred_from_plays() {
-    let any_top_face = RuleSetSpec {
-        stop: Stop::Shifts(1),
-        ..RuleSetSpec::preset("original2020").unwrap()
-    };
-    let rules = any_top_face.validate().unwrap();
-    let played = TestGame::dealt(rules, 7, 1).record(|_| v1::DecisionSource::Agent);
-    // A transcript of the complete Shift determines every hand, but not which top-face card was Golden.
-    let watched = import(transcript(&rules, &played, Observed::TURNS).as_bytes()).unwrap();
-    let found = before_turns(&watched);
+    let HiddenGolden {
+        rules,
+        lines: played,
+        ..
+    } = HiddenGolden::record();
+    // The turns of the Shift determine every hand, but not which top-face card is Golden.
+    let record = import(transcript(&rules, &played, Observed::TURNS).as_bytes()).unwrap();
+    let found = before_turns(&record);
     let top = chefshat_engine::Face::new(rules.faces()).unwrap();
     for (hands, known, golden) in &found {
         for (seat, hand) in hands.iter() {

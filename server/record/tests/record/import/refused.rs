@@ -1,4 +1,4 @@
-//! What cannot have happened at a real table is refused, at its row or at its line of the record.
+//! Impossible games of real tables are refused, at the row of the transcript or the line of the record.
 
 use chefshat_proto::v1::{self, record_line::Line};
 use chefshat_record::import::import;
@@ -7,9 +7,9 @@ use chefshat_record::replay::replay;
 use super::{NOTED, SPARSE, documented, from_the_second_shift};
 
 #[test]
-fn rows_that_cannot_be_are_named() {
-    // What is replaced in the documented transcript, by what, the line and words of the refusal.
-    #[rustfmt::skip] // A table is read by its rows.
+fn impossible_rows_are_reported() {
+    // Replaced text of the documented transcript, replacement, wrong line, part of the message.
+    #[rustfmt::skip] // One row each.
     let cases = [
         ("seconds,took", "seconds,takes", 1, "there is no column \"takes\""),
         ("shift,seat,what", "shift,seat,why", 1, "there is no column \"why\""),
@@ -54,7 +54,7 @@ fn rows_that_cannot_be_are_named() {
     check_refused(&documented(), &cases);
 }
 
-/// A transcript is refused for each change: what is replaced, by what, the line and words of the refusal.
+/// Checks that every change is refused: replaced text, replacement, wrong line, part of the message.
 fn check_refused(text: &str, cases: &[(&str, &str, usize, &str)]) {
     let mut wrong = Vec::new();
     for (found, replaced, line, words) in cases {
@@ -63,15 +63,17 @@ fn check_refused(text: &str, cases: &[(&str, &str, usize, &str)]) {
         match import(changed.as_bytes()) {
             Err(error) if error.line == *line && error.problem.contains(words) => {}
             Err(error) => wrong.push(format!("{replaced}: line {line}, {words:?}: {error}")),
-            Ok(_) => wrong.push(format!("{replaced}: line {line}, {words:?}: it was taken")),
+            Ok(_) => wrong.push(format!(
+                "{replaced}: line {line}, {words:?}: it was accepted"
+            )),
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
 #[test]
-fn what_is_noted_is_compared_with_the_shift_of_its_row() {
-    #[rustfmt::skip] // A table is read by its rows.
+fn notes_are_compared_with_the_shift_of_their_row() {
+    #[rustfmt::skip] // One row each.
     let cases = [
         ("1,1,points,0", "1,1,points,1", 8, "by the rules, seat 1 has 0 points, not 1"),
         ("1,1,points,0", "1,1,role,Dishwasher", 8, "the first Shift has no roles"),
@@ -85,14 +87,14 @@ fn what_is_noted_is_compared_with_the_shift_of_its_row() {
 }
 
 #[test]
-fn what_no_gifts_could_explain_is_refused() {
-    #[rustfmt::skip] // A table is read by its rows.
+fn facts_that_no_gifts_explain_are_refused() {
+    #[rustfmt::skip] // One row each.
     let cases = [
         ("2,0,plays,G 15", "2,0,plays,1", 17, "too many cards of face 1 were dealt to or played by the seats together: 2, but the deck has 1"),
         ("2,0,plays,G 15", "2,0,plays,14", 17, "must play the Golden card"),
         ("2,0,plays,G 15", "2,2,plays,G 15", 17, "seat 2 does not hold these cards"),
         ("8 8 9 9 9 9", "8 8 9 9 9 G", 17, "no seat can have been dealt the Golden card"),
-        // The Dishwasher plays a card rarer than those it gave, and was given none that rare.
+        // The Dishwasher plays a card rarer than those it gave, and received none that rare.
         ("2,0,plays,G 15", "2,5,gives,14 14\n2,0,gives,10 10\n2,0,plays,15\n2,1,passes,\n2,2,passes,\n2,3,passes,\n2,4,passes,\n2,5,plays,13", 24, "no deal and exchange fit"),
         // The Golden card goes last of its face.
         ("2,0,plays,G 15", "2,0,hand,10 10 10 10 10 11 11 11 11 11 12 12 12 12 13 13 13 13 15 G\n2,0,gives,15 G\n2,0,plays,15", 19, "no seat can have been dealt the Golden card"),
@@ -103,14 +105,14 @@ fn what_no_gifts_could_explain_is_refused() {
 }
 
 #[test]
-fn gifts_are_checked_against_the_hands_that_were_seen() {
+fn gifts_are_checked_against_stated_hands() {
     let (text, _) = from_the_second_shift();
     let gives: Vec<(usize, &str)> = (1..)
         .zip(text.lines())
         .filter(|(_, line)| line.contains(",gives,"))
         .collect();
     assert_eq!(gives.len(), 4, "{text}");
-    // The Dishwasher gives its two rarest cards, and nothing else.
+    // The Dishwasher must give its two rarest cards.
     let (line, row) = gives[0];
     let seat = row.split(',').nth(1).unwrap();
     let hand = text
@@ -124,14 +126,14 @@ fn gifts_are_checked_against_the_hands_that_were_seen() {
     let wrong = text.replacen(&right, &format!("2,{seat},gives,{} {last}", cards[0]), 1);
     let error = import(wrong.as_bytes()).unwrap_err();
     assert_eq!(error.line, line, "{error}");
-    let seen_short = text.replacen(&right, &format!("2,{seat},gives,{}", cards[0]), 1);
-    let error = import(seen_short.as_bytes()).unwrap_err();
+    let one_card = text.replacen(&right, &format!("2,{seat},gives,{}", cards[0]), 1);
+    let error = import(one_card.as_bytes()).unwrap_err();
     assert_eq!(error.line, line, "{error}");
 }
 
 #[test]
-fn a_damaged_record_of_a_real_table_is_named() {
-    let whole = import(documented().as_bytes()).unwrap();
+fn damaged_imported_records_are_reported() {
+    let record = import(documented().as_bytes()).unwrap();
     type Change = fn(&mut Vec<v1::RecordLine>);
     let cases: [(Change, usize, &str); 4] = [
         (
@@ -164,7 +166,7 @@ fn a_damaged_record_of_a_real_table_is_named() {
         ),
     ];
     for (change, line, words) in cases {
-        let mut changed = whole.clone();
+        let mut changed = record.clone();
         change(&mut changed);
         let error = replay(&changed).unwrap_err();
         assert!(
