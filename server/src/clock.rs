@@ -1,19 +1,19 @@
-//! The time of a room: the time since it was created, restarts of the server included.
+//! The age of a room: the time since it was created, restarts of the server included.
 
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use tokio::time::Instant;
 
-/// Turns instants into times since the room was created, and back.
+/// Converts between instants and the age of a room.
 #[derive(Debug, Clone, Copy)]
 pub struct RoomClock {
     epoch: Instant,
-    /// How old the room was at `epoch`.
+    /// The age of the room at `epoch`.
     age: Duration,
 }
 
 impl RoomClock {
-    /// The clock of a room that is so old now.
+    /// Starts the clock of a room that has this age now.
     pub fn of_age(age: Duration) -> Self {
         Self {
             epoch: Instant::now(),
@@ -21,17 +21,17 @@ impl RoomClock {
         }
     }
 
-    /// The time now.
+    /// The age now.
     pub fn now(&self) -> Duration {
         self.at(Instant::now())
     }
 
-    /// The time at an instant; for one before the clock was started, the time when it was.
+    /// The age at an instant, or at the start of the clock if the instant is earlier.
     pub fn at(&self, instant: Instant) -> Duration {
         self.age + instant.saturating_duration_since(self.epoch)
     }
 
-    /// The instant of a time; for one before the clock was started, the instant when it was.
+    /// The instant of an age, or the start of the clock if the age was reached earlier.
     pub fn instant(&self, time: Duration) -> Instant {
         self.epoch + time.saturating_sub(self.age)
     }

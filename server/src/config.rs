@@ -1,4 +1,4 @@
-//! What a server is configured with, and every limit it keeps.
+//! The settings of a server and its limits.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -15,96 +15,97 @@ pub const MAX_SEATS_PER_WATCH: usize = 64;
 pub const MAX_COMMANDS_PER_MESSAGE: usize = 1_024;
 /// Messages that wait for one room.
 pub const ROOM_MAILBOX: usize = 256;
-/// Largest message of a client that steps games of its own, bytes: room for seeds given one by one.
+/// Largest message of a vector stream, bytes: large enough for a list of seeds.
 pub const MAX_VECTOR_MESSAGE_BYTES: usize = 1024 * 1024;
-/// Largest batch of such games, bytes: that of the most games of the largest rule set, two Shifts of each having ended at once.
+/// Largest batch of a vector stream, bytes: the most games of the largest rule set, each with two
+/// Shifts ended at once.
 pub const MAX_VECTOR_BATCH_BYTES: usize = 16 * 1024 * 1024;
-/// Streams of clients' own games at a time.
+/// Most vector streams at a time.
 pub const MAX_VECTOR_STREAMS: usize = 64;
-/// Seats played on all of them together, games times seats: some 5 KB each.
+/// Most seats played on all vector streams together, games times seats: about 5 KB each.
 pub const MAX_VECTOR_SEATS_IN_ALL: usize = 131_072;
-/// Seeds that may be given one by one.
+/// Most game seeds in one message.
 pub const MAX_VECTOR_SEEDS: usize = 16_384;
-/// Games of one such stream whose records are kept.
+/// Most games of a vector stream with records.
 pub const MAX_VECTOR_RECORDED_GAMES: u32 = 256;
-/// How long a client may take to say which games it wants.
+/// How long a client may take to send the setup of a vector stream.
 pub const VECTOR_SETUP_TIMEOUT: Duration = Duration::from_secs(30);
 /// How long a client may think about a batch.
 pub const VECTOR_IDLE_TIMEOUT: Duration = Duration::from_secs(3_600);
-/// How long a client may take to take in one message.
+/// How long a client may take to receive one message.
 pub const VECTOR_SEND_TIMEOUT: Duration = Duration::from_secs(60);
 /// Largest record that may be imported, bytes as encoded.
 pub const MAX_IMPORT_BYTES: usize = 64 * 1024 * 1024;
 /// Most lines of a record that may be imported.
 pub const MAX_IMPORT_LINES: usize = 1_500_000;
-/// How long the whole of a record that is imported may take to arrive.
+/// How long the upload of a record may take.
 pub const IMPORT_TIMEOUT: Duration = Duration::from_secs(120);
-/// Records that are being received at a time.
+/// Most uploads of records at a time.
 pub const MAX_IMPORTS: usize = 2;
-/// Records that are put together, or replayed, at a time, for each of the purposes that they serve.
+/// Most records that are assembled or replayed at a time, for each purpose.
 pub const MAX_RECORDS_IN_HAND: usize = 2;
-/// Records that are being sent at a time.
+/// Most records that are sent at a time.
 pub const MAX_RECORDS_SENT: usize = 8;
-/// How long a client may take to take in one message of a record.
+/// How long a client may take to receive one message of a record.
 pub const RECORD_SEND_TIMEOUT: Duration = Duration::from_secs(30);
-/// Most tournaments, ended ones that are still shown included.
+/// Most tournaments, including ended ones that are still listed.
 pub const MAX_TOURNAMENTS: usize = 256;
-/// Messages that wait for one tournament.
+/// Messages that may wait for one tournament.
 pub const TOURNAMENT_MAILBOX: usize = 256;
-/// Calls to games that wait for one stream; beyond it the stream is ended.
+/// Most calls to games that may wait for one stream; a further one ends the stream.
 pub const MAX_CALLS_WAITING: usize = 4_096;
-/// How long a tournament stays open that nobody joins or begins.
+/// How long a tournament stays open if nobody joins or starts it.
 pub const TOURNAMENT_OPEN_TIME: Duration = Duration::from_secs(7 * 24 * 3_600);
-/// When rooms for games of a tournament that could not be made are tried again.
+/// Pause before rooms for games of a tournament are tried again after a failure.
 pub const TOURNAMENT_RETRY: Duration = Duration::from_secs(1);
-/// Streams that follow tournaments.
+/// Most streams that follow tournaments.
 pub const MAX_FOLLOWERS: usize = 256;
-/// How often those who follow a tournament are told of it at most.
+/// Shortest time between two updates of a followed tournament.
 pub const FOLLOW_INTERVAL: Duration = Duration::from_millis(250);
-/// Tournaments of which it is worked out at a time what their followers are told; and those whose results are.
+/// Most updates for followers, and most results, that are computed at a time.
 pub const MAX_RESULTS_IN_HAND: usize = 2;
-/// Most games of which those who follow a tournament are told, so that a message stays well below the 4 MB that clients take by standard. At a
-/// time only half as many can be played.
+/// Most games in an update of a followed tournament. It keeps a message well below the 4 MB that
+/// clients accept by default. At most half as many are played at a time.
 pub const MAX_GAMES_FOLLOWED: usize = 512;
-/// How long a follower may take to take in what it is told.
+/// How long a follower may take to receive an update.
 pub const FOLLOW_SEND_TIMEOUT: Duration = Duration::from_secs(30);
 /// Most games of a tournament in one page.
 pub const MAX_GAMES_PAGE: u32 = 500;
-/// Most lines of a leaderboard.
+/// Most rows of a leaderboard.
 pub const MAX_LEADERBOARD_LINES: u32 = 1_000;
-/// How old a leaderboard may be that is shown although games have ended since.
+/// How old a cached leaderboard may be although games have ended since.
 pub const LEADERBOARD_AGE: Duration = Duration::from_secs(2);
-/// The part of the time that may go into working it out is one by this.
+/// 1/N of the time may be spent computing the leaderboard.
 pub const LEADERBOARD_PART: u32 = 10;
-/// How long streams and connections that do not close may hold up a shutdown.
+/// How long open streams and connections may delay a shutdown.
 pub const DRAIN_LIMIT: Duration = Duration::from_secs(5);
 /// Longest name of a room or participant, characters.
 pub const MAX_NAME_CHARS: usize = 64;
-/// Most Shifts of a hosted game, and most points it may be played to.
+/// Most Shifts of a hosted game, and highest target in points.
 pub const MAX_HOSTED_SHIFTS: u32 = 1_000;
-/// How often an idle Watch stream says that it is alive.
+/// Interval of heartbeats on an idle Watch stream.
 pub const HEARTBEAT: Duration = Duration::from_secs(15);
 
-/// What may be set for a server.
+/// The settings of a server.
 #[derive(Debug, Clone)]
 pub struct ServerConfig {
-    /// Where records of finished games are written; `None`: nowhere.
+    /// Folder for the records of finished games; `None` disables them.
     pub data_dir: Option<PathBuf>,
-    /// Most rooms at a time, ended ones that are still shown included.
+    /// Most rooms at a time, including ended ones that are still listed.
     pub max_rooms: usize,
     /// Most connections at a time.
     pub max_connections: usize,
-    /// Threads that step the games of clients' own; 0: one for each core.
+    /// Threads that step the games of vector streams; 0: one for each core.
     pub vector_threads: usize,
-    /// How long an ended room is still shown.
+    /// How long an ended room stays listed.
     pub retention: Duration,
-    /// How long running games may go on after a shutdown was asked for.
+    /// How long running games may continue after a shutdown is requested.
     pub grace: Duration,
     /// How long a new connection may stay silent before it is dropped.
     pub first_byte_timeout: Duration,
-    /// Whether anybody may add records of games played elsewhere.
+    /// Whether clients may import records of games played elsewhere.
     pub allow_import: bool,
-    /// Web origins that may call the server from a browser; `*` is all.
+    /// Web origins that may call the server from a browser; `*` allows all.
     pub allowed_origins: Vec<String>,
 }
 

@@ -1,4 +1,5 @@
-//! Connections as they come in: without Nagle's delay, at most so many at a time, and dropped when they stay silent from the start.
+//! Accepts connections: disables Nagle's delay, limits their number, and drops those that send
+//! nothing at the start.
 
 use std::io;
 use std::pin::Pin;
@@ -14,15 +15,15 @@ use tokio::time::Sleep;
 use tonic::transport::server::{Connected, TcpConnectInfo};
 use tracing::debug;
 
-/// How long to wait after a connection could not be accepted: usually file descriptors have run out.
+/// Pause after a failed accept: usually the process has run out of file descriptors.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
-/// What is asked of connections.
+/// Limits of connections.
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
-    /// Most at a time; more wait to be accepted.
+    /// Most connections at a time; further ones wait to be accepted.
     pub max_connections: usize,
-    /// How long a new one may stay silent.
+    /// How long a new connection may stay silent.
     pub first_byte_timeout: Duration,
 }
 
@@ -43,7 +44,7 @@ pub fn accept(listener: TcpListener, limits: Limits) -> impl Stream<Item = io::R
                 }
             }
         };
-        // A connection on which this fails is slower, not wrong.
+        // If this fails, the connection is slower but still works.
         let _ = stream.set_nodelay(true);
         let connection = Connection {
             stream,
@@ -54,11 +55,11 @@ pub fn accept(listener: TcpListener, limits: Limits) -> impl Stream<Item = io::R
     })
 }
 
-/// A connection that must not stay silent from the start.
+/// A connection that is dropped unless it sends its first bytes in time.
 #[derive(Debug)]
 pub struct Connection {
     stream: TcpStream,
-    /// Rings unless something has been read.
+    /// Fires unless something has been read.
     silence: Option<Pin<Box<Sleep>>>,
     _place: OwnedSemaphorePermit,
 }

@@ -8,7 +8,7 @@ use prost::Message as _;
 use chefshat_room::journal::Source;
 use chefshat_room::{Answered, ExpressError, Verdict};
 
-/// A mask as the protocol writes it.
+/// Encodes a mask.
 pub(super) fn mask_bytes(mask: &Mask, rules: &RuleSet) -> Vec<u8> {
     mask.to_bytes(rules.actions().size())
 }
@@ -53,14 +53,14 @@ pub fn answer_result(decision_id: u64, action: u32, answered: Answered) -> v1::A
     result
 }
 
-/// Annotations hold a number that is not finite, which no record could hold.
+/// Annotations contain a number that is not finite, which records cannot hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct NotFinite;
 
-/// Annotations as they are stored: encoded.
+/// Encodes annotations for storage.
 ///
 /// # Errors
-/// A number in them is not finite.
+/// An annotation is not a finite number.
 pub fn annotations_from_proto(
     annotations: Option<v1::Annotations>,
 ) -> Result<Option<Box<[u8]>>, NotFinite> {
@@ -78,16 +78,16 @@ pub fn annotations_from_proto(
     Ok(Some(bytes).filter(|bytes| !bytes.is_empty()))
 }
 
-/// An expression as it is stored: checked and encoded.
+/// Checks an expression and encodes it for storage.
 ///
 /// # Errors
-/// The field out of its range.
+/// A field is out of its range.
 pub fn expression_from_proto(expression: &v1::Expression) -> Result<Box<[u8]>, FieldProblem> {
     check_expression(expression)?;
     Ok(expression.encode_to_vec().into_boxed_slice())
 }
 
-/// Why an expression was refused, on the stream of its seat.
+/// Why an expression was refused, for the stream of its seat.
 pub fn express_refused(error: ExpressError) -> v1::Refused {
     // Codes of google.rpc.Code.
     const RESOURCE_EXHAUSTED: u32 = 8;

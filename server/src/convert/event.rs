@@ -1,5 +1,5 @@
-//! The events of a room as messages, as a viewer may see them. `Event::seen_by` of the engine decides what of its events a viewer may see;
-//! rewards are withheld here, because only rooms have them.
+//! The events of a room as messages, redacted for a viewer. `Event::seen_by` redacts the engine's
+//! events; rewards are redacted here, because only rooms have them.
 
 use chefshat_engine::SeedPlan;
 use chefshat_engine::{Game, Seat, Viewer};
@@ -16,7 +16,7 @@ use super::room::{abort_reason, participants};
 use chefshat_room::Core;
 use chefshat_room::log::RoomEvent;
 
-/// The event at a position of the log (from 0), as `viewer` may see it. `None` beyond the end.
+/// The event at a position of the log (from 0), redacted for `viewer`. `None` beyond the end.
 pub fn event_to_proto(core: &Core, position: usize, viewer: Viewer) -> Option<v1::GameEvent> {
     let entry = core.log().get(position)?;
     Some(v1::GameEvent {
@@ -50,7 +50,7 @@ fn kind(core: &Core, event: &RoomEvent, viewer: Viewer) -> Kind {
         RoomEvent::GameStarted => {
             let mut started = game_started(core);
             for seat in &mut started.seats {
-                // The same at any time and for all viewers: later changes have events of their own.
+                // The same at any time and for all viewers: later changes have their own events.
                 seat.connected = true;
                 seat.substituted = false;
             }
@@ -61,7 +61,7 @@ fn kind(core: &Core, event: &RoomEvent, viewer: Viewer) -> Kind {
                 source: source_to_proto(game.source),
                 decision_time_us: game.time_us,
             };
-            // The engine's end of a game has no seed to reveal: the room's end has.
+            // The engine's final event does not reveal the seed; the room's does.
             event_kind(
                 &game.event.seen_by(viewer),
                 core.header().rules.actions(),
@@ -88,7 +88,7 @@ fn kind(core: &Core, event: &RoomEvent, viewer: Viewer) -> Kind {
     }
 }
 
-/// The start of a game, with its seats as they stand now.
+/// The start of a game, with the current state of its seats.
 pub fn game_started(core: &Core) -> v1::GameStarted {
     let header = core.header();
     v1::GameStarted {
@@ -112,8 +112,8 @@ pub(super) fn standings(core: &Core) -> Vec<v1::Standing> {
         .map_or_else(Vec::new, |standings| final_table(&standings))
 }
 
-/// The seed, public once a game has ended. For a series of games with the same deals only the record has it, which stays closed while one
-/// of them is played.
+/// The seed, public once a game has ended. In a series of games with the same deals it is only in
+/// the record, which stays closed until all of them have ended.
 fn reveal(core: &Core, viewer: Viewer) -> Option<v1::SeedReveal> {
     let game = core.game()?;
     if core.header().series().is_some() && viewer != Viewer::Everything {
@@ -135,7 +135,8 @@ fn reveal(core: &Core, viewer: Viewer) -> Option<v1::SeedReveal> {
     })
 }
 
-/// The rewards of an event that a viewer may see: a seat its own, the record all, spectators none.
+/// The rewards of an event that a viewer may see: a seat sees its own, a record all, a spectator
+/// none.
 fn rewards(event: &RoomEvent, viewer: Viewer) -> Vec<v1::SeatReward> {
     let RoomEvent::Game(game) = event else {
         return Vec::new();

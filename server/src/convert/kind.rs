@@ -1,4 +1,4 @@
-//! Kinds of participants, and values that an enum of the protocol does not have.
+//! Kinds of participants, and unknown values of enums.
 
 use chefshat_proto::v1;
 use chefshat_record::convert::FieldProblem;
@@ -7,7 +7,7 @@ use chefshat_room::journal::ParticipantKind;
 /// The kind of a participant; `None` when unspecified.
 ///
 /// # Errors
-/// A number that names no kind.
+/// The number is not a kind.
 pub fn kind_from_proto(
     field: &'static str,
     kind: i32,
@@ -24,7 +24,7 @@ pub fn kind_from_proto(
     }
 }
 
-/// The message's name for a kind.
+/// Converts a kind to its number.
 pub fn kind_to_proto(kind: Option<ParticipantKind>) -> i32 {
     match kind {
         None => v1::ParticipantKind::Unspecified,
@@ -35,7 +35,7 @@ pub fn kind_to_proto(kind: Option<ParticipantKind>) -> i32 {
     .into()
 }
 
-/// A number that names no value of an enum.
+/// The error for a number that is not a value of an enum.
 pub(super) fn unknown(field: &'static str, value: i32) -> FieldProblem {
     FieldProblem::new(field, format!("{value} is not a value of this enum"))
 }

@@ -1,5 +1,5 @@
-//! Translation between rooms and the protocol: policies, seats, decisions, the log. `chefshat-record` translates rule sets and the engine's
-//! events, which records share.
+//! Translation between rooms and the protocol: policies, seats, decisions, the log.
+//! `chefshat-record` translates rule sets and the engine's events, which records share.
 
 mod decision;
 mod event;
@@ -36,7 +36,7 @@ pub use vector::{
     Reset, batch_to_proto, reset_from_proto, setup_from_proto, setup_seeds, started_to_proto,
 };
 
-/// A count as messages have it. All counts are bounded far below the limit.
+/// Converts a count to the protocol's integer. All counts are bounded far below its limit.
 pub fn number(value: usize) -> u32 {
     u32::try_from(value).unwrap_or(u32::MAX)
 }

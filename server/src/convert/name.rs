@@ -1,13 +1,13 @@
-//! Names to show, of rooms, tournaments and those who play: which are taken.
+//! Checks the names of rooms, tournaments and participants.
 
 use chefshat_record::convert::FieldProblem;
 
 use crate::config::MAX_NAME_CHARS;
 
-/// A name to show, without the spaces around it.
+/// Checks a name and trims it.
 ///
 /// # Errors
-/// It has fewer than `least` or too many characters, or looks like another.
+/// It has fewer than `least` or too many characters, or contains invisible characters.
 pub fn name_to_show(field: &'static str, name: &str, least: usize) -> Result<String, FieldProblem> {
     let name = name.trim();
     let length = name.chars().count();
@@ -23,14 +23,14 @@ pub fn name_to_show(field: &'static str, name: &str, least: usize) -> Result<Str
     {
         return Err(FieldProblem::new(
             field,
-            "characters that cannot be seen, or turn the direction of writing, would make it look like another name",
+            "invisible characters and direction marks are not allowed: they make names look alike",
         ));
     }
     Ok(name.to_owned())
 }
 
-/// Whether a character shows nothing of itself: joiners, marks of direction, fillers, tags (Unicode's category Cf, the
-/// Hangul fillers, the joiner of graphemes and the empty pattern of Braille).
+/// Whether a character is invisible: joiners, direction marks, fillers, tags (Unicode's category
+/// Cf, the Hangul fillers, the grapheme joiner and the blank Braille pattern).
 fn is_unseen(letter: char) -> bool {
     matches!(letter,
         '\u{ad}' | '\u{34f}' | '\u{61c}' | '\u{115f}' | '\u{1160}' | '\u{180e}' | '\u{200b}'..='\u{200f}'

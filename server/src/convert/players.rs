@@ -1,4 +1,4 @@
-//! From a record to an agent that plays as one of its players.
+//! Built-in agents that replay a player of a record.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use chefshat_record::players::PlayerError;
 /// The player of a seat of a recorded game, for `BuiltInAgent::replay`.
 ///
 /// # Errors
-/// The record does not fit, has no such seat, or says nothing of its decisions.
+/// The record is inconsistent, lacks the seat, or has none of its decisions.
 pub fn recorded_player(
     lines: &[v1::RecordLine],
     seat: u32,

@@ -1,4 +1,4 @@
-//! A room's policy as a message, and back with its ranges checked.
+//! A room's policy as a message, and back, with its ranges checked.
 
 use std::ops::RangeInclusive;
 use std::time::Duration;
@@ -13,13 +13,13 @@ use chefshat_room::journal::ParticipantKind;
 use chefshat_room::policy::{AbortPolicy, Durability, KindClock, Policy};
 use chefshat_room::{Core, State};
 
-/// A day, the longest time a policy may name, milliseconds.
+/// A day, the longest time in a policy, milliseconds.
 const DAY_MS: u32 = 86_400_000;
 
-/// The policy a message asks for. Fields that are not set have their defaults.
+/// The policy of a message. Unset fields take their defaults.
 ///
 /// # Errors
-/// The first field out of its range.
+/// The first field that is out of its range.
 pub fn policy_from_proto(message: &v1::RoomPolicy) -> Result<Policy, FieldProblem> {
     let standard = Policy::default();
     let spectator_delay = in_range(
@@ -77,7 +77,7 @@ pub fn policy_from_proto(message: &v1::RoomPolicy) -> Result<Policy, FieldProble
     Ok(policy)
 }
 
-/// The policy of a room. A pace that depends on who plays is set once the game has begun.
+/// The policy of a room. A pace that depends on the participants is set once the game has started.
 pub(super) fn policy_of(core: &Core) -> v1::RoomPolicy {
     let mut policy = policy_to_proto(&core.header().policy);
     if core.state() != State::Waiting {
@@ -86,7 +86,7 @@ pub(super) fn policy_of(core: &Core) -> v1::RoomPolicy {
     policy
 }
 
-/// A policy with every field set, except a pace that depends on who plays.
+/// A policy with every field set, except a pace that depends on the participants.
 pub fn policy_to_proto(policy: &Policy) -> v1::RoomPolicy {
     v1::RoomPolicy {
         decision_time_ms: Some(millis(policy.decision_time)),
@@ -123,7 +123,7 @@ pub fn policy_to_proto(policy: &Policy) -> v1::RoomPolicy {
     }
 }
 
-/// The policy of a game that is played without a room. Only its limits and rewards have a meaning.
+/// The policy of a game without a room. Only its limits and rewards have a meaning.
 pub fn simulation_policy(
     max_invalid_attempts: Option<u32>,
     reward_scheme: Option<RewardScheme>,
@@ -137,14 +137,15 @@ pub fn simulation_policy(
     })
 }
 
-/// Clocks for kinds of participants, each kind at most once. Times that were chosen for the room are everybody's, also people's.
+/// Clocks for kinds of participants, each kind at most once. A time set for the room applies to
+/// everybody, people included.
 fn clocks(policy: &v1::RoomPolicy) -> Result<Vec<KindClock>, FieldProblem> {
     let mut clocks: Vec<KindClock> = Vec::new();
     for message in &policy.clocks {
         let kind = kind_from_proto("clocks", message.kind)?
-            .ok_or_else(|| FieldProblem::new("clocks", "say for which kind a clock is"))?;
+            .ok_or_else(|| FieldProblem::new("clocks", "set the kind of each clock"))?;
         if clocks.iter().any(|clock| clock.kind == kind) {
-            return Err(FieldProblem::new("clocks", "there are two for one kind"));
+            return Err(FieldProblem::new("clocks", "a kind has two clocks"));
         }
         clocks.push(KindClock {
             kind,
@@ -160,7 +161,7 @@ fn clocks(policy: &v1::RoomPolicy) -> Result<Vec<KindClock>, FieldProblem> {
     Ok(clocks)
 }
 
-/// The built-in agent of a name; `None` for the empty name.
+/// The built-in agent with this name; `None` for the empty name.
 pub(super) fn agent(field: &'static str, name: &str) -> Result<Option<AgentKind>, FieldProblem> {
     if name.is_empty() {
         return Ok(None);
@@ -206,7 +207,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn people_have_more_time_unless_somebody_says_otherwise() {
+    fn people_have_more_time_by_default() {
         let policy = Policy::default();
         let times = |kind| {
             (
@@ -230,7 +231,7 @@ mod tests {
             ..v1::RoomPolicy::default()
         };
         let read =
-            |message: v1::RoomPolicy| policy_from_proto(&message).expect("the policy makes sense");
+            |message: v1::RoomPolicy| policy_from_proto(&message).expect("the policy is valid");
         let chosen = read(chosen);
         for policy in [&policy, &chosen] {
             assert_eq!(read(policy_to_proto(policy)), *policy);

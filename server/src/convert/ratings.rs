@@ -4,7 +4,7 @@ use chefshat_proto::v1;
 use chefshat_record::outcome::Identity;
 use chefshat_tournament::ratings::{Rated, Ratings};
 
-/// A rating and how many games it came from.
+/// A rating and its number of games.
 pub fn rating_to_proto(rated: &Rated) -> v1::Rating {
     v1::Rating {
         mean: rated.rating.mean,
@@ -13,7 +13,8 @@ pub fn rating_to_proto(rated: &Rated) -> v1::Rating {
     }
 }
 
-/// The leaderboard of participants of a kind (UNSPECIFIED: all) with at least `min_games` games, at most `limit` rows.
+/// The leaderboard of one kind of participant (UNSPECIFIED: all) with at least `min_games` games,
+/// at most `limit` rows.
 pub fn leaderboard(
     ratings: &Ratings<Identity>,
     kind: v1::ParticipantKind,

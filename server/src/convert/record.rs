@@ -1,4 +1,4 @@
-//! The record of a finished game: its journal folded again, with every decision and event in the order in which they happened.
+//! Builds the record of a finished game by folding its journal: every decision and event, in order.
 
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -19,7 +19,7 @@ use chefshat_record::convert::decision_kind;
 use chefshat_room::Core;
 use chefshat_room::journal::{Change, Decided, Entry, GameHeader};
 
-/// Every line of the record of a game, from its header and its journal.
+/// All lines of the record of a game, from its header and its journal.
 pub fn record_lines(header: &Arc<GameHeader>, journal: &[Entry]) -> Vec<v1::RecordLine> {
     let mut core = Core::new(Arc::clone(header));
     let mut body = Vec::with_capacity(journal.len() * 2);
@@ -87,7 +87,7 @@ fn record_header(core: &Core) -> v1::RecordHeader {
     }
 }
 
-/// A record in short. The game ended with the last event.
+/// The summary of a record. The game ended with the last event.
 pub fn summary(core: &Core) -> v1::RecordSummary {
     let header = core.header();
     let last = core.log().len().checked_sub(1);
@@ -113,7 +113,7 @@ pub fn summary(core: &Core) -> v1::RecordSummary {
     }
 }
 
-/// Every line of the record of a stored game.
+/// All lines of the record of a stored game.
 pub fn lines_of(kept: &StoredGame) -> Cow<'_, [v1::RecordLine]> {
     match kept {
         StoredGame::Hosted(header, journal) => Cow::Owned(record_lines(header, journal)),
@@ -121,7 +121,7 @@ pub fn lines_of(kept: &StoredGame) -> Cow<'_, [v1::RecordLine]> {
     }
 }
 
-/// A decision, as the game stood before it.
+/// A decision, with the state of the game before it.
 fn decision(core: &Core, entry: &Entry, decided: &Decided, attempts: &[u32]) -> v1::DecisionRecord {
     let rules = &core.header().rules;
     let open = core.open();

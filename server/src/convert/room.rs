@@ -15,10 +15,10 @@ use chefshat_room::ids::Id;
 use chefshat_room::journal::{AbortReason, Fill, GameHeader, ParticipantKind, RecordedSeat};
 use chefshat_room::{Core, State};
 
-/// What fills the seats of a new room; none given means that all are open.
+/// The participants of a new room's seats. An empty list leaves all seats open.
 ///
 /// # Errors
-/// A number of seats other than the rule set's, or a seat that makes no sense.
+/// The number of seats is not the rule set's, or a seat is invalid.
 pub fn fills_from_proto(
     seats: &[v1::SeatConfig],
     rules: &RuleSet,
@@ -51,10 +51,10 @@ pub fn fills_from_proto(
         .collect()
 }
 
-/// The names of the built-in agents that go by others than their own, by seat.
+/// The display names of built-in agents, by seat.
 ///
 /// # Errors
-/// An open seat with a name, or a name that cannot be shown.
+/// An open seat with a name, or a name that is not allowed.
 pub fn called_from_proto(
     seats: &[v1::SeatConfig],
 ) -> Result<BTreeMap<usize, String>, FieldProblem> {
@@ -65,7 +65,7 @@ pub fn called_from_proto(
     named
         .map(|(seat, config)| {
             if matches!(config.filled_by, None | Some(FilledBy::ReservedFor(_))) {
-                let problem = "a name is for a built-in agent; whoever joins brings their own";
+                let problem = "only a built-in agent takes a name here; participants choose theirs when they join";
                 return Err(FieldProblem::new("seats", problem));
             }
             Ok((seat, name_to_show("seats", &config.name, 1)?))
@@ -73,7 +73,7 @@ pub fn called_from_proto(
         .collect()
 }
 
-/// How the seats of a room were asked to be filled.
+/// How the seats of a room were requested to be filled.
 pub fn seats_to_proto(header: &GameHeader) -> Vec<v1::SeatConfig> {
     let seats = header.fills.iter().enumerate();
     seats
@@ -84,7 +84,7 @@ pub fn seats_to_proto(header: &GameHeader) -> Vec<v1::SeatConfig> {
         .collect()
 }
 
-/// What fills a seat, as it was asked for.
+/// What fills a seat, as requested.
 fn fill_to_proto(fill: &Fill) -> v1::SeatConfig {
     v1::SeatConfig {
         name: String::new(),
@@ -99,12 +99,12 @@ fn fill_to_proto(fill: &Fill) -> v1::SeatConfig {
 fn recorded_seat(player: &v1::RecordedPlayer) -> Result<RecordedSeat, FieldProblem> {
     let problem = |message: String| FieldProblem::new("seats", message);
     let game = Id::parse(&player.game_id)
-        .ok_or_else(|| problem(format!("{:?} is no game id", player.game_id)))?;
+        .ok_or_else(|| problem(format!("{:?} is not a game id", player.game_id)))?;
     let seat = usize::try_from(player.seat)
         .ok()
         .filter(|index| *index < MAX_SEATS)
         .map(Seat::new)
-        .ok_or_else(|| problem(format!("no game has a seat {}", player.seat)))?;
+        .ok_or_else(|| problem(format!("seat {} does not exist", player.seat)))?;
     Ok(RecordedSeat { game, seat })
 }
 
@@ -138,17 +138,17 @@ pub fn describe(core: &Core) -> v1::Room {
     }
 }
 
-/// The tournament a game belongs to, or nothing.
+/// The id of the game's tournament, or an empty string.
 pub fn tournament_id(header: &GameHeader) -> String {
     (header.tournament).map_or_else(String::new, |game| game.tournament.to_string())
 }
 
-/// The series a game belongs to, or nothing.
+/// The id of the game's series, or an empty string.
 pub(super) fn series_id(header: &GameHeader) -> String {
     (header.series()).map_or_else(String::new, |series| series.to_string())
 }
 
-/// The protocol's name for why a game has no result.
+/// The protocol's value for the reason why a game has no result.
 pub(super) fn abort_reason(reason: AbortReason) -> v1::AbortReason {
     match reason {
         AbortReason::Closed => v1::AbortReason::Closed,
@@ -159,7 +159,7 @@ pub(super) fn abort_reason(reason: AbortReason) -> v1::AbortReason {
     }
 }
 
-/// Why the game has no result, if it has none.
+/// Why the game has no result; unspecified if it has one.
 pub(super) fn aborted_because(state: State) -> v1::AbortReason {
     match state {
         State::Aborted(reason) => abort_reason(reason),
@@ -195,7 +195,7 @@ pub fn participants(core: &Core) -> Vec<v1::Participant> {
                 name: match (participant, standing.fill) {
                     (Some(participant), _) => participant.name.clone(),
                     _ if let Some(name) = called => name.clone(),
-                    // Told apart by whom they play as, which is what whoever reads their games wants to know.
+                    // Named after the agent, which is what the reader of a record wants to know.
                     (None, Fill::Replay(player)) => {
                         let game = player.game.to_string();
                         format!("{} {}:{}", BuiltInAgent::REPLAY, &game[..8], player.seat)

@@ -1,4 +1,5 @@
-//! Standings of a tournament as messages, with ratings and the confidence in their order. `chefshat-tournament` computes them.
+//! Standings of a tournament as messages, with ratings and the confidence in their order.
+//! `chefshat-tournament` computes them.
 
 use chefshat_proto::v1;
 use chefshat_tournament::Tournament;
@@ -6,7 +7,7 @@ use chefshat_tournament::ratings::Ratings;
 
 use super::{number, rating_to_proto};
 
-/// The standings, best first, with the ratings of the participants by number.
+/// The standings, best first, with the ratings by participant number.
 pub fn standings_to_proto(
     tournament: &Tournament,
     ratings: &Ratings<usize>,
@@ -33,7 +34,7 @@ pub fn standings_to_proto(
         .collect()
 }
 
-/// How sure it is of each two neighbours that the upper one is the better one, from the top.
+/// For each two neighbours, from the top: the probability that the upper one is better.
 pub fn confidence_to_proto(tournament: &Tournament) -> Vec<v1::OrderConfidence> {
     let neighbours = tournament.order_confidence().into_iter();
     neighbours

@@ -1,4 +1,4 @@
-//! How a game begins, as messages and back: scripted hands, and what is taken over from another game's record.
+//! The start of a game as a message, and back: scripted hands, and branches of other games.
 
 use chefshat_engine::{ActionId, RuleSet, Seed};
 use chefshat_proto::v1;
@@ -29,7 +29,7 @@ pub(super) fn branch_point(branch: &Branch) -> v1::BranchPoint {
     }
 }
 
-/// How a game of so many faces begins; `None` if it is simply dealt.
+/// The start of a game with this number of faces; `None` if it is simply dealt.
 pub fn start_to_proto(start: &GameStart, faces: u8) -> Option<v1::GameStart> {
     let taken_over = start.branch.iter().flat_map(|branch| &branch.taken_over);
     (*start != GameStart::default()).then(|| v1::GameStart {
@@ -44,10 +44,10 @@ pub fn start_to_proto(start: &GameStart, faces: u8) -> Option<v1::GameStart> {
     })
 }
 
-/// How a game begins that takes over these actions in all.
+/// The start of a game that takes over these actions.
 ///
 /// # Errors
-/// The first field that makes no sense.
+/// The first invalid field.
 pub fn start_from_proto(
     start: &v1::GameStart,
     actions: &[ActionId],
@@ -73,7 +73,7 @@ fn branch(
         let count = usize::try_from(part.decisions).unwrap_or(usize::MAX);
         let (own, rest) = actions
             .split_at_checked(count)
-            .ok_or_else(|| problem("there are fewer decisions than it says"))?;
+            .ok_or_else(|| problem("it has fewer decisions than it states"))?;
         actions = rest;
         let seed = part.game_seed.as_slice().try_into();
         taken_over.push(TakenOver {
@@ -82,7 +82,7 @@ fn branch(
         });
     }
     if taken_over.is_empty() || !actions.is_empty() {
-        return Err(problem("there are more decisions than it says"));
+        return Err(problem("it has more decisions than it states"));
     }
     Ok(Branch {
         game: Id::parse(&point.game_id)

@@ -1,4 +1,4 @@
-//! What a tournament is to be, checked, and tournaments as everybody sees them.
+//! Settings of tournaments, checked, and tournaments as messages.
 
 use chefshat_agents::AgentKind;
 use chefshat_engine::RuleSet;
@@ -15,16 +15,16 @@ use chefshat_room::ids::Id;
 use chefshat_room::journal::ParticipantKind;
 use chefshat_room::policy::{AbortPolicy, Policy};
 
-/// What is taken where a request does not say.
+/// Defaults of fields that a request leaves unset.
 const STANDARD_PARTICIPANTS: u32 = 64;
 const STANDARD_NO_SHOW_MS: u32 = 60_000;
 const STANDARD_CALLS: u32 = 2;
 const STANDARD_PARALLEL: u32 = 64;
 
-/// What a tournament is to be, checked.
+/// The checked settings of a tournament.
 #[derive(Debug)]
 pub struct TournamentPlan {
-    /// As its core knows it.
+    /// The settings of its core.
     pub core: Settings,
     /// The rules of all games.
     pub rules: RuleSet,
@@ -32,16 +32,17 @@ pub struct TournamentPlan {
     pub policy: Policy,
     /// Kinds that may join; empty: all.
     pub kinds: Vec<ParticipantKind>,
-    /// Built-in agents that take part.
+    /// The built-in agents that take part.
     pub built_in: Vec<AgentKind>,
-    /// What all deals follow from, if its owner fixes that.
+    /// The seed of all deals, if the owner sets it.
     pub deal_seed: Option<[u8; 32]>,
 }
 
-/// What a tournament is asked to be, with the standard in place of what is left out. `draw_seed` is taken where none is asked for.
+/// Checks the settings of a new tournament and fills in defaults. `draw_seed` is used if the request
+/// has no seed.
 ///
 /// # Errors
-/// The first field that cannot be.
+/// The first invalid field.
 pub fn tournament_plan(
     message: &v1::TournamentSettings,
     draw_seed: [u8; 32],
@@ -61,7 +62,7 @@ pub fn tournament_plan(
     let max_participants = standard(message.max_participants, STANDARD_PARTICIPANTS);
     if built_in.len() > count(max_participants).min(MAX_PARTICIPANTS) {
         let problem = format!(
-            "{} of at most {max_participants} participants",
+            "{} built-in agents do not fit {max_participants} participants",
             built_in.len()
         );
         return Err(FieldProblem::new("built_in_agents", problem));
@@ -87,7 +88,7 @@ pub fn tournament_plan(
         kinds: (message.kinds.iter())
             .map(|kind| {
                 kind_from_proto("kinds", *kind)?
-                    .ok_or_else(|| FieldProblem::new("kinds", "a kind is not said"))
+                    .ok_or_else(|| FieldProblem::new("kinds", "a kind is unspecified"))
             })
             .collect::<Result<_, _>>()?,
         rules,
@@ -106,7 +107,7 @@ fn seed(name: &'static str, bytes: &[u8]) -> Result<Option<[u8; 32]>, FieldProbl
     })
 }
 
-/// The policy of all games. What a tournament decides itself may be left out, but not be asked for otherwise.
+/// The policy of all games. Fields that a tournament sets itself must be unset or agree with it.
 fn policy(
     message: &v1::TournamentSettings,
     deals: Deals,
@@ -116,7 +117,7 @@ fn policy(
     let mut asked = message.policy.clone().unwrap_or_default();
     if ![v1::AbortPolicy::Unspecified, v1::AbortPolicy::Never].contains(&asked.abort()) {
         return refuse(
-            "abort: games of a tournament go on with substitutes; leave it unset".into(),
+            "abort: games of a tournament continue with substitutes; leave it unset".into(),
         );
     }
     if asked.waiting_time_ms.is_some_and(|time| time != no_show_ms) {
@@ -125,14 +126,14 @@ fn policy(
     if deals != Deals::Independent {
         if asked.spectators == Some(true) {
             return refuse(
-                "spectators: who watches one game would know the cards of others with the same deal".into(),
+                "spectators: a spectator of one game would see the cards of others with the same deal".into(),
             );
         }
         asked.spectators = Some(false);
     }
     if deals == Deals::SameAtAllTables && asked.durability() == v1::Durability::Ephemeral {
         return refuse(
-            "durability: a game that is lost would be dealt once more to those who have seen its cards".into(),
+            "durability: a lost game would be dealt again to participants who have seen its cards".into(),
         );
     }
     asked.abort = v1::AbortPolicy::Never.into();
@@ -150,7 +151,7 @@ fn format_from_proto(format: i32) -> Result<Format, FieldProblem> {
         Ok(v1::TournamentFormat::Swiss) => Ok(Format::Swiss),
         Ok(v1::TournamentFormat::Unspecified) => Err(FieldProblem::new(
             "format",
-            "say knockout, round robin or swiss",
+            "set knockout, round robin or swiss",
         )),
         Err(_) => Err(unknown("format", format)),
     }
@@ -167,7 +168,7 @@ fn deals_from_proto(deals: i32) -> Result<Deals, FieldProblem> {
     }
 }
 
-/// What a tournament is, every field set.
+/// The settings of a tournament, every field set.
 pub fn settings_to_proto(name: &str, plan: &TournamentPlan) -> v1::TournamentSettings {
     let core = &plan.core;
     v1::TournamentSettings {
@@ -205,7 +206,7 @@ pub fn settings_to_proto(name: &str, plan: &TournamentPlan) -> v1::TournamentSet
     }
 }
 
-/// A kind of participant as the core of a tournament knows it.
+/// Converts a kind of participant to that of the tournament's core.
 pub fn entrant_kind(kind: ParticipantKind) -> EntrantKind {
     match kind {
         ParticipantKind::Agent => EntrantKind::Agent,
@@ -214,7 +215,7 @@ pub fn entrant_kind(kind: ParticipantKind) -> EntrantKind {
     }
 }
 
-/// The kind of a participant, as rooms know it.
+/// Converts a kind of participant from that of the tournament's core.
 pub fn participant_kind(kind: EntrantKind) -> ParticipantKind {
     match kind {
         EntrantKind::Agent => ParticipantKind::Agent,
@@ -223,7 +224,7 @@ pub fn participant_kind(kind: EntrantKind) -> ParticipantKind {
     }
 }
 
-/// Where a tournament stands, as a message.
+/// The state of a tournament as a message.
 pub fn tournament_state(state: State) -> v1::TournamentState {
     match state {
         State::Open => v1::TournamentState::Open,
@@ -233,10 +234,10 @@ pub fn tournament_state(state: State) -> v1::TournamentState {
     }
 }
 
-/// A state from the protocol; `None` if it is not set.
+/// A state from the protocol; `None` if it is unset.
 ///
 /// # Errors
-/// A number that stands for no state.
+/// The number is not a state.
 pub fn tournament_state_from_proto(
     field: &'static str,
     state: i32,
@@ -269,7 +270,7 @@ pub fn tournament_participants(tournament: &Tournament) -> Vec<v1::TournamentPar
         .collect()
 }
 
-/// A game of a tournament. `placed` is the room and the game it is or was played in.
+/// A game of a tournament. `placed` is its room and game id.
 pub fn tournament_game(
     index: usize,
     game: &Game,
@@ -325,7 +326,8 @@ pub fn tournament_game(
     }
 }
 
-/// Whether a game counts for ratings: it has a result, the server chose its deals, and all its participants played it themselves.
+/// Whether a game counts for ratings: it has a result, the server chose its deals, and no
+/// participant was replaced.
 pub fn is_rated(game: &Game, plan: &TournamentPlan) -> bool {
     game.is_rated() && plan.deal_seed.is_none()
 }

@@ -1,5 +1,5 @@
-//! The setup of a client's own games, and their batches, as messages. The columns of a batch are already in the protocol's layout; they are
-//! handed over, not copied.
+//! The setup of vector streams, and their batches, as messages. The columns of a batch already have
+//! the protocol's layout; they are moved, not copied.
 
 use std::num::{NonZeroU32, NonZeroU64};
 
@@ -20,10 +20,10 @@ use super::policy::agent;
 use crate::config::{MAX_HOSTED_SHIFTS, MAX_VECTOR_RECORDED_GAMES, MAX_VECTOR_SEEDS};
 use chefshat_record::convert::MAX_RECORDED_ATTEMPTS;
 
-/// The games a message asks for, its rules, start and seeds having been looked at.
+/// The games of a setup message, whose rules, start and seeds are already checked.
 ///
 /// # Errors
-/// The first field that makes no sense.
+/// The first invalid field.
 pub fn setup_from_proto(
     message: &v1::VectorSetup,
     rules: RuleSet,
@@ -60,10 +60,10 @@ pub fn setup_from_proto(
     Ok(setup)
 }
 
-/// Seeds given one by one.
+/// Reads a list of seeds.
 ///
 /// # Errors
-/// If there are none or too many, or one is not 32 bytes long.
+/// The list is empty or too long, or a seed is not 32 bytes long.
 fn seeds_from_proto(message: &v1::GameSeeds) -> Result<Seeds, FieldProblem> {
     if !(1..=MAX_VECTOR_SEEDS).contains(&message.seeds.len()) {
         let given = message.seeds.len();
@@ -79,36 +79,36 @@ fn seeds_from_proto(message: &v1::GameSeeds) -> Result<Seeds, FieldProblem> {
     Ok(Seeds::List(seeds.collect::<Result<_, _>>()?))
 }
 
-/// Which games are to begin anew.
+/// The games to reset.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Reset {
-    /// Some, with their next indices.
+    /// Some games, which continue with their next seeds.
     Some(Vec<u32>),
-    /// All: with seeds from the first, else with their next indices.
+    /// All games: with the first of these seeds, or with their next ones.
     All(Option<Seeds>),
 }
 
-/// The games that a message wants to begin anew.
+/// Reads a reset request.
 ///
 /// # Errors
-/// If the games are no whole numbers, or what goes with all games comes with some.
+/// The column of games has a partial entry, or a field for all games comes with a list of games.
 pub fn reset_from_proto(message: &v1::VectorReset) -> Result<Reset, FieldProblem> {
     let (games, rest) = message.games.as_chunks::<4>();
     if !rest.is_empty() {
-        let words = "the column is not whole: 4 bytes for each game";
+        let words = "the column is incomplete: 4 bytes for each game";
         return Err(FieldProblem::new("games", words));
     }
     let seeds = match &message.seeds {
         None => None,
         Some(_) if !message.all => {
-            let words = "seeds can be given where all games begin anew; set `all`";
+            let words = "seeds can only be given for a reset of all games; set `all`";
             return Err(FieldProblem::new("seeds", words));
         }
         Some(vector_reset::Seeds::BaseSeed(base)) => Some(Seeds::Base(*base)),
         Some(vector_reset::Seeds::GameSeeds(seeds)) => Some(seeds_from_proto(seeds)?),
     };
     if message.all && !games.is_empty() {
-        let words = "name games, or set `all`, not both";
+        let words = "list games or set `all`, not both";
         return Err(FieldProblem::new("games", words));
     }
     if message.all {
@@ -118,7 +118,7 @@ pub fn reset_from_proto(message: &v1::VectorReset) -> Result<Reset, FieldProblem
     Ok(Reset::Some(games.collect()))
 }
 
-/// What was made of a setup.
+/// The answer to a setup.
 pub fn started_to_proto(setup: &VectorSetup) -> v1::VectorStarted {
     let rules = setup.rules();
     v1::VectorStarted {
@@ -136,7 +136,7 @@ pub fn started_to_proto(setup: &VectorSetup) -> v1::VectorStarted {
     }
 }
 
-/// A batch, but for the games whose decisions were kept.
+/// Converts a batch, except for the records of its games.
 pub fn batch_to_proto(batch: Batch, statistics: bool) -> v1::VectorBatch {
     let (endings, beginnings, shifts) = (batch.endings, batch.beginnings, batch.shifts);
     v1::VectorBatch {
@@ -215,7 +215,7 @@ fn observations(columns: ObservationColumns) -> v1::ObservationColumns {
     }
 }
 
-/// Who plays each seat; `None`: the client.
+/// The agent of each seat; `None`: the client.
 fn agents(
     message: &v1::VectorSetup,
     rules: &RuleSet,
@@ -227,7 +227,7 @@ fn agents(
         let seat = seat_from_number(number, players).filter(|_| before < Some(number));
         let Some(seat) = seat else {
             let words = format!(
-                "{:?}: name seats of 0..={}, ascending, each once",
+                "{:?}: list seats of 0..={}, ascending, each once",
                 message.client_seats,
                 players - 1
             );
@@ -242,7 +242,7 @@ fn agents(
         .collect::<Result<_, _>>()?;
     if !(names.len() <= 1 || names.len() == others) {
         let words = format!(
-            "{} agents for {others} other seats: name one for each of them, or one for all",
+            "{} agents for {others} other seats: give one for each of them, or one for all",
             names.len()
         );
         return Err(FieldProblem::new("opponents", words));
@@ -266,7 +266,7 @@ fn decisions(message: &v1::VectorSetup) -> Result<Decisions, FieldProblem> {
         Ok(v1::DecisionScope::Turns) => Ok(Decisions::Turns { others }),
         Ok(v1::DecisionScope::Unspecified | v1::DecisionScope::All) if others.is_some() => {
             let words =
-                "the client takes all decisions; leave it empty, or let it take turns alone";
+                "the client takes all decisions; leave it empty, or set `decisions` to turns";
             Err(FieldProblem::new("other_decisions", words))
         }
         Ok(v1::DecisionScope::Unspecified | v1::DecisionScope::All) => Ok(Decisions::All),
@@ -279,7 +279,7 @@ fn invalid_actions(message: &v1::VectorSetup) -> Result<InvalidActions, FieldPro
     match v1::InvalidActionRule::try_from(message.invalid_actions) {
         Ok(v1::InvalidActionRule::AskAgain) => Ok(InvalidActions::AskAgain { limit }),
         Ok(_) if limit.is_some() => {
-            let words = "an invalid action is an error here; leave it 0, or ask again";
+            let words = "an invalid action is an error here; leave it 0, or set ASK_AGAIN";
             Err(FieldProblem::new("max_invalid_attempts", words))
         }
         Ok(_) => Ok(InvalidActions::Error),
@@ -287,21 +287,21 @@ fn invalid_actions(message: &v1::VectorSetup) -> Result<InvalidActions, FieldPro
     }
 }
 
-/// Checks that records can say what happens and stay of bounded size.
+/// Checks that the games can be recorded and that records stay of bounded size.
 fn check_records(setup: &VectorSetup, dealt: bool) -> Result<(), FieldProblem> {
     let refused = |words: String| Err(FieldProblem::new("records", words));
     if !dealt {
-        return refused("records are for games that are dealt; leave `start` unset".to_owned());
+        return refused("only dealt games can be recorded; leave `start` unset".to_owned());
     }
     if setup.games() > MAX_VECTOR_RECORDED_GAMES {
         return refused(format!(
-            "records are kept of at most {MAX_VECTOR_RECORDED_GAMES} games side by side"
+            "at most {MAX_VECTOR_RECORDED_GAMES} parallel games can be recorded"
         ));
     }
     let max_turns = RuleSetSpec::default().max_turns;
     if setup.rules().max_turns() > max_turns {
         return refused(format!(
-            "a recorded Shift has a max_turns of at most {max_turns}"
+            "a recorded Shift has at most {max_turns} max_turns"
         ));
     }
     let (Stop::Points(length) | Stop::Shifts(length)) = setup.rules().stop();
@@ -333,10 +333,10 @@ fn problem(error: SetupError) -> FieldProblem {
     FieldProblem::new(field, error.to_string())
 }
 
-/// What a setup says of where the seeds come from.
+/// The seeds of a setup; `drawn` supplies a base seed if it has none.
 ///
 /// # Errors
-/// If there are none or too many, or one is not 32 bytes long.
+/// The list is empty or too long, or a seed is not 32 bytes long.
 pub fn setup_seeds(
     message: &v1::VectorSetup,
     drawn: impl FnOnce() -> u64,
@@ -369,7 +369,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_in_columns_are_those_of_the_protocol() {
+    fn columns_use_the_numbers_of_the_protocol() {
         let rules = RuleSetSpec::default().validate().unwrap();
         let setup = VectorSetup::new(rules, 64, &[None; 4], Seeds::Base(3))
             .unwrap()
@@ -392,7 +392,7 @@ mod tests {
                 .for_each(|end| ends[usize::from(*end)] += 1);
             let special = batch.shifts.special_actions.iter();
             special.for_each(|special| specials[usize::from(*special)] += 1);
-            // Whoever may declare does; giving is told by its actions.
+            // Declare whenever possible; exchanges are recognised by their actions.
             let masks = batch
                 .masks
                 .chunks(27)
@@ -426,15 +426,15 @@ mod tests {
         );
         assert_eq!(ends[v1::EpisodeEnd::CutShort as usize], 0);
         assert!(ends[v1::EpisodeEnd::Finished as usize] > 0);
-        // One role in four has a Food Fight to declare.
+        // One role in four can declare a Food Fight.
         let fights = specials[v1::SpecialAction::FoodFight as usize];
         let dinners = specials[v1::SpecialAction::DinnerIsServed as usize];
         assert!(fights > 0 && dinners > fights, "{specials:?}");
     }
 
     #[test]
-    fn the_largest_batch_is_within_its_bound() {
-        // All columns as wide as can be, and two Shifts of one turn each ended in every game.
+    fn the_largest_batch_fits_its_limit() {
+        // All columns at their widest, and two Shifts of one turn each ended in every game.
         let spec = RuleSetSpec {
             players: 6,
             faces: 15,
